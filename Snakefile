@@ -13,7 +13,7 @@ sys.path.sort(key=lambda folder: os.path.realpath(folder) in HERE and folder not
 from snakemake.settings.types import DeploymentMethod
 from snakemake.utils import min_version
 
-from icha.planning.needs import missing_software
+from icha.planning.requirements import missing_software
 
 min_version("9.17")
 

@@ -67,7 +67,7 @@ def load(contact, waypoint):
 
 
 def history(waypoints):
-    return Events.joined(waypoints[-1].state.history)
+    return Events.concatenate(waypoints[-1].state.history)
 
 
 def closed_again(waypoints):

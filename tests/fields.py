@@ -8,7 +8,7 @@ from icha.half_space.grid_displacement import DisplacementField
 
 def displacement_field(*args, free=False):
     """Displacement (n, n) at all nodes; arguments as of `DisplacementField`."""
-    return np.concatenate(DisplacementField(*args, free=free).in_blocks(lambda _, w: w))
+    return np.concatenate(DisplacementField(*args, free=free).map_blocks(lambda _, w: w))
 
 
 def displacement(law, surface, state):

@@ -13,7 +13,7 @@ import xarray as xr
 
 from icha import ConvergenceError, Material, Path, SelfAffineSpectrum, Surface, simulate
 from icha.asperity.stickiness import stickiness
-from icha.datasets.format import RUN, flaws
+from icha.datasets.format import RUN, problems_with_file
 from icha.surfaces.moments import spectral_moments
 
 PERIOD, MODULUS, ENERGY, RANGE = 100e-6, 25e6, 0.05, 2.071e-9
@@ -70,7 +70,7 @@ def test_values_asked_for_have_the_unit_of_their_kind_where_they_have_one(path, 
     for name, expected in (("step_target", steps), ("snapshot_target", snapshots)):
         attrs = run[name].attrs
         assert (attrs["units"], attrs.get("comment")) == expected
-    assert not [flaw for flaw in flaws(RUN, run) if "_target" in flaw]
+    assert not [flaw for flaw in problems_with_file(RUN, run) if "_target" in flaw]
     in_metres = run["step_kind"].isin(["mean_separation", "path"])
     np.testing.assert_allclose(run["step_target"][in_metres], run["mean_separation"][in_metres], rtol=1e-9)
 
@@ -116,7 +116,7 @@ def test_a_pit_deeper_than_the_bins_ends_no_run(model):
     assert whole == pytest.approx(1, abs=1e-12)
     # One node is in the last bin.
     assert content[-1] == pytest.approx(1 / 64**2, rel=1e-9)
-    assert not list(flaws(RUN, run))
+    assert not list(problems_with_file(RUN, run))
 
 
 def test_spots_follow_the_jkr_law(run):
@@ -275,9 +275,9 @@ def test_a_surface_that_pulls_itself_together_is_reported_with_what_was_computed
 
 
 def test_nothing_reached_is_an_empty_dataset_not_a_wrong_one(monkeypatch):
-    import icha.equilibrium.equilibrium
+    import icha.equilibrium.solver
 
-    monkeypatch.setattr(icha.equilibrium.equilibrium, "_MAX_NEWTON_STEPS", 0)
+    monkeypatch.setattr(icha.equilibrium.solver, "_MAX_NEWTON_STEPS", 0)
     with pytest.raises(ConvergenceError, match="after 0 of 3 stops") as caught:
         run_of(rough(), BARE)
     assert caught.value.dataset.sizes["step"] == 0

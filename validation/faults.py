@@ -1,12 +1,12 @@
-"""A small campaign that is disturbed, as campaigns are: tables of docs/faults.md.
+"""Disturb a small campaign and check that it recovers: tables of docs/faults.md.
 
     python -m validation.faults [--parts PART ...] [--trials N] [--seed N] [--scratch FOLDER]
 
-Processes are killed, the power is cut, the disk is full, and files are damaged. Whatever happens, no result may be
-there that is not, byte for byte, that of an undisturbed campaign; and the next call goes on to the end by itself, or
-says what to do. The counts go to validation/results/faults.json. Needs Linux, and for disks the right to mount: power
-cuts need root, full disks do with user namespaces. What is tried no longer keeps its counts of version 0.1.0; short
-trials of more kinds are among the tests (tests/workflow/test_faults.py).
+Processes are killed, the power is cut, the disk is full, and files are damaged. Afterwards every result must be, byte
+for byte, that of an undisturbed campaign, and the next call must finish the campaign or print what to do. Counts are
+saved in validation/results/faults.json. Needs Linux and the right to mount disks: power cuts need root, full disks work
+with user namespaces. Counts of other disturbances are those of version 0.1.0; tests/workflow/test_faults.py has short
+trials of more kinds.
 """
 
 from __future__ import annotations
@@ -34,151 +34,161 @@ from typing import NamedTuple
 from validation.tables import Table, write_tables
 
 HERE = Path(__file__).resolve().parent
-KEPT = HERE / "results/faults.json"
+COUNTS = HERE / "results/faults.json"
 CAMPAIGN = "faults"
 CONFIGURATION = HERE / "faults.yaml"
 RESULTS = f"results/{CAMPAIGN}"
-# What the outside does not see of a campaign: measurements of time, and what is said on the way.
-MEASURED = ("logs", "benchmarks", "checksums", "run_times.tsv")
-# Seconds after which what is left of a killed call is taken for left behind.
-MOMENT = 5.0
-LONGEST = 600.0
-WENT_ON, REFUSED = "went on", "said what to do"
-WAYS = ("snakemake", "icha run")
+# Files that may differ from call to call: times, and the output of jobs.
+NOT_RESULTS = ("logs", "benchmarks", "checksums", "run_times.tsv")
+# Seconds in which the processes of a killed call must end.
+GRACE_PERIOD = 5.0
+# Seconds that a call may take.
+TIME_LIMIT = 600.0
+RESUMED, REFUSED = "resumed", "refused"
+CALLS = ("snakemake", "icha run")
 
 
 class Trial(NamedTuple):
-    """What was done to the campaign, how it ended, the words of the refusal if any, and what was wrong with it."""
+    """One disturbance of the campaign and its consequences.
+
+    Attributes
+    ----------
+    fault : what was done.
+    outcome : `RESUMED` or `REFUSED`.
+    violations : requirements that were not met.
+    output : the message of a refusal.
+    """
 
     fault: str
-    ended: str
+    outcome: str
     violations: list[str]
-    said: str = ""
+    output: str = ""
 
 
 class Place:
-    """A folder in which the campaign is run, by the program in `project`."""
+    """A folder in which the program in `project` runs the campaign."""
 
     def __init__(self, project: Path, folder: Path, targets=("all", "publish")):
-        """Make the folder."""
+        """Create the folder."""
         self.project, self.folder, self.targets = project, folder, targets
         self.results = folder / RESULTS
         folder.mkdir(parents=True, exist_ok=True)
-        # All processes of this place, and no others, have it in their environment.
-        self.mark = f"ICHA_TEST_PLACE={folder}"
+        # An environment variable that only the processes of this place have.
+        self.marker = f"ICHA_TEST_PLACE={folder}"
 
-    def command(self, way: str) -> list[str]:
-        """A call that makes everything; `icha run` calls Snakemake in its turn."""
-        if way == "icha run":
+    def command(self, call: str) -> list[str]:
+        """Return the command that makes all targets, with Snakemake itself or with `icha run`."""
+        if call == "icha run":
             program = [sys.executable, "-c", "from icha.cli import main; main()", "run", str(CONFIGURATION)]
-            program += ["--anyway"]  # on disks that are too small from the beginning, too
+            program += ["--anyway"]  # also on disks that are too small
             return [*program, *self.targets, "--plain", "--cores", "2", "--directory", str(self.folder)]
         program = [sys.executable, "-m", "snakemake", *self.targets, "--cores", "2", "--configfile", str(CONFIGURATION)]
         return [*program, "--snakefile", str(self.project / "Snakefile"), "--directory", str(self.folder)]
 
-    def start(self, way: str = "snakemake", *arguments: str, **variables: str) -> subprocess.Popen:
-        """Start a call in a session of its own; what it says goes to a file outside of the place."""
-        name, _, value = self.mark.partition("=")
-        found = os.pathsep.join([str(self.project), str(self.project / "workflow/plugins")])
-        said = tempfile.TemporaryFile("w+", encoding="utf-8")
+    def start(self, call: str = "snakemake", *arguments: str, **variables: str) -> subprocess.Popen:
+        """Start a call in a new session; its output goes to a file outside of the place."""
+        name, _, value = self.marker.partition("=")
+        modules = os.pathsep.join([str(self.project), str(self.project / "workflow/plugins")])
+        output = tempfile.TemporaryFile("w+", encoding="utf-8")
         process = subprocess.Popen(
-            [*self.command(way), *arguments],
+            [*self.command(call), *arguments],
             cwd=self.project,
-            env=os.environ | {"PYTHONPATH": found, "OMP_NUM_THREADS": "1", name: value} | variables,
+            env=os.environ | {"PYTHONPATH": modules, "OMP_NUM_THREADS": "1", name: value} | variables,
             stdin=subprocess.DEVNULL,
-            stdout=said,
+            stdout=output,
             stderr=subprocess.STDOUT,
             start_new_session=True,
         )
-        process.said = said
+        process.output_file = output
         return process
 
     def end(self, process: subprocess.Popen) -> tuple[int, str]:
-        """Wait for a call; its status, and all that it said."""
+        """Wait for a call; return its exit status and its output."""
         try:
-            process.wait(LONGEST)
+            process.wait(TIME_LIMIT)
         except subprocess.TimeoutExpired:
-            self.left_behind()
+            self.end_remaining()
             process.wait()
-        process.said.seek(0)
-        # Wherever it is, what it says is the same.
-        text = process.said.read().replace(f"{self.folder}/", "").replace(str(self.folder), "FOLDER")
-        process.said.close()
+        process.output_file.seek(0)
+        text = process.output_file.read().replace(f"{self.folder}/", "").replace(str(self.folder), "FOLDER")
+        process.output_file.close()
         return process.returncode, text
 
-    def run(self, way: str = "snakemake", *arguments: str, **variables: str) -> tuple[int, str]:
-        """A call to its end: its status, and all that it said."""
-        return self.end(self.start(way, *arguments, **variables))
+    def run(self, call: str = "snakemake", *arguments: str, **variables: str) -> tuple[int, str]:
+        """Run a call; return its exit status and its output."""
+        return self.end(self.start(call, *arguments, **variables))
 
     def processes(self) -> dict[int, tuple[int, list[str]]]:
-        """Its processes that have not ended: their parents and command lines."""
+        """Return the running processes of this place: parent and command line by process id."""
         found = {}
         for entry in Path("/proc").iterdir():
             with contextlib.suppress(OSError):
-                if entry.name.isdigit() and self.mark.encode() in (entry / "environ").read_bytes().split(b"\0"):
+                if entry.name.isdigit() and self.marker.encode() in (entry / "environ").read_bytes().split(b"\0"):
                     state, parent = (entry / "stat").read_text().rsplit(")", 1)[1].split()[:2]
                     line = (entry / "cmdline").read_bytes().decode(errors="replace").split("\0")
                     if state != "Z":
                         found[int(entry.name)] = int(parent), line
         return found
 
-    def left_behind(self) -> list[str]:
-        """What still runs a moment later, and is ended now."""
-        until = time.monotonic() + MOMENT
-        while (there := self.processes()) and time.monotonic() < until:
+    def end_remaining(self) -> list[str]:
+        """Wait for the processes of this place, kill those that remain, and return a line about each."""
+        until = time.monotonic() + GRACE_PERIOD
+        while (remaining := self.processes()) and time.monotonic() < until:
             time.sleep(0.05)
-        for pid in there:
+        for pid in remaining:
             kill_process(pid)
-        return [f"{' '.join(line)[:200]} is left running" for _, line in there.values()]
+        return [f"{' '.join(line)[:200]} is still running" for _, line in remaining.values()]
 
-    def server(self) -> list[int]:
-        """The process with everything imported."""
-        there = self.processes()
-        warm = {pid for pid, (_, line) in there.items() if any("multiprocessing.forkserver" in part for part in line)}
-        return [pid for pid in warm if there[pid][0] not in warm]
+    def fork_servers(self) -> list[int]:
+        """Return the processes from which jobs are forked."""
+        processes = self.processes()
+        forks = {
+            pid for pid, (_, line) in processes.items() if any("multiprocessing.forkserver" in word for word in line)
+        }
+        return [pid for pid in forks if processes[pid][0] not in forks]
 
     def jobs(self) -> list[int]:
-        """Processes in which jobs do their work: forks, and those that run by themselves."""
-        there, server = self.processes(), set(self.server())
-        alone = [pid for pid, (_, line) in there.items() if any("/.snakemake/scripts/" in part for part in line)]
-        return sorted([*alone, *(pid for pid, (parent, _) in there.items() if parent in server)])
+        """Return the processes of jobs: forks, and scripts that run by themselves."""
+        processes, servers = self.processes(), set(self.fork_servers())
+        scripts = [pid for pid, (_, line) in processes.items() if any("/.snakemake/scripts/" in word for word in line)]
+        return sorted([*scripts, *(pid for pid, (parent, _) in processes.items() if parent in servers)])
 
     def result_files(self) -> Iterator[str]:
-        """All results that anybody would take for whole: no measurements, no hidden files, nothing set aside."""
+        """Yield the paths of all results: no measurements, no hidden files, no damaged files."""
         for file in sorted(self.results.rglob("*")):
             path = file.relative_to(self.results)
-            hidden = any(part.startswith(".") for part in path.parts if part != ".zenodo.json")
-            aside = any(".damaged" in part for part in path.parts)
-            if file.is_file() and not hidden and not aside and path.parts[0] not in MEASURED:
+            hidden = any(name.startswith(".") for name in path.parts if name != ".zenodo.json")
+            damaged = any(".damaged" in name for name in path.parts)
+            if file.is_file() and not hidden and not damaged and path.parts[0] not in NOT_RESULTS:
                 yield str(path)
 
     def contents(self) -> dict[str, str]:
-        """Checksums of all results."""
+        """Return the checksums of all results."""
         return {path: hashlib.sha256((self.results / path).read_bytes()).hexdigest() for path in self.result_files()}
 
     def times(self) -> dict[str, int]:
-        """When each result was written, of the jobs that Snakemake knows to have ended well."""
+        """Return the modification times of the results whose jobs Snakemake has recorded as complete."""
         unfinished = []
         top = self.folder / ".snakemake/incomplete"
         for file in (each for each in top.rglob("*") if each.is_file()):
-            name = "".join(part.removeprefix("@") for part in file.relative_to(top).parts)
-            # All of a deposit is the result of one job.
+            name = "".join(name.removeprefix("@") for name in file.relative_to(top).parts)
+            # A whole deposit is the result of one job.
             unfinished.append(urlsafe_b64decode(name).decode().removesuffix("SHA256SUMS"))
         deposit = self.results / f"publish/{CAMPAIGN}-1.0"
-        if not (deposit / "SHA256SUMS").is_file():  # of a job that failed Snakemake removes this, its output
+        if not (deposit / "SHA256SUMS").is_file():  # Snakemake removes it if the job failed
             unfinished.append(f"{RESULTS}/publish/{deposit.name}/")
-        whole = (path for path in self.result_files() if not f"{RESULTS}/{path}".startswith(tuple(unfinished)))
-        return {path: (self.results / path).stat().st_mtime_ns for path in whole}
+        complete = (path for path in self.result_files() if not f"{RESULTS}/{path}".startswith(tuple(unfinished)))
+        return {path: (self.results / path).stat().st_mtime_ns for path in complete}
 
 
 def kill_process(pid: int) -> None:
-    """End a process without giving it a chance to react."""
+    """Kill a process with SIGKILL."""
     with contextlib.suppress(ProcessLookupError):
         os.kill(pid, signal.SIGKILL)
 
 
 class Reference:
-    """The campaign undisturbed: its bytes, and how long it takes."""
+    """The undisturbed campaign: its bytes and its duration."""
 
     def __init__(self, project: Path, scratch: Path, **options):
         """Run it."""
@@ -186,43 +196,43 @@ class Reference:
         self.numbers = itertools.count()
         self.place = Place(project, scratch / "reference", **options)
         started = time.monotonic()
-        status, said = self.place.run()
+        status, output = self.place.run()
         self.seconds = time.monotonic() - started
         if status:
-            raise SystemExit(f"The campaign does not run undisturbed:\n{said}")
+            raise SystemExit(f"The campaign does not run undisturbed:\n{output}")
         self.contents = self.place.contents()
 
     def empty(self, inside: Path | None = None) -> Place:
-        """A place where nothing was computed yet."""
+        """Return a new place without results."""
         return Place(self.project, inside or self.scratch / f"trial{next(self.numbers)}", **self.options)
 
     def copy(self) -> Place:
-        """A place where everything was computed."""
+        """Return a new place with all results."""
         place = self.empty()
         shutil.copytree(self.place.folder, place.folder, dirs_exist_ok=True, symlinks=True)
         return place
 
-    def half_written(self, place: Place) -> list[str]:
-        """Results that are there but are not those of the reference."""
-        there = place.contents()
-        return [f"{path} passes for whole" for path in there if there[path] != self.contents.get(path)]
+    def foreign_results(self, place: Place) -> list[str]:
+        """Return the results whose bytes differ from those of the reference."""
+        contents = place.contents()
+        return [f"{path} has other bytes" for path in contents if contents[path] != self.contents.get(path)]
 
-    def unequal(self, place: Place) -> list[str]:
-        """What differs from the reference at the end, and what was left lying about."""
-        there = place.contents()
-        wrong = [f"{path} is missing" for path in self.contents if path not in there]
-        rests = place.results.rglob("*.part")
-        return [*wrong, *self.half_written(place), *(f"{rest.relative_to(place.results)} is left" for rest in rests)]
+    def differences(self, place: Place) -> list[str]:
+        """Return all differences from the reference: missing and foreign results, and temporary files."""
+        contents = place.contents()
+        missing = [f"{path} is missing" for path in self.contents if path not in contents]
+        temporary = [f"{file.relative_to(place.results)} is temporary" for file in place.results.rglob("*.part")]
+        return [*missing, *self.foreign_results(place), *temporary]
 
-    def goes_on(self, place: Place, way: str = "snakemake") -> list[str]:
-        """Give the same command again; what is wrong with its end."""
-        status, said = place.run(way)
-        return [*([f"the next call failed: {said[-500:]}"] if status else []), *self.unequal(place)]
+    def resume(self, place: Place, call: str = "snakemake") -> list[str]:
+        """Give the same command again; return a failure of it and all differences."""
+        status, output = place.run(call)
+        return [*([f"the next call failed: {output[-500:]}"] if status else []), *self.differences(place)]
 
 
-def sentence(said: str, words: str) -> str:
-    """The first line that holds some words."""
-    return next((line.strip()[:200] for line in said.splitlines() if words in line), "")
+def first_line_with(output: str, words: str) -> str:
+    """Return the first line that contains some words."""
+    return next((line.strip()[:200] for line in output.splitlines() if words in line), "")
 
 
 # --- kills --------------------------------------------------------------------------------------------------------
@@ -231,16 +241,18 @@ VICTIMS = ("Snakemake", "the whole session", "a job", "the process that the jobs
 
 
 def kill(place: Place, reference: Reference, victim: str, moment: float, chance: random.Random) -> list[str] | None:
-    """Start the campaign and kill a process after `moment` seconds; what is wrong with what is left.
+    """Start the campaign and kill a process after `moment` seconds; return the violations.
 
-    None if the call ended before.
+    Returns None if the call ended before.
     """
     before = place.times()
     process = place.start("icha run" if victim == VICTIMS[4] else "snakemake")
     time.sleep(moment)
     found: list[int] = []
     while not found and process.poll() is None:
-        found = place.jobs() if victim == VICTIMS[2] else place.server() if victim == VICTIMS[3] else [process.pid]
+        found = (
+            place.jobs() if victim == VICTIMS[2] else place.fork_servers() if victim == VICTIMS[3] else [process.pid]
+        )
         time.sleep(0.0 if found else 0.02)
     if process.poll() is not None:
         place.end(process)
@@ -250,42 +262,42 @@ def kill(place: Place, reference: Reference, victim: str, moment: float, chance:
     else:
         kill_process(chance.choice(found))
     place.end(process)
-    return [*place.left_behind(), *reference.half_written(place), *computed_again(before, place)]
+    return [*place.end_remaining(), *reference.foreign_results(place), *recomputed(before, place)]
 
 
-def computed_again(before: dict[str, int], place: Place) -> list[str]:
-    """Results that were complete and are not as they were."""
+def recomputed(before: dict[str, int], place: Place) -> list[str]:
+    """Return the complete results that were written again."""
     after = place.times()
-    return [f"{path} was computed again" for path in before if after.get(path) != before[path]]
+    return [f"{path} was recomputed" for path in before if after.get(path) != before[path]]
 
 
-def kills(reference: Reference, place: Place, number: int, chance: random.Random) -> Trial:
-    """Kill a process at a random moment; what is left goes on."""
+def disturb_by_kill(reference: Reference, place: Place, number: int, chance: random.Random) -> Trial:
+    """Kill a process at a random moment, and resume."""
     victim = VICTIMS[number % len(VICTIMS)]
     wrong = kill(place, reference, victim, chance.uniform(0.1, 0.7) * reference.seconds, chance)
     before = place.times()
-    return Trial(victim, WENT_ON, [*(wrong or []), *reference.goes_on(place), *computed_again(before, place)])
+    return Trial(victim, RESUMED, [*(wrong or []), *reference.resume(place), *recomputed(before, place)])
 
 
 # --- disks --------------------------------------------------------------------------------------------------------
 
-# ext4 as it is hardest for programs: names may be on the disk before the data that they stand for.
-HARDEST = "loop,noauto_da_alloc,data=writeback"
-# EXT4_IOC_SHUTDOWN with EXT4_GOING_FLAGS_NOLOGFLUSH (Linux, fs/ext4/ext4.h): from now on nothing gets to the disk.
+# The least safe mode of ext4: a file may have its new name on the disk before its data.
+MOUNT_OPTIONS = "loop,noauto_da_alloc,data=writeback"
+# EXT4_IOC_SHUTDOWN with EXT4_GOING_FLAGS_NOLOGFLUSH (Linux, fs/ext4/ext4.h): nothing more reaches the disk.
 _SHUTDOWN, _WITHOUT_FLUSH = 0x8004587D, struct.pack("I", 2)
 
 
 @contextlib.contextmanager
-def power(folder: Path, image: Path):
-    """A disk of its own at `folder`; gives functions that cut its power, and mount it again."""
+def disk_with_power(folder: Path, image: Path):
+    """Mount a separate disk at `folder`; yield functions that cut its power and mount it again."""
 
     def mount():
-        subprocess.run(["mount", "-o", HARDEST, str(image), str(folder)], check=True)
+        subprocess.run(["mount", "-o", MOUNT_OPTIONS, str(image), str(folder)], check=True)
 
     def cut():
-        top = os.open(folder, os.O_RDONLY)
-        fcntl.ioctl(top, _SHUTDOWN, _WITHOUT_FLUSH)
-        os.close(top)
+        descriptor = os.open(folder, os.O_RDONLY)
+        fcntl.ioctl(descriptor, _SHUTDOWN, _WITHOUT_FLUSH)
+        os.close(descriptor)
 
     with image.open("wb") as file:
         file.truncate(2**28)
@@ -300,49 +312,49 @@ def power(folder: Path, image: Path):
 
 
 def unmount(folder: Path) -> None:
-    """Unmount a disk, once what was killed has let go of it."""
-    until = time.monotonic() + LONGEST
+    """Unmount a disk as soon as the killed processes have released it."""
+    until = time.monotonic() + TIME_LIMIT
     while subprocess.run(["umount", str(folder)], stderr=subprocess.DEVNULL).returncode:
         if time.monotonic() > until:
             raise SystemExit(f"{folder} cannot be unmounted")
         time.sleep(0.1)
 
 
-def power_cuts(reference: Reference, place: Place, number: int, chance: random.Random) -> Trial:
-    """Run on a disk whose power is cut at a random moment: what was not forced to it by then is lost."""
-    with power(place.folder, place.folder.with_suffix(".disk")) as (cut, mount):
-        process = place.start(WAYS[number % 2])
+def disturb_by_power_cut(reference: Reference, place: Place, number: int, chance: random.Random) -> Trial:
+    """Run on a disk whose power is cut at a random moment."""
+    with disk_with_power(place.folder, place.folder.with_suffix(".disk")) as (cut, mount):
+        process = place.start(CALLS[number % 2])
         time.sleep(chance.uniform(0.1, 0.95) * reference.seconds)
         cut()
         with contextlib.suppress(ProcessLookupError):
             os.killpg(process.pid, signal.SIGKILL)
         place.end(process)
-        wrong = place.left_behind()
+        wrong = place.end_remaining()
         unmount(place.folder)
         mount()
-        wrong += [*reference.half_written(place), *reference.goes_on(place, WAYS[number % 2])]
-    return Trial("the disk of the working folder", WENT_ON, wrong)
+        wrong += [*reference.foreign_results(place), *reference.resume(place, CALLS[number % 2])]
+    return Trial("the disk of the working folder", RESUMED, wrong)
 
 
-def full_disks(reference: Reference, place: Place, number: int, chance: random.Random) -> Trial:
+def disturb_by_full_disk(reference: Reference, place: Place, number: int, chance: random.Random) -> Trial:
     """Run with the results, or the whole folder, on a disk that is full from the start, or too small."""
-    what, below = (("results", place.results.parent), ("working folder", place.folder))[number % 2]
+    name, folder = (("results", place.results.parent), ("working folder", place.folder))[number % 2]
     size = 4096 + 4096 * sum(1 + file.stat().st_size // 4096 for file in reference.place.folder.rglob("*"))
     room = 0.0 if number < 2 else chance.uniform(0.05, 0.7)
-    below.mkdir(parents=True, exist_ok=True)
+    folder.mkdir(parents=True, exist_ok=True)
     options = f"size={max(int(room * size), 8192)},mode=755"
-    subprocess.run(["mount", "-t", "tmpfs", "-o", options, "none", str(below)], check=True)
+    subprocess.run(["mount", "-t", "tmpfs", "-o", options, "none", str(folder)], check=True)
     try:
-        status, said = place.run(WAYS[number // 2 % 2])
-        words = sentence(said, "No space left on device")
-        wrong = [*place.left_behind(), *reference.half_written(place)]
-        wrong += [] if not status or words else [f"not told that the disk is full: {said[-500:]}"]
-        subprocess.run(["mount", "-o", f"remount,size={4 * size + 2**24}", str(below)], check=True)
-        wrong += reference.goes_on(place)
+        status, output = place.run(CALLS[number // 2 % 2])
+        words = first_line_with(output, "No space left on device")
+        wrong = [*place.end_remaining(), *reference.foreign_results(place)]
+        wrong += [] if not status or words else [f"no message about the full disk: {output[-500:]}"]
+        subprocess.run(["mount", "-o", f"remount,size={4 * size + 2**24}", str(folder)], check=True)
+        wrong += reference.resume(place)
     finally:
-        subprocess.run(["umount", "--lazy", str(below)], check=True)
-    fault = f"{what}: full {'on the way' if room else 'from the start'}"
-    return Trial(fault, REFUSED if status else WENT_ON, wrong, words)
+        subprocess.run(["umount", "--lazy", str(folder)], check=True)
+    fault = f"{name}: full {'during the run' if room else 'from the start'}"
+    return Trial(fault, REFUSED if status else RESUMED, wrong, words)
 
 
 # --- files --------------------------------------------------------------------------------------------------------
@@ -371,7 +383,7 @@ def flip(file: Path, place: str, bit: int = 0) -> None:
     file.write_bytes(content)
 
 
-def damages(reference: Reference, place: Place, number: int, chance: random.Random) -> Trial:
+def disturb_by_damage(reference: Reference, place: Place, number: int, chance: random.Random) -> Trial:
     """Empty, cut or flip one file of a finished campaign, and run it again."""
     shutil.copytree(reference.place.folder, place.folder, dirs_exist_ok=True, symlinks=True)
     kind = list(KINDS)[number % len(KINDS)]
@@ -381,55 +393,53 @@ def damages(reference: Reference, place: Place, number: int, chance: random.Rand
         os.truncate(file, 0 if how == "empty" else file.stat().st_size // 2)
     else:
         flip(file, how, chance.randrange(8))
-    return Trial(kind, WENT_ON, [f"{how}: {wrong}" for wrong in reference.goes_on(place, WAYS[number % 2])])
+    return Trial(kind, RESUMED, [f"{how}: {wrong}" for wrong in reference.resume(place, CALLS[number % 2])])
 
 
 # --- counts -------------------------------------------------------------------------------------------------------
 
 PARTS = {
-    "kill": kills,
-    "power cut": power_cuts,
-    "full disk": full_disks,
-    "damage": damages,
+    "kill": disturb_by_kill,
+    "power cut": disturb_by_power_cut,
+    "full disk": disturb_by_full_disk,
+    "damage": disturb_by_damage,
 }
 
 
-def kept() -> dict:
-    """What was counted."""
-    return json.loads(KEPT.read_text(encoding="utf-8"))
+def read_counts() -> dict:
+    """Read the counts of all trials."""
+    return json.loads(COUNTS.read_text(encoding="utf-8"))
 
 
 def tables(found: dict) -> dict[str, Table]:
-    """The counts of all parts, and of each by what was done."""
+    """Return the tables of all parts: trials by outcome for each fault."""
 
     def counts(rows):
-        trials, on, refused = (sum(row[name] for row in rows) for name in ("trials", WENT_ON, REFUSED))
-        return [str(number) for number in (trials, on, refused, trials - on - refused)]
+        trials, resumed, refused = (sum(row[name] for row in rows) for name in ("trials", RESUMED, REFUSED))
+        return [str(number) for number in (trials, resumed, refused, trials - resumed - refused)]
 
-    head = ["trials", WENT_ON, REFUSED, "wrong"]
-    parts = {
-        part: [row for row in found["rows"] if row["part"] == part]
-        for part in dict.fromkeys(r["part"] for r in found["rows"])
+    head = ["trials", RESUMED, REFUSED, "wrong"]
+    parts: dict[str, list[dict]] = {}
+    for row in found["rows"]:
+        parts.setdefault(row["part"], []).append(row)
+    tables = {
+        "all": Table(["disturbance", *head], [[part, *counts(rows)] for part, rows in parts.items()], numbers=True)
     }
-    all_parts = [[part, *counts(rows)] for part, rows in parts.items()]
-    own = {
-        part.replace(" ", "_").replace("-", "_"): [[row["fault"], *counts([row])] for row in rows]
-        for part, rows in parts.items()
-    }
-    tables = {name: Table(["of what", *head], rows, numbers=True) for name, rows in own.items()}
-    tables["all"] = Table(["disturbance", *head], all_parts, numbers=True)
+    for part, rows in parts.items():
+        name = part.replace(" ", "_").replace("-", "_")
+        tables[name] = Table(["fault", *head], [[row["fault"], *counts([row])] for row in rows], numbers=True)
     return {f"faults_{name}": table for name, table in tables.items()}
 
 
-def counted(part: str, trials: list[Trial]) -> list[dict]:
-    """What became of the trials of a part, by what was done."""
+def count_trials(part: str, trials: list[Trial]) -> list[dict]:
+    """Count the outcomes of the trials of a part for each fault."""
     rows: dict[str, dict] = {}
     for trial in trials:
         new = {
             "part": part,
             "fault": trial.fault,
             "trials": 0,
-            WENT_ON: 0,
+            RESUMED: 0,
             REFUSED: 0,
             "messages": [],
             "violations": [],
@@ -438,14 +448,14 @@ def counted(part: str, trials: list[Trial]) -> list[dict]:
         row["trials"] += 1
         row["violations"] += trial.violations
         if not trial.violations:
-            row[trial.ended] += 1
-        if trial.said and trial.said not in row["messages"]:
-            row["messages"].append(trial.said)
+            row[trial.outcome] += 1
+        if trial.output and trial.output not in row["messages"]:
+            row["messages"].append(trial.output)
     return list(rows.values())
 
 
 def main() -> None:
-    """Make all trials, keep their counts, and write the tables."""
+    """Make all trials, save their counts, and write the tables."""
     parser = argparse.ArgumentParser("python -m validation.faults", description=__doc__.splitlines()[0])
     parser.add_argument("--parts", nargs="+", choices=PARTS, default=PARTS)
     parser.add_argument("--trials", type=int, default=50, help="of each part")
@@ -454,12 +464,12 @@ def main() -> None:
     parser.add_argument("--in-namespace", action="store_true", help=argparse.SUPPRESS)
     options = parser.parse_args()
     if not options.in_namespace:
-        # Disks that are mounted here are seen by nobody else, and end with the process.
+        # In a mount namespace no other process sees the disks, and they end with this process.
         unshare = ["unshare", "--mount", *([] if os.getuid() == 0 else ["--map-root-user"])]
         os.execvp(unshare[0], [*unshare, sys.executable, "-m", "validation.faults", *sys.argv[1:], "--in-namespace"])
     with tempfile.TemporaryDirectory(prefix="icha-faults-", dir=options.scratch) as name:
         scratch = Path(name)
-        # The committed state of the program, so that edits while it runs do not matter.
+        # The committed state of the program, so that edits during the trials have no effect.
         subprocess.run(["git", "clone", "--quiet", str(HERE.parent), str(scratch / "project")], check=True)
         reference = Reference(scratch / "project", scratch)
         for part in options.parts:
@@ -469,10 +479,10 @@ def main() -> None:
                 trials.append(PARTS[part](reference, place, number, chance))
                 shutil.rmtree(place.folder, ignore_errors=True)
                 print(part, *trials[-1], sep=": ", flush=True)
-            found = kept()
-            found["rows"] = [row for row in found["rows"] if row["part"] != part] + counted(part, trials)
-            KEPT.write_text(json.dumps(found, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
-    write_tables(tables(kept()))
+            found = read_counts()
+            found["rows"] = [row for row in found["rows"] if row["part"] != part] + count_trials(part, trials)
+            COUNTS.write_text(json.dumps(found, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    write_tables(tables(read_counts()))
 
 
 if __name__ == "__main__":

@@ -26,9 +26,10 @@ from icha.asperity.material import Material
 from icha.contact.model import Control
 from icha.equilibrium.interacting_asperities import InteractingAsperities
 from icha.half_space.interaction import displacement_at
-from icha.references.finite_range import NodalState, contact_state, perimeter_correction, states_at_mean_separations
+from icha.references.finite_range import NodalState, contact_state, perimeter_correction
 from icha.surfaces.summits import find_summits
 from icha.surfaces.surface import Surface
+from validation.mean_gaps import states_at_mean_separations
 from validation.surfaces import paraboloid
 from validation.tables import Table, write_tables
 

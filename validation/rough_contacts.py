@@ -13,9 +13,10 @@ from icha.boundary_elements.contact import BoundaryElements, contact_of
 from icha.contact.model import PRESSURE, Control
 from icha.path.follow import follow
 from icha.path.targets import Path
-from icha.references.finite_range import contact_state, perimeter_correction, states_at_mean_separations
+from icha.references.finite_range import contact_state, perimeter_correction
 from icha.surfaces.spectrum import SelfAffineSpectrum
 from icha.surfaces.surface import Surface
+from validation.mean_gaps import states_at_mean_separations
 
 # The paper's: dgamma/E* = 2 nm.
 SOFT = Material(25e6, 0.05, 2.071e-9)
@@ -141,7 +142,7 @@ def loop(surface: Surface, largest_pressure: float, step: float, material: Mater
         "steps": steps,
         "largest_work": most / unit,
         "work": balance.work / unit,
-        "not_closed": (balance.work - balance.lost - contact.stored_energy(waypoint.state)) / unit,
+        "not_closed": (balance.work - balance.loss - contact.stored_energy(waypoint.state)) / unit,
         **{part: getattr(balance, part) / unit for part in parts},
     }
 

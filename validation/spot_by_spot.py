@@ -141,9 +141,9 @@ def split(
 def _summit_of_spots(contact, state):
     """The summit (s,) that every spot of one summit is at; summits under it are in its hand as well."""
     spots, asperities = state.spots, contact.asperities
-    held = np.flatnonzero(state.owner >= 0)
+    held = np.flatnonzero(state.spot_of_asperity >= 0)
     there = np.mod(asperities.position[held], asperities.period)
-    at_summit = np.all(spots.position[state.owner[held]] == there, axis=1)
+    at_summit = np.all(spots.position[state.spot_of_asperity[held]] == there, axis=1)
     summit = np.full(len(spots), -1)
-    summit[state.owner[held[at_summit]]] = held[at_summit]
+    summit[state.spot_of_asperity[held[at_summit]]] = held[at_summit]
     return summit

@@ -16,7 +16,7 @@ from snakemake.logging import logger
 from snakemake_records import METADATA, file_of, mark_incomplete, record_of
 
 from icha.deposit.program import note_versions
-from icha.planning.belonging import belongs_to_another, claim
+from icha.planning.ownership import belongs_to_another, claim
 from icha.support import checksums
 from icha.support.atomic_files import Superseded, is_left_over, take_over, while_owned, why_not_writable
 from icha.support.program import beginning_of, end_with_parent

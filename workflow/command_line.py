@@ -6,7 +6,7 @@ from snakemake.logging import logger
 
 from icha.configuration.errors import ConfigurationError
 from icha.configuration.load import Configuration, load_configuration
-from icha.support.in_words import printable, printable_lines
+from icha.support.formatting import printable, printable_lines
 
 DEFAULT = "config/config.yaml"
 

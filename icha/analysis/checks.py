@@ -13,8 +13,8 @@ import numpy as np
 import xarray as xr
 
 from icha.asperity.cohesive_zone import MAX_STRENGTH_NUMBER
-from icha.checks.findings import IDENTITY_LIMIT, Check, Finding, at_most, not_finite
-from icha.checks.run import checked
+from icha.checks.findings import IDENTITY_LIMIT, Check, Finding, compare_with_limit, count_not_finite
+from icha.checks.run import check_variables
 from icha.datasets.campaign import run_labels, variables_of_run
 from icha.datasets.labels import RunLabels
 from icha.datasets.variables.campaign import MISSING
@@ -61,7 +61,7 @@ def check_campaign(tree: xr.DataTree, expected: Iterable[RunLabels | tuple] | No
             checks.append(Check(COMPLETED, 1.0, 0.0, False, reason, str(labels)))
             continue
         checks.append(Check(COMPLETED, 0.0, 0.0, True, "the run reached the end of its path", str(labels)))
-        checks.extend(checked(variables, attrs, str(labels)))
+        checks.extend(check_variables(variables, attrs, str(labels)))
     return tuple(checks)
 
 
@@ -74,13 +74,13 @@ def check_solution(solution: xr.Dataset, subject: str = "") -> tuple[Check, ...]
     subject : name of the solution in the findings.
     """
     findings = (*_of_solver(solution), *_identities_of_solution(solution))
-    return tuple(at_most(f"boundary elements: {name}", *rest, subject) for name, *rest in findings)
+    return tuple(compare_with_limit(f"boundary elements: {name}", *rest, subject) for name, *rest in findings)
 
 
 def _of_solver(solution) -> Iterator[Finding]:
     """Findings on how well a solution was found."""
     values = (variable.values for variable in solution.variables.values())
-    yield "finite", not_finite(values), 0, "number of values that are not finite"
+    yield "finite", count_not_finite(values), 0, "number of values that are not finite"
     yield (
         "converged",
         float(solution["residual"]) / float(solution["tolerance"]),

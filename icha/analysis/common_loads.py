@@ -7,12 +7,12 @@ import numpy as np
 import xarray as xr
 from scipy.interpolate import PchipInterpolator
 
-from icha.datasets.attributes import DERIVED, collected
-from icha.datasets.build import variable
+from icha.datasets.attributes import DERIVED, combine_attributes
+from icha.datasets.build import make_variable
 from icha.datasets.campaign import loading_stops, reduced_gap
 from icha.datasets.labels import LABELS
 from icha.datasets.variables.campaign import COMPLETE, COMPUTED_RUNS, MISSING
-from icha.datasets.variables.terms import Variable, term
+from icha.datasets.variables.terms import TERMS, Variable
 from icha.support.statistics import ensemble
 
 # Loads at which curves are compared, per decade.
@@ -92,18 +92,18 @@ def compare_runs(study: xr.Dataset, *, attrs: Mapping[str, str] = {}) -> xr.Data
         ("seed_count", _SEED_COUNT, averaged),
         ("asked_seed_count", _ASKED_SEED_COUNT, asked),
     ):
-        variables[name] = variable(description, counted.sum(axis=LABELS.index("seed")))
+        variables[name] = make_variable(description, counted.sum(axis=LABELS.index("seed")))
     coords = {label: study[label] for label in LABELS}
     for axis, load in _loads(study).items():
         suffix = "" if axis == "reduced_pressure" else "_at_load"
         at, on_grid = _on_common_grid(study, load, complete)
-        coords[axis] = variable(term(axis)._replace(dims=(axis,)), at)
+        coords[axis] = make_variable(TERMS[axis]._replace(dims=(axis,)), at)
         for name, (description, values) in (_curves(study, on_grid) | _spreads(on_grid, averaged)).items():
             along = description._replace(
-                dims=(*description.dims, axis), long_name=f"{description.long_name}, at {term(axis).long_name}"
+                dims=(*description.dims, axis), long_name=f"{description.long_name}, at {TERMS[axis].long_name}"
             )
-            variables[name + suffix] = variable(along, values)
-    described = collected(
+            variables[name + suffix] = make_variable(along, values)
+    described = combine_attributes(
         f"Comparison of the runs of study {study.attrs.get('study', '')}".rstrip(),
         "Contact area and mean separation at loads common to all runs, by monotone interpolation.",
         DERIVED,
@@ -250,7 +250,7 @@ def _common_grid(loads):
 def compare_campaign(tree: xr.DataTree, *, attrs: Mapping[str, str] = {}) -> xr.DataTree:
     """`compare_runs` for every study of a campaign, as a tree of the same shape."""
     groups = {f"/{name}": compare_runs(node.to_dataset()) for name, node in tree.children.items()}
-    root = collected(
+    root = combine_attributes(
         "Comparison of the runs of every study",
         "Contact area and mean separation of all runs of a study at common loads, a group for each study.",
         DERIVED,

@@ -16,8 +16,8 @@ from scipy.stats import wasserstein_distance
 
 from icha.contact.model import GAP_BINS, PRESSURE_BINS
 from icha.contact.models import DEFAULT_MODEL
-from icha.datasets.attributes import DERIVED, collected, why_no_result
-from icha.datasets.build import bin_values, described, variable
+from icha.datasets.attributes import DERIVED, combine_attributes, why_no_result
+from icha.datasets.build import bin_values, describe_variables, make_variable
 from icha.datasets.campaign import find_snapshot, loading_stops, select_run, spots_of
 from icha.datasets.labels import LABELS, RunLabels, SolutionLabels, arrange_slopes, labels_at, place_of, slope_dims
 from icha.datasets.variables.campaign import COMPLETE, INCOMPLETE, NOT_IN_DESIGN, RAGGED, STATUS
@@ -97,9 +97,9 @@ def model_error(
     for entry, states in entries.items():
         truth = SHORT_RANGE if entry in short_range else FINITE_RANGE
         title = f"{_TITLE}, {'study' if entry in short_range else 'entry'} {entry}"
-        described = collected(title, _SUMMARY, DERIVED, origins.get(entry, [])) | {"truth": truth}
+        described = combine_attributes(title, _SUMMARY, DERIVED, origins.get(entry, [])) | {"truth": truth}
         groups[f"/{entry}"] = _entry_dataset(campaign, entry, states).assign_attrs(described)
-    root = collected(_TITLE, _SUMMARY, DERIVED, itertools.chain(*origins.values()))
+    root = combine_attributes(_TITLE, _SUMMARY, DERIVED, itertools.chain(*origins.values()))
     return xr.DataTree.from_dict({"/": xr.Dataset(attrs=root | dict(attrs))} | groups)
 
 
@@ -362,7 +362,7 @@ def _entry_dataset(campaign, entry, states):
         )
         for label in _LABELS
     }
-    coords["reduced_pressure"] = variable(ASKED, axes["reduced_pressure"])
+    coords["reduced_pressure"] = make_variable(ASKED, axes["reduced_pressure"])
     shape = tuple(slopes.shape[-1] if label == "rms_slope" else len(values) for label, values in axes.items())
     labelled = xr.Dataset(coords=coords)
     grid = [SolutionLabels(entry, studies[0], *labels_at(labelled, place, AXES)) for place in np.ndindex(shape)]
@@ -372,14 +372,14 @@ def _entry_dataset(campaign, entry, states):
 
     # Of a contact that was compared at some loads the best one counts.
     of_state = [NOT_IN_DESIGN if labels not in states else _status(states[labels]) for labels in grid]
-    variables = {"status": variable(STATUS._replace(dims=_LABELS), np.reshape(of_state, shape).min(axis=-1))}
+    variables = {"status": make_variable(STATUS._replace(dims=_LABELS), np.reshape(of_state, shape).min(axis=-1))}
     variables |= _along_axes([states.get(labels) for labels in grid], shape)
     applicable, applicability = True, None
     if "applicability" in study:  # which campaigns of earlier versions lack
         applicability = _of_asperities(study["applicability"], labelled)
         applicable = applicability.values[..., None] == ""
     variables |= _over_seeds(variables, applicable)
-    bins = described(BINS, bin_values("gap", GAP_BINS) | bin_values("pressure", PRESSURE_BINS))
+    bins = describe_variables(BINS, bin_values("gap", GAP_BINS) | bin_values("pressure", PRESSURE_BINS))
     coords |= {name: bins.pop(name) for name in BINS if BINS[name].coordinate}
     result = xr.Dataset(variables | bins, coords, {"entry": entry, "study": studies[0]})
     for name in MATERIAL:
@@ -440,7 +440,7 @@ def _over_seeds(variables, applicable):
         # Of no complete run there is no mean.
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", RuntimeWarning)
-            found[f"{name}_mean"] = variable(mean, np.nanmean(values, axis=seeds))
+            found[f"{name}_mean"] = make_variable(mean, np.nanmean(values, axis=seeds))
             if values.shape[seeds] > 1:
                 deviation = Variable(
                     others,
@@ -448,7 +448,7 @@ def _over_seeds(variables, applicable):
                     f"standard deviation over the seeds: {long_name}",
                     further={"missing": "where fewer than two runs are complete"},
                 )
-                found[f"{name}_deviation"] = variable(deviation, np.nanstd(values, axis=seeds, ddof=1))
+                found[f"{name}_deviation"] = make_variable(deviation, np.nanstd(values, axis=seeds, ddof=1))
     return found
 
 

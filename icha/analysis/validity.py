@@ -19,7 +19,7 @@ from icha.contact.models import DEFAULT_MODEL, MODELS
 from icha.datasets.attributes import reasons_not_applicable
 from icha.datasets.labels import LABELS
 from icha.datasets.variables.campaign import COMPUTED_RUNS
-from icha.support.in_words import counted
+from icha.support.formatting import format_count
 from icha.surfaces.moments import RESOLVED_CELLS, cells_per_short_wave, error_of_cells
 
 if TYPE_CHECKING:
@@ -270,7 +270,7 @@ def _not_applicable(campaign):
     """The statement on the runs to which their model is not applicable."""
     reasons = sum(map(reasons_not_applicable, campaign.children.values()), Counter())
     if reasons:
-        text = f"{counted(reasons.total(), 'run')} to which the model is not applicable: {named(reasons, '. ')}"
+        text = f"{format_count(reasons.total(), 'run')} to which the model is not applicable: {named(reasons, '. ')}"
         yield Statement("applicability", text, False)
 
 

@@ -1,28 +1,29 @@
 """Coalescence: overlapping spots become one equivalent spot (Violano & Afferrante, section II; Afferrante et al. 2012).
 
-The height follows from the equilibrium at hand (`icha.equilibrium.unions`).
+The height of the equivalent spot follows from the present equilibrium (`icha.equilibrium.unions`).
 """
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-from icha.asperity.law import SpotLaw
+from icha.asperity.jkr import JKR
 from icha.surfaces.square import periodic_difference
 
 
 def overlapping_pairs(position, a, first, second, r):
-    """Of near pairs, those with r_ij < a_i + a_j.
+    """Return the pairs of spots with r_ij < a_i + a_j.
 
     Parameters
     ----------
-    position : (n, 2) centres in m.
-    a : (n,) contact radii in m.
-    first, second, r : (p,) near pairs, in both directions (those from the larger spot count), and distances in m.
+    position : (n, 2) float, centres, m.
+    a : (n,) float, contact radii, m.
+    first, second : (p,) int, near pairs in both directions; those from the larger spot count.
+    r : (p,) float, their distances, m.
 
     Returns
     -------
-    (k, 2) array of indices, the deepest overlap a_i + a_j - r_ij first; equal depths by position, so that the order
-    of the input does not matter.
+    (k, 2) int, the deepest overlap a_i + a_j - r_ij first. Pairs of equal depth are in the order of their positions, so
+    that the order of the input does not matter.
     """
     depth = a[first] + a[second] - r
     larger = (a[second] < a[first]) | ((a[second] == a[first]) & (second > first))
@@ -37,7 +38,7 @@ def overlapping_pairs(position, a, first, second, r):
 
 
 def disjoint_pairs(pairs):
-    """From pairs in order of precedence, those that can merge at once: every spot at most in one pair."""
+    """Select pairs, in order of precedence, so that every spot is in one pair at most."""
     taken, chosen = set(), []
     for i, j in pairs.tolist():
         if i not in taken and j not in taken:
@@ -46,29 +47,24 @@ def disjoint_pairs(pairs):
     return np.array(chosen, dtype=int).reshape(-1, 2)
 
 
-def united_paraboloids(a_i, R_i, a_j, R_j):
-    """Contact radius, radius of curvature (m), and the centre's way from the first to the second, as part of it.
-
-    a_eq^2 = a_i^2 + a_j^2, R_eq^2 = R_i^2 + R_j^2, centre in the centroid of the caps' volumes pi a^4/(4 R).
-    """
-    volume_i, volume_j = a_i**4 / R_i, a_j**4 / R_j
-    return np.hypot(a_i, a_j), np.hypot(R_i, R_j), volume_j / (volume_i + volume_j)
-
-
-def equivalent_spots(law: SpotLaw, position_i, a_i, R_i, position_j, a_j, R_j, period):
-    """Centre (k, 2), contact radius and radius of curvature (k,) of the spots that replace pairs i, j, all in m."""
-    a, R, share = law.union(a_i, R_i, a_j, R_j)
+def equivalent_spots(law: JKR, position_i, a_i, R_i, position_j, a_j, R_j, period):
+    """Return centre (k, 2), contact radius and radius of curvature (k,) of the spots that replace pairs i, j, m."""
+    a, R, fraction = law.union(a_i, R_i, a_j, R_j)
     offset = periodic_difference(position_j, position_i, period)
-    centre = np.mod(position_i + share[:, None] * offset, period)
+    centre = np.mod(position_i + fraction[:, None] * offset, period)
     centre[centre >= period] = 0.0
     return centre, a, R
 
 
 def covering_spot(points, position, a, period, larger_than=None):
-    """For every point (k, 2) the spot (m,) whose contact covers it deepest, -1 where none does: (k,) of int.
+    """Return the spot that covers each point deepest, (k,) int; -1 where no spot covers it.
 
-    larger_than (k,): for points that are spots themselves, at the same indices: only larger ones count, and of
-    equal ones the first.
+    Parameters
+    ----------
+    points : (k, 2) float, m.
+    position, a : (m, 2) and (m,) float, centres and contact radii of the spots, m.
+    larger_than : (k,) float, contact radii of the points if they are the spots themselves, m. Then only larger spots
+        cover a point, and of two equal spots the first one.
     """
     covering = np.full(len(points), -1)
     if not len(points) or not len(position):
@@ -82,5 +78,5 @@ def covering_spot(points, position, a, period, larger_than=None):
         inside &= (a[j] > larger_than[i]) | ((a[j] == larger_than[i]) & (j < i))
     i, j, depth = i[inside], j[inside], depth[inside]
     order = np.lexsort((-j, depth))
-    covering[i[order]] = j[order]  # the deepest comes last and stays
+    covering[i[order]] = j[order]  # the deepest cover comes last and remains
     return covering

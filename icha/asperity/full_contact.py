@@ -1,12 +1,11 @@
-"""Energy of full contact, by which sticky surfaces are known before anything is computed.
+"""Energy of full contact, which shows before any computation whether a surface is sticky.
 
 B. N. J. Persson and E. Tosatti, J. Chem. Phys. 115 (2001) 5597-5610, doi:10.1063/1.1398300.
 """
 
 import math
 
-# Of U_full/dgamma. Below the first, full contact has a lower energy than no contact. Below the second, high pull-off is
-# expected.
+# Values of U_full/dgamma below which full contact has a lower energy than no contact, and high pull-off is expected.
 FULL_CONTACT_BELOW, HIGH_PULL_OFF_BELOW = 1.0, 2.0
 MEANING = (
     f"below {FULL_CONTACT_BELOW:g} full contact has the lower energy; below about {HIGH_PULL_OFF_BELOW:g} high "
@@ -15,7 +14,7 @@ MEANING = (
 
 
 def full_contact_energy_ratio(full_contact_energy: float, contact_modulus: float, surface_energy: float) -> float:
-    """Elastic energy of full contact over the work of adhesion, U_full/dgamma; infinite without adhesion.
+    """Return the elastic energy of full contact over the work of adhesion, U_full/dgamma; infinite without adhesion.
 
     Parameters
     ----------

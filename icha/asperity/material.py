@@ -1,4 +1,4 @@
-"""The elastic half-space and the interface: three numbers."""
+"""Material: composite modulus, energy of adhesion and range of attraction."""
 
 from dataclasses import dataclass
 
@@ -7,7 +7,7 @@ import numpy as np
 from icha.support.rules import ADHESION_LENGTH, CONTACT_MODULUS, LENGTH, SURFACE_ENERGY
 
 # From this Tabor parameter on Wu's distance of the jump into contact is within 0.5 % of the exact one, which
-# icha.references.jump_in computes.
+# validation.jump_in computes.
 WU_HOLDS_FROM = 1.0
 
 
@@ -34,11 +34,11 @@ class Material:
 
     def __post_init__(self):
         """Check the values."""
-        object.__setattr__(self, "contact_modulus", CONTACT_MODULUS.checked("contact_modulus", self.contact_modulus))
-        object.__setattr__(self, "surface_energy", SURFACE_ENERGY.checked("surface_energy", self.surface_energy))
-        object.__setattr__(self, "interaction_range", LENGTH.checked("interaction_range", self.interaction_range))
+        object.__setattr__(self, "contact_modulus", CONTACT_MODULUS.validate("contact_modulus", self.contact_modulus))
+        object.__setattr__(self, "surface_energy", SURFACE_ENERGY.validate("surface_energy", self.surface_energy))
+        object.__setattr__(self, "interaction_range", LENGTH.validate("interaction_range", self.interaction_range))
         if self.surface_energy:
-            ADHESION_LENGTH.checked("surface_energy over contact_modulus", self.adhesion_length)
+            ADHESION_LENGTH.validate("surface_energy over contact_modulus", self.adhesion_length)
 
     @property
     def adhesion_length(self) -> float:

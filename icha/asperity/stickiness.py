@@ -1,4 +1,4 @@
-"""Whether rough surfaces stick: attraction over repulsion where they touch."""
+"""Stickiness of rough surfaces: attraction over repulsion where they touch."""
 
 import numpy as np
 
@@ -10,7 +10,7 @@ REPULSIVE_AREA_SLOPE = 2.0
 
 
 def stickiness(moments: SpectralMoments, material: Material) -> float:
-    r"""Attraction over repulsion where surfaces touch; those above 1 stick, without adhesion it is 0.
+    r"""Return attraction over repulsion where surfaces touch: above 1 surfaces stick, without adhesion it is 0.
 
     L. Pastewka and M. O. Robbins, PNAS 111 (2014) 3298-3303, doi:10.1073/pnas.1320846111. The contact, of area A, feels
     the mean repulsive pressure h' E*/kappa with kappa = 2. Around it lies the area of a gap less than the range r of
@@ -18,11 +18,12 @@ def stickiness(moments: SpectralMoments, material: Material) -> float:
 
         A_att/A = pi [3 h'' r/(16 h'^2)]^(2/3).
 
-    The ratio of the two forces is kappa/kappa_att in their notation, and their criterion for sticking,
+    The ratio of the two forces is kappa/kappa_att in their notation. It exceeds 1 where their criterion for sticking
+    holds,
 
-        (h' r E*/(kappa dgamma)) [h' d/(4 r)]^(2/3) < pi (3/16)^(2/3) = 1.03,
+        (h' r E*/(kappa dgamma)) [h' d/(4 r)]^(2/3) < pi (3/16)^(2/3) = 1.03.
 
-    is that it exceeds 1. h' is the rms slope, h'' the rms Laplacian. The criterion needs an attraction of short range,
+    Here h' is the rms slope, h'' the rms Laplacian. The criterion needs an attraction of short range,
     whose area stays small compared with A: J. M. Monti, A. Sanner and L. Pastewka, Tribol. Lett. 69 (2021),
     doi:10.1007/s11249-021-01454-6. Here r is the range of the material.
 

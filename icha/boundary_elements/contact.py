@@ -27,7 +27,7 @@ from icha.boundary_elements.patches import (
     patch_events,
     unpack,
 )
-from icha.contact.kept import Kept
+from icha.contact.checkpoints import CheckpointedContact
 from icha.contact.model import PRESSURE, Control, Events, NotConverged
 from icha.contact.models import MODELS, REFERENCE_MODEL, PathAccuracy
 from icha.surfaces.summits import Asperities, locate_summits
@@ -180,7 +180,7 @@ class BoundaryElements:
 
     def events_between(self, before: CellState, after: CellState) -> Events:
         """Events on the path from one state to a later one."""
-        return Events.joined(after.history[len(before.history) :])
+        return Events.concatenate(after.history[len(before.history) :])
 
     def _predict(self, state, separation):
         """Contact of a state, moved along its rates to a separation (m) if that is close."""
@@ -301,9 +301,9 @@ def contact_of(surface: Surface, material: Material) -> BoundaryElements:
     )
 
 
-def resumable(contact: BoundaryElements, folder: pathlib.Path) -> Kept:
+def resumable(contact: BoundaryElements, folder: pathlib.Path) -> CheckpointedContact:
     """Contact whose equilibria are saved in a folder, so that an interrupted path can resume."""
     programs = [(name, version(name)) for name in ("icha", "numpy", "scipy")]
     others = repr((contact.spacing, contact.law.material, programs)).encode()
     of = hashlib.sha256(contact.heights.tobytes() + others).hexdigest()
-    return Kept(contact, of[:32], folder, pack, unpack)
+    return CheckpointedContact(contact, of[:32], folder, pack, unpack)

@@ -16,9 +16,9 @@ from icha.contact.model import (
     PRESSURE_BINS,
     SPLIT,
     Events,
+    count_summits,
     gap_bins,
     largest_tension,
-    summit_counts,
 )
 from icha.surfaces.moments import LEAST_CELLS_PER_WAVE, cells_per_short_wave
 from icha.surfaces.surface import Surface
@@ -36,7 +36,7 @@ class PatchObservables:
 
     def of_contact(self) -> dict:
         """Values that all states have in common."""
-        return summit_counts(self.contact.asperities)
+        return count_summits(self.contact.asperities)
 
     def of_step(self, state: CellState) -> dict:
         """Residuals of the equilibrium, events so far, and the share of summits outside the range of Wu's formula."""
@@ -44,7 +44,7 @@ class PatchObservables:
         touched = np.isin(contact.summits.cell, state.cells)
         verified = contact.law.is_jump_in_verified(contact.asperities.radius_of_curvature[touched])
         outside = np.count_nonzero(~verified) / max(len(verified), 1)
-        events = Events.joined(state.history)
+        events = Events.concatenate(state.history)
         counts = {
             name: events.count(kind)
             for name, kind in (

@@ -51,7 +51,7 @@ def pack(state: CellState, before: CellState) -> dict[str, np.ndarray]:
     """Return the arrays of a state, with the events since the one before."""
     arrays = {each.name: getattr(state, each.name) for each in fields(state) if each.name not in ("rates", "history")}
     arrays |= {f"rates_{k}": rate for k, rate in enumerate(state.rates or ())}
-    events = Events.joined(state.history[len(before.history) :])
+    events = Events.concatenate(state.history[len(before.history) :])
     return arrays | {f"event_{name}": getattr(events, name) for name in Events.__match_args__}
 
 
@@ -149,7 +149,7 @@ def patch_events(
     def of_new(kind, which, sign):
         return _events(kind, after, new, new_count, energy_of_cells, which, sign, summits, grid, spacing)
 
-    return Events.joined(
+    return Events.concatenate(
         [
             of_new(JUMP_IN, np.flatnonzero(parts_of_new == 0), -1.0),
             of_old(JUMP_OFF, np.flatnonzero(parts_of_old == 0), 1.0),
@@ -162,7 +162,7 @@ def patch_events(
 def _events(kind, state, labels, count, energy_of_cells, which, sign, summits, grid, spacing):
     """Events of one kind of patches `which`, (k,), of a state; a jump sets the energy of its patch free."""
     if not len(which):
-        return Events.joined(())
+        return Events.concatenate(())
     energy = np.bincount(labels, energy_of_cells(state), count + 1)[1:]
     position = patch_centres(state.cells, grid, labels, count, state.fraction) * spacing
     return Events(

@@ -1,7 +1,7 @@
-"""Findings of checks: a value, its limit and what it is."""
+"""Findings of checks: a value, its limit and its meaning."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,13 +9,23 @@ import numpy as np
 # Largest relative error of an identity between values of one dataset.
 IDENTITY_LIMIT = 1e-8
 
-# Name, value, limit and description of what is checked.
+# Name, value, limit and description of a check.
 Finding = tuple[str, float, float, str]
 
 
 @dataclass(frozen=True)
 class Check:
-    """One finding: `passed` says whether `value` keeps to `limit`; `subject` is the run it belongs to."""
+    """Result of one check.
+
+    Attributes
+    ----------
+    name : name of the check.
+    value : value that was found; -1 if it is not finite.
+    limit : largest value that passes.
+    passed : whether the value is finite and at most the limit.
+    description : meaning of the value.
+    subject : name of the run.
+    """
 
     name: str
     value: float
@@ -27,14 +37,14 @@ class Check:
 
 @dataclass(frozen=True)
 class RunArrays:
-    """A run as bare arrays: of thousands of small runs, labels take many times as long as the checks."""
+    """Arrays of a run by name; for thousands of small runs the labels of xarray would cost more than the checks."""
 
     values: dict[str, np.ndarray]
     sizes: dict[str, int]
     attrs: Mapping[str, str]
 
     def __contains__(self, name: str) -> bool:
-        """Whether the run has a variable."""
+        """Return whether the run has a variable."""
         return name in self.values
 
     def __getitem__(self, name: str) -> np.ndarray:
@@ -42,14 +52,13 @@ class RunArrays:
         return self.values[name]
 
 
-def not_finite(arrays):
-    """Number of values that are not finite."""
+def count_not_finite(arrays: Iterable[np.ndarray]) -> int:
+    """Count the values that are not finite."""
     return sum(int(np.count_nonzero(~np.isfinite(values))) for values in arrays if values.dtype.kind in "fiu")
 
 
-def at_most(name, value, limit, description, subject):
-    """The finding that a value keeps to a limit, or does not."""
-    # A value that is not a number keeps to no limit; it is reported as -1, which no error can be.
+def compare_with_limit(name: str, value: float, limit: float, description: str, subject: str) -> Check:
+    """Return the check that a value is finite and at most its limit."""
     value = float(value)
     finite = math.isfinite(value)
     return Check(name, value if finite else -1.0, float(limit), bool(finite and value <= limit), description, subject)

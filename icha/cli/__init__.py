@@ -1,4 +1,4 @@
-"""The command line: `icha`. Whatever takes time to import is imported by the commands that need it."""
+"""The command line: `icha`. Commands import slow libraries only when they run."""
 
 from typing import Annotated
 
@@ -23,8 +23,8 @@ app = typer.Typer(
 )
 
 
-def _version(asked: bool) -> None:
-    if asked:
+def _print_version(wanted: bool) -> None:
+    if wanted:
         from importlib.metadata import version
 
         echo(f"icha {version('icha')}")
@@ -34,14 +34,15 @@ def _version(asked: bool) -> None:
 @app.callback()
 def icha(
     version: Annotated[
-        bool, typer.Option("--version", help="Show the version and exit.", callback=_version, is_eager=True)
+        bool,
+        typer.Option("--version", help="Print the version and exit.", callback=_print_version, is_eager=True),
     ] = False,
 ) -> None:
-    """Adhesive rough contact: campaigns of runs from one YAML file.
+    """Adhesive contact of rough surfaces: campaigns of runs from one YAML file.
 
-    Start with `icha new NAME`, look with `icha describe NAME`, compute with `icha run NAME`.
+    Start with `icha new NAME`, look at it with `icha describe NAME`, compute it with `icha run NAME`.
 
-    Exit status: 0 if all went well, 1 if something failed, 2 if the call or the configuration is wrong.
+    Exit status: 0 on success, 1 if something failed, 2 if the call or the configuration is wrong.
     """
 
 
@@ -50,5 +51,5 @@ for command in (new, describe, run, simulate, show, explore, check, verify, repr
 
 
 def main() -> None:
-    """Entry point."""
+    """Run the command line."""
     app()

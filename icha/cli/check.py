@@ -1,4 +1,4 @@
-"""Check files against their documented format and the identities of the physics."""
+"""The command `icha check`: check files against their documented format and the identities of the physics."""
 
 from pathlib import Path
 from typing import Annotated
@@ -7,76 +7,64 @@ import typer
 
 from icha.cli.project import FAILED, WRONG, echo
 from icha.deposit.verify import CHECKSUMS
-from icha.support.in_words import counted, printable
+from icha.support.formatting import format_count, printable
 
 
 def check(
     files: Annotated[list[Path], typer.Argument(help="Runs, surfaces, campaign datasets or other results.")],
 ) -> None:
-    """Check files: documented names, dimensions, units and attributes, and the physics that every result must satisfy.
+    """Check files: documented names, dimensions, units and attributes, and the physics of every result.
 
-    Exit status: 0 if all is well, 1 if a file has flaws (each is printed), 2 if a file is none that ICHA writes. All
-    files are checked in any case.
+    All files are checked in any case. Exit status: 0 if no file has problems, 1 if one has (all problems are printed),
+    2 if ICHA cannot read one.
     """
-    from icha.datasets.format import CAMPAIGN, RUN, SOLUTION, SURFACE, UnknownFile, kind_of
+    from icha.datasets.format import CAMPAIGN, RUN, SOLUTION, SURFACE, UnknownFile, identify_file
 
     status = 0
     for file in files:
         if (file.suffix == ".zip" and file.is_file()) or (file / CHECKSUMS).is_file():
-            echo(f"{file}: deposit; `icha verify` checks it")
+            echo(f"{file}: deposit; use `icha verify`")
             continue
         try:
-            kind, data = kind_of(file)
+            kind, data = identify_file(file)
         except UnknownFile as error:
             echo(f"Error: {error}", err=True, fg="red")
             status = WRONG
             continue
         if kind not in (RUN, SURFACE, CAMPAIGN, SOLUTION):
-            echo(f"{file}: {kind}; it can be read, and has no checks of its own")
+            echo(f"{file}: {kind}; readable, there are no checks for it")
             continue
         try:
-            found, tested = _checked(kind, data)
-        except Exception as error:  # whatever is missing, or of another shape, in a file from elsewhere
-            found, tested = [f"is of another format: {error!r}"], 0
-        if found:
+            problems, count = _problems(kind, data)
+        except Exception as error:  # a file that another program wrote may lack anything
+            problems, count = [f"unknown format: {error!r}"], 0
+        if problems:
             status = max(status, FAILED)
-            echo(f"{file}: {kind}, {counted(len(found), 'flaw')}", fg="red")
-            for flaw in found:
-                echo(f"    {printable(flaw)}")
+            echo(f"{file}: {kind}, {format_count(len(problems), 'problem')}", fg="red")
+            for problem in problems:
+                echo(f"    {printable(problem)}")
         else:
-            numbers = f" ({counted(tested, 'check')} of its numbers)" if tested else ""
-            echo(f"{file}: {kind}, all is well{numbers}")
+            echo(f"{file}: {kind}, no problems" + (f" ({format_count(count, 'check')} passed)" if count else ""))
     if status:
         raise typer.Exit(status)
 
 
-def _checked(kind, data):
-    """Everything that is wrong with a file, as text, and how many checks of its numbers there are."""
-    from icha.datasets.format import SOLUTION, SURFACE, flaws
-
-    found = flaws(kind, data) if kind != SOLUTION else []
-    return (found, 0) if found or kind == SURFACE else _physics(kind, data)
-
-
-def _physics(kind, data):
-    """Checks of the numbers that failed, as text, and how many there are."""
-    from icha.analysis.checks import check_campaign, check_solution
+def _problems(kind, data) -> tuple[list[str], int]:
+    """Return all problems of a file, and the number of checks of its numbers."""
+    from icha.analysis.checks import COMPLETED, check_campaign, check_solution
     from icha.checks.run import check_run
-    from icha.datasets.format import RUN, SOLUTION
+    from icha.datasets.format import RUN, SOLUTION, SURFACE, problems_with_file
 
-    if kind == SOLUTION:
-        checks = check_solution(data)
-        return [_said(check) for check in checks if not check.passed], len(checks)
+    problems = problems_with_file(kind, data) if kind != SOLUTION else []
+    if problems or kind == SURFACE:
+        return problems, 0
     if kind == RUN and "incomplete" in data.attrs:
         return [f"the run failed: {data.attrs['incomplete']}"], 1
-    checks = check_run(data) if kind == RUN else check_campaign(data)
-    return [_said(check) for check in checks if not check.passed], len(checks)
-
-
-def _said(check):
-    from icha.analysis.checks import COMPLETED
-
-    subject = f"{check.subject}: " if check.subject else ""
-    if check.name == COMPLETED:
-        return f"{subject}the run failed: {check.description}"
-    return f"{subject}{check.name}: {check.value:.3g}, {check.description}; allowed: at most {check.limit:g}"
+    checks = (check_solution if kind == SOLUTION else check_run if kind == RUN else check_campaign)(data)
+    for check in checks:
+        if not check.passed:
+            subject = f"{check.subject}: " if check.subject else ""
+            values = f"{check.name}: {check.value:.3g}, {check.description}; expected at most {check.limit:g}"
+            failure = f"the run failed: {check.description}"
+            problems.append(subject + (failure if check.name == COMPLETED else values))
+    return problems, len(checks)

@@ -1,4 +1,4 @@
-"""What commands share: the project they work in, options, printing, and how users are told of their mistakes."""
+"""Shared by all commands: options, printing, error messages, and the project that a command works in."""
 
 import os
 import re
@@ -10,43 +10,81 @@ from typing import Annotated
 
 import typer
 
-from icha.support.in_words import printable_lines
+from icha.support.formatting import printable_lines
 from icha.support.input_files import problem_with_path
 from icha.support.program import own_workflow
 
-Config = Annotated[
-    str | None,
-    typer.Argument(help="Configuration file, or name of a campaign. Left out: config/config.yaml.", show_default=False),
-]
-Anyway = Annotated[
-    bool, typer.Option("--anyway", help="Run even if more memory or disk is expected to be needed than there is.")
-]
-Large = Annotated[
-    bool,
-    typer.Option(
-        "--large", help="Accept a deposit with more files, or a zip that unpacks to more, than is good from a stranger."
-    ),
-]
 CAMPAIGNS = Path("config/campaigns")
 DEFAULT = Path("config/config.yaml")
 # Exit statuses.
 FAILED, WRONG = 1, 2
+PICTURES = (".png", ".pdf", ".svg")
+
+
+def option(help_text: str, *names: str, **settings):
+    """Declare an option without a printed default; `help_text` says what happens without the option."""
+    return typer.Option(*names, help=help_text, show_default=False, **settings)
+
+
+def _check_cores(value: str | None) -> str | None:
+    if value is not None and value != "all" and not re.fullmatch("0*[1-9][0-9]{0,5}", value, re.ASCII):
+        raise typer.BadParameter(f"{value!r}: expected a number of cores, 1 or more, or `all`")
+    return value
+
+
+def _check_folder(value: Path | None) -> Path | None:
+    try:
+        return value if value is None else value.resolve()
+    except RuntimeError:  # Python before 3.13
+        raise typer.BadParameter(f"{str(value)!r} is a link to itself; expected a folder") from None
+
+
+def _check_picture(value: Path | None) -> Path | None:
+    if value is not None and value.suffix not in PICTURES:
+        raise typer.BadParameter(f"{str(value)!r}: expected a name that ends in {', '.join(PICTURES)}")
+    return value
+
+
+Config = Annotated[
+    str | None,
+    typer.Argument(help="Configuration file, or name of a campaign. Default: config/config.yaml.", show_default=False),
+]
+Anyway = Annotated[bool, typer.Option("--anyway", help="Run even if memory or disk space is probably too small.")]
+Large = Annotated[bool, typer.Option("--large", help="Accept a deposit with very many or very large files.")]
+Plot = Annotated[Path | None, option("Also draw a plot into this file (.png, .pdf or .svg).", callback=_check_picture)]
+Cores = Annotated[str | None, option("Cores to use, or `all`. Default: 2.", "--cores", "-c", callback=_check_cores)]
+Folder = Annotated[
+    Path | None,
+    option(
+        "Folder that holds results/. Default: the clone, or the working directory.",
+        "--directory",
+        "-d",
+        callback=_check_folder,
+    ),
+]
+
+
+def core_count(cores: str | None) -> int:
+    """Return the number of cores that the option `--cores` means."""
+    if cores == "all":
+        return os.cpu_count() or 1
+    return int(cores) if cores else 2
 
 
 def echo(text: object = "", *, err: bool = False, **style) -> None:
-    """Print text, to the error output if `err`; `style` is that of `typer.style`: `fg="red"`, `bold=True`."""
+    """Print text, to the standard error if `err`; `style` as in `typer.style`: `fg="red"`, `bold=True`."""
     typer.secho(printable_lines(text), err=err, **style)
 
 
 def markup(text: object) -> str:
-    """The text for a table or line of rich, in which brackets stand for themselves."""
+    """Escape text for rich, which gives brackets a meaning."""
     from rich.markup import escape
 
     return escape(printable_lines(text))
 
 
-def confirmed(question: str) -> bool:
-    """The answer of who sits at the terminal; that there is none, and Ctrl-C, are a no."""
+def confirm(question: str) -> bool:
+    """Ask a yes-no question; without a terminal, and after Ctrl-C, the answer is no."""
     try:
         return sys.stdin.isatty() and typer.confirm(question)
     except typer.Abort:
@@ -54,137 +92,71 @@ def confirmed(question: str) -> bool:
         return False
 
 
-def _cores(value: str | None) -> str | None:
-    if value is not None and value != "all" and not re.fullmatch("0*[1-9][0-9]{0,5}", value, re.ASCII):
-        raise typer.BadParameter(f"{value!r} is neither a number of cores, 1 or more, nor `all`")
-    return value
-
-
-def _folder(value: Path | None) -> Path | None:
-    try:
-        return value if value is None else value.resolve()
-    except RuntimeError:  # of Python before 3.13
-        raise typer.BadParameter(f"{str(value)!r} is a link that leads to itself; allowed: a folder") from None
-
-
-def core_count(cores: str | None) -> int:
-    """How many cores are meant."""
-    if cores == "all":
-        return os.cpu_count() or 1
-    return int(cores) if cores else 2
-
-
-Cores = Annotated[
-    str | None,
-    typer.Option("--cores", "-c", help="Cores to use, or `all`. Left out: 2.", callback=_cores, show_default=False),
-]
-Folder = Annotated[
-    Path | None,
-    typer.Option(
-        "--directory",
-        "-d",
-        help="Folder that holds results/. Left out: the clone, or the working directory.",
-        callback=_folder,
-        show_default=False,
-    ),
-]
-
-
 class UserError(Exception):
-    """What was asked for cannot be done; the message says why and what can."""
+    """A command that cannot be carried out as given; the message says why, and what to do."""
 
 
 def reports_errors(command: Callable) -> Callable:
-    """Decorate a command: mistakes and failures end it with their message and an exit status, not with a traceback."""
+    """Decorate a command: print expected errors as a message and exit with a status, without a traceback."""
+
+    def fail(message: object, status: int):
+        echo(f"Error: {message}", err=True, fg="red")
+        raise typer.Exit(status) from None
 
     @wraps(command)
     def call(*args, **kwargs):
         try:
             return command(*args, **kwargs)
-        except UserError as mistake:
-            echo(f"Error: {mistake}", err=True, fg="red")
-            raise typer.Exit(WRONG) from None
+        except UserError as error:
+            fail(error, WRONG)
         except UnicodeEncodeError as error:
-            echo(f"Error: {error.object!r}: holds bytes that are no UTF-8; allowed: text", err=True, fg="red")
-            raise typer.Exit(WRONG) from None
-        except BrokenPipeError:
-            # Whoever read our output has seen enough (`icha describe --runs | head`).
+            fail(f"{error.object!r} contains bytes that are not UTF-8; expected text", WRONG)
+        except BrokenPipeError:  # `icha describe --runs | head`
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             raise typer.Exit(FAILED) from None
         except MemoryError as error:
-            echo(f"Error: not enough memory: {error or 'nothing is left'}", err=True, fg="red")
-            raise typer.Exit(FAILED) from None
-        except OSError as error:
-            # What the system refuses: a folder that cannot be written to, a full disk.
-            what = f"{error.filename}: {error.strerror}" if error.filename and error.strerror else error
-            echo(f"Error: {what}", err=True, fg="red")
-            raise typer.Exit(FAILED) from None
+            fail(f"not enough memory: {error or 'all of it is in use'}", FAILED)
+        except OSError as error:  # a folder without permission, a full disk
+            fail(f"{error.filename}: {error.strerror}" if error.filename and error.strerror else error, FAILED)
 
     return call
 
 
-def find_project(start: Path | None = None) -> Path | None:
-    """The clone: the folder with the Snakefile, at or above `start` (the working directory if left out)."""
-    start = (start or Path.cwd()).resolve()
-    for folder in (start, *start.parents):
+def find_project() -> Path | None:
+    """Return the clone: the folder with the Snakefile, at or above the working directory."""
+    here = Path.cwd()
+    for folder in (here, *here.parents):
         if (folder / "Snakefile").is_file() and (folder / "workflow/rules/runs.smk").is_file():
             return folder
     return None
 
 
 def project() -> Path:
-    """The folder that holds the campaigns and results of whoever works here: the clone, else the working directory."""
+    """Return the folder that holds campaigns and results: the clone, else the working directory."""
     return find_project() or Path.cwd()
 
 
 def workflow_folder() -> Path:
-    """The folder of the workflow that is run, with its Snakefile and profiles: the clone, else what is installed."""
+    """Return the folder of the Snakefile and its profiles: the clone, else the installed workflow."""
     return find_project() or own_workflow()
 
 
-def configuration_path(asked: str | None) -> Path:
-    """The configuration file that is meant: by its path, by the name of a campaign, or the default one.
-
-    Raises
-    ------
-    UserError
-        If there is no such file.
-    """
-    if asked is None:
-        if not (project() / DEFAULT).is_file():
-            raise UserError(
-                f"there is no {DEFAULT} here; name a campaign: {', '.join(sorted(campaigns()))}, or a YAML file. "
-                "`icha new NAME` writes a campaign to start from"
-            )
-        return shown(project() / DEFAULT)
-    if Path(asked).is_file():
-        return Path(asked)
-    there = campaigns()
-    if asked in there:
-        return shown(there[asked])
-    if Path(asked).exists():
-        raise UserError(f"{asked}: {problem_with_path(asked)}; allowed: a YAML file, or the name of a campaign")
-    raise UserError(
-        f"{asked}: no such file and no campaign of that name; there are: {', '.join(sorted(there))}. `icha new NAME` "
-        "writes a campaign to start from"
-    )
-
-
 def campaigns() -> dict[str, Path]:
-    """The files of campaigns by the names that commands take: those of the project, and those that come with ICHA.
+    """Return the configuration files that commands find by name: those of the project and those shipped with ICHA.
 
-    The default file goes by the name that is in it.
+    The default file has the name that is written in it.
     """
-    named: dict[str, Path] = {}
-    for folder in (workflow_folder(), project()):  # where names are the same, the project's own go before
-        default = _name_in(folder / DEFAULT) if (folder / DEFAULT).is_file() else None
-        named |= {default: folder / DEFAULT} if default else {}
-        named |= {path.stem: path for path in sorted((folder / CAMPAIGNS).glob("*.yaml"))}
-    return named
+    files: dict[str, Path] = {}
+    for folder in (workflow_folder(), project()):  # the project's files replace shipped ones of the same name
+        default = folder / DEFAULT
+        if default.is_file() and (name := _campaign_name(default)):
+            files[name] = default
+        files |= {path.stem: path for path in sorted((folder / CAMPAIGNS).glob("*.yaml"))}
+    return files
 
 
-def _name_in(file: Path) -> str | None:
-    """The name of the campaign of a configuration file; None where it cannot be read, which is told when it is used."""
+def _campaign_name(file: Path) -> str | None:
+    """Return the name of the campaign in a file; None if the file cannot be read, which is reported when it is used."""
     from icha.configuration.errors import ConfigurationError
     from icha.configuration.yaml_files import read_yaml
 
@@ -195,13 +167,34 @@ def _name_in(file: Path) -> str | None:
     return name if isinstance(name, str) else None
 
 
-def read_configuration(path: Path):
-    """The configuration of a file, as `icha.configuration.load.load_configuration` gives it; warnings are printed.
+def configuration_path(config: str | None) -> Path:
+    """Find a configuration file by its path or by the name of its campaign; None means the default file.
 
     Raises
     ------
     UserError
-        With everything that is wrong with it.
+        If there is no such file.
+    """
+    files = campaigns()
+    listed = f"expected a YAML file or a campaign: {', '.join(sorted(files))}. `icha new NAME` writes a new campaign"
+    if config is None:
+        if not (project() / DEFAULT).is_file():
+            raise UserError(f"no {DEFAULT} in this folder; {listed}")
+        return shown(project() / DEFAULT)
+    if Path(config).is_file():
+        return Path(config)
+    if config in files:
+        return shown(files[config])
+    raise UserError(f"{config}: {problem_with_path(config)}, and not the name of a campaign; {listed}")
+
+
+def read_configuration(path: Path):
+    """Load a configuration with `icha.configuration.load.load_configuration`, and print its warnings.
+
+    Raises
+    ------
+    UserError
+        With all errors of the configuration.
     """
     from icha.configuration.errors import ConfigurationError
     from icha.configuration.load import load_configuration
@@ -216,7 +209,7 @@ def read_configuration(path: Path):
 
 
 def profile_settings(folder: Path) -> dict:
-    """Settings of a profile of Snakemake, a folder; none if it is not there."""
+    """Read the settings of a Snakemake profile; none if the folder has no config.yaml."""
     import yaml
 
     file = folder / "config.yaml"
@@ -224,6 +217,6 @@ def profile_settings(folder: Path) -> dict:
 
 
 def shown(path: Path) -> Path:
-    """The path as people like to read it: relative to the working directory where it lies in it."""
+    """Shorten a path for printing: relative to the working directory if it lies inside."""
     path = Path(path)
     return path.relative_to(Path.cwd()) if path.is_absolute() and path.is_relative_to(Path.cwd()) else path

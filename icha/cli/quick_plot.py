@@ -32,7 +32,7 @@ _LINES = ("-", "--")
 
 
 def draw(kind: str, data: xr.Dataset | xr.DataTree, path: Path) -> None:
-    """Draw what `icha.datasets.format.kind_of` gave into a file, whose ending says the format."""
+    """Draw what `icha.datasets.format.identify_file` gave into a file, whose ending says the format."""
     drawing = _run if kind == RUN else _surface if kind == SURFACE else _campaign
     with whole_file(path) as temporary:
         drawing(data).savefig(temporary, format=path.suffix[1:], dpi=150)

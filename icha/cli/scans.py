@@ -1,4 +1,4 @@
-"""Scans: what is told of them before anything is computed, and their section in a new campaign."""
+"""Scans: what ICHA prints about them before anything is computed, and their section in a new campaign."""
 
 from __future__ import annotations
 
@@ -6,119 +6,130 @@ import json
 import os
 import re
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 from icha.cli.project import UserError
-from icha.support import in_words
-from icha.support.in_words import printable
+from icha.support import formatting
+from icha.support.formatting import format_count, printable
 from icha.support.input_files import problem_with_path
 
 if TYPE_CHECKING:
     from icha.contact.models import Model
 
-# Endings of the pictures that can be drawn.
-PICTURES = (".png", ".pdf", ".svg")
-# A few per cent of filled points do no harm; the documentation says "measure again" for more.
-MANY_FILLED = 0.05
-# What stands in the place of what is left to fill in while the rest is checked, in SI units and in a configuration.
-_GUESSES = {"height_unit": 1e-9, "size": (1e-4, 1e-4)}
-_GUESSED = {"height_unit": "nm", "lateral_unit": "um", "boundary": "window"}
-_EXAMPLES = {"height_unit": "nm", "lateral_unit": "um", "size": "[90 um, 90 um]"}
-# Bytes that show whether anything is in a file.
-_BEGINNING = 2**16
-
-
-def check_picture(path: Path | None) -> None:
-    """Raise `UserError` unless the path, if there is one, ends as a picture."""
-    if path is not None and path.suffix not in PICTURES:
-        raise UserError(f"--plot {path}: ends in {path.suffix!r}; allowed: {', '.join(PICTURES)}")
+# Largest share of filled points without a warning; the documentation recommends another measurement above.
+MOST_FILLED = 0.05
+# Values that replace missing keys while the rest is checked: in SI units, and as written in a configuration.
+GUESSES = {"height_unit": 1e-9, "size": (1e-4, 1e-4)}
+GUESSED_TEXT = {"height_unit": "nm", "lateral_unit": "um", "boundary": "window"}
+EXAMPLES = {"height_unit": "nm", "lateral_unit": "um", "size": "[90 um, 90 um]"}
+FIRST_BYTES = 2**16  # read to see whether a file is empty
 
 
 def about_scan(name: str, scan, *, to_scale: bool = True, models: Iterable[Model] = ()) -> Iterator[str]:
-    """Lines about the `icha.surfaces.measured.resolution.ScanResolution` of a surface of some name.
+    """Return the lines that describe a scan.
 
+    Parameters
+    ----------
+    name : name of the surface.
+    scan : its `icha.surfaces.measured.resolution.ScanResolution`.
     to_scale : whether the units of its heights and of its size are known.
-    models : those that press it; none if that is not known yet.
+    models : the contact models of its runs; empty if not known yet.
     """
-    from icha.surfaces.measured.resolution import LEAST_CELLS_OF_SUMMIT, RESOLVED_CELLS, slope_left
-    from icha.surfaces.moments import LEAST_CELLS_PER_WAVE, error_of_cells
+    lines = [*_reading(scan), *_resolution(scan, to_scale, list(models)), *(_noise(scan) if to_scale else ())]
+    return (f"{name}: {line}" for line in lines)
 
-    used = scan.used
-    points = in_words.counted(scan.filled, "point")
-    filled = f"{points} had no height and {'was' if scan.filled == 1 else 'were'} filled" if scan.filled else ""
-    taken = f", `data: {printable(scan.data)}` of several" if scan.data else ""
-    yield f"{name}: read as {scan.format}{taken}, {filled or 'no point is missing'}"
-    yield f"{name}: {scan.reading.partition(', ')[2]}"
+
+def _reading(scan) -> Iterator[str]:
+    """Return how the file was read, its missing points, and whether opposite edges fit."""
+    filled = f"{format_count(scan.filled, 'point')} without height {'was' if scan.filled == 1 else 'were'} filled"
+    array = f", `data: {printable(scan.data)}` of several" if scan.data else ""
+    yield f"read as {scan.format}{array}, {filled if scan.filled else 'no point is missing'}"
+    yield scan.reading.partition(", ")[2]
     if scan.filled:
-        yield f"{name}: {in_words.share(scan.filled, scan.points)} of the points are filled"
-    if scan.filled > MANY_FILLED * scan.points:
+        yield f"{formatting.share(scan.filled, scan.points)} of the points are filled"
+    if scan.filled > MOST_FILLED * scan.points:
         yield (
-            f"{name}: warning: more than {100 * MANY_FILLED:.0f} % of the points are filled, so much of it is "
-            "made up and smooth; measure again, or `crop` a part with fewer missing points"
+            f"warning: more than {100 * MOST_FILLED:.0f} % of the points are filled by interpolation, which is smooth; "
+            "measure again, or `crop` an area with fewer missing points"
         )
     if not scan.edges_fit:
         yield (
-            f"{name}: warning: `boundary: periodic`, but opposite edges differ by much more than neighbouring nodes, "
-            "so there is a step at the edges; use `boundary: window`, `mirror` or `free`"
+            "warning: `boundary: periodic`, but opposite edges differ by much more than neighbouring nodes, so the "
+            "surface has a step there; use `boundary: window`, `mirror` or `free`"
         )
-    nodes = f"{used.grid} x {used.grid} nodes"
-    scale = f" {in_words.length(used.spacing)} apart, rms slope {used.rms_slope:.3g}," if to_scale else ","
-    few = "; fewer than " if scan.cells_per_summit < LEAST_CELLS_OF_SUMMIT else "; at least "
+
+
+def _resolution(scan, to_scale: bool, models: list[Model]) -> Iterator[str]:
+    """Return how well the nodes resolve summits and waves, and which models are not applicable."""
+    from icha.surfaces.measured.resolution import LEAST_CELLS_OF_SUMMIT, RESOLVED_CELLS
+    from icha.surfaces.moments import LEAST_CELLS_PER_WAVE, error_of_cells
+
+    used = scan.used
+    scale = f" {formatting.length(used.spacing)} apart, rms slope {used.rms_slope:.3g}" if to_scale else ""
     yield (
-        f"{name}: {nodes}{scale} {in_words.counted(scan.summits, 'summit')}, {scan.cells_per_summit:.0f} nodes for each"
-        f"{few}{LEAST_CELLS_OF_SUMMIT}, with which summits are resolved"
+        f"{used.grid} x {used.grid} nodes{scale}, {format_count(scan.summits, 'summit')}, {scan.cells_per_summit:.0f} "
+        f"nodes per summit (recommended: at least {LEAST_CELLS_OF_SUMMIT})"
     )
     if unsupported := len(scan.asperities.unsupported_height):
         yield (
-            f"{name}: asperities leave out {unsupported} of them, which the nodes around do not support, as at steps, "
-            "spikes, pits and plateaus"
+            f"the asperity model excludes {unsupported} of these summits, which the nodes around do not support, as at "
+            "steps, spikes, pits and plateaus"
         )
-    models = list(models)
     reasons = scan.reasons_against_asperities
     if reasons and (not models or any(model.by_summits for model in models)):
-        others = ", or `models: [boundary_elements]`" if scan.cells_per_short_wave >= LEAST_CELLS_PER_WAVE else ""
+        other_model = ", or `models: [boundary_elements]`" if scan.cells_per_short_wave >= LEAST_CELLS_PER_WAVE else ""
         yield (
-            f"{name}: warning: asperity model not applicable ({'; '.join(reasons)}); use a `cutoff` that smooths the "
-            f"surface{others}"
+            f"warning: asperity model not applicable ({'; '.join(reasons)}); use a `cutoff` that smooths the surface"
+            f"{other_model}"
         )
     error = error_of_cells(scan.cells_per_short_wave)
     if error and any(model.by_cells for model in models):
         yield (
-            f"{name}: boundary elements have about {scan.cells_per_short_wave:.2g} nodes for its shortest waves, with "
-            f"which areas are off by {error}; recommended: {RESOLVED_CELLS}, by a longer `cutoff` or a finer "
-            "`grid`"
+            f"boundary elements have about {scan.cells_per_short_wave:.2g} nodes per shortest wave, which causes an "
+            f"error of {error} in areas; recommended: {RESOLVED_CELLS}, by a longer `cutoff` or a finer `grid`"
         )
-    if not to_scale:
-        return
-    noise = scan.noise
-    if noise is None:
-        yield f"{name}: its spectrum falls to the shortest waves: no noise floor is seen"
+
+
+def _noise(scan) -> Iterator[str]:
+    """Return where the spectrum ends in noise, and the recommended keys."""
+    from icha.surfaces.measured.resolution import slope_left
+
+    if (noise := scan.noise) is None:
+        yield "no noise floor: the spectrum decreases down to the shortest waves"
     else:
+        rms, wavelength = (formatting.length(float(f"{length:.2g}")) for length in (noise.rms, noise.wavelength))
         yield (
-            f"{name}: its spectrum ends in a noise floor of {in_words.length(float(f'{noise.rms:.2g}'))} rms; waves "
-            f"shorter than {in_words.length(float(f'{noise.wavelength:.2g}'))} are mostly noise, and have "
-            f"{noise.slope_share:.0%} of its mean square slope"
+            f"the spectrum ends in a noise floor of {rms} rms; waves shorter than {wavelength} are mostly noise, and "
+            f"contribute {noise.slope_share:.0%} of the mean square slope"
         )
     if scan.advice:
-        keys = " and ".join(f"`{key}: {value}`" for key, value in in_yaml(scan.advice).items())
+        keys = " and ".join(f"`{key}: {value}`" for key, value in advice_in_yaml(scan.advice).items())
         cutoff = scan.advice.get("cutoff")
-        leaves = f", which leaves {slope_left(scan.measured, cutoff):.0%} of its rms slope" if cutoff else ""
-        yield f"{name}: advisable: {keys}{leaves}"
+        effect = f", which keeps {slope_left(scan.measured, cutoff):.0%} of the rms slope" if cutoff else ""
+        yield f"recommended: {keys}{effect}"
 
 
-def in_yaml(advice: Mapping[str, float | int]) -> dict[str, str]:
-    """Advised keys with their values as a configuration has them."""
-    return {key: in_words.length(value) if key == "cutoff" else str(value) for key, value in advice.items()}
+def advice_in_yaml(advice: Mapping[str, float | int]) -> dict[str, str]:
+    """Return recommended keys with their values as written in a configuration."""
+    return {key: formatting.length(value) if key == "cutoff" else str(value) for key, value in advice.items()}
 
 
-class MeasuredSection(NamedTuple):
-    """What a new campaign has of a scan.
+@dataclass(frozen=True)
+class MeasuredSection:
+    """The section of a scan in a new campaign.
 
-    name, path : of the surface, and of its file from the configuration. lines : what the file says, and what it does
-    not. to_fill_in : why, by key. filled_in : values with which the rest can be checked. periodic : whether it is a
-    Fourier series. advice : keys that are advised, as a configuration has them. scan : its
-    `icha.surfaces.measured.resolution.ScanResolution`.
+    Attributes
+    ----------
+    name : name of the surface.
+    path : its file, relative to the configuration.
+    lines : keys that the file determines, and keys to fill in.
+    to_fill_in : reason for each key to fill in.
+    filled_in : guessed values of these keys, with which the other keys can be checked.
+    periodic : whether it is a Fourier series.
+    advice : recommended keys, as written in a configuration.
+    scan : its `icha.surfaces.measured.resolution.ScanResolution`.
     """
 
     name: str
@@ -132,12 +143,12 @@ class MeasuredSection(NamedTuple):
 
 
 def measured_section(path: Path, data: str | None, folder: Path) -> MeasuredSection:
-    """Read the file of a measured topography for its section in a configuration of a folder.
+    """Read a measured topography and return its section for a configuration in a folder.
 
     Raises
     ------
     UserError
-        If it can be read by no setting, or has no topography that can be used.
+        If no setting can read the file, or its topography cannot be used.
     """
     import numpy as np
 
@@ -145,44 +156,53 @@ def measured_section(path: Path, data: str | None, folder: Path) -> MeasuredSect
     from icha.surfaces.measured.settings import UnfitTopography
 
     _check_file(path)
-    scan, assumed, missing, sides = _read(path, data)
+    scan, assumed, missing, sides = _load(path, data)
     rows, columns = scan.heights.shape
     gaps = int(np.count_nonzero(~np.isfinite(scan.heights)))
-    boundary, detrend = ("periodic", "none") if scan.format == "fourier" else ("free", "tilt")
-    how = {"format": "auto", "boundary": boundary, "data": data, "detrend": detrend, "missing": "fill"} | assumed
+    periodic = scan.format == "fourier"
+    boundary, detrend = ("periodic", "none") if periodic else ("free", "tilt")
+    settings = {"format": "auto", "boundary": boundary, "data": data, "detrend": detrend, "missing": "fill"} | assumed
     try:
-        resolution = scan_resolution(path, how)
+        resolution = scan_resolution(path, settings)
     except UnfitTopography as error:
         raise UserError(f"--measured {path}: {error.key} {error}") from None
 
-    taken = data if data is not None else scan.data
-    lines = [f"data: {json.dumps(taken)}"] if taken else []
-    lines.append(f"# {columns} x {rows} points{_what_is_known(scan, missing, sides)}")
+    array = data if data is not None else scan.data
+    lines = [f"data: {json.dumps(array)}"] if array else []
+    lines.append(f"# {columns} x {rows} points{_size_and_heights(scan, missing, sides)}")
     for key in missing:
-        empty = " (empty: that of the heights)" if key == "lateral_unit" else ""
-        lines.append(f"{key}:        # to fill in, since the file does not say it{empty}: such as {_EXAMPLES[key]}")
+        default = " (default: that of the heights)" if key == "lateral_unit" else ""
+        lines.append(f"{key}:        # to fill in, since the file lacks it{default}: such as {EXAMPLES[key]}")
     if gaps:
         lines.append(f"missing: fill                # {gaps} points have no height; `refuse` makes that an error")
-    advice = {} if missing else in_yaml(resolution.advice)
+    advice = {} if missing else advice_in_yaml(resolution.advice)
     name = re.sub("[^a-z0-9_-]+", "_", path.stem.lower()).strip("_") or "measured"
-    if boundary != "periodic":
-        missing = missing | {"boundary": "what lies beyond the edges: free, window, mirror or periodic"}
-    guessed = _GUESSED | {"size": [f"{columns} um", f"{rows} um"]}
+    if not periodic:
+        missing = missing | {"boundary": "what surrounds the scan: free, window, mirror or periodic"}
+    guessed = GUESSED_TEXT | {"size": [f"{columns} um", f"{rows} um"]}
     filled_in = {key: guessed[key] for key in missing}
     path = Path(os.path.relpath(path.resolve(), folder.resolve())).as_posix()
-    return MeasuredSection(name, path, lines, missing, filled_in, boundary == "periodic", advice, resolution)
+    return MeasuredSection(name, path, lines, missing, filled_in, periodic, advice, resolution)
 
 
-def _check_file(path):
+def _check_file(path: Path) -> None:
     if problem := problem_with_path(path):
-        raise UserError(f"--measured {path}: {problem}; allowed: a file that holds a topography")
+        raise UserError(f"--measured {path}: {problem}; expected a file with a topography")
     with path.open("rb") as file:
-        if not file.read(_BEGINNING).strip():
-            raise UserError(f"--measured {path}: the file is empty; allowed: one that holds a topography")
+        if not file.read(FIRST_BYTES).strip():
+            raise UserError(f"--measured {path}: the file is empty; expected a file with a topography")
 
 
-def _read(path, data):
-    """The scan, what was assumed to read it and what is missing of it, by key; its sides, if their unit is missing."""
+def _load(path: Path, data: str | None):
+    """Load a scan; guess keys that the file lacks.
+
+    Returns
+    -------
+    scan : the scan.
+    assumed : guessed values of missing keys, in SI units.
+    missing : reason for each missing key.
+    sides : sides in the coordinates of the file; None if their unit is known, or there are none.
+    """
     from icha.surfaces.measured.scan import load_scan
     from icha.surfaces.measured.settings import Preparation, UnfitTopography
 
@@ -192,33 +212,31 @@ def _read(path, data):
             scan = load_scan(path, Preparation("auto", "free", data, **assumed))
             break
         except UnfitTopography as error:
-            if error.key not in _GUESSES or error.key in assumed:
-                how = "; say which by --data NAME" if error.key == "data" else ""
-                raise UserError(f"--measured {path}: {error.key} {error}{how}") from None
-            assumed[error.key] = _GUESSES[error.key]
+            if error.key not in GUESSES or error.key in assumed:
+                hint = "; choose one with --data NAME" if error.key == "data" else ""
+                raise UserError(f"--measured {path}: {error.key} {error}{hint}") from None
+            assumed[error.key] = GUESSES[error.key]
             missing[error.key] = str(error)
     if "size" in missing:
-        # Pixels are square, as a rule.
-        rows, columns = scan.heights.shape
+        rows, columns = scan.heights.shape  # most scans have square pixels
         assumed["size"] = columns * 1e-6, rows * 1e-6
     elif "height_unit" in missing:
-        # Coordinates without a unit would count in that of the heights, which is not known either.
-        bare = load_scan(path, Preparation("auto", "free", data, **assumed, lateral_unit=1.0))
-        if bare.size != scan.size:
-            missing["lateral_unit"] = "is missing, and the file does not say it; left out, it is that of the heights"
-            return scan, assumed, missing, bare.size
+        # Coordinates without a unit have the unit of the heights, which is unknown too.
+        unscaled = load_scan(path, Preparation("auto", "free", data, **assumed, lateral_unit=1.0))
+        if unscaled.size != scan.size:
+            missing["lateral_unit"] = "is missing, and the file does not contain it; default: that of the heights"
+            return scan, assumed, missing, unscaled.size
     return scan, assumed, missing, None
 
 
-def _what_is_known(scan, missing, sides) -> str:
-    """Size and heights of a scan; `sides` are in the file's coordinates, if it gives these without their unit."""
+def _size_and_heights(scan, missing: Mapping, sides: tuple[float, float] | None) -> str:
     import numpy as np
 
-    known = ""
+    text = ""
     if sides is not None:
-        known += f" over {sides[0]:.4g} x {sides[1]:.4g} in its coordinates"
+        text += f" over {sides[0]:.4g} x {sides[1]:.4g} in its coordinates"
     elif "size" not in missing:
-        known += f" over {scan.size[0] * 1e6:.4g} um x {scan.size[1] * 1e6:.4g} um"
+        text += f" over {scan.size[0] * 1e6:.4g} um x {scan.size[1] * 1e6:.4g} um"
     if "height_unit" not in missing:
-        known += f", heights from {np.nanmin(scan.heights) * 1e6:.4g} um to {np.nanmax(scan.heights) * 1e6:.4g} um"
-    return known
+        text += f", heights from {np.nanmin(scan.heights) * 1e6:.4g} um to {np.nanmax(scan.heights) * 1e6:.4g} um"
+    return text

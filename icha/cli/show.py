@@ -1,82 +1,69 @@
-"""Look into a file: what it is, its numbers in short, and a quick plot."""
+"""The command `icha show`: print what a file contains, and plot it."""
 
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from icha.cli.project import UserError, echo
-from icha.cli.scans import check_picture
+from icha.cli.project import Plot, UserError, echo, option
 from icha.datasets.attributes import reasons_not_applicable, why_no_result
-from icha.support.in_words import counted, printable
+from icha.support.formatting import format_count, printable
 
-_BARS = " ▁▂▃▄▅▆▇█"
-_WIDTH = 60
-_CURVES = {"contact_area_fraction": "A/A0", "reduced_pressure": "p*", "reduced_separation": "u/h_rms"}
+BARS = " ▁▂▃▄▅▆▇█"
+MOST_BARS = 60
+MOST_ROWS = 12
+CURVES = {"contact_area_fraction": "A/A0", "reduced_pressure": "p*", "reduced_separation": "u/h_rms"}
 
 
 def show(
     file: Annotated[Path, typer.Argument(help="A run, surface or campaign dataset (.nc).")],
-    plot: Annotated[
-        Path | None, typer.Option(help="Draw a plot into this file (.png, .pdf or .svg).", show_default=False)
-    ] = None,
-    study: Annotated[
-        str | None, typer.Option(help="Study of a campaign dataset. Left out: all of them.", show_default=False)
-    ] = None,
+    plot: Plot = None,
+    study: Annotated[str | None, option("Study of a campaign dataset. Default: all of them.")] = None,
 ) -> None:
-    """Show what is in a file: a run, a surface or a campaign dataset. --plot draws it."""
-    check_picture(plot)
-    from icha.datasets.format import CAMPAIGN, RUN, SURFACE, UnknownFile, kind_of
+    """Show what a file contains: a run, a surface or a campaign dataset. --plot draws it."""
+    from icha.datasets.format import CAMPAIGN, RUN, SURFACE, UnknownFile, identify_file
 
     try:
-        kind, data = kind_of(file)
+        kind, data = identify_file(file)
     except UnknownFile as error:
         raise UserError(str(error)) from None
-    if kind not in (RUN, SURFACE, CAMPAIGN):
-        raise UserError(f"{file}: {kind}; shown are runs, surfaces and campaign datasets, and others by `ncdump -h`")
-    if kind == CAMPAIGN:
-        studies = list(data.children)
-        if study is not None and study not in studies:
-            raise UserError(f"--study {study}: there is none in {file}; there are: {printable(', '.join(studies))}")
-        data = data if study is None else data.filter(lambda node: node.name in (None, data.name, study))
+    printers = {RUN: print_run, SURFACE: _print_surface, CAMPAIGN: _print_campaign}
+    if kind not in printers:
+        raise UserError(f"{file}: {kind}; expected a run, a surface or a campaign dataset. Try `ncdump -h`")
+    if kind == CAMPAIGN and study is not None:
+        if study not in data.children:
+            raise UserError(f"--study {study}: not in {file}; expected one of {printable(', '.join(data.children))}")
+        data = data.filter(lambda node: node.name in (None, data.name, study))
     try:
-        if kind == RUN:
-            show_run(data, str(file))
-        elif kind == SURFACE:
-            _show_surface(data, file)
-        else:
-            _show_campaign(data, file)
+        printers[kind](data, file)
         if plot is not None:
             from icha.cli.quick_plot import draw
 
             draw(kind, data, plot)
-            echo(f"drawn:   {plot}")
-    except (AttributeError, LookupError, TypeError, ValueError) as error:  # of files from elsewhere
-        raise UserError(f"{file}: {kind} of another format ({error!r}); `icha check` lists what is wrong") from None
+    except (AttributeError, LookupError, TypeError, ValueError) as error:  # a file that another program wrote
+        raise UserError(f"{file}: {kind} of another format ({error!r}); `icha check` lists the problems") from None
 
 
-def show_run(run, name: str) -> None:
-    """Print what a run was and what came out."""
+def print_run(run, file: Path) -> None:
+    """Print the model, material and surface of a run, and its results."""
     from icha.figures.style import quantity
 
-    def value(variable):
-        return float(run[variable])
+    def value(variable, unit=None):
+        number = float(run[variable])
+        return number if unit is None else quantity(number, unit)
 
-    echo(f"{name}: {printable(run.attrs.get('title', 'run'))}")
-    place = [printable(run.attrs[key]) for key in ("campaign", "study") if run.attrs.get(key)]
-    if place:
-        echo(f"campaign {' and study '.join(place)}")
-    if run.attrs.get("applicability"):
-        echo(printable(run.attrs["applicability"]), fg="yellow")
+    echo(f"{file}: {printable(run.attrs.get('title', 'run'))}")
+    labels = [f"{key} {printable(run.attrs[key])}" for key in ("campaign", "study") if run.attrs.get(key)]
+    if labels:
+        echo(" and ".join(labels))
     echo(f"model:    {printable(run.attrs.get('contact_model', 'unknown')).replace('_', ' ')}")
     echo(
-        f"material: E* {quantity(value('contact_modulus'), 'Pa')}, surface energy "
-        f"{quantity(value('surface_energy'), 'J/m²')}, range {quantity(value('interaction_range'), 'm')}, "
-        f"Tabor parameter {value('tabor_parameter'):.3g}"
+        f"material: E* {value('contact_modulus', 'Pa')}, surface energy {value('surface_energy', 'J/m²')}, "
+        f"range {value('interaction_range', 'm')}, Tabor parameter {value('tabor_parameter'):.3g}"
     )
     echo(
-        f"surface:  period {quantity(value('period'), 'm')}, rms slope {value('rms_slope'):.4g}, rms height "
-        f"{quantity(value('rms_height'), 'm')}, seed {int(run['seed'])}, {int(run['asperity_count'])} asperities"
+        f"surface:  period {value('period', 'm')}, rms slope {value('rms_slope'):.4g}, rms height "
+        f"{value('rms_height', 'm')}, seed {int(run['seed'])}, {int(run['asperity_count'])} asperities"
     )
     if reason := why_no_result(run.attrs):
         echo(f"failed:   {printable(reason)}", fg="red")
@@ -88,21 +75,19 @@ def show_run(run, name: str) -> None:
         return
     residual = float(run["residual"].max())
     echo(f"{steps} steps, {run.sizes.get('snapshot', 0)} snapshots, residual at most {residual:.1e} h_rms")
-    for variable, label in _CURVES.items():
-        values = run[variable].values
-        echo(f"{label:>8} {sparkline(values)} {values.min():.3g} to {values.max():.3g}")
+    curves = {label: run[name].values for name, label in CURVES.items()}
     if str(run["boundary"].values) == "free":
-        gap = (run["mean_gap"] / run["rms_height"]).values
-        echo(f" gap/h_rms {sparkline(gap)} {gap.min():.3g} to {gap.max():.3g}")
+        curves["gap/h_rms"] = (run["mean_gap"] / run["rms_height"]).values
+    for label, values in curves.items():
+        echo(f"{label:>10} {sparkline(values)} {values.min():.3g} to {values.max():.3g}")
+    if "gap/h_rms" in curves:
         echo("          u: mean separation from the half-space far away; gap: mean gap between the surfaces")
     if "hysteresis_loss" in run:
-        echo(
-            f"pull-off: {quantity(-value('pull_off_pressure'), 'Pa')} of tension; "
-            f"loss {value('hysteresis_loss'):.3g} J/m²"
-        )
-    echo("")
-    echo("  step      p/(E* h'rms)   A/A0         u/h_rms    spots")
-    for k in _some(steps):
+        tension = quantity(-value("pull_off_pressure"), "Pa")
+        echo(f"pull-off: {tension} of tension; loss {value('hysteresis_loss'):.3g} J/m²")
+    echo("\n  step      p/(E* h'rms)   A/A0         u/h_rms    spots")
+    rows = min(steps, MOST_ROWS)
+    for k in sorted({round(row * (steps - 1) / max(rows - 1, 1)) for row in range(rows)}):
         row = run.isel(step=k)
         echo(
             f"{k:>6}  {float(row['reduced_pressure']):>16.4e}   {float(row['contact_area_fraction']):.4e}   "
@@ -110,14 +95,8 @@ def show_run(run, name: str) -> None:
         )
 
 
-def _some(count: int, most: int = 12) -> list[int]:
-    """At most so many indices, evenly spread from the first to the last."""
-    if count <= most:
-        return list(range(count))
-    return sorted({round(k * (count - 1) / (most - 1)) for k in range(most)})
-
-
-def _show_surface(surface, file) -> None:
+def _print_surface(surface, file: Path) -> None:
+    """Print attributes and statistics of a surface; those of a scan as measured, too."""
     from icha.datasets.surface_file import as_measured
     from icha.figures.style import quantity
 
@@ -140,22 +119,23 @@ def _show_surface(surface, file) -> None:
             echo(printable(f"{variable.attrs.get('long_name', name)}: {text}{unit}"))
     heights = surface["height"].values
     low, high = (quantity(float(height) * scale, "m") for height in (heights.min(), heights.max()))
-    echo(f"heights from {low} to {high}, as {'stored' if scale == 1 else 'measured'}; a line through the middle:")
+    echo(f"heights from {low} to {high}, as {'stored' if scale == 1 else 'measured'}; profile through the centre:")
     echo(f"  {sparkline(heights[len(heights) // 2])}")
 
 
-def _show_campaign(tree, file) -> None:
+def _print_campaign(tree, file: Path) -> None:
+    """Print sizes, models, ranges of results and failures of every study."""
     from icha.datasets.labels import LABELS, labels_at
 
     echo(f"{file}: {printable(tree.attrs.get('title', 'campaign'))}")
     echo(printable(" ".join(str(tree.attrs.get("summary", "")).split())))
     for name, node in tree.children.items():
         study = node.to_dataset()
-        sizes = ", ".join(f"{study.sizes[d]} {d}" for d in LABELS)
+        sizes = ", ".join(f"{study.sizes[dim]} {dim}" for dim in LABELS)
         status = study["status"].values.ravel()
         meanings = study["status"].attrs.get("flag_meanings", "").split()
-        numbers = {word: int((status == k).sum()) for k, word in enumerate(meanings)}
-        counts = ", ".join(f"{number} {word}" for word, number in numbers.items() if number)
+        numbers = {meaning: int((status == k).sum()) for k, meaning in enumerate(meanings)}
+        counts = ", ".join(f"{number} {meaning}" for meaning, number in numbers.items() if number)
         echo(f"\n{printable(f'{name}: {sizes}; {counts}')}")
         echo(f"  models {printable(', '.join(study['model'].values))}")
         for label, variable in (("A/A0", "contact_area_fraction"), ("p*", "reduced_pressure")):
@@ -163,24 +143,23 @@ def _show_campaign(tree, file) -> None:
             if (known := values[values == values]).size:
                 echo(f"  {label:<6} {known.min():.3g} to {known.max():.3g}")
         if reasons := reasons_not_applicable(study):
-            some = printable(". ".join(list(reasons)[:3]))
-            echo(f"  model not applicable to {counted(reasons.total(), 'run')}: {some}", fg="red")
+            first = printable(". ".join(list(reasons)[:3]))
+            echo(f"  model not applicable to {format_count(reasons.total(), 'run')}: {first}", fg="red")
         if "failure" in study:
-            for where in zip(*(study["failure"] != "").values.nonzero(), strict=True):
-                labels = map(str, labels_at(study, where, study["failure"].dims))
-                reason = printable(study["failure"].values[where])
-                echo(f"  failed: {printable(', '.join(labels))}: {reason}", fg="red")
+            for index in zip(*(study["failure"] != "").values.nonzero(), strict=True):
+                labels = ", ".join(map(str, labels_at(study, index, study["failure"].dims)))
+                echo(f"  failed: {printable(labels)}: {printable(study['failure'].values[index])}", fg="red")
 
 
 def sparkline(values) -> str:
-    """A row of bars, at most 60, as high as the values are between their least and their largest."""
+    """Return a row of bars whose heights represent values."""
     import numpy as np
 
     values = np.asarray(values, dtype=float)
     values = values[np.isfinite(values)]
     if not values.size:
         return ""
-    if values.size > _WIDTH:
-        values = values[np.linspace(0, values.size - 1, _WIDTH).round().astype(int)]
+    if values.size > MOST_BARS:
+        values = values[np.linspace(0, values.size - 1, MOST_BARS).round().astype(int)]
     span = np.ptp(values) or 1.0
-    return "".join(_BARS[1 + round((value - values.min()) / span * 7)] for value in values)
+    return "".join(BARS[1 + round((value - values.min()) / span * 7)] for value in values)

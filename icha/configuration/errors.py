@@ -9,7 +9,7 @@ from pydantic import BaseModel
 
 from icha.configuration.campaign import Campaign
 from icha.configuration.surfaces import SURFACE_KINDS
-from icha.support.in_words import printable
+from icha.support.formatting import printable
 from icha.support.values import NAME_PATTERN, NOTHING, Problem
 
 # Of what is wrong with a configuration so much is told at once.

@@ -10,7 +10,7 @@ from icha.asperity.full_contact import FULL_CONTACT_BELOW, full_contact_energy_r
 from icha.configuration.campaign import Campaign
 from icha.configuration.surfaces import SelfAffineSurface
 from icha.contact.models import DEFAULT_MODEL
-from icha.support import in_words
+from icha.support import formatting
 from icha.support.values import Problem, listed, to_number, to_si
 from icha.surfaces.moments import self_affine_full_contact_energy
 
@@ -28,7 +28,7 @@ class Usual(NamedTuple):
     why: str
     or_zero: bool = False
 
-    def holds(self, value: Any) -> bool:
+    def contains(self, value: Any) -> bool:
         """Whether a value, as it is written, is usual; what is no such value at all is refused elsewhere."""
         try:
             number = self._read(value)
@@ -97,7 +97,7 @@ def _unusual(location: tuple, value: Any) -> Iterator[Unusual]:
             yield from _unusual((*location, part), each)
         return
     name = next(part for part in reversed(location) if isinstance(part, str))
-    if name in USUAL and not USUAL[name].holds(value):
+    if name in USUAL and not USUAL[name].contains(value):
         yield Unusual(location, value, USUAL[name])
 
 
@@ -110,9 +110,9 @@ def unusual_topography(location: tuple, section: Any, period: float, rms_slope: 
     period : side of the square, m.
     rms_slope : its own; None if no study asks for it.
     """
-    if getattr(section, "size", section) is None and not _SIDE.holds(f"{period!r} m"):
-        yield Unusual((*location, "size"), in_words.length(period), _SIDE, "as the file has it")
-    if rms_slope is not None and not _SLOPE.holds(rms_slope):
+    if getattr(section, "size", section) is None and not _SIDE.contains(f"{period!r} m"):
+        yield Unusual((*location, "size"), formatting.length(period), _SIDE, "as the file has it")
+    if rms_slope is not None and not _SLOPE.contains(rms_slope):
         about = f"rms slope {rms_slope:.3g}"
         yield Unusual((*location, "height_unit"), about, _SLOPE, _OF_SLOPE)
 

@@ -18,7 +18,7 @@ from icha.configuration.surfaces import SURFACE_KINDS, MaterialSection
 from icha.contact.models import DEFAULT_MODEL, MODELS
 from icha.path.states import AreaFraction, ReducedPressure, Snapshot
 from icha.path.targets import DEFAULT_STEP, MAX_AREA_FRACTION, MAX_REDUCED_PRESSURE, STEP, Path
-from icha.support.rules import NUMBER, SLOPE, Real
+from icha.support.rules import NUMBER, SLOPE, FloatRange
 from icha.support.values import (
     Flag,
     Length,
@@ -48,9 +48,9 @@ def _slope(value: Any) -> float | str:
     except ValueError as error:
         if value == MEASURED:
             return value
-        raise ValueError(f"{error}; allowed: {SLOPE.allowed}, or {MEASURED}") from None
-    if not SLOPE.holds(slope):
-        raise ValueError(f"is out of range; allowed: {SLOPE.allowed}, or {MEASURED}")
+        raise ValueError(f"{error}; allowed: {SLOPE.expected}, or {MEASURED}") from None
+    if not SLOPE.contains(slope):
+        raise ValueError(f"is out of range; allowed: {SLOPE.expected}, or {MEASURED}")
     return slope
 
 
@@ -130,7 +130,7 @@ class _OrEveryStop:
 class TurningPoint(Section):
     """A state at which the path turns: exactly one of the four keys. Loads may be tensile (negative) or zero."""
 
-    reduced_pressure: number(Real(most=MAX_REDUCED_PRESSURE, model_ends=True)) | None = Field(
+    reduced_pressure: number(FloatRange(most=MAX_REDUCED_PRESSURE, model_ends=True)) | None = Field(
         default=None, description="At this p/(E* h'rms)."
     )
     relative_load: number(NUMBER) | None = Field(default=None, description="At this p/E* = F/(E* A0).")

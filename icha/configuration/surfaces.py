@@ -5,8 +5,8 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import BeforeValidator, ConfigDict, Field, WithJsonSchema, field_validator, model_validator
 
-from icha.support import in_words
-from icha.support.rules import GRID, HURST, LENGTH, Integer, Real
+from icha.support import formatting
+from icha.support.rules import GRID, HURST, LENGTH, FloatRange, IntegerRange
 from icha.support.values import (
     PATTERN,
     ROUNDING,
@@ -47,7 +47,7 @@ def _unit_of_length(value: Any) -> float:
         metres = to_si(value, "m") if is_multiple else float(conversion_factor(value, "m"))
     except ValueError as error:
         raise ValueError(f"{error}; {allowed}") from None
-    if not LENGTH.holds(metres):
+    if not LENGTH.contains(metres):
         raise ValueError(f"is not in {LENGTH.interval} m; {allowed}")
     return metres
 
@@ -55,7 +55,7 @@ def _unit_of_length(value: Any) -> float:
 UnitOfLength = Annotated[
     float, BeforeValidator(_unit_of_length), WithJsonSchema({"type": "string", "examples": ["um", "0.1 mm"]})
 ]
-Position = quantity(Real("m", least=0), "20 um")
+Position = quantity(FloatRange("m", least=0), "20 um")
 
 
 def _sides(value: Any) -> tuple[float, float]:
@@ -68,7 +68,7 @@ def _sides(value: Any) -> tuple[float, float]:
         metres = tuple(to_si(side, "m") for side in sides)
     except ValueError as error:
         raise ValueError(f"{error}; {allowed}") from None
-    if not all(map(LENGTH.holds, metres)):
+    if not all(map(LENGTH.contains, metres)):
         raise ValueError(f"is not in {LENGTH.interval} m; {allowed}")
     return metres
 
@@ -92,7 +92,7 @@ class Crop(Section):
 
     def __repr__(self):
         """How messages call it."""
-        side, x, y = map(in_words.length, (self.side, self.x, self.y))
+        side, x, y = map(formatting.length, (self.side, self.x, self.y))
         return f"a square of {side} at x = {x}, y = {y}"
 
 
@@ -112,7 +112,7 @@ class MeasuredSurface(Section):
         "of a microscope that SurfaceTopography can read). `auto` decides by the ending of the file's name "
         "and, for text, by the number of columns.",
     )
-    columns: Annotated[list[integer(Integer(1))], Field(min_length=3, max_length=3)] | None = Field(
+    columns: Annotated[list[integer(IntegerRange(1))], Field(min_length=3, max_length=3)] | None = Field(
         default=None,
         description="Which columns of a text are x, y and z, counted from 1, such as `[1, 2, 3]`. Needed if a line has "
         "more than three numbers.",
@@ -172,7 +172,7 @@ class MeasuredSurface(Section):
         "mirror images form a periodic cell of twice the side; `free`: nothing, that is, one square on a "
         "half-space that extends beyond it."
     )
-    taper: number(Real(above=0, most=0.5)) | None = Field(
+    taper: number(FloatRange(above=0, most=0.5)) | None = Field(
         default=None,
         description="With `window`: the part of the side, at each edge, over which heights fall. Left out: 0.1.",
     )

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import json
 import math
 import os
 import warnings
 from collections.abc import Collection
+from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -34,7 +36,7 @@ def inspect_topographies(campaign: Campaign) -> tuple[dict[str, Topography], lis
             continue
         try:
             if isinstance(surface, MeasuredSurface):
-                found[name] = _scanned(surface, with_slope=name in asking)
+                found[name] = inspect_scan(surface, with_slope=name in asking)
             else:
                 found[name] = _mapped(surface, with_slope=name in asking, with_energy=name in adhering)
         except (ValueError, MemoryError) as error:
@@ -46,13 +48,27 @@ def inspect_topographies(campaign: Campaign) -> tuple[dict[str, Topography], lis
     return found, wrong
 
 
-def _scanned(surface: MeasuredSurface, *, with_slope: bool) -> Topography:
-    # Slow to import, and not for every campaign.
-    from icha.surfaces.measured.topography import topography_facts
+def inspect_scan(surface: MeasuredSurface, *, with_slope: bool = True) -> Topography:
+    """Return facts of a prepared scan, which are known already if the file has not changed."""
+    try:
+        stat = os.stat(surface.path)
+        version = stat.st_mtime_ns, stat.st_size
+    except (OSError, ValueError):  # reading the file reports what is wrong
+        version = None
+    facts = _facts(surface.path, version, json.dumps(surface.preparation, sort_keys=True))
+    return facts if with_slope else facts._replace(rms_slope=None)
 
-    facts = topography_facts(surface.path, surface.preparation)
-    slope = _rounded(facts.rms_slope) if with_slope else None
-    return Topography(facts.grid, facts.period, slope, facts.source_sha256, facts.full_contact_energy)
+
+@lru_cache(maxsize=256)
+def _facts(path: str, version: tuple[int, int] | None, preparation: str) -> Topography:
+    """Facts of a prepared topography, which are kept until the file has another version (time and size)."""
+    # Slow to import, and not needed for every campaign.
+    from icha.surfaces.measured.topography import prepared_topography
+
+    prepared = prepared_topography(path, json.loads(preparation))
+    surface = prepared.surface
+    energy = surface.full_contact_energy / surface.rms_slope**2
+    return Topography(surface.grid, surface.period, _rounded(surface.rms_slope), prepared.source_sha256, energy)
 
 
 def _mapped(surface: FileSurface, *, with_slope: bool, with_energy: bool) -> Topography:

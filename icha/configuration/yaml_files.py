@@ -12,7 +12,7 @@ import yaml
 from icha.configuration.campaign import Defaults
 from icha.configuration.errors import ConfigurationError
 from icha.configuration.surfaces import SURFACE_KINDS
-from icha.support import in_words
+from icha.support import formatting
 from icha.support.input_files import problem_with_path
 from icha.support.values import NOTHING, Problem
 
@@ -54,7 +54,7 @@ def _text_of(path: Path) -> str:
     except OSError as error:
         raise ConfigurationError(f"{path}: {error.strerror}; allowed: a readable YAML file") from None
     if len(content) > _MOST_BYTES:
-        raise ConfigurationError(f"{path}: is longer than {in_words.size(_MOST_BYTES)}; allowed: a shorter YAML file")
+        raise ConfigurationError(f"{path}: is longer than {formatting.size(_MOST_BYTES)}; allowed: a shorter YAML file")
     if content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         raise ConfigurationError(f"{path}: is text in UTF-16; allowed: a YAML file saved in UTF-8")
     if b"\0" in content:
@@ -153,7 +153,7 @@ def dumped(content: Mapping, origin: str) -> str:
     if len(text.encode()) > _MOST_BYTES:
         raise ConfigurationError(
             f"{origin}: with a line for each value, as it is kept with the results, is longer than "
-            f"{in_words.size(_MOST_BYTES)}; allowed: fewer values, such as ranges of seeds"
+            f"{formatting.size(_MOST_BYTES)}; allowed: fewer values, such as ranges of seeds"
         )
     return text
 

@@ -1,1 +1,1 @@
-"""What every model of a contact has: its interface, events, failures, and the bins of its distributions."""
+"""Interface of contact models: states, events, errors, bins of distributions, and checkpoints."""

@@ -1,25 +1,25 @@
-"""The contact models that a run may be computed with: everything that is known of a model without its solver.
+"""Records of the contact models, without their solvers.
 
-Nothing here imports a solver, so that what only names models (figures, plans, configurations) does not change with one.
-What a model costs is in `icha.planning.costs`, and how figures draw it in `icha.figures.looks`: a change there must
-not compute runs again.
+This module imports no solver, so that the fingerprints of figures, plans and configurations do not depend on one. The
+cost of a model is in `icha.planning.costs`, and how figures draw it in `icha.figures.looks`: a change there must not
+recompute runs.
 """
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-# Largest error of an equilibrium of asperities, in units of h_rms.
+# Largest error of an equilibrium of asperities, in h_rms.
 RESIDUAL_TOLERANCE = 1e-9
-# Of what a load is made up of, the part below which it counts as none when its error is measured.
+# Load over the attraction and repulsion that make it up, below which its error is measured relative to those.
 SMALLEST_LOAD = 1e-4
-# Without adhesion a contact counted in cells changes by whole cells: an area that is held is met to so many, and to
-# this part of it.
-HELD_CELLS, HELD_PART = 2.0, 0.1
+# Largest error of a prescribed area without adhesion where contact is counted in whole cells: in cells, and relative to
+# the area.
+AREA_TOLERANCE_CELLS, AREA_TOLERANCE_PART = 2.0, 0.1
 
 
 class Paper(NamedTuple):
-    """A paper on arXiv; the authors by given and family names."""
+    """Paper on arXiv; each author is a pair of given and family names."""
 
     authors: tuple[tuple[str, str], ...]
     title: str
@@ -28,18 +28,17 @@ class Paper(NamedTuple):
 
     @property
     def address(self) -> str:
-        """Where the paper is."""
+        """Address of the paper."""
         return f"https://arxiv.org/abs/{self.arxiv}"
 
     @property
     def line(self) -> str:
-        """The paper as it is cited in a text."""
+        """Citation of the paper in a text."""
         authors = " and ".join(f"{given[0]}. {family}" for given, family in self.authors)
         return f"{authors}, {self.title}, arXiv:{self.arxiv} ({self.year})"
 
 
-# The paper of the asperity model, which whoever uses data of the model builds on. Volume and pages of its printed
-# version could not be verified and are left out.
+# Paper of the asperity model. Volume and pages of the printed version could not be verified and are left out.
 MODEL_PAPER = Paper(
     (("Guido", "Violano"), ("Luciano", "Afferrante")),
     "Modeling the adhesive contact of rough soft media with an advanced asperity model",
@@ -52,13 +51,13 @@ MODEL_PAPER = Paper(
 class PathAccuracy:
     """Accuracy to which a path resolves what a model does between two equilibria.
 
-    Parameters
+    Attributes
     ----------
-    event : separation within which an event that changes the pressure is located, in units of h_rms.
-    loss : part of the work and losses so far that the events of one step may leave unknown.
-    balance : part of the work so far by which work and energy of a step without events may disagree.
-    tension : part of the largest tension so far by which the largest one may be missed where the path is smooth.
-    predicts_steps : whether the length of a step follows from the errors of the one before; else it doubles.
+    event : separation within which an event that changes the pressure is located, in h_rms.
+    loss : largest unknown work of one step with events, relative to the work so far.
+    balance : largest difference between work and change of energy in a long step without events, likewise.
+    tension : largest error of the largest tension between two equilibria without an event, relative to it.
+    predicts_steps : whether the length of a step follows from the errors of the one before; otherwise it doubles.
     """
 
     event: float = 1e-12
@@ -70,26 +69,25 @@ class PathAccuracy:
 
 @dataclass(frozen=True)
 class Model:
-    """A contact model.
+    """Record of a contact model.
 
-    Parameters
+    Attributes
     ----------
-    words : its name in sentences and legends, a plural.
-    title : of a run, before the names of surface and material.
-    method : for the summary of a run.
+    words : name of the model in sentences and legends, in the plural.
+    title : title of a run, before the names of surface and material.
+    method : method in the summary of a run.
     references : publications of its methods, separated by "; ".
-    module : name of the module whose `contact_of(surface, material)` makes the contact, a
-        `icha.contact.model.ContactModel`.
-    folder : of its runs, beside those of the default model; ends with a slash unless it is empty.
-    variables : what its runs have besides those of all models: dimensions, unit, long name and type by name.
+    module : module whose `contact_of(surface, material)` returns an `icha.contact.model.ContactModel`.
+    folder : folder of its runs beside those of the default model; ends with a slash unless it is empty.
+    variables : variables that only its runs have: dimensions, unit, long name and type by name.
     stiffness_error : largest relative error of the contact stiffness.
-    by_summits : whether summits stand for the surface.
-    by_cells : whether contact is counted in cells of the grid: its runs then have a map of the contact.
+    by_summits : whether summits represent the surface.
+    by_cells : whether contact is counted in cells of the grid; its runs then have a map of the contact.
     unites : whether spots unite by a rule, which may cost or gain a little energy.
     periodic_only : whether it cannot press a square with free edges.
-    least_cells : grid cells per shortest wavelength that it needs at least; 0 if it needs none.
-    accuracy : to which a path resolves its events.
-    resumable : whether its equilibria take so long that a run keeps them (`resumable(contact, folder)` of its module).
+    least_cells : smallest number of grid cells per shortest wavelength; 0 for any number.
+    accuracy : accuracy to which a path resolves its events.
+    resumable : whether a run saves checkpoints (`resumable(contact, folder)` of its module).
     """
 
     words: str
@@ -111,9 +109,9 @@ class Model:
 
 _WU = "J.-J. Wu, J. Phys. D: Appl. Phys. 43 (2010) 415303"
 _MAP = ("snapshot", "row", "column")
-# The model of runs that name none, and the one that others are compared with.
+# Model of runs that name no model, and model that others are compared with.
 DEFAULT_MODEL, REFERENCE_MODEL = "asperities", "boundary_elements"
-# By their names in configurations, in files and in `icha.simulate`.
+# Models by their names in configurations, in files and in `icha.simulate`.
 MODELS = {
     DEFAULT_MODEL: Model(
         words="asperities",
@@ -156,7 +154,7 @@ MODELS = {
         by_cells=True,
         periodic_only=True,
         least_cells=4,
-        # Fronts that hop from cell to cell lose energy in steps that only a finer grid resolves.
+        # Fronts that hop from cell to cell lose energy that only a finer grid would resolve.
         accuracy=PathAccuracy(event=1e-5, loss=1e-4, balance=1e-5, tension=1e-5, predicts_steps=True),
         resumable=True,
     ),
@@ -164,10 +162,10 @@ MODELS = {
 
 
 def model_of(attributes: Mapping[str, str]) -> Model:
-    """The model of a run with these global attributes."""
+    """Return the model of a run with these global attributes."""
     return MODELS[attributes.get("contact_model", DEFAULT_MODEL)]
 
 
-def first_of(models: Iterable[str]) -> str:
-    """The one of some models that stands for all of them where only one is shown."""
+def first_model(models: Iterable[str]) -> str:
+    """Return the first of some models in the order of `MODELS`, where only one is shown."""
     return min(models, key=list(MODELS).index)

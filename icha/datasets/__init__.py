@@ -1,1 +1,1 @@
-"""What is kept: variables, attributes and netCDF files of surfaces, runs and campaigns."""
+"""Results as files: variables, attributes and netCDF files of surfaces, runs and campaigns."""

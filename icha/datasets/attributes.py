@@ -1,8 +1,8 @@
-"""Global attributes of every file, so that it can be found and understood by itself, and what they say of runs.
+"""Global attributes of every file, by which it can be found and understood, and the status of runs in attributes.
 
 They are those of the CF conventions, section 2.6.2, and of the Attribute Convention for Data Discovery (ACDD 1.3) as
-far as they apply. Those of place and time do not; who made a file and when is said of a publication as a whole. So ACDD
-is not among the conventions that a file claims to follow.
+far as they apply. Those of place and time do not; makers and date belong to a publication as a whole. Therefore files
+do not claim to follow ACDD.
 """
 
 from collections import Counter
@@ -23,18 +23,18 @@ INPUT, COMPUTED, COLLECTED, DERIVED, THEORY = (
 
 
 def why_no_result(attrs: Mapping) -> str:
-    """Return why a run is no result, by its attributes: it ended early, or its checks failed; "" if it is one."""
+    """Explain from a run's attributes why it is not a result (it ended early, or checks failed); "" if it is one."""
     return str(attrs.get("incomplete") or attrs.get("failed_checks", ""))
 
 
 def reasons_not_applicable(study: Mapping) -> Counter[str]:
-    """Count the runs of a study to which their model is not applicable, by the reason; none in earlier versions."""
+    """Count the runs of a study to which their model is not applicable, by reason; earlier versions have none."""
     if "applicability" not in study:
         return Counter()
     return Counter(filter(None, study["applicability"].values.ravel().astype(str).tolist()))
 
 
-def discovery(
+def file_attributes(
     title: str,
     summary: str,
     level: str,
@@ -44,15 +44,15 @@ def discovery(
     references: str = "",
     keywords: Iterable[str] = (),
 ) -> dict[str, str]:
-    """Global attributes of a file.
+    """Return the global attributes of a file.
 
     Parameters
     ----------
-    title, summary : what it holds, in a line and in sentences.
-    level : how far its content is from what was computed, one of the levels here.
+    title, summary : its content, in a line and in sentences.
+    level : one of the processing levels of this module.
     programs : names of the Python packages that computed it; their versions are added.
-    sources : programs with their versions, where others than those installed did it.
-    references : publications of the methods; none if empty.
+    sources : programs with their versions, if others than the installed ones computed it.
+    references : publications of the methods.
     keywords : besides those of all files.
     """
     source = "; ".join([*sources] or [f"{name} {version(name)}" for name in programs])
@@ -70,10 +70,10 @@ def discovery(
     return {name: text for name, text in found.items() if text}
 
 
-def collected(title: str, summary: str, level: str, origins: Iterable[Mapping[str, str]]) -> dict[str, str]:
-    """Global attributes of a file made from datasets with the global attributes `origins`, in any order.
+def combine_attributes(title: str, summary: str, level: str, origins: Iterable[Mapping[str, str]]) -> dict[str, str]:
+    """Return the global attributes of a file made from datasets with the global attributes `origins`, in any order.
 
-    Programs, publications and further keywords are theirs, each once.
+    Programs, publications and further keywords are those of the datasets, each once.
     """
     origins = list(origins)
     sources, references, keywords = (
@@ -81,4 +81,4 @@ def collected(title: str, summary: str, level: str, origins: Iterable[Mapping[st
         for name, mark in (("source", ";"), ("references", ";"), ("keywords", ","))
     )
     further = [word for word in keywords if word not in KEYWORDS]
-    return discovery(title, summary, level, sources=sources, references="; ".join(references), keywords=further)
+    return file_attributes(title, summary, level, sources=sources, references="; ".join(references), keywords=further)

@@ -1,4 +1,4 @@
-"""The builder of datasets: values by name, and a table of the vocabulary that describes them."""
+"""Building datasets from values by name, and a table of the vocabulary that describes them."""
 
 from __future__ import annotations
 
@@ -12,17 +12,14 @@ from icha.datasets.variables.terms import Table, Variable
 if TYPE_CHECKING:
     import xarray as xr
 
-# Lower and upper edge of a bin, as CF has bounds.
-BOUND = "bound"
 
-
-def build(table: Table, values: Mapping[str, Any], attrs: Mapping[str, str]) -> xr.Dataset:
-    """The dataset of some values, in the order of the table, coordinates last.
+def build_dataset(table: Table, values: Mapping[str, Any], attrs: Mapping[str, str]) -> xr.Dataset:
+    """Build a dataset, in the order of the table, coordinates last.
 
     Parameters
     ----------
     table : descriptions of the variables (`icha.datasets.variables`).
-    values : of those variables that the dataset has; numbers, texts or arrays of the shapes of their dimensions.
+    values : numbers, texts or arrays of the variables that the dataset has.
     attrs : global attributes.
 
     Raises
@@ -32,82 +29,57 @@ def build(table: Table, values: Mapping[str, Any], attrs: Mapping[str, str]) -> 
     """
     import xarray as xr  # which takes a while, and the vocabulary needs no more than `bin_table`
 
-    variables = described(table, values)
+    variables = describe_variables(table, values)
     coordinates = {name: variables.pop(name) for name in table if name in variables and table[name].coordinate}
     return xr.Dataset(variables, coordinates, attrs)
 
 
-def described(table: Table, values: Mapping[str, Any]) -> dict[str, xr.Variable]:
-    """Variables of some values with their dimensions, types and attributes, in the order of the table."""
+def describe_variables(table: Table, values: Mapping[str, Any]) -> dict[str, xr.Variable]:
+    """Make variables with dimensions, types and attributes, in the order of the table."""
     if unknown := values.keys() - table.keys():
         raise ValueError(f"variables without a description: {', '.join(sorted(unknown))}")
-    return {name: variable(table[name], values[name]) for name in table if name in values}
+    return {name: make_variable(table[name], values[name]) for name in table if name in values}
 
 
-def variable(description: Variable, values: Any) -> xr.Variable:
-    """A variable with the dimensions, type and attributes of its description."""
+def make_variable(description: Variable, values: Any) -> xr.Variable:
+    """Make a variable with the dimensions, type and attributes of its description."""
     import xarray as xr
 
     dtype = object if description.dtype is str else description.dtype
     return xr.Variable(description.dims, np.asarray(values, dtype), description.attributes)
 
 
-def of(thing: Any, *names: str) -> dict[str, Any]:
-    """Values that a surface, a material or a spectrum has under the names of their variables."""
+def get_values(thing: Any, *names: str) -> dict[str, Any]:
+    """Return attributes of a surface, a material or a spectrum that have the names of variables."""
     return {name: getattr(thing, name) for name in names}
 
 
-def stacked(
+def stack_rows(
     table: Table, rows: Sequence[Mapping[str, Any]], dim: str, sizes: Mapping[str, int] = {}
 ) -> dict[str, np.ndarray]:
-    """Rows of values, one for each position along a dimension, as arrays of all variables that begin with it.
+    """Stack rows of values, one for each position along a dimension, to arrays of the variables that begin with it.
 
-    Parameters
-    ----------
-    sizes : of further dimensions.
+    `sizes` are those of further dimensions.
     """
-    names = [name for name, own in table.items() if own.dims[:1] == (dim,) and name != dim]
+    names = [name for name, described in table.items() if described.dims[:1] == (dim,) and name != dim]
     shapes = {name: (len(rows), *(sizes[each] for each in table[name].dims[1:])) for name in names}
     values = {name: np.array([row[name] for row in rows]).reshape(shapes[name]) for name in names}
     return values | ({dim: np.arange(len(rows))} if dim in table else {})
 
 
-def joined(table: Table, rows: Sequence[Mapping[str, Any]], dim: str, instance: str) -> dict[str, np.ndarray]:
-    """The variables of a table along a ragged dimension, of which every row has as many values as it likes.
+def concatenate_rows(table: Table, rows: Sequence[Mapping[str, Any]], dim: str, instance: str) -> dict[str, np.ndarray]:
+    """Concatenate the variables of a table along a ragged dimension, along which rows have different lengths.
 
-    They stand one after the other, and `<dim>_<instance>` says to which row each belongs.
+    `<dim>_<instance>` is the row of each value.
     """
     index = f"{dim}_{instance}"
-    names = [name for name, own in table.items() if own.dims == (dim,) and name != index]
+    names = [name for name, described in table.items() if described.dims == (dim,) and name != index]
     values = {name: np.concatenate([np.empty(0), *(row[name] for row in rows)]) for name in names}
     return values | {index: np.repeat(np.arange(len(rows)), [len(row[names[0]]) for row in rows])}
 
 
-def bin_table(quantity: str, units: str, over: str = "") -> Table:
-    """Descriptions of the variables that say where the bins of a quantity are.
-
-    `<quantity>_bin_edges` are the edges; `<quantity>_bin_centre`, a coordinate, has `<quantity>_bin_bounds` as its
-    bounds (CF 1.11, section 7.1), which have its units and its long name. In Pa it must not be a coordinate
-    variable, along a dimension of its own name, which CF would take for a height.
-
-    Parameters
-    ----------
-    quantity : what is binned.
-    units : of the edges.
-    over : by what the quantity is divided, if by anything.
-    """
-    over = f" over {over}" if over else ""
-    bins, inside = f"{quantity}_bin", f"{quantity} in the bin{over}"
-    middle = {"bounds": f"{bins}_bounds", "comment": "middle of the bin"}
-    return {
-        f"{bins}_edges": Variable((f"{quantity}_edge",), units, f"edges of the {quantity} bins{over}"),
-        f"{bins}_centre": Variable((bins,), units, inside, further=middle, coordinate=True),
-        f"{bins}_bounds": Variable((bins, BOUND), units, inside),
-    }
-
-
 def bin_values(quantity: str, edges: np.ndarray) -> dict[str, np.ndarray]:
-    """Values of the variables of `bin_table`."""
+    """Return the values of the variables of `bin_table`."""
     return {
         f"{quantity}_bin_edges": edges,
         f"{quantity}_bin_centre": (edges[:-1] + edges[1:]) / 2,

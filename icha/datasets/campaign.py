@@ -15,7 +15,7 @@ from icha.datasets.variables.campaign import COMPUTED_RUNS, FAILED_CHECKS, INCOM
 from icha.datasets.variables.run import FURTHER
 from icha.path.targets import BETWEEN
 
-# What the dataset of a campaign says of a run.
+# Variables of the campaign dataset that describe a run.
 _OF_EVERY_CAMPAIGN = ("status", "step_count", "failure")
 
 
@@ -25,7 +25,7 @@ def campaign_tree(
     design: Iterable[RunLabels | tuple] | None = None,
     attrs: Mapping[str, str] = {},
 ) -> xr.DataTree:
-    """The campaign dataset of some runs in memory; arguments and errors as `campaign_file.write_campaign`."""
+    """Return the campaign dataset of some runs in memory; arguments and errors as `campaign_file.write_campaign`."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "campaign.nc")
         write_campaign(runs, path, design=design, attrs=attrs)
@@ -33,26 +33,26 @@ def campaign_tree(
 
 
 def run_labels(tree: xr.DataTree) -> list[RunLabels]:
-    """Labels of all runs in a campaign dataset, complete or not, in its order."""
+    """List the labels of all runs in a campaign dataset, complete or not, in its order."""
     found = []
     for study, node in tree.children.items():
         found += runs_of_status(node.to_dataset(), study, COMPUTED_RUNS)
     return found
 
 
-def runs_of_status(study: xr.Dataset, name: str, asked: Collection[int]) -> list[RunLabels]:
-    """Labels of the runs of a study whose status is one of those asked for, in the order of the dataset."""
-    there = np.isin(study["status"].transpose(*LABELS).values, tuple(asked))
-    return [RunLabels(name, *labels_at(study, place, LABELS)) for place in np.argwhere(there).tolist()]
+def runs_of_status(study: xr.Dataset, name: str, statuses: Collection[int]) -> list[RunLabels]:
+    """List the labels of the runs of a study with one of these statuses, in the order of the dataset."""
+    found = np.argwhere(np.isin(study["status"].transpose(*LABELS).values, tuple(statuses)))
+    return [RunLabels(name, *labels_at(study, place, LABELS)) for place in found.tolist()]
 
 
 def run_place(study: xr.Dataset, labels: RunLabels) -> dict[str, int]:
-    """Position of a run along the labels of its study's dataset.
+    """Return the position of a run along the labels of its study's dataset.
 
     Raises
     ------
     ValueError
-        If the study has no such value of a label; the message says what it has.
+        If the study has no such value of a label; the message lists its values.
     """
     wanted = {label: getattr(labels, label) for label in LABELS}
     try:
@@ -63,20 +63,20 @@ def run_place(study: xr.Dataset, labels: RunLabels) -> dict[str, int]:
         if label == "rms_slope":
             row = place_of(study, {"surface": labels.surface})
             known = [f"{slope:g}" for slope in slopes_at(study, row) if np.isfinite(slope)]
-        there = ", ".join(map(str, known))
-        raise ValueError(f"study {labels.study}: no {label} {wanted[label]!r}; there are {there}") from None
+        listed = ", ".join(map(str, known))
+        raise ValueError(f"study {labels.study}: no {label} {wanted[label]!r}; expected one of {listed}") from None
 
 
 def select_run(tree: xr.DataTree, labels: RunLabels | tuple) -> xr.Dataset:
-    """Take one run out of a campaign dataset, with the steps that it has and its own spots.
+    """Select one run of a campaign dataset, with its steps and its spots.
 
-    Its attributes give reasons, as those of its file do: `incomplete` why it ended early, `failed_checks` which checks
-    failed, `applicability` why its model is not applicable.
+    Its attributes are those of its file: `incomplete` is why it ended early, `failed_checks` which checks failed,
+    `applicability` why its model is not applicable.
 
     Raises
     ------
     ValueError
-        If the campaign has no such run; the message says what it has.
+        If the campaign has no such run; the message lists what it has.
     """
     variables, attrs = variables_of_run(tree, labels)
     of_study = tree.children[RunLabels(*labels).study].dataset.coords
@@ -85,55 +85,49 @@ def select_run(tree: xr.DataTree, labels: RunLabels | tuple) -> xr.Dataset:
 
 
 def variables_of_run(tree: xr.DataTree, labels: RunLabels | tuple) -> tuple[dict[str, xr.Variable], dict]:
-    """Variables and attributes of `select_run`; for thousands of runs the dataset itself would take too long."""
+    """Return variables and attributes as `select_run` does; for thousands of runs a dataset of each is too slow."""
     labels = RunLabels(*labels)
     if labels.study not in tree.children:
-        raise ValueError(f"no study {labels.study!r}; there are {', '.join(tree.children)}")
+        raise ValueError(f"no study {labels.study!r}; expected one of {', '.join(tree.children)}")
     study = tree.children[labels.study].dataset
     index = run_place(study, labels)
     place = tuple(index.values())
     status, steps, failure = (study.variables[name].transpose(*LABELS)[place] for name in _OF_EVERY_CAMPAIGN)
     if int(status) in (MISSING, NOT_IN_DESIGN):
         raise ValueError(f"{labels}: this run is {'missing' if int(status) == MISSING else 'not in the design'}")
-    part = (
-        index | {"step": slice(0, int(steps))} | {dim: _own(study, dim, place) for dim in RAGGED if dim in study.dims}
-    )
+    index |= {dim: _ragged_slice(study, dim, place) for dim in RAGGED if dim in study.dims}
+    index |= {"step": slice(0, int(steps))}
     incomplete = int(status) == INCOMPLETE
     if incomplete:
-        there = study.variables["overlap_fraction"].transpose(*LABELS, "snapshot")[place].values
-        part["snapshot"] = np.flatnonzero(np.isfinite(there))
-    of_others = {name for model, names in FURTHER.items() if model != labels.model for name in names}
-    left_out = {
-        *_OF_EVERY_CAMPAIGN,
-        "applicability",
-        *of_others,
-        *(f"{dim}_{label}" for dim in RAGGED for label in LABELS),
-    }
+        overlap = study.variables["overlap_fraction"].transpose(*LABELS, "snapshot")[place].values
+        index["snapshot"] = np.flatnonzero(np.isfinite(overlap))
+    left_out = {*_OF_EVERY_CAMPAIGN, "applicability", *(f"{dim}_{label}" for dim in RAGGED for label in LABELS)}
+    left_out |= {name for model, names in FURTHER.items() if model != labels.model for name in names}
     variables = {}
-    for name, variable in study.variables.items():
+    for name, of_study in study.variables.items():
         if name in left_out:
             continue
-        own = variable[tuple(part.get(dim, slice(None)) for dim in variable.dims)].load()
-        if incomplete and own.ndim == 0 and own.dtype.kind == "f" and np.isnan(own.values):
+        variable = of_study[tuple(index.get(dim, slice(None)) for dim in of_study.dims)].load()
+        if incomplete and variable.ndim == 0 and variable.dtype.kind == "f" and np.isnan(variable.values):
             continue  # not known of a run that ended early
-        if own.dtype.kind == "f" and own.encoding.get("dtype") == np.dtype("int32"):
-            own = xr.Variable(own.dims, own.values.astype(np.int32), own.attrs)  # a float for other runs that lack it
+        if variable.dtype.kind == "f" and variable.encoding.get("dtype") == np.dtype("int32"):
+            # Stored as a float because other runs lack it.
+            variable = xr.Variable(variable.dims, variable.values.astype(np.int32), variable.attrs)
         if incomplete and name in ("snapshot", "spot_snapshot"):
-            # Its snapshots are counted without those that only others have.
-            own = xr.Variable(own.dims, np.searchsorted(part["snapshot"], own.values), own.attrs)
-        variables[name] = own
+            # Number its snapshots without those that only other runs have.
+            numbers = np.searchsorted(index["snapshot"], variable.values)
+            variable = xr.Variable(variable.dims, numbers, variable.attrs)
+        variables[name] = variable
     attrs = study.attrs | {"contact_model": labels.model}
-    if incomplete:
-        attrs["incomplete"] = failure.item()
-    if int(status) == FAILED_CHECKS:
-        attrs["failed_checks"] = failure.item()
+    if int(status) in (INCOMPLETE, FAILED_CHECKS):
+        attrs["incomplete" if incomplete else "failed_checks"] = failure.item()
     if "applicability" in study.variables:  # which campaigns of earlier versions lack
         attrs["applicability"] = study.variables["applicability"].transpose(*LABELS)[place].item()
     return variables, attrs
 
 
-def _own(study, dim, place):
-    """Where a run's spots or events are: all runs' follow each other in the order of the labels."""
+def _ragged_slice(study: xr.Dataset, dim: str, place: tuple[int, ...]) -> slice:
+    """Locate the spots or events of a run; those of all runs stand in the order of the labels."""
     begin, end = 0, study.sizes[dim]
     for label, k in zip(LABELS, place, strict=True):
         column = study.variables[f"{dim}_{label}"].values[begin:end]
@@ -142,39 +136,38 @@ def _own(study, dim, place):
 
 
 def reduced_gap(data: xr.Dataset) -> xr.DataArray:
-    """Mean gap over rms height: what figures and comparisons show as separation of a run or of all runs of a study.
+    """Mean gap over rms height, which figures show as the separation of a run or of all runs of a study.
 
-    Of a periodic surface it is the mean separation over the rms height; of a free square, whose separation is that of
-    the half-space far away, it is the one that can be compared with others.
+    For a periodic surface it is the mean separation over the rms height. For a free square, whose separation is that of
+    the half-space far away, it is the quantity that can be compared with other surfaces.
     """
     gap = (data["mean_gap"] / data["rms_height"]).transpose(*data["reduced_separation"].dims)
     return data["reduced_separation"].where(data["boundary"] != "free", gap)
 
 
 def loading_stops(data: xr.Dataset) -> xr.DataArray:
-    """Which steps of a run, or of all runs of a study, are stops of the first loading, and not between stops."""
+    """Mark the steps of a run, or of all runs of a study, that are stops of the first loading."""
     return (data["leg"] == 0) & (data["step_kind"] != BETWEEN)
 
 
 def find_snapshot(run: xr.Dataset, kind: str | None = None, target: float | None = None) -> int:
-    """Position of the snapshot of a kind and target; the first one of the kind, or of all, if nothing more is said.
+    """Find the first snapshot of a kind and target, of any kind or any target if left out; return its position.
 
     Raises
     ------
     ValueError
         If there is none; the message lists the run's snapshots.
     """
-    kinds = [str(value) for value in run["snapshot_kind"].values]
-    targets = run["snapshot_target"].values
-    for k, (own_kind, own_target) in enumerate(zip(kinds, targets, strict=True)):
-        if kind in (None, own_kind) and (target is None or np.isclose(own_target, target, rtol=1e-9)):
+    snapshots = list(zip(run["snapshot_kind"].values.astype(str), run["snapshot_target"].values, strict=True))
+    for k, (found, value) in enumerate(snapshots):
+        if kind in (None, found) and (target is None or np.isclose(value, target, rtol=1e-9)):
             return k
-    there = ", ".join(f"{k} {t:g}" for k, t in zip(kinds, targets, strict=True)) or "none"
-    asked = kind or "any kind"
-    raise ValueError(f"no snapshot of {asked}{'' if target is None else f' {target:g}'}; there are: {there}")
+    wanted = f"{kind or 'any kind'}{'' if target is None else f' {target:g}'}"
+    listed = ", ".join(f"{found} {value:g}" for found, value in snapshots) or "none"
+    raise ValueError(f"no snapshot of {wanted}; the run has: {listed}")
 
 
 def spots_of(run: xr.Dataset, snapshot: int) -> xr.Dataset:
-    """The spots of one snapshot of a run."""
-    own = [name for name, variable in run.variables.items() if variable.dims == ("spot",)]
-    return run[own].isel(spot=np.flatnonzero(run["spot_snapshot"].values == snapshot))
+    """Return the spots of one snapshot of a run."""
+    names = [name for name, variable in run.variables.items() if variable.dims == ("spot",)]
+    return run[names].isel(spot=np.flatnonzero(run["spot_snapshot"].values == snapshot))

@@ -9,8 +9,7 @@ import itertools
 import math
 import os
 import tempfile
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import BinaryIO, NamedTuple
 
@@ -18,8 +17,8 @@ import netCDF4
 import numpy as np
 import xarray as xr
 
-from icha.datasets.attributes import COLLECTED, collected
-from icha.datasets.campaign_runs import Arrangement, Entry, arranged, spooled, values_back
+from icha.datasets.attributes import COLLECTED, combine_attributes
+from icha.datasets.campaign_runs import Arrangement, Entry, arrange_runs, load_values, spool_runs
 from icha.datasets.files import (
     FLOAT_FILL,
     INTEGER_FILL,
@@ -32,7 +31,7 @@ from icha.datasets.files import (
 )
 from icha.datasets.labels import LABELS, RunLabels
 from icha.datasets.results import COMPRESSION, LEAST_COMPRESSED
-from icha.datasets.variables.campaign import CAMPAIGN, RAGGED, place_of
+from icha.datasets.variables.campaign import CAMPAIGN, RAGGED, index_variable
 from icha.datasets.variables.run import FURTHER
 from icha.support.atomic_files import whole_file
 
@@ -47,116 +46,133 @@ _LAYOUT = (
     "along that dimension each belongs, from 0; those that agree in all of them are of one snapshot of one run."
 )
 _OWN_SLOPES = {"comment": "each surface has slopes of its own, along the dimension rms_slope in ascending order"}
-# Of what runs share, values at so many places are kept at most.
-_LATEST = 256
 _STUDIES = "The runs of every study, a group for each."
+# Who opens the root of the file alone sees nothing else.
+_ACCESS = (
+    "The data are in the groups, one for each study: {0}. With Python's xarray: "
+    "xarray.open_datatree(FILE)['{1}'].to_dataset(), or xarray.open_dataset(FILE, group='{1}')"
+)
+# Variables of reasons, one for each run.
+_REASONS = ("failure", "applicability")
 
 
 class Column(NamedTuple):
-    """A variable of the runs in the file: the labels it varies with, its own dimensions, what stands for no value."""
+    """A variable of the runs in the file.
+
+    Attributes
+    ----------
+    variable : the variable.
+    along : the labels that it varies with.
+    dims : its further dimensions.
+    fill : what stands for no value.
+    """
 
     variable: netCDF4.Variable
     along: tuple[str, ...]
-    own: tuple[str, ...]
+    dims: tuple[str, ...]
     fill: float | int | bytes
 
-    def fitting(self, dims: tuple[str, ...], values: np.ndarray) -> np.ndarray:
-        """A run's values with their dimensions in the order of the file's, texts of the file's width."""
-        if dims != self.own:
-            values = np.moveaxis(values, [dims.index(dim) for dim in self.own], range(len(self.own)))
-        if values.dtype.kind == "S":
-            whole = np.zeros((*values.shape[:-1], self.variable.shape[-1]), "S1")
-            whole[..., : values.shape[-1]] = values
-            return whole
-        return values
+    def pad(self, values: np.ndarray) -> np.ndarray:
+        """Pad texts of a run to the width that they have in the file; return numbers as they are."""
+        if values.dtype.kind != "S":
+            return values
+        padded = np.zeros((*values.shape[:-1], self.variable.shape[-1]), "S1")
+        padded[..., : values.shape[-1]] = values
+        return padded
 
-    def places(self, snapshots: list[int], values: np.ndarray) -> tuple[list[int] | slice, ...]:
-        """Where a run's values stand along the own dimensions; its snapshots are those at the positions given."""
-        sizes = zip(self.own, values.shape, strict=False)
+    def slots(self, snapshots: list[int], values: np.ndarray) -> tuple[list[int] | slice, ...]:
+        """Index a run's values along `dims`; `snapshots` are the positions of its snapshots in the file."""
+        sizes = zip(self.dims, values.shape, strict=False)
         return tuple(snapshots if dim == "snapshot" else slice(0, size) for dim, size in sizes)
 
 
-@dataclass(frozen=True, eq=False)
-class Group:
-    """A study's group, defined and empty.
+class Group(NamedTuple):
+    """The group of a study, defined and empty.
 
-    study : what belongs there. block : how many neighbouring runs are written at once, along every label. columns : the
-    variables of the runs. places : of what is ragged, by dimension and label, to which run it belongs. known :
-    variables whose values need no run, with these. texts : reasons, by name, with what each of the study's runs has.
+    Attributes
+    ----------
+    study : the runs that belong there.
+    block : how many neighbouring runs are written at once, along every label.
+    columns : the variables of the runs, by name.
+    ragged : the variables along ragged dimensions, by dimension and name.
+    known : variables whose values need no run, with these.
+    texts : reasons, with that of each of the study's runs.
     """
 
     study: Arrangement
     block: tuple[int, ...]
     columns: dict[str, Column]
-    places: dict[tuple[str, str], netCDF4.Variable]
+    ragged: dict[str, dict[str, netCDF4.Variable]]
     known: list[tuple[netCDF4.Variable, np.ndarray]]
     texts: list[tuple[netCDF4.Variable, list[str]]]
 
 
 def define_group(group: netCDF4.Dataset, study: Arrangement, attrs: Mapping[str, str]) -> Group:
-    """Make dimensions, variables and attributes of a study's group; `attrs` are those of the file."""
+    """Define dimensions, variables and attributes of a study's group; `attrs` are those of the file."""
     sample = study.sample
     counts = {dim: int(study.sizes_of(dim).sum()) for dim in RAGGED if dim in sample.dims}
     sizes = dict(zip(LABELS, study.status.shape, strict=True)) | study.sizes | counts
     define_dimensions(group, sizes)
-    own = {"study": study.name} | {name: sample.attrs[name] for name in ("license",) if name in sample.attrs}
-    # Not the checksum of one of its runs.
-    own |= {name: attrs[name] for name in ("config_sha256",) if name in attrs}
-    group.setncatts(collected(f"Study {study.name}", _LAYOUT, COLLECTED, study.origins) | own)
-
+    # The checksum is that of the campaign, and not that of one of the runs.
+    shared = {"license": sample.attrs.get("license"), "config_sha256": attrs.get("config_sha256")}
+    group.setncatts(
+        combine_attributes(f"Study {study.name}", _LAYOUT, COLLECTED, study.origins)
+        | {"study": study.name}
+        | {name: value for name, value in shared.items() if value is not None}
+    )
     names = [name for name in sample.variables if name not in LABELS]
     dims = {name: sum(study.dims_of(name), ()) for name in names} | {label: (label,) for label in LABELS}
-    dims |= {name: CAMPAIGN[name].dims for name in ("status", "step_count", "failure", "applicability")}
+    dims |= {name: CAMPAIGN[name].dims for name in ("status", "step_count", *_REASONS)}
     dims |= {"rms_slope": study.slope_dims}
     coordinates = coordinates_of(sample.variables, {*sample.coords, *LABELS}, dims)
+
+    def attributes_of(name: str, attributes: Mapping) -> dict:
+        return {**attributes, **({"coordinates": coordinates[name]} if name in coordinates else {})}
+
     storage = _Storage.of(study, sizes, names)
-    columns = {}
-    for name in names:
-        if name not in sizes:
-            attributes = (
-                sample[name].attrs
-                | _why_lacking(study, name)
-                | ({"coordinates": coordinates[name]} if name in coordinates else {})
-            )
-            columns[name] = _define_column(group, study, storage, name, attributes)
-    described = {
-        name: CAMPAIGN[name].attributes | ({"coordinates": coordinates[name]} if name in coordinates else {})
-        for name in CAMPAIGN
+    columns = {
+        name: _define_column(
+            group, study, storage, name, attributes_of(name, sample[name].attrs | _why_lacking(study, name))
+        )
+        for name in names
+        if name not in sizes
     }
-    known = [*_define_numbers_along(group, study), *_define_of_campaign(group, study, storage, described)]
+    described = {name: attributes_of(name, CAMPAIGN[name].attributes) for name in CAMPAIGN}
+    known = [*_define_positions(group, study), *_define_of_campaign(group, study, storage, described)]
     texts = [
-        (_define_reasons(group, storage, name, own, described[name]), own)
-        for name, own in (
-            ("failure", study.failures),
-            ("applicability", [entry.applicability for entry in study.entries]),
+        (_define_reasons(group, storage, name, reasons, described[name]), reasons)
+        for name, reasons in zip(
+            _REASONS, (study.failures, [each.applicability for each in study.entries]), strict=True
         )
     ]
-    places = {
-        (dim, label): define_numbers(
-            group, f"{dim}_{label}", (dim,), np.int32, place_of(dim, label).attributes, **storage.options((), (dim,))
-        )
-        for dim in counts
-        for label in LABELS
-    }
-    return Group(study, storage.block, columns, places, known, texts)
+    ragged = {dim: {name: each.variable for name, each in columns.items() if each.dims == (dim,)} for dim in counts}
+    for dim, variables in ragged.items():
+        for label in LABELS:
+            name, options = f"{dim}_{label}", storage.options((), (dim,))
+            variables[name] = define_numbers(
+                group, name, (dim,), np.int32, index_variable(dim, label).attributes, **options
+            )
+    return Group(study, storage.block, columns, ragged, known, texts)
 
 
-@dataclass(frozen=True)
-class _Storage:
-    """How variables of a group are stored: sizes of its dimensions, and how many neighbouring runs make a block."""
+class _Storage(NamedTuple):
+    """How the variables of a group are stored.
+
+    `sizes` are those of its dimensions, `block` is how many neighbouring runs make a block along every label.
+    """
 
     sizes: dict[str, int]
     block: tuple[int, ...]
 
     @classmethod
     def of(cls, study, sizes, names):
-        varying = [own for along, own in map(study.dims_of, names) if along == LABELS]
-        largest = max(math.prod(sizes[dim] for dim in own) for own in varying)
+        varying = [dims for along, dims in map(study.dims_of, names) if along == LABELS]
+        largest = max(math.prod(sizes[dim] for dim in dims) for dims in varying)
         return cls(sizes, _block(sizes, LABELS, largest))
 
-    def options(self, along, own, width=None):
-        """Options of a variable: none if it is small, else it is compressed, block by block."""
-        shape = tuple(self.sizes[dim] for dim in own) + (() if width is None else (width,))
+    def options(self, along, dims, width=None):
+        """Return the options of a variable: none if it is small, else it is compressed, block by block."""
+        shape = tuple(self.sizes[dim] for dim in dims) + (() if width is None else (width,))
         if math.prod(self.sizes[dim] for dim in along) * math.prod(shape) < LEAST_COMPRESSED:
             return {}
         block = self.block if along == LABELS else _block(self.sizes, along, math.prod(shape))
@@ -166,7 +182,7 @@ class _Storage:
 
 
 def _block(sizes, along, values):
-    """How many neighbouring runs make a block, along every label; of each there are so many values."""
+    """Count the neighbouring runs that make a block, along every label; each has so many values."""
     left = max(1, min(_RUNS_IN_BLOCK, VALUES_IN_BLOCK // max(1, values)))
     block = []
     for size in reversed([sizes[label] for label in along]):
@@ -176,49 +192,50 @@ def _block(sizes, along, values):
 
 
 def _why_lacking(study, name):
-    """Attribute of a variable that some of the study's models do not have."""
-    owners = [model for model, own in FURTHER.items() if name in own]
+    """Return the attribute of a variable that some of the study's models do not have."""
+    owners = [model for model, names in FURTHER.items() if name in names]
     lacking = [model for model in study.axes["model"] if owners and model not in owners]
     return {"missing": f"of runs by {' and '.join(lacking)}"} if lacking else {}
 
 
 def _define_column(group, study, storage, name, attributes):
-    """Make a variable of the runs."""
-    along, own = study.dims_of(name)
+    """Define a variable of the runs."""
+    along, dims = study.dims_of(name)
     dtype = study.sample[name].dtype
     if is_text(dtype):
         width = study.widths[name]
-        options = storage.options(along, own, width)
-        return Column(define_text(group, name, along + own, width, attributes, **options), along, own, b"")
-    options, lacks = storage.options(along, own), study.lacks(name)
+        options = storage.options(along, dims, width)
+        return Column(define_text(group, name, along + dims, width, attributes, **options), along, dims, b"")
+    options, lacks = storage.options(along, dims), study.lacks(name)
     fill = FLOAT_FILL
     if dtype.kind != "f":
         # 32 bits, which every netCDF tool reads, or flags.
         dtype = np.dtype(np.int8 if dtype == np.int8 and not lacks else np.int32)
         fill = INTEGER_FILL if lacks else 0
     options |= {"fill_value": fill} if lacks else {}
-    return Column(define_numbers(group, name, along + own, dtype, attributes, **options), along, own, fill)
+    return Column(define_numbers(group, name, along + dims, dtype, attributes, **options), along, dims, fill)
 
 
-def _define_reasons(group, storage, name, own, attributes):
-    """Make a variable of texts, one for each run, as wide as the longest of its `own` texts."""
-    width = max(1, *(len(text.encode()) for text in own))
+def _define_reasons(group, storage, name, reasons, attributes):
+    """Define a variable of texts, one for each run, as wide as the longest of them."""
+    width = max(1, *(len(text.encode()) for text in reasons))
     return define_text(group, name, LABELS, width, attributes, **storage.options(LABELS, (), width))
 
 
-def _define_numbers_along(group, study):
-    """Make the variables that number the positions along the dimensions of runs, and give them with their values."""
-    for dim, size in study.sizes.items():
-        if dim in study.sample.variables:
-            variable = define_numbers(group, dim, (dim,), np.int32, study.sample[dim].attrs)
-            yield variable, np.arange(size, dtype=np.int32)
+def _define_positions(group, study):
+    """Define the variables that number the positions along the dimensions of runs; return them with their values."""
+    return [
+        (define_numbers(group, dim, (dim,), np.int32, study.sample[dim].attrs), np.arange(size, dtype=np.int32))
+        for dim, size in study.sizes.items()
+        if dim in study.sample.variables
+    ]
 
 
 def _define_of_campaign(group, study, storage, described):
-    """Make the variables that say what runs there are, and give them with their values."""
+    """Define the variables that list the runs of the study; yield them with their values."""
     values = {"status": study.status, "step_count": study.step_count, **study.axes}
     for name, (dims, _, _, dtype, *_) in CAMPAIGN.items():
-        if name in ("failure", "applicability"):
+        if name in _REASONS:
             continue
         attributes = described[name]
         if dtype is str:
@@ -280,45 +297,54 @@ def write_campaign(
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryFile(dir=path.parent) as spool:
-        studies = arranged(spooled(runs, spool, settings), design)
+        studies = arrange_runs(spool_runs(runs, spool, settings), design)
         with whole_file(path) as temporary, netCDF4.Dataset(temporary, "w") as file:
             origins = [each for study in studies for each in study.origins]
-            own = collected("Campaign of rough contacts", _STUDIES, COLLECTED, origins)
-            file.setncatts(own | {"comment": _where([study.name for study in studies])} | dict(attrs))
+            names = [study.name for study in studies]
+            described = combine_attributes("Campaign of rough contacts", _STUDIES, COLLECTED, origins)
+            file.setncatts(described | {"comment": _ACCESS.format(", ".join(names), names[0])} | dict(attrs))
             # All is defined before anything is written, which is quicker: see icha.datasets.files.
             groups = [define_group(file.createGroup(study.name), study, attrs) for study in studies]
             for group in groups:
                 _write(group, spool)
 
 
-def _where(studies: list[str]) -> str:
-    """Where in the file the data are: who opens its root alone sees nothing else."""
-    return (
-        f"The data are in the groups, one for each study: {', '.join(studies)}. With Python's xarray: "
-        f"xarray.open_datatree(FILE)['{studies[0]}'].to_dataset(), or xarray.open_dataset(FILE, group='{studies[0]}')"
-    )
-
-
 def _write(group: Group, spool: BinaryIO) -> None:
     """Write all values of a group, those of the runs from the spool, block by block."""
     for variable, values in group.known:
         variable[...] = values
-    for variable, own in group.texts:
-        for position, reason in zip(group.study.positions, own, strict=True):
+    for variable, reasons in group.texts:
+        for position, reason in zip(group.study.positions, reasons, strict=True):
             if reason:
                 text = characters(np.array(reason))
                 variable[(*position, slice(0, len(text)))] = text
-    common = {name: _Common(name, column) for name, column in group.columns.items() if _is_common(column)}
-    ragged = _Ragged(group)
-    for start, members in _blocks(group):
-        _write_block(group, start, members, spool, common, ragged)
-    ragged.flush()
-    for each in common.values():
+    shared = {
+        name: _SharedVariable(name, column)
+        for name, column in group.columns.items()
+        if column.along != LABELS and not set(column.dims) & set(RAGGED)
+    }
+    ragged = [_RaggedVariables(dim, variables) for dim, variables in group.ragged.items()]
+    placed = zip(group.study.entries, map(tuple, group.study.positions.tolist()), strict=True)
+    for start, members in itertools.groupby(
+        placed, key=lambda each: tuple(k // n * n for k, n in zip(each[1], group.block, strict=True))
+    ):
+        _write_block(group, start, members, spool, shared, ragged)
+    for each in ragged:
         each.flush()
+    for each in shared.values():
+        if not each.is_large:
+            each.column.variable[...] = each.values
 
 
-def _write_block(group, start, members, spool, common, ragged):
-    """Write a block of neighbouring runs, but for what is kept for later: what they share, and what is ragged."""
+def _write_block(
+    group: Group,
+    start: tuple[int, ...],
+    members: Iterable[tuple[Entry, tuple[int, ...]]],
+    spool: BinaryIO,
+    shared: Mapping[str, "_SharedVariable"],
+    ragged: Iterable["_RaggedVariables"],
+) -> None:
+    """Write a block of neighbouring runs, except shared and ragged variables, which are kept for later."""
     corner = zip(start, group.block, group.study.status.shape, strict=True)
     box = tuple(slice(k, min(k + n, size)) for k, n, size in corner)
     lengths = tuple(side.stop - side.start for side in box)
@@ -328,119 +354,99 @@ def _write_block(group, start, members, spool, common, ragged):
         if column.along == LABELS
     }
     for entry, position in members:
-        at = [group.study.snapshots[each] for each in entry.snapshots]
+        snapshots = [group.study.snapshots[each] for each in entry.snapshots]
         place = dict(zip(LABELS, position, strict=True))
         values = {
-            name: group.columns[name].fitting(*own)
-            for name, own in values_back(entry, spool).items()
+            name: group.columns[name].pad(v)
+            for name, (_, v) in load_values(entry, spool).items()
             if name in group.columns
         }
         for name, v in values.items():
             column = group.columns[name]
-            own = column.places(at, v)
+            slots = column.slots(snapshots, v)
             if name in block:
-                block[name][(*np.subtract(position, start), ...)][own] = v
-            elif name in common:
-                common[name].put(entry.labels, tuple(place[label] for label in column.along), own, v)
-        ragged.add(position, values, at)
+                block[name][(*np.subtract(position, start), ...)][slots] = v
+            elif name in shared:
+                shared[name].put(entry.labels, tuple(place[label] for label in column.along), slots, v)
+        for each in ragged:
+            each.add(position, values, snapshots)
     for name, values in block.items():
         group.columns[name].variable[box] = values
 
 
-def _is_common(column):
-    return column.along != LABELS and not set(column.own) & set(RAGGED)
+class _SharedVariable:
+    """A variable that several runs share: the first of them gives its values, the others must have the same.
 
-
-def _blocks(group: Group) -> Iterator[tuple[tuple[int, ...], list[tuple[Entry, tuple[int, ...]]]]]:
-    """Where every block begins that has runs, and these with their positions."""
-    placed = zip(group.study.entries, map(tuple, group.study.positions.tolist()), strict=True)
-    for start, members in itertools.groupby(
-        placed, key=lambda each: tuple(k // n * n for k, n in zip(each[1], group.block, strict=True))
-    ):
-        yield start, list(members)
-
-
-class _Common:
-    """A variable that several runs share: the first of them says what it is, the others must agree."""
+    Attributes
+    ----------
+    name, column : the variable.
+    values : of all places; few enough to stay in memory.
+    known : which places, and snapshots, have values.
+    is_large : True for arrays along labels, which are written one by one; others are written at the end.
+    """
 
     def __init__(self, name: str, column: Column):
-        """Nothing is known yet."""
+        """Begin without values."""
         self.name, self.column = name, column
-        shape, at = column.variable.shape, column.own.index("snapshot") + 1 if "snapshot" in column.own else 0
-        self.known = np.zeros(shape[: len(column.along) + at], bool)
-        # A number of each run is kept in memory, arrays of each are read from the file again.
-        self.held = column.variable
-        if not column.own or not column.along:
-            self.held = np.full(shape, column.fill, column.variable.dtype)
-        # What was last taken or found to agree, by place.
-        self.latest: dict[tuple[int, ...], tuple[tuple, np.ndarray]] = {}
+        shape, snapshot = column.variable.shape, column.dims.index("snapshot") + 1 if "snapshot" in column.dims else 0
+        self.is_large = bool(column.dims and column.along)
+        self.values = np.full(shape, column.fill, column.variable.dtype)
+        self.known = np.zeros(shape[: len(column.along) + snapshot], bool)
 
-    def put(self, labels: RunLabels, place: tuple[int, ...], own: tuple, values: np.ndarray) -> None:
+    def put(self, labels: RunLabels, place: tuple[int, ...], slots: tuple, values: np.ndarray) -> None:
         """Take the values of a run, or compare them."""
-        latest = self.latest.get(place)
-        if latest and latest[0] == own and np.array_equal(latest[1], values):
+        index = (*place, *slots)
+        known, present = self.known[index[: self.known.ndim]], self.values[index]
+        if np.all(known) and np.array_equal(present, values):
             return
-        known = self.known[(*place, *own)[: self.known.ndim]]
-        if np.any(known):
-            there = self.held[(*place, *own)]
-            same = there == values if values.dtype.kind == "S" else np.isclose(there, values, rtol=1e-9, atol=0)
-            if np.any(known & ~np.reshape(same, (*np.shape(known), -1)).all(axis=-1)):
-                shared = ", ".join(self.column.along) or "the study"
-                raise ValueError(f"{labels}: {self.name} differs between runs that share {shared}")
+        same = present == values if values.dtype.kind == "S" else np.isclose(present, values, rtol=1e-9, atol=0)
+        if np.any(known & ~np.reshape(same, (*np.shape(known), -1)).all(axis=-1)):
+            shared = ", ".join(self.column.along) or "the study"
+            raise ValueError(f"{labels}: {self.name} differs between runs that share {shared}")
         if not np.all(known):
-            self.held[(*place, *own)] = values
-            self.known[(*place, *own)[: self.known.ndim]] = True
-        if len(self.latest) == _LATEST:
-            self.latest.clear()
-        self.latest[place] = own, values
-
-    def flush(self) -> None:
-        """Write what is kept in memory."""
-        if self.held is not self.column.variable:
-            self.column.variable[...] = self.held
+            self.values[index] = values
+            self.known[index[: self.known.ndim]] = True
+            if self.is_large:
+                self.column.variable[index] = values
 
 
-class _Ragged:
-    """What the runs have along ragged dimensions, one after the other."""
+class _RaggedVariables:
+    """The variables along one ragged dimension, to which the values of the runs are appended.
 
-    def __init__(self, group: Group):
-        """Nothing is written yet."""
-        dims = dict.fromkeys(dim for dim, _ in group.places)
-        self.written = dict.fromkeys(dims, 0)
-        self.variables = {
-            dim: {name: column.variable for name, column in group.columns.items() if column.own == (dim,)}
-            | {f"{dim}_{label}": group.places[dim, label] for label in LABELS}
-            for dim in dims
-        }
-        self._empty()
+    Attributes
+    ----------
+    dim, variables : the dimension and its variables, by name.
+    runs, pending : values of the runs that are not yet written, and their number.
+    written : number of values along the dimension that are written.
+    """
 
-    def _empty(self):
-        self.parts = {dim: {name: [] for name in variables} for dim, variables in self.variables.items()}
-        self.taken = 0
+    def __init__(self, dim: str, variables: Mapping[str, netCDF4.Variable]):
+        """Begin with nothing written."""
+        self.dim, self.variables = dim, variables
+        self.runs, self.pending, self.written = [], 0, 0
 
-    def add(self, position: tuple[int, ...], values: dict[str, np.ndarray], at: list[int]) -> None:
-        """Take what a run has; `at` is where its snapshots stand, in whose order its spots are put."""
-        for dim, parts in self.parts.items():
-            own = {name: values[name] for name in parts if name in values}
-            count = max(map(len, own.values()), default=0)
-            if "spot_snapshot" in own and count:
-                now = np.asarray(at, np.int32)[own["spot_snapshot"]]
-                order = np.argsort(now, kind="stable")
-                own = {name: v[order] for name, v in (own | {"spot_snapshot": now}).items()}
-            own |= {f"{dim}_{label}": np.full(count, k) for label, k in zip(LABELS, position, strict=True)}
-            for name, v in own.items():
-                parts[name].append(v)
-                self.taken += count
-        if self.taken > VALUES_IN_BLOCK:
+    def add(self, position: tuple[int, ...], values: Mapping[str, np.ndarray], snapshots: list[int]) -> None:
+        """Take the values of a run at a position; its spots are sorted by the positions of their snapshots."""
+        found = {name: values[name] for name in self.variables if name in values}
+        count = len(next(iter(found.values()), ()))
+        if not count:
+            return
+        if "spot_snapshot" in found:
+            found["spot_snapshot"] = np.asarray(snapshots, np.int32)[found["spot_snapshot"]]
+            order = np.argsort(found["spot_snapshot"], kind="stable")
+            found = {name: v[order] for name, v in found.items()}
+        found |= {f"{self.dim}_{label}": np.full(count, k) for label, k in zip(LABELS, position, strict=True)}
+        self.runs.append(found)
+        self.pending += len(found) * count
+        if self.pending > VALUES_IN_BLOCK:
             self.flush()
 
     def flush(self) -> None:
-        """Write what has been taken since the last time."""
-        for dim, parts in self.parts.items():
-            for name, values in parts.items():
-                joined = np.concatenate(values) if values else np.empty(0)
-                end = self.written[dim] + len(joined)
-                if len(joined):
-                    self.variables[dim][name][self.written[dim] : end] = joined
-            self.written[dim] = end
-        self._empty()
+        """Write what has been added since the last time."""
+        if not self.runs:
+            return
+        for name, variable in self.variables.items():
+            joined = np.concatenate([run[name] for run in self.runs])
+            variable[self.written : self.written + len(joined)] = joined
+        self.written += len(joined)
+        self.runs, self.pending = [], 0

@@ -1,10 +1,10 @@
-"""Datasets as netCDF-4 files, written and read, and the conventions that all files here share.
+"""Writing and reading datasets as netCDF-4 files, and the conventions that all files here share.
 
-A file appears whole or not at all, holds no value that is not finite except where it says that a run is
-missing or has no more steps, and has the same bytes whenever it is written from the same values.
+A file appears whole or not at all, has the same bytes whenever it is written from the same values, and all its values
+are finite, except where a run is marked as missing or has no more steps.
 
-Files of runs hold many small variables. All of a file are defined before the first is written: the library goes
-through them all whenever it turns from one to the other.
+Files of runs hold many small variables. All are defined before the first one is written, since the library visits all
+of them whenever it changes between defining and writing.
 """
 
 from __future__ import annotations
@@ -25,20 +25,21 @@ from icha.support.atomic_files import whole_file
 
 FLOAT_FILL = 9.969209968386869e36
 INTEGER_FILL = -(2**31) + 1
-# How xarray marks text that is kept as characters. Every netCDF tool reads those, and they compress, unlike strings of
-# variable length.
+# Attribute by which xarray recognises text that is stored as characters. Every netCDF tool reads those, and they
+# compress, unlike strings of variable length.
 TEXT = {"_Encoding": "utf-8"}
 
 
 def write_dataset(data: xr.Dataset | xr.DataTree, path: str | os.PathLike) -> None:
     """Write a dataset or a tree of datasets to the netCDF-4 file `path`.
 
+    Missing values are written as the variable's `_FillValue`. They are allowed in runs that are not complete by the
+    dataset's `status`, beyond the `step_count` steps of a run, and in variables with an attribute `missing`.
+
     Raises
     ------
     ValueError
-        If a variable lacks units or holds a value that is not finite. A run that is not complete by the dataset's
-        `status` may lack values, none has any beyond its `step_count` steps, and a variable whose attribute `missing`
-        says why may lack some, too; those are written as the variable's `_FillValue`.
+        If a variable lacks units or holds another value that is not finite.
     """
     nodes = {"/": data}
     if isinstance(data, xr.DataTree):
@@ -58,7 +59,7 @@ def write_dataset(data: xr.Dataset | xr.DataTree, path: str | os.PathLike) -> No
 
 
 def _define(group: netCDF4.Dataset, dataset: xr.Dataset) -> list[tuple[netCDF4.Variable, np.ndarray]]:
-    """Make the dimensions and variables of a dataset in a group of a file; give them with what is to be written."""
+    """Define the dimensions and variables of a dataset in a group of a file; return variables with their values."""
     define_dimensions(group, dataset.sizes)
     group.setncatts(dataset.attrs)
     coordinates = coordinates_of(dataset.variables, dataset.coords)
@@ -71,12 +72,12 @@ def _define(group: netCDF4.Dataset, dataset: xr.Dataset) -> list[tuple[netCDF4.V
             continue
         values, storage = variable.values, {}
         if variable.dtype.kind == "f" and np.isnan(values).any():
-            whole = variable.encoding.get("dtype") == np.dtype("int32")
-            storage["fill_value"] = INTEGER_FILL if whole else FLOAT_FILL
-            values = np.where(np.isnan(values), storage["fill_value"], values)
-            values = values.astype(np.int32) if whole else values
+            is_integer = variable.encoding.get("dtype") == np.dtype("int32")
+            fill = storage["fill_value"] = INTEGER_FILL if is_integer else FLOAT_FILL
+            values = np.where(np.isnan(values), fill, values)
+            values = values.astype(np.int32) if is_integer else values
         if variable.dims[-2:] == CELLS:
-            # Maps are mostly zeros, and looked at one by one.
+            # Maps are mostly zeros, and are read one by one.
             storage |= COMPRESSION | {"chunksizes": (*[1] * (variable.ndim - 2), *variable.shape[-2:])}
         elif variable.size in COMPRESSED_SIZES:
             storage |= COMPRESSION
@@ -119,7 +120,7 @@ def read_dataset(path: str | os.PathLike) -> xr.Dataset:
 
 
 def has_groups(path: str | os.PathLike) -> bool:
-    """Whether a netCDF file has groups, as a campaign dataset has; errors as `read_dataset`."""
+    """Return True if a netCDF file has groups, as a campaign dataset has; errors as `read_dataset`."""
     with readable(path), netCDF4.Dataset(path) as file:
         return bool(file.groups)
 
@@ -127,26 +128,21 @@ def has_groups(path: str | os.PathLike) -> bool:
 def read_campaign(path: str | os.PathLike) -> xr.DataTree:
     """Read a campaign dataset into memory, except for large arrays; errors as `read_dataset`.
 
-    What takes more than 64 MB, as distributions of thousands of runs do, stays in the file until it is used; for a
-    single run (`icha.datasets.campaign.select_run`) only its own part is then read.
+    Arrays of more than 64 MB, such as distributions of thousands of runs, stay in the file until they are used; for a
+    single run (`icha.datasets.campaign.select_run`) only its own values are then read.
     """
     with readable(path):
-        return _load_small(xr.open_datatree(path, engine="netcdf4"))
-
-
-def _load_small(tree):
-    variables = [variable for node in tree.subtree for variable in node.variables.values()]
-    for variable in variables:
-        if variable.nbytes <= LEFT_IN_FILE:
-            variable.load()
-    if all(variable.nbytes <= LEFT_IN_FILE for variable in variables):
-        tree.close()
-    return tree
+        tree = xr.open_datatree(path, engine="netcdf4")
+        variables = [variable for node in tree.subtree for variable in node.variables.values()]
+        small = [variable.load() for variable in variables if variable.nbytes <= LEFT_IN_FILE]
+        if len(small) == len(variables):
+            tree.close()
+        return tree
 
 
 @contextmanager
 def readable(path: str | os.PathLike) -> Iterator[None]:
-    """Name the file that cannot be read in a ValueError."""
+    """Turn errors of reading into a ValueError that names the file."""
     try:
         yield
     except FileNotFoundError:
@@ -169,26 +165,26 @@ def read_run(path: str | os.PathLike) -> xr.Dataset:
 
 
 def check_is_run(variables: Container[Hashable], path: str | os.PathLike) -> None:
-    """Refuse a file without the variables that all runs have; `variables` are the names of its own."""
+    """Refuse a file without the variables that all runs have; `variables` are the names of those that it has."""
     for name in ("mean_separation", "nominal_pressure", "contact_area_fraction", "contact_modulus"):
         if name not in variables:
             raise ValueError(f"{path}: not a run dataset, it has no variable {name!r}")
 
 
 def is_text(dtype: np.dtype) -> bool:
-    """Whether an array of this type holds text."""
+    """Return True if an array of this type holds text."""
     return dtype.kind in "OUTS"
 
 
 def characters(texts: np.ndarray) -> np.ndarray:
-    """Texts as characters along a further, last dimension, as many as the longest text has (UTF-8), at least one."""
+    """Encode texts as characters (UTF-8) along a further, last dimension as long as the longest text, at least 1."""
     texts = np.asarray(texts)
     encoded = np.ascontiguousarray(np.char.encode(texts.astype("U"), "utf-8"))
     return encoded.view("S1").reshape(*texts.shape, max(encoded.dtype.itemsize, 1))
 
 
 def define_dimensions(group: netCDF4.Dataset, sizes: Mapping[Hashable, int]) -> None:
-    """Make the dimensions of a group."""
+    """Define the dimensions of a group."""
     for name, size in sizes.items():
         group.createDimension(name, size)
 
@@ -196,7 +192,7 @@ def define_dimensions(group: netCDF4.Dataset, sizes: Mapping[Hashable, int]) -> 
 def define_text(
     group: netCDF4.Dataset, name: str, dims: tuple[str, ...], width: int, attrs: Mapping, **storage
 ) -> netCDF4.Variable:
-    """Make a variable of texts of at most `width` bytes, kept as characters."""
+    """Define a variable of texts of at most `width` bytes, stored as characters."""
     along = f"string{width}"
     if along not in group.dimensions:
         group.createDimension(along, width)
@@ -206,23 +202,23 @@ def define_text(
 def define_numbers(
     group: netCDF4.Dataset, name: str, dims: tuple[str, ...], dtype: np.dtype | str, attrs: Mapping, **storage
 ) -> netCDF4.Variable:
-    """Make a variable of numbers; `storage` as `netCDF4.Dataset.createVariable` takes it."""
+    """Define a variable of numbers; `storage` as `netCDF4.Dataset.createVariable` takes it."""
     variable = group.createVariable(name, dtype, dims, **storage)
     variable.setncatts(dict(attrs))
-    # Values are written, and read, as they are.
+    # Values are written and read without conversion.
     variable.set_auto_maskandscale(False)
     variable.set_auto_chartostring(False)
     return variable
 
 
 def is_refused(values: np.ndarray, attrs: Mapping[str, object]) -> np.ndarray:
-    """Which numbers of a variable are not finite, but for infinite ones where its attributes allow them."""
+    """Mark the values of a variable that are not finite, except infinite ones that its attributes allow."""
     refused = ~np.isfinite(values)
     return refused & ~np.isposinf(values) if INFINITE in attrs else refused
 
 
 def not_finite(name: Hashable, dims: tuple[Hashable, ...], bad: np.ndarray) -> str:
-    """Name of a variable, how many of its values are not finite, and where the first is; `bad` says which are not."""
+    """Describe which values of a variable are not finite; `bad` marks them."""
     first = ", ".join(f"{dim}={index}" for dim, index in zip(dims, np.argwhere(bad)[0], strict=True))
     text = f"{name!r} holds {np.count_nonzero(bad)} of {bad.size} values that are not finite"
     return f"{text}, the first at {first}" if first else text
@@ -233,20 +229,20 @@ def coordinates_of(
     coordinates: Collection[Hashable],
     dims: Mapping[Hashable, tuple[Hashable, ...]] = {},
 ) -> dict[Hashable, str]:
-    """The attribute `coordinates` (CF) of each variable that has coordinates besides those of its dimensions.
+    """Return the attribute `coordinates` (CF) of each variable that has coordinates besides those of its dimensions.
 
     Parameters
     ----------
-    variables : all of a group, by name. Bounds of coordinates have no coordinates.
-    coordinates : the names of those that are coordinates.
-    dims : dimensions of those that have others in the file.
+    variables : all variables of a group, by name. Bounds of coordinates have no coordinates.
+    coordinates : names of the coordinates.
+    dims : dimensions of the variables that have others in the file.
     """
     dims = {name: variable.dims for name, variable in variables.items()} | dict(dims)
     without = {*coordinates, *(variable.attrs.get("bounds") for variable in variables.values())}
     auxiliary = sorted(name for name in coordinates if dims[name] != (name,))
     found = {
-        name: " ".join(each for each in auxiliary if set(dims[each]) <= set(own))
-        for name, own in dims.items()
+        name: " ".join(each for each in auxiliary if set(dims[each]) <= set(dims[name]))
+        for name in dims
         if name not in without
     }
     return {name: text for name, text in found.items() if text}

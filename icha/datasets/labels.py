@@ -1,8 +1,8 @@
-"""Names of the runs of a campaign and of what is computed beside them, and their places in a dataset.
+"""Labels of the runs of a campaign and of references, and their positions in a dataset.
 
-The labels are dimensions, and their values coordinates. Where surfaces have the same rms slopes, so is `rms_slope`.
-Where each has slopes of its own, as measured surfaces have, a square of surfaces and slopes would be nearly empty:
-`rms_slope(surface, rms_slope)` then holds the slopes of every surface, and missing values beyond the last.
+The labels are dimensions, and their values coordinates. `rms_slope` is one of them where surfaces have the same rms
+slopes. Where each has different slopes, as measured surfaces have, a rectangle of surfaces and slopes would be nearly
+empty: `rms_slope(surface, rms_slope)` then holds the slopes of every surface, with missing values after the last one.
 """
 
 from __future__ import annotations
@@ -18,22 +18,29 @@ from icha.contact.models import DEFAULT_MODEL, MODELS
 if TYPE_CHECKING:
     import xarray as xr
 
-# Where their files stand among others of their kind, without the ending; in braces what differs from one to the next.
+# Paths of files below the folder of their kind, without ending, with fields in braces.
 RUN = "{study}/{surface}/seed{seed}/slope{slope}/{model_folder}{material}"
 CONTACT = "{entry}/{surface}/seed{seed}/slope{slope}/{material}"
 SOLUTION = CONTACT + "/p{pressure}"
 _NUMBERS = {"rms_slope": "slope", "reduced_pressure": "pressure"}
-# Slopes that differ by less than this part are the same.
+# Relative difference below which two rms slopes are the same, from the rounding of scaled surfaces.
 _SAME_SLOPE = 1e-9
 
 
 def model_folder(model: str) -> str:
-    """What stands before the name of a run's file: the folder of its model, with a slash, or nothing."""
+    """Return the folder of a model before the name of a run's file, with a slash, or nothing."""
     return MODELS[model].folder
 
 
 class RunLabels(NamedTuple):
-    """Which run of a campaign: names of study, model, surface and material, seed, and rms slope as configured."""
+    """Labels of a run.
+
+    Attributes
+    ----------
+    study, model, surface, material : names.
+    seed : of the surface.
+    rms_slope : as configured.
+    """
 
     study: str
     model: str
@@ -44,20 +51,20 @@ class RunLabels(NamedTuple):
 
     @property
     def path(self) -> str:
-        """Where the run's dataset stands among the runs, without the ending."""
-        return RUN.format(**parts(self))
+        """Path of the run's dataset below the folder of runs, without ending."""
+        return RUN.format(**path_fields(self))
 
     def __str__(self):
-        """The run's place among the runs."""
+        """Return the path of the run."""
         return self.path
 
 
-# Those of them that a study has as dimensions.
+# Labels that are dimensions of a study.
 LABELS = RunLabels._fields[1:]
 
 
 class ContactLabels(NamedTuple):
-    """What an entry beside a study asks for: the entry, and what is pressed against what."""
+    """Labels of a contact that an entry of the references asks for."""
 
     entry: str
     surface: str
@@ -67,12 +74,12 @@ class ContactLabels(NamedTuple):
 
     @property
     def path(self) -> str:
-        """Where its file stands among the others, without the ending."""
-        return CONTACT.format(**parts(self))
+        """Path of its file below the folder of its kind, without ending."""
+        return CONTACT.format(**path_fields(self))
 
 
 class SolutionLabels(NamedTuple):
-    """Which boundary-element solution of a campaign: the entry that asks for it, the run beside it, and its load."""
+    """Labels of a boundary-element solution: the entry that asks for it, the run compared with it, and its load."""
 
     entry: str
     study: str
@@ -84,21 +91,21 @@ class SolutionLabels(NamedTuple):
 
     @property
     def run(self) -> RunLabels:
-        """The run that is compared with it, one of asperities."""
+        """The asperity run that is compared with it."""
         return RunLabels(self.study, DEFAULT_MODEL, *self[2:6])
 
     @property
     def path(self) -> str:
-        """Where its file stands among the solutions, without the ending."""
-        return SOLUTION.format(**parts(self))
+        """Path of its file below the folder of solutions, without ending."""
+        return SOLUTION.format(**path_fields(self))
 
     def __str__(self):
-        """The solution's place among the solutions."""
+        """Return the path of the solution."""
         return self.path
 
 
-def parts(labels: RunLabels | ContactLabels | SolutionLabels) -> dict[str, str]:
-    """What stands in the braces of a path."""
+def path_fields(labels: RunLabels | ContactLabels | SolutionLabels) -> dict[str, str]:
+    """Return the fields in braces of a path."""
     found = {
         _NUMBERS.get(name, name): number_label(value) if name in _NUMBERS else str(value)
         for name, value in labels._asdict().items()
@@ -107,16 +114,16 @@ def parts(labels: RunLabels | ContactLabels | SolutionLabels) -> dict[str, str]:
 
 
 def number_label(value: float) -> str:
-    """The shortest text that reads back as `value`: 0.2 is `0.2`, 1.0 is `1`."""
+    """Return the shortest text that reads back as `value`: 0.2 is `0.2`, 1.0 is `1`."""
     return repr(float(value)).removesuffix(".0")
 
 
 def arrange_slopes(pairs: Iterable[tuple[str, float]]) -> np.ndarray:
-    """Rms slopes in ascending order: common to all surfaces, or a row for every surface where that takes fewer cells.
+    """Arrange rms slopes in ascending order: common ones, or a row for every surface if that takes fewer cells.
 
     Parameters
     ----------
-    pairs : surface and rms slope of every run; surfaces keep the order in which they first come.
+    pairs : surface and rms slope of every run; surfaces keep the order in which they first appear.
 
     Returns
     -------
@@ -129,28 +136,28 @@ def arrange_slopes(pairs: Iterable[tuple[str, float]]) -> np.ndarray:
     most = max(map(len, found.values()))
     if most == len(common):
         return np.array(common, float)
-    return np.array([sorted(own) + [np.nan] * (most - len(own)) for own in found.values()], float)
+    return np.array([sorted(slopes) + [np.nan] * (most - len(slopes)) for slopes in found.values()], float)
 
 
 def count_cells(runs: Sequence[RunLabels]) -> int:
-    """Number of combinations of the labels of a study's runs that have a place in its dataset."""
+    """Count the combinations of labels that the dataset of a study with these runs has."""
     others = (len({getattr(run, label) for run in runs}) for label in LABELS if label != "rms_slope")
     return math.prod(others) * arrange_slopes((run.surface, run.rms_slope) for run in runs).shape[-1]
 
 
 def slope_dims(slopes: np.ndarray) -> tuple[str, ...]:
-    """Dimensions of the coordinate `rms_slope` with the values that `arrange_slopes` returns."""
+    """Return the dimensions of the coordinate `rms_slope` with values from `arrange_slopes`."""
     return ("surface", "rms_slope") if slopes.ndim == 2 else ("rms_slope",)
 
 
 def slopes_of(data: xr.Dataset) -> list[float]:
-    """All rms slopes of a dataset, each once, in ascending order."""
+    """List all rms slopes of a dataset, each once, in ascending order."""
     values = np.unique(data["rms_slope"].values)
     return values[np.isfinite(values)].tolist()
 
 
 def surfaces_and_slopes(data: xr.Dataset) -> list[tuple[str, float]]:
-    """Every surface and rms slope that a dataset has a place for."""
+    """List every surface and rms slope in a dataset."""
     return [
         (surface, slope)
         for k, surface in enumerate(data["surface"].values.tolist())
@@ -160,22 +167,22 @@ def surfaces_and_slopes(data: xr.Dataset) -> list[tuple[str, float]]:
 
 
 def labels_at(data: xr.Dataset, place: Sequence[int], labels: Sequence[str]) -> list[Any]:
-    """Values of the labels at a place along them."""
+    """Return the values of the labels at a position along them."""
     at = dict(zip(labels, place, strict=True))
     coordinates = (data.variables[label] for label in labels)
     return [np.asarray(each.values[tuple(at[dim] for dim in each.dims)]).item() for each in coordinates]
 
 
 def place_of(data: xr.Dataset, wanted: Mapping[str, Any]) -> dict[str, int]:
-    """Position along every label at which the labels have the values wanted, with `surface` among them.
+    """Return the position along every label at which it has the value wanted; `surface` must be among them.
 
     Raises
     ------
     KeyError
-        Naming the label: if it has no such value.
+        With the name of a label that has no such value.
     """
     at: dict[str, int] = {}
-    # The slope comes last, since it may depend on the surface.
+    # The slope comes last because it may depend on the surface.
     for label in sorted(wanted, key="rms_slope".__eq__):
         values = slopes_at(data, at) if label == "rms_slope" else data.variables[label].values
         same = np.isclose(values, wanted[label], rtol=_SAME_SLOPE) if label == "rms_slope" else values == wanted[label]
@@ -186,6 +193,6 @@ def place_of(data: xr.Dataset, wanted: Mapping[str, Any]) -> dict[str, int]:
 
 
 def slopes_at(data: xr.Dataset, at: Mapping[str, int]) -> np.ndarray:
-    """Rms slopes along the dimension `rms_slope` of the surface at a place, (slope,)."""
+    """Return the rms slopes, (slope,), of the surface at a position."""
     slopes = data.variables["rms_slope"]
     return slopes.values[at["surface"]] if slopes.ndim == 2 else slopes.values

@@ -1,4 +1,4 @@
-"""The file of a surface: its heights, statistics and power spectrum, and where it comes from."""
+"""The file of a surface: its heights, statistics, power spectrum and origin."""
 
 import os
 from collections.abc import Mapping
@@ -6,8 +6,8 @@ from collections.abc import Mapping
 import numpy as np
 import xarray as xr
 
-from icha.datasets.attributes import INPUT, discovery
-from icha.datasets.build import build, of
+from icha.datasets.attributes import INPUT, file_attributes
+from icha.datasets.build import build_dataset, get_values
 from icha.datasets.files import read_dataset, readable, write_dataset
 from icha.datasets.variables.surface import SURFACE
 from icha.datasets.variables.terms import ROUGHNESS
@@ -25,15 +25,15 @@ def write_surface(
     measured=None,
     attrs: Mapping[str, str] = {},
 ) -> None:
-    """Write a topography, its statistics and power spectrum, and where it comes from.
+    """Write a topography with its statistics, power spectrum and origin.
 
     Parameters
     ----------
     path : the file.
-    surface : the topography; the campaigns keep it at rms slope 1.
-    name, seed : what the campaign calls it.
-    spectrum : the `icha.surfaces.spectrum.SelfAffineSpectrum` that it realises, if any.
-    measured : the `icha.surfaces.measured.topography.PreparedTopography` whose heights, scaled, it has, if any.
+    surface : the topography; campaigns scale it to rms slope 1.
+    name, seed : its labels in the campaign.
+    spectrum : the `icha.surfaces.spectrum.SelfAffineSpectrum` of a random surface.
+    measured : the `icha.surfaces.measured.topography.PreparedTopography` of a measured surface, before scaling.
     attrs : further global attributes.
     """
     n = surface.grid
@@ -47,7 +47,7 @@ def write_surface(
         "psd_wavevector": wave_number,
         "height": surface.heights,
         "seed": seed,
-        **of(surface, "period", "grid", *ROUGHNESS),
+        **get_values(surface, "period", "grid", *ROUGHNESS),
         "spectral_moment_0": moments.m0,
         "spectral_moment_2": moments.m2,
         "spectral_moment_4": moments.m4,
@@ -56,7 +56,7 @@ def write_surface(
         "power_spectrum": power,
     }
     if spectrum is not None:
-        values |= of(spectrum, "rolloff_wavelength", "short_wavelength", "hurst")
+        values |= get_values(spectrum, "rolloff_wavelength", "short_wavelength", "hurst")
     if measured is not None:
         values["measured_rms_slope"] = measured.rms_slope
     kind, origin = "Self-affine surface" if spectrum is not None else "Surface from a file", {}
@@ -67,20 +67,20 @@ def write_surface(
             "source_sha256": measured.source_sha256,
             "preparation": measured.description,
         }
-    attributes = discovery(
+    attributes = file_attributes(
         f"Topography {name}, seed {seed}",
         f"{kind}, {'one square' if surface.free else 'a periodic cell'} of {n} by {n} nodes.",
         INPUT,
         keywords=["topography"],
     )
     origin |= {"surface": name, "boundary": surface.boundary}
-    write_dataset(build(SURFACE, values, attributes | origin | dict(attrs)), path)
+    write_dataset(build_dataset(SURFACE, values, attributes | origin | dict(attrs)), path)
 
 
 def as_measured(surface: xr.Dataset) -> float:
-    """Factor from the heights of a surface file to those that were measured; 1 of what was not measured.
+    """Return the factor from the heights of a surface file to the measured heights; 1 if it was not measured.
 
-    All topographies are kept at rms slope 1, whatever their own.
+    All topographies are stored at rms slope 1.
     """
     if "measured_rms_slope" not in surface:
         return 1.0
@@ -99,7 +99,7 @@ def read_surface(path: str | os.PathLike) -> Surface:
 
 
 def surface_of(dataset: xr.Dataset, path: str | os.PathLike) -> Surface:
-    """The topography of what was read of a surface file; errors as `read_surface`."""
+    """Return the topography in the dataset of a surface file; errors as `read_surface`."""
     for name in ("height", "period"):
         if name not in dataset:
             raise ValueError(f"{path}: not a surface file, it has no variable {name!r}")
@@ -119,7 +119,6 @@ def read_spectral_moments(path: str | os.PathLike) -> SpectralMoments:
         If the file cannot be read or does not hold them.
     """
     names = [f"spectral_moment_{order}" for order in (0, 2, 4)]
-
     with readable(path), xr.open_dataset(path, engine="netcdf4") as dataset:
         if missing := [name for name in names if name not in dataset]:
             raise ValueError(f"{path}: not a surface file, it has no variable {missing[0]!r}")

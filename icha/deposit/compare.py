@@ -16,7 +16,7 @@ import json
 import os
 import textwrap
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
@@ -27,7 +27,7 @@ from icha.checks.run import FRONT_LIMIT, RESIDUAL_LIMIT
 from icha.deposit.verify import COMPUTED, files_of
 from icha.support.atomic_files import whole_file
 from icha.support.checksums import sha256_of
-from icha.support.in_words import printable
+from icha.support.formatting import printable
 from icha.support.input_files import refuse_traps
 
 IDENTICAL, WITHIN, DIFFERENT, MISSING, EXTRA = VERDICTS = (
@@ -147,46 +147,41 @@ def _compare_groups(a: netCDF4.Dataset, b: netCDF4.Dataset, path: str) -> Iterat
     """Compare two groups and the groups in them."""
     yield from _compare_attributes(a, b, f"{path}/ (attributes)")
     sizes_a, sizes_b = ({name: len(dim) for name, dim in group.dimensions.items()} for group in (a, b))
-    for name in dict.fromkeys([*sizes_a, *sizes_b]):
-        if sizes_a.get(name) != sizes_b.get(name):
-            detail = f"size: {sizes_a.get(name, 'none')} and {sizes_b.get(name, 'none')}"
-            yield Difference(f"{path}/{name} (dimension)", DIFFERENT, detail)
-    for name, one, other in _paired(a.variables, b.variables):
-        yield from _compare_variables(one, other, f"{path}/{name}")
-    for name, one, other in _paired(a.groups, b.groups):
-        if one is None or other is None:
-            yield _only_in_one(f"{path}/{name} (group)", one)
+    for name, size, other in _paired(sizes_a, sizes_b):
+        if size != other:
+            yield Difference(f"{path}/{name} (dimension)", DIFFERENT, f"size: {size} and {other}")
+    for name, variable, other in _paired(a.variables, b.variables):
+        if variable is None or other is None:
+            yield _only_in_one(f"{path}/{name}", variable)
         else:
-            yield from _compare_groups(one, other, f"{path}/{name}")
+            yield from _compare_variables(variable, other, f"{path}/{name}")
+    for name, group, other in _paired(a.groups, b.groups):
+        if group is None or other is None:
+            yield _only_in_one(f"{path}/{name} (group)", group)
+        else:
+            yield from _compare_groups(group, other, f"{path}/{name}")
 
 
-def _paired(a, b) -> Iterator[tuple]:
+def _paired(a: Mapping, b: Mapping) -> Iterator[tuple]:
     """Keys of two mappings with the values of both; None where there is no value."""
     return ((key, a.get(key), b.get(key)) for key in dict.fromkeys([*a, *b]))
 
 
-def _only_in_one(name: str, of_deposit) -> Difference:
+def _only_in_one(name: str, of_deposit: object) -> Difference:
     if of_deposit is None:
         return Difference(name, EXTRA, "the deposit has none")
     return Difference(name, MISSING, "the rerun has none")
 
 
-def _compare_variables(a: netCDF4.Variable | None, b: netCDF4.Variable | None, name: str) -> Iterator[Difference]:
-    if a is None or b is None:
-        yield _only_in_one(name, a)
-        return
-    for what, one, other in (
-        ("type", *("text" if each.dtype is str else str(each.dtype) for each in (a, b))),
-        ("dimensions", a.dimensions, b.dimensions),
-        ("shape", a.shape, b.shape),
-    ):
+def _compare_variables(a: netCDF4.Variable, b: netCDF4.Variable, name: str) -> Iterator[Difference]:
+    for quantity in ("dtype", "dimensions", "shape"):
+        one, other = getattr(a, quantity), getattr(b, quantity)
         if one != other:
-            yield Difference(name, DIFFERENT, f"{what}: {_shown(one)} and {_shown(other)}")
+            yield Difference(name, DIFFERENT, f"{quantity}: {_shown(one)} and {_shown(other)}")
             return
     for variable in (a, b):
         variable.set_auto_scale(False)
-        variable.set_auto_chartostring(False)
-    found = compare_values(a[...], b[...], noise=NOISE.get(name.rpartition("/")[2], 0.0))
+    found = compare_values(np.ma.asarray(a[...]), np.ma.asarray(b[...]), noise=NOISE.get(name.rpartition("/")[2], 0.0))
     if found:
         yield found._replace(name=name)
     yield from _compare_attributes(a, b, name)
@@ -199,8 +194,7 @@ def _compare_attributes(a, b, name: str) -> Iterator[Difference]:
             yield Difference(name, DIFFERENT, f"attribute {key}: {'extra' if one is None else 'missing'}")
             continue
         one, other = np.asarray(one), np.asarray(other)
-        texts = one.dtype.kind == other.dtype.kind == "U"  # of any length
-        if one.shape != other.shape or (one.dtype != other.dtype and not texts):
+        if (one.shape, one.dtype.kind) != (other.shape, other.dtype.kind):
             yield Difference(name, DIFFERENT, f"attribute {key}: {_shown(one)} and {_shown(other)}")
         elif found := compare_values(one, other):
             yield found._replace(name=name, detail=f"attribute {key}: {found.detail}")
@@ -211,19 +205,19 @@ def compare_values(a: np.ndarray, b: np.ndarray, *, noise: float = 0.0) -> Diffe
 
     Parameters
     ----------
-    a, b : values of the deposit and of the rerun; missing are those that are masked or NaN.
+    a, b : values of the deposit and of the rerun; masked values and NaN are missing.
     noise : a difference that is allowed in any case.
     """
-    masked_a, masked_b = np.ma.getmaskarray(a), np.ma.getmaskarray(b)
-    a, b = np.asarray(np.ma.getdata(a)), np.asarray(np.ma.getdata(b))
-    if a.dtype != object and a.tobytes() == b.tobytes():
-        return None
     if a.dtype.kind != "f":
-        return _compare_exactly(a, b)
-    missing, missing_b = masked_a | np.isnan(a), masked_b | np.isnan(b)
-    if (missing != missing_b).any():
-        return Difference("", DIFFERENT, f"missing in other places: {_places(a, b, missing != missing_b)}")
-    a, b = a.astype(float), b.astype(float)
+        a, b = np.ma.getdata(a), np.ma.getdata(b)
+        unequal = np.asarray(a != b)
+        return Difference("", DIFFERENT, f"not equal: {_places(a, b, unequal)}") if unequal.any() else None
+    a, b = (np.ma.filled(np.ma.asarray(each, float), np.nan) for each in (a, b))
+    missing = np.isnan(a)
+    if (missing != np.isnan(b)).any():
+        return Difference("", DIFFERENT, f"missing in other places: {_places(a, b, missing != np.isnan(b))}")
+    if np.array_equal(a, b, equal_nan=True):
+        return None
     size = np.where(missing, 0.0, np.maximum(abs(a), abs(b)))
     largest = np.max(size, where=np.isfinite(size), initial=0.0)
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
@@ -231,8 +225,6 @@ def compare_values(a: np.ndarray, b: np.ndarray, *, noise: float = 0.0) -> Diffe
     deviation[missing | (a == b)] = 0.0
     deviation[np.isnan(deviation)] = np.inf  # infinite in one of them, or of the other sign
     most = float(deviation.max())
-    if most == 0.0:
-        return Difference("", WITHIN, "other signs of zero, or other bits of NaN", 0.0)
     detail = f"largest relative deviation {most:.2g}, {_place(a, b, np.argmax(deviation))}"
     if most <= TOLERANCE:
         return Difference("", WITHIN, detail, most)
@@ -240,29 +232,17 @@ def compare_values(a: np.ndarray, b: np.ndarray, *, noise: float = 0.0) -> Diffe
     return Difference("", DIFFERENT, f"{detail}; {count} of {deviation.size} values", most)
 
 
-def _compare_exactly(a: np.ndarray, b: np.ndarray) -> Difference | None:
-    if a.dtype == np.dtype("S1") and a.ndim and a.shape[-1]:  # text as characters
-        a, b = (np.ascontiguousarray(each).view(f"S{each.shape[-1]}")[..., 0] for each in (a, b))
-    if a.dtype == object:
-        pairs = zip(a.flat, b.flat, strict=True)
-        unequal = np.array([not np.array_equal(*pair) for pair in pairs], bool).reshape(a.shape)
-    else:
-        unequal = np.asarray(a != b)
-    return Difference("", DIFFERENT, f"not equal: {_places(a, b, unequal)}") if unequal.any() else None
-
-
-def _places(a, b, where) -> str:
+def _places(a: np.ndarray, b: np.ndarray, where: np.ndarray) -> str:
     return f"{np.count_nonzero(where)} of {where.size}, first {_place(a, b, np.argmax(where))}"
 
 
-def _place(a, b, position) -> str:
+def _place(a: np.ndarray, b: np.ndarray, position: int) -> str:
     index = ", ".join(str(k) for k in np.unravel_index(position, a.shape))
     return (f"at [{index}]: " if index else "") + f"{_shown(a.flat[position])} and {_shown(b.flat[position])}"
 
 
-def _shown(value) -> str:
+def _shown(value: object) -> str:
     value = value.item() if isinstance(value, np.ndarray | np.generic) and value.size == 1 else value
-    value = value.decode(errors="replace") if isinstance(value, bytes) else value
     text = repr(value) if isinstance(value, str | float) else str(value)
     return text if len(text) <= _LONGEST_VALUE else f"{text[: _LONGEST_VALUE - 3]}..."
 

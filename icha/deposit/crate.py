@@ -27,26 +27,26 @@ from icha.deposit.verify import CRATE, README, SOURCE
 from icha.support.atomic_files import whole_file
 
 _PROGRAM = f"{SOURCE}/"
-WORKFLOW = f"{_PROGRAM}Snakefile"
-LOCK = f"{_PROGRAM}uv.lock"
-PROGRAM_LICENCE = f"{_PROGRAM}LICENSE"
+_WORKFLOW = f"{_PROGRAM}Snakefile"
+_LICENCE = f"{_PROGRAM}LICENSE"
+# Files of the source that the crate shows, besides the scripts of the jobs.
+_SHOWN = {_WORKFLOW, f"{_PROGRAM}uv.lock", _LICENCE}
 
 _WORKFLOW_PROFILE = "https://w3id.org/workflowhub/workflow-ro-crate/1.0"
-# Of the run crates' own terms, the one that is used here (https://w3id.org/ro/terms/workflow-run/context).
+# The term of run crates that is used here (https://w3id.org/ro/terms/workflow-run/context).
 _TERMS = {"sha256": "https://w3id.org/ro/terms/workflow-run#sha256"}
-_COMPLETED = "http://schema.org/CompletedActionStatus"
 
 
 class Job(NamedTuple):
-    """What one job did; its files are named as they lie in the deposit.
+    """One job of the workflow; files are named as they lie in the deposit.
 
     Attributes
     ----------
     rule : name of the rule of the workflow.
     inputs, outputs : files read and written; at least one is written.
     parameters : names and values of its settings.
-    description : what its program does.
-    script : its program.
+    description : what its script does.
+    script : the script that it ran.
     """
 
     rule: str
@@ -93,14 +93,21 @@ def write_crate(
         crate.add(ContextEntity(crate, key, properties))
     _describe(crate, publication, campaign)
     shown = {path for path in checksums if not path.startswith(_PROGRAM)}
-    shown |= {WORKFLOW, LOCK, PROGRAM_LICENCE, *(job.script for job in jobs)} & set(checksums)
+    shown |= {*_SHOWN, *(job.script for job in jobs)} & set(checksums)
     files = {path: _add_file(crate, path, Path(folder, path), checksums[path]) for path in sorted(shown)}
-    _add_source(crate, files, revision)
-    engine, number = crate.dereference("#snakemake"), version("snakemake")
-    _set(engine, name=f"Snakemake {number}", version=number)
-    workflow = _describe_workflow(crate, files, engine, revision, _steps(jobs))
-    _add_jobs(crate, jobs, files, workflow, engine, f"Campaign {campaign}", publication.title)
-    _set(crate.root_dataset, mainEntity=workflow)
+    source = crate.add(Dataset(crate, dest_path=_PROGRAM))
+    _set(
+        source,
+        name="Source of the workflow and of its program",
+        version=revision,
+        identifier=revision,
+        hasPart=[file for path, file in files.items() if path.startswith(_PROGRAM)],
+    )
+    number = version("snakemake")
+    _set(crate.dereference("#snakemake"), name=f"Snakemake {number}", version=number)
+    _describe_workflow(crate, files, revision, _steps(jobs))
+    _add_jobs(crate, jobs, files, f"Campaign {campaign}", publication.title)
+    _set(crate.root_dataset, mainEntity=files[_WORKFLOW])
     if README in files:
         _set(files[README], about=crate.root_dataset)
     with whole_file(Path(folder) / CRATE) as part:
@@ -112,18 +119,14 @@ def _steps(jobs: Sequence[Job]) -> list[Job]:
     """Return one job of every rule, in an order in which the rules can run."""
     maker = {path: job for job in jobs for path in job.outputs}
     before = {job.outputs[0]: {maker[path].outputs[0] for path in job.inputs if path in maker} for job in jobs}
-    depth: dict[str, int] = {}
-    for output in TopologicalSorter(before).static_order():
-        depth[output] = 1 + max((depth[earlier] for earlier in before[output]), default=0)
-    latest: dict[str, int] = {}
-    for job in jobs:
-        latest[job.rule] = max(latest.get(job.rule, 0), depth[job.outputs[0]])
+    # All jobs of a level, which depend on earlier levels alone, come before those of the next one.
+    latest = {maker[output].rule: k for k, output in enumerate(TopologicalSorter(before).static_order())}
     first = {job.rule: job for job in reversed(jobs)}
-    return [first[rule] for rule in sorted(latest, key=lambda rule: (latest[rule], rule))]
+    return [first[rule] for rule in sorted(latest, key=latest.get)]
 
 
 def _describe(crate: ROCrate, publication: Publication, campaign: str) -> None:
-    """What the publication says of the whole."""
+    """Describe the deposit as a whole."""
     licence = known_licence(publication.license)
     _set(
         crate.root_dataset,
@@ -180,21 +183,8 @@ def _add_file(crate: ROCrate, path: str, file: Path, sha256: str) -> File:
     return crate.add(File(crate, dest_path=path, properties=properties))
 
 
-def _add_source(crate: ROCrate, files: Mapping[str, File], revision: str) -> None:
-    """The folder with the source, of which only some files are shown."""
-    _set(
-        crate.add(Dataset(crate, dest_path=_PROGRAM)),
-        name="Source of the workflow and of its program",
-        version=revision,
-        identifier=revision,
-        hasPart=[file for path, file in files.items() if path.startswith(_PROGRAM)],
-    )
-
-
-def _describe_workflow(
-    crate: ROCrate, files: Mapping[str, File], engine: Entity, revision: str, steps: Sequence[Job]
-) -> Entity:
-    """What the workflow's file is besides a file: a program, with tools and steps."""
+def _describe_workflow(crate: ROCrate, files: Mapping[str, File], revision: str, steps: Sequence[Job]) -> None:
+    """Describe scripts and workflow, which are programs as well as files, and the steps of the workflow."""
     configuration = crate.dereference("#configuration")
     _set(files[CONFIGURATION], exampleOfWork=configuration)
     tools = {job.script: files[job.script] for job in steps}
@@ -207,91 +197,75 @@ def _describe_workflow(
             version=revision,
             programmingLanguage=crate.dereference("#python"),
         )
-    workflow = files[WORKFLOW]
+    how_to = [
+        _add(
+            crate,
+            f"{_WORKFLOW}#{job.rule}",
+            "HowToStep",
+            name=job.rule,
+            position=str(position),
+            workExample=tools[job.script],
+        )
+        for position, job in enumerate(steps, 1)
+    ]
     _set(
-        workflow,
+        files[_WORKFLOW],
         ["File", "SoftwareSourceCode", "ComputationalWorkflow", "HowTo"],
         name="ICHA: adhesive rough contact by interacting and coalescing asperities",
         version=revision,
         conformsTo={"@id": "https://bioschemas.org/profiles/ComputationalWorkflow/1.0-RELEASE"},
-        license=files.get(PROGRAM_LICENCE),
-        programmingLanguage=engine,
+        license=files.get(_LICENCE),
+        programmingLanguage=crate.dereference("#snakemake"),
         hasPart=list(tools.values()),
-        step=[
-            _add(
-                crate,
-                f"{WORKFLOW}#{job.rule}",
-                "HowToStep",
-                name=job.rule,
-                position=str(position),
-                workExample=tools[job.script],
-            )
-            for position, job in enumerate(steps, 1)
-        ],
+        step=how_to,
         input=[configuration],
     )
-    return workflow
 
 
-def _add_jobs(
-    crate: ROCrate,
-    jobs: Sequence[Job],
-    files: Mapping[str, File],
-    workflow: Entity,
-    engine: Entity,
-    campaign: str,
-    title: str,
-) -> None:
+def _add_jobs(crate: ROCrate, jobs: Sequence[Job], files: Mapping[str, File], campaign: str, title: str) -> None:
     """Add the run of the workflow, every job in it, and the step of the workflow that started each job."""
+    engine = crate.dereference("#snakemake")
     made = {path for job in jobs for path in job.outputs}
-    given = sorted({path for job in jobs for path in job.inputs} - made | {CONFIGURATION})
-    run = _add(
+    given = {path for job in jobs for path in job.inputs} - made | {CONFIGURATION}
+    run = _add_action(
         crate,
         "#campaign",
-        "CreateAction",
         name=campaign,
         description=title,
-        instrument=workflow,
-        object=[files[path] for path in given],
+        instrument=files[_WORKFLOW],
+        object=[files[path] for path in sorted(given)],
         result=[files[path] for path in sorted(made)],
-        actionStatus=_COMPLETED,
     )
     actions, controls = [], []
     for job in jobs:
         name = quote(job.outputs[0])
-        action = _add(
+        settings = [_add_value(crate, job, *each) for each in job.parameters]
+        action = _add_action(
             crate,
             f"#job/{name}",
-            "CreateAction",
             name=f"{job.rule}: {job.outputs[0]}",
             description=job.description,
             instrument=files[job.script],
-            object=[*(files[path] for path in job.inputs), *(_add_value(crate, job, *each) for each in job.parameters)],
+            object=[*(files[path] for path in job.inputs), *settings],
             result=[files[path] for path in job.outputs],
-            actionStatus=_COMPLETED,
         )
         actions.append(action)
-        control = _add(
+        control = _add_action(
             crate,
             f"#control/{name}",
             "ControlAction",
             name=f"step {job.rule}: {job.outputs[0]}",
-            instrument={"@id": f"{WORKFLOW}#{job.rule}"},
+            instrument={"@id": f"{_WORKFLOW}#{job.rule}"},
             object=action,
-            actionStatus=_COMPLETED,
         )
         controls.append(control)
-    _add(
-        crate,
-        "#organised",
-        "OrganizeAction",
-        name=f"{campaign}, organised by {engine['name']}",
-        instrument=engine,
-        object=controls,
-        result=run,
-        actionStatus=_COMPLETED,
-    )
+    name = f"{campaign}, organised by {engine['name']}"
+    _add_action(crate, "#organised", "OrganizeAction", name=name, instrument=engine, object=controls, result=run)
     crate.root_dataset.append_to("mentions", [run, *actions])
+
+
+def _add_action(crate: ROCrate, key: str, kind: str = "CreateAction", **properties: Any) -> Entity:
+    return _add(crate, key, kind, **properties, actionStatus="http://schema.org/CompletedActionStatus")
 
 
 def _add_value(crate: ROCrate, job: Job, name: str, value: str) -> Entity:

@@ -1,4 +1,4 @@
-"""Make a deposit: results with all that others need to understand, trust and compute them again, as a folder and a zip.
+"""Making a deposit, as a folder and a zip: results with all that others need to understand, verify and reproduce them.
 
 The same results of the same revision give the same bytes: the only times and the only names of people, machines and
 folders are those in the results, the configuration and the source.
@@ -29,9 +29,9 @@ from icha.support.atomic_files import moving, sync_folder, whole_file
 from icha.support.checksums import is_whole, made_as, sha256_of, stale
 
 _BLOCK = 2**20
-# The earliest time that a zip can hold.
+# The time of every file in a zip, the earliest possible one.
 _NO_TIME = (1980, 1, 1, 0, 0, 0)
-# The system in a zip to which modes of files belong.
+# Number of the system in a zip that has modes of files.
 _UNIX = 3
 
 
@@ -50,20 +50,20 @@ def make_deposit(
 
     Parameters
     ----------
-    folder, archive : where it goes. The name of the folder is also that within the archive.
+    folder, archive : paths to write to. The folder in the archive has the name of `folder`.
     results : the campaign's folder of results.
-    files : what of it is published, by paths from there: at least config.used.yaml, checks.json and the campaign
+    files : paths of the published results in that folder: at least config.used.yaml, checks.json and the campaign
         dataset.
-    campaign : what was asked for, with complete metadata (`icha.configuration.publication.needed`).
+    campaign : its configuration, with complete metadata (`icha.configuration.publication.needed`).
     source : the source of the program.
-    jobs : those that made the results.
-    cost : what computing the campaign is expected to take.
+    jobs : the jobs that made the results.
+    cost : expected cost of computing the campaign.
 
     Raises
     ------
     ValueError
-        If a file is not what its job wrote or has a name that not every system can have, or if the failed checks are
-        not exactly the known failures.
+        If a file is not what its job wrote or has a name that some systems refuse, or if the failed checks are not
+        exactly the known failures.
     """
     folder, archive, results = Path(folder), Path(archive), Path(results)
     files, publication = sorted(files), campaign.published()
@@ -87,7 +87,7 @@ def make_deposit(
             _write_zip(temporary, part, folder.name)
             sync_folder(part)
             with moving():
-                # What was here before goes at once, and its checksums with it.
+                # Remove an earlier deposit at once, with its checksums.
                 archive.unlink(missing_ok=True)
                 _remove(folder)
                 part.rename(folder)
@@ -98,16 +98,15 @@ def make_deposit(
 def _refuse_names(files: Iterable[str]) -> None:
     """Refuse names that `verify` would refuse."""
     if wrong := [f"  {file!r} {problem}" for file in files if (problem := problem_with_name(file))]:
-        raise ValueError("not published, because of these names; rename the files:\n" + "\n".join(wrong))
+        raise ValueError("not published, because of names of files. Rename these:\n" + "\n".join(wrong))
 
 
 def _refuse_changed(results: Path, files: Iterable[str]) -> None:
     """Refuse results that are not what their jobs wrote, as far as that is recorded; every byte is read."""
-    changed = [file for file in files if not is_whole(results, file, thorough=True)]
-    if changed:
+    if changed := [f"  {results / file}" for file in files if not is_whole(results, file, thorough=True)]:
         raise ValueError(
-            "not published, since these files of the results are not what was written; needed: remove them, and run "
-            "the campaign again:\n" + "\n".join(f"  {results / file}" for file in changed)
+            "not published, because these files are not what their jobs wrote. Remove them, and run the campaign "
+            "again:\n" + "\n".join(changed)
         )
 
 
@@ -117,9 +116,9 @@ def refuse_mixed(results: Path, campaign: Campaign, recorded: Mapping[str, str])
     Parameters
     ----------
     results : the campaign's folder of results.
-    campaign : what is published.
-    recorded : results, from that folder, with what the workflow has recorded that it asked of their jobs
-        (`icha.support.checksums.asked_of`).
+    campaign : its configuration.
+    recorded : checksums of the parameters that the workflow recorded for the jobs (`icha.support.checksums.asked_of`),
+        by the path of a result in that folder.
 
     Raises
     ------
@@ -138,13 +137,13 @@ def refuse_mixed(results: Path, campaign: Campaign, recorded: Mapping[str, str])
             wrong.setdefault(path, "the workflow has recorded another job for it")
     if wrong:
         raise ValueError(
-            "not published, since these results do not belong together; needed: remove them, and give the same command "
-            "again:\n" + "\n".join(f"  {results / path}: {why}" for path, why in sorted(wrong.items()))
+            "not published, because these results do not belong together. Remove them, and repeat the command:\n"
+            + "\n".join(f"  {results / path}: {why}" for path, why in sorted(wrong.items()))
         )
 
 
 def _describe(part: Path, files: Sequence[str], campaign: Campaign, revision: str, cost: Cost) -> None:
-    """Write the files by which the deposit describes itself."""
+    """Write licence, citation, metadata, data dictionary and page of the deposit."""
     publication, dictionary = campaign.published(), data_dictionary(part, files)
     _write(part / "LICENSE.txt", known_licence(publication.license).page(SOURCE))
     _write(part / "CITATION.cff", citation_cff(publication, revision))
@@ -152,7 +151,7 @@ def _describe(part: Path, files: Sequence[str], campaign: Campaign, revision: st
         _write(part / name, json.dumps(metadata, indent=1, ensure_ascii=False, allow_nan=False) + "\n")
     _write(part / "data_dictionary.csv", dictionary_csv(dictionary))
     error = part / "aggregated/model_error.nc"
-    # Opened and not loaded, since the dataset may be large and the page shows little of it.
+    # Opened and not loaded, because the dataset may be large and the page shows little of it.
     with xr.open_datatree(part / f"dataset/{campaign.name}.nc", engine="netcdf4") as dataset:
         page = readme(
             campaign,
@@ -173,7 +172,7 @@ def _write(path: Path, text: str) -> None:
 
 
 def _remove(folder: Path) -> None:
-    """Remove a folder so that at no moment a part of it has its name."""
+    """Remove a folder; at no moment does an incomplete one have its name."""
     if folder.is_dir():
         old = folder.with_name(f".{folder.name}.old")
         shutil.rmtree(old, ignore_errors=True)
@@ -182,7 +181,7 @@ def _remove(folder: Path) -> None:
 
 
 def _write_zip(path: Path, folder: Path, name: str) -> None:
-    """Write all files of a folder to a zip, in a folder of the given name; without compression, as zlib may differ."""
+    """Write a folder to a zip, under the given name; without compression, since versions of zlib differ."""
     with zipfile.ZipFile(path, "w", zipfile.ZIP_STORED) as archive:
         for file in files_of(folder):
             status = (folder / file).stat()

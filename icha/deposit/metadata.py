@@ -26,7 +26,7 @@ class Licence(NamedTuple):
     ----------
     identifier : its SPDX identifier.
     name, address : its name and web address.
-    text : its text, if ICHA has it; else empty.
+    text : its text if ICHA has it, else empty.
     """
 
     identifier: str
@@ -37,11 +37,11 @@ class Licence(NamedTuple):
     def page(self, source: str) -> str:
         """Write LICENSE.txt of a deposit whose data have this licence; `source` is the folder of the program."""
         name = self.identifier if self.name == self.identifier else f"{self.name} ({self.identifier})"
-        said = (
+        statement = (
             f"Data, figures and texts of this deposit: {name}\n{self.address}\n\n"
             f"The program in {source}/ has a licence of its own: {source}/LICENSE\n"
         )
-        return f"{said}\n{'-' * 72}\n\n{self.text}" if self.text else said
+        return f"{statement}\n{'-' * 72}\n\n{self.text}" if self.text else statement
 
 
 def known_licence(identifier: str) -> Licence:
@@ -58,11 +58,11 @@ def known_licence(identifier: str) -> Licence:
         found = ""
     if not re.fullmatch(r"(?!LicenseRef-)[A-Za-z0-9.-]+", found):
         raise ValueError(
-            "is not a licence known to SPDX; allowed: one identifier of https://spdx.org/licenses, for data usually "
-            f"one of {', '.join(TABLES['licences'])}"
+            "is not a licence known to SPDX; expected one identifier of https://spdx.org/licenses, for data usually "
+            f"{' or '.join(TABLES['licences'])}"
         )
     if identifier != found:
-        raise ValueError(f"is not spelled as SPDX spells it; allowed: {found!r}")
+        raise ValueError(f"is not spelled as SPDX spells it; expected {found!r}")
     if found not in TABLES["licences"]:
         return Licence(found, found, f"https://spdx.org/licenses/{found}.html", "")
     text = (_FOLDER / f"license_texts/{found}.txt").read_text(encoding="utf-8")
@@ -70,7 +70,7 @@ def known_licence(identifier: str) -> Licence:
 
 
 def licence_problem(campaign: Campaign) -> tuple[str, str] | None:
-    """Return key and text of what is wrong with the licence of a campaign's data; None if a deposit can have it."""
+    """Return key and text of a problem with the licence of a campaign's data; None if a deposit can have it."""
     licence = campaign.published().license
     try:
         known_licence(licence)
@@ -80,7 +80,7 @@ def licence_problem(campaign: Campaign) -> tuple[str, str] | None:
 
 
 def acknowledgement(funding: Funding) -> str:
-    """Write a sentence that names the funder and the grant."""
+    """Write an acknowledgement of the funder and the grant."""
     number = f"award {funding.award_number}" if funding.award_number else ""
     award = ": ".join(filter(None, (number, funding.award_title)))
     return f"Funded by {funding.funder}{f' ({award})' if award else ''}"
@@ -89,7 +89,7 @@ def acknowledgement(funding: Funding) -> str:
 def discovery_attributes(publication: Publication) -> dict[str, str]:
     """Return the attributes of the Attribute Convention for Data Discovery (ACDD 1.3) for a dataset.
 
-    Several creators are separated by semicolons, since names hold commas, in the same order in every attribute.
+    Several creators are separated by semicolons, because names contain commas, in the same order in every attribute.
     """
     authors = publication.authors
     values = {
@@ -117,8 +117,8 @@ def citation_cff(publication: Publication, revision: str) -> str:
 
     Parameters
     ----------
-    publication : what is to be cited; complete (`icha.configuration.publication.needed`).
-    revision : the state of the program that made the data.
+    publication : complete metadata (`icha.configuration.publication.needed`).
+    revision : that of the program that made the data.
     """
     licence = known_licence(publication.license)
     content = {
@@ -159,8 +159,8 @@ def _cff_author(author: Author) -> dict[str, str]:
 def zenodo_metadata(publication: Publication) -> dict[str, Any]:
     """Return the metadata of `.zenodo.json`, as Zenodo's deposit API takes them (https://developers.zenodo.org).
 
-    Grants are listed where Zenodo knows the funder. The notes have all funding, and the runs that are published
-    although a check fails.
+    Grants are listed if Zenodo knows the funder. The notes have all funding, and the runs that are published although a
+    check fails.
     """
     notes = [f"{acknowledgement(funding)}." for funding in publication.funding]
     notes += [f"Published with a failed check: {each.run}. {each.reason}" for each in publication.known_failures]
@@ -203,7 +203,7 @@ def zenodo_metadata(publication: Publication) -> dict[str, Any]:
 
 
 def read_zenodo_metadata(folder: Path) -> dict[str, Any]:
-    """Read the metadata of a deposit that may be a stranger's; ValueError if they are not a mapping."""
+    """Read the metadata of a deposit from an unknown maker; ValueError if they are not a mapping."""
     try:
         metadata = json.loads(read_text(folder, ZENODO))
     except (ValueError, RecursionError) as error:
@@ -214,21 +214,21 @@ def read_zenodo_metadata(folder: Path) -> dict[str, Any]:
 
 
 def summary_of(metadata: dict[str, Any]) -> dict[str, str]:
-    """Return title, version, authors, licence and communities of Zenodo metadata as text, whatever they are."""
+    """Return title, version, authors, licence and communities of Zenodo metadata, of any types, as text."""
 
-    def named(entries: Any, key: str) -> str:
+    def join(entries: Any, key: str) -> str:
         entries = entries if isinstance(entries, list) else ()
         return "; ".join(str(each.get(key, "")) for each in entries if isinstance(each, dict))
 
     texts = {name: str(metadata.get(name, "")) for name in ("title", "version", "license")}
-    communities = named(metadata.get("communities"), "identifier")
-    return texts | {"authors": named(metadata.get("creators"), "name"), "community": communities}
+    communities = join(metadata.get("communities"), "identifier")
+    return texts | {"authors": join(metadata.get("creators"), "name"), "community": communities}
 
 
 def datacite_metadata(publication: Publication) -> dict[str, Any]:
-    """Return the metadata after DataCite's schema 4.5 (https://doi.org/10.14454/g8e5-6293), as JSON.
+    """Return the metadata after DataCite's schema 4.5 (https://doi.org/10.14454/g8e5-6293), for JSON.
 
-    The publisher is known only with the DOI; else it is `:tba`, DataCite's word for what will be known later.
+    Without a DOI the publisher is unknown, and `:tba`, DataCite's word for values that will be known later.
     """
     licence = known_licence(publication.license)
     paper = RelatedIdentifier(identifier=f"arXiv:{MODEL_PAPER.arxiv}", relation="Cites", resource="Preprint")
@@ -321,5 +321,5 @@ def _html(texts: list[str]) -> str:
 
 
 def _given(content: dict[str, Any]) -> dict[str, Any]:
-    """Leave out what is not given."""
+    """Remove empty entries."""
     return {key: value for key, value in content.items() if value not in (None, [], "")}

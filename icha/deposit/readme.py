@@ -5,9 +5,9 @@ import io
 import math
 import re
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 from typing import NamedTuple
 from urllib.parse import quote
 
@@ -29,19 +29,18 @@ from icha.datasets.variables.campaign import COMPLETE, FAILED_CHECKS, INCOMPLETE
 from icha.deposit.metadata import TABLES, acknowledgement, known_licence, paragraphs, web_address
 from icha.deposit.verify import COMPUTED
 from icha.planning.costs import Cost
-from icha.planning.needs import further_software
-from icha.support import in_words
+from icha.planning.requirements import further_software
+from icha.support import formatting
 
 _TEMPLATE = "README.md.jinja"
 # Placeholders for what differs between files of one kind.
 _PLACEHOLDERS = {name: f"<{name}>" for name in ("study", "entry", "surface", "material")}
-_PLACEHOLDERS |= {"seed": "<k>", "slope": "<g>", "pressure": "<load>", "model_folder": ""}
-# Kinds of files by the beginning of a path and the number of its parts.
-_KINDS = {
-    (pattern.partition("/{")[0], len(PurePosixPath(kind).parts)): kind
+_PLACEHOLDERS |= {"seed": "<k>", "slope": "<g>", "pressure": "<load>"}
+_KINDS = [
+    pattern.format(**_PLACEHOLDERS, model_folder=folder)
     for pattern in (SURFACE, RUN, SOLUTION, LOOP, THEORIES)
-    for kind in {pattern.format(**_PLACEHOLDERS | {"model_folder": folder}) for folder in ("", "<model>/")}
-}
+    for folder in ("", "<model>/")
+]
 # Numbers of a variable that are read at once.
 _BLOCK = 2**22
 # A longer list is cut.
@@ -96,7 +95,9 @@ def data_dictionary(folder: Path, files: Iterable[str]) -> list[Entry]:
             file.set_auto_scale(False)
             for group in _groups(file):
                 for variable in group.variables.values():
-                    found.setdefault((kind_of(name), group.path, *_described(variable)), []).append(_range(variable))
+                    found.setdefault((file_pattern(name), group.path, *_described(variable)), []).append(
+                        _range(variable)
+                    )
     entries = []
     for key, ranges in found.items():
         smallest, largest = ([value for value in values if value is not None] for values in zip(*ranges, strict=True))
@@ -107,17 +108,13 @@ def data_dictionary(folder: Path, files: Iterable[str]) -> list[Entry]:
 def dictionary_csv(entries: Iterable[Entry]) -> str:
     """Write the dictionary as a table with headings, commas and quotes (RFC 4180 except for its line ends)."""
     text = io.StringIO()
-    table = csv.writer(text, lineterminator="\n")
-    table.writerow(Entry._fields)
-    table.writerows(["" if value is None else value for value in entry] for entry in entries)
+    csv.writer(text, lineterminator="\n").writerows([Entry._fields, *entries])
     return text.getvalue()
 
 
-def kind_of(path: str) -> str:
+def file_pattern(path: str) -> str:
     """Return the path with placeholders for what differs between files of its kind."""
-    parts = PurePosixPath(path).parts
-    kinds = (_KINDS.get((beginning, len(parts))) for beginning in ("/".join(parts[:2]), parts[0]))
-    return next(filter(None, kinds), path)
+    return next((kind for kind in _KINDS if re.fullmatch(re.sub("<.*?>", "[^/]+", kind), path)), path)
 
 
 def _groups(group) -> Iterator[netCDF4.Dataset]:
@@ -129,20 +126,21 @@ def _groups(group) -> Iterator[netCDF4.Dataset]:
 def _described(variable) -> tuple[str, ...]:
     """Name, dimensions, type, units, long name, flags, meaning of missing values, and comment of a variable."""
     attributes = {name: variable.getncattr(name) for name in variable.ncattrs()}
-    dimensions, kind = variable.dimensions, np.dtype(variable.dtype)
-    if kind == np.dtype("S1"):  # text, kept as characters along a last dimension
+    dimensions, dtype = variable.dimensions, np.dtype(variable.dtype)
+    if dtype == np.dtype("S1"):  # text is stored as characters along a last dimension
         dimensions = dimensions[:-1]
-    values = np.atleast_1d(attributes.get("flag_values", []))
-    meanings = str(attributes.get("flag_meanings", "")).split()
+    flags = zip(
+        np.atleast_1d(attributes.get("flag_values", [])), str(attributes.get("flag_meanings", "")).split(), strict=False
+    )
     missing = str(attributes.get("missing", ""))
     if "_FillValue" in attributes:
         missing = f"{attributes['_FillValue']!s}: {missing or 'no value, see status and step_count'}"
     return (
         variable.name,
         " ".join(dimensions),
-        "text" if kind == np.dtype("S1") or kind.kind in "OU" else kind.name,
+        dtype.name if dtype.kind in "fiu" else "text",
         *(str(attributes.get(name, "")) for name in ("units", "long_name")),
-        ", ".join(f"{value}: {meaning}" for value, meaning in zip(values, meanings, strict=False)),
+        ", ".join(f"{value}: {meaning}" for value, meaning in flags),
         missing,
         str(attributes.get("comment", "")),
     )
@@ -184,9 +182,10 @@ def readme(
     cost : what computing the whole campaign is expected to take.
     """
     publication = campaign.published()
+    authors = "; ".join(author.sorted_name for author in publication.authors)
     text = _template().render(
         publication=publication,
-        citation=_citation(publication),
+        citation=f"{authors} ({publication.date[:4]}): {publication.title}. Version {publication.version}. Data set.",
         paper=MODEL_PAPER,
         summary=paragraphs(publication.summary),
         licence=known_licence(publication.license),
@@ -219,8 +218,8 @@ def _template() -> jinja2.Template:
         "link": _link,
         "number": "{:.4g}".format,
         "value": "{:z.2g}".format,
-        "size": in_words.size,
-        "duration": in_words.duration,
+        "size": formatting.size,
+        "duration": formatting.duration,
         "span": _span,
         "seeds": _seeds,
         "few": _few,
@@ -239,8 +238,8 @@ def _asked(campaign: Campaign) -> dict:
         "surfaces": surfaces,
         "materials": materials,
         "self_affine": any(isinstance(each, SelfAffineSurface) for each in surfaces.values()),
-        "sides": _known_of(surfaces, campaign.period, "{:.4g}".format),
-        "grids": _known_of(surfaces, campaign.grid, str),
+        "sides": {name: _known(campaign.period, name, "{:.4g}") for name in surfaces},
+        "grids": {name: _known(campaign.grid, name, "{}") for name in surfaces},
         "adhesive": any(material.surface_energy > 0 for material in campaign.materials.values()),
         "both_ways": any(study.unload or study.turning_points for study in campaign.studies.values()),
         "installed": (*further_software(campaign), "environment")[0],
@@ -248,15 +247,12 @@ def _asked(campaign: Campaign) -> dict:
     }
 
 
-def _known_of(surfaces: Iterable[str], ask, form) -> dict[str, str]:
-    """Properties of surfaces; empty for files that have not been read."""
-    found = {}
-    for name in surfaces:
-        try:
-            found[name] = form(ask(name))
-        except AttributeError:
-            found[name] = ""
-    return found
+def _known(quantity: Callable[[str], float], surface: str, form: str) -> str:
+    """Write a property of a surface; empty for files that have not been read."""
+    try:
+        return form.format(quantity(surface))
+    except AttributeError:
+        return ""
 
 
 def _outcome(publication: Publication, dataset: xr.DataTree, checks: Sequence[Check]) -> dict:
@@ -287,11 +283,6 @@ def _outcome(publication: Publication, dataset: xr.DataTree, checks: Sequence[Ch
     }
 
 
-def _citation(publication: Publication) -> str:
-    authors = "; ".join(author.sorted_name for author in publication.authors)
-    return f"{authors} ({publication.date[:4]}): {publication.title}. Version {publication.version}. Data set."
-
-
 def _study_designs(dataset: xr.DataTree) -> list[dict]:
     """Labels of every study, and the number of its cells with each status."""
     designs = []
@@ -305,14 +296,13 @@ def _study_designs(dataset: xr.DataTree) -> list[dict]:
 
 
 def _runs_of_status(dataset: xr.DataTree, status: int) -> dict[RunLabels, tuple[int, str]]:
-    """Runs of a status in a campaign dataset: number of steps, and the reason for a failure."""
+    """Return number of steps, and reason for a failure, of the runs of a status in a campaign dataset."""
     found = {}
     for name, node in dataset.children.items():
         study = node.to_dataset()
         for labels in runs_of_status(study, name, (status,)):
-            place = run_place(study, labels)
-            steps, failure = (study[each].isel(place) for each in ("step_count", "failure"))
-            found[labels] = int(steps), str(failure.values)
+            run = study.isel(run_place(study, labels))
+            found[labels] = int(run["step_count"]), str(run["failure"].values)
     return found
 
 
@@ -322,18 +312,18 @@ def _model_errors(tree: xr.DataTree) -> list[dict]:
     for entry, node in tree.children.items():
         data = node.to_dataset()
         for material in data["material"].values.tolist():
-            own = data.sel(material=material)
-            there = np.isfinite(own["area_error_mean"])
-            if not bool(there.any()):
+            errors = data.sel(material=material)
+            known = np.isfinite(errors["area_error_mean"])
+            if not known.any():
                 continue
             values = {
-                "loads": own["reduced_pressure"].broadcast_like(there).where(there),
-                "area": own["area_error_mean"],
-                "separation": own["separation_error_mean"],
-                "overlap": own["jaccard_mean"],
+                "loads": errors["reduced_pressure"].broadcast_like(known).where(known),
+                "area": errors["area_error_mean"],
+                "separation": errors["separation_error_mean"],
+                "overlap": errors["jaccard_mean"],
             }
             ranges = {name: (float(each.min()), float(each.max())) for name, each in values.items()}
-            found.append({"entry": entry, "study": str(data.attrs["study"]), "material": material, **ranges})
+            found.append({"entry": entry, "study": data.attrs["study"], "material": material, **ranges})
     return found
 
 
@@ -347,18 +337,18 @@ def _short_dictionary(dictionary: Sequence[Entry], campaign: str) -> list[Entry]
 
 
 def _parts(sizes: Mapping[str, int]) -> list[dict]:
-    """The parts of the deposit: path, content, number of files and bytes."""
-    found = []
-    for part, content in TABLES["contents"].items():
-        own = [size for path, size in sizes.items() if path == part or path.startswith(f"{part}/")]
-        if own:
-            path = part if part in sizes else f"{part}/"
-            found.append({"path": path, "content": content, "files": len(own), "size": sum(own)})
-    rest = {path: size for path, size in sizes.items() if path.split("/")[0] not in TABLES["contents"]}
-    found.append(
-        {"path": ", ".join(sorted(rest)), "content": _METADATA, "files": len(rest), "size": sum(rest.values())}
-    )
-    return found
+    """List the parts of the deposit: path, content, number of files and bytes."""
+    grouped: dict[str, list[int]] = {}
+    for path, size in sizes.items():
+        top = path.split("/")[0]
+        grouped.setdefault(top if top in TABLES["contents"] else "", []).append(size)
+    others = ", ".join(sorted(path for path in sizes if path.split("/")[0] not in TABLES["contents"]))
+    rows = [(part if part in sizes else f"{part}/", part, content) for part, content in TABLES["contents"].items()]
+    return [
+        {"path": path, "content": content, "files": len(grouped[part]), "size": sum(grouped[part])}
+        for path, part, content in [*rows, (others, "", _METADATA)]
+        if part in grouped
+    ]
 
 
 def _few(values: Sequence) -> str:

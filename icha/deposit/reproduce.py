@@ -1,12 +1,12 @@
-"""Prepare the rerun of a deposit with the ICHA that is installed; nothing in the deposit is executed.
+"""Preparation of the rerun of a deposit with the installed ICHA; nothing in the deposit is executed.
 
-The deposit is a folder that `icha.deposit.verify.whole_deposit` has found to be whole.
+The deposit is a folder that `icha.deposit.verify.whole_deposit` has verified.
 """
 
 import re
 import shutil
 import tomllib
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from importlib.metadata import version
 from pathlib import Path
 
@@ -17,12 +17,12 @@ from icha.configuration.load import INPUTS, load_configuration
 from icha.configuration.yaml_files import read_yaml
 from icha.datasets.attributes import why_no_result
 from icha.datasets.results import CONFIGURATION
-from icha.deposit.program import PROGRAM, differences
+from icha.deposit.program import PROGRAM, differences, program_files
 from icha.deposit.verify import CHECKSUMS, COMPUTED, SOURCE, files_of, read_text
 from icha.support.checksums import sha256_of
-from icha.support.in_words import counted
+from icha.support.formatting import format_count
 from icha.support.input_files import refuse_traps
-from icha.support.program import own_workflow, package_of
+from icha.support.program import own_workflow
 from icha.support.values import NAME_PATTERN
 
 SMALLEST = "smallest"
@@ -34,7 +34,7 @@ _RUN = re.compile(r"runs(/[^/]+){4}/[^/]+\.nc")
 
 
 class Refused(ValueError):
-    """A rerun that cannot begin; the message gives the reason."""
+    """A rerun cannot begin; the message gives the reason."""
 
 
 def campaign_name(deposit: Path) -> str:
@@ -43,9 +43,9 @@ def campaign_name(deposit: Path) -> str:
         if not (deposit / file).is_file():
             raise Refused(f"the deposit has no {file}, so it cannot be computed again")
     if not any((deposit / name).exists() for name in COMPUTED):
-        raise Refused("the deposit has no results, so there is nothing to compare with")
+        raise Refused("the deposit has no results to compare with")
     try:
-        read_text(deposit, CONFIGURATION)  # of a size that can be read
+        read_text(deposit, CONFIGURATION)  # refuses a file that is too large
         name = read_yaml(deposit / CONFIGURATION).get("name")
     except ValueError as error:
         raise Refused(str(error).replace(f"{deposit}/", "")) from None
@@ -75,45 +75,35 @@ def changed_files(deposit: Path) -> int:
     lines = read_text(deposit, CHECKSUMS).splitlines()
     listed = {name.removeprefix(f"{SOURCE}/"): digest for digest, name in (line.split("  ", 1) for line in lines)}
     theirs = {name: digest for name, digest in listed.items() if name == PROGRAM[0] or name.startswith(PROGRAM[1:])}
-    ours = {name: sha256_of(file) for name, file in _installed_files()}
+    ours = {name: sha256_of(file) for name, file in program_files(own_workflow()).items()}
     return sum(theirs.get(name) != ours.get(name) for name in {*theirs, *ours})
 
 
-def _installed_files() -> Iterator[tuple[str, Path]]:
-    """Files of the installed program with their names in the repository."""
-    workflow = own_workflow()
-    for part in PROGRAM:
-        top = package_of(workflow) if part == "icha/" else workflow / part
-        for file in [top] if top.is_file() else top.rglob("*"):
-            if file.is_file() and "__pycache__" not in file.parts:
-                yield (Path(part) / file.relative_to(top)).as_posix(), file
-
-
-def asked_runs(only: Iterable[str], deposit: Path) -> list[str]:
-    """Return the paths of the runs that are asked for.
+def find_runs(only: Iterable[str], deposit: Path) -> list[str]:
+    """Return the paths of selected runs of a deposit.
 
     Parameters
     ----------
-    only : names, `study/surface/seed1/slope1/material`, or `SMALLEST`.
+    only : names such as `study/surface/seed1/slope1/material`, or `SMALLEST`.
     deposit : its folder.
 
     Raises
     ------
     Refused
-        If there is no such run.
+        If the deposit has no such run.
     """
     runs = [name for name in files_of(deposit) if _RUN.fullmatch(name)]
     found = []
-    for asked in only:
-        if asked == SMALLEST and runs:
+    for name in only:
+        if name == SMALLEST and runs:
             found.append(_smallest(deposit, runs))
             continue
-        path = f"runs/{asked.removeprefix('runs/').removesuffix('.nc')}.nc"
+        path = f"runs/{name.removeprefix('runs/').removesuffix('.nc')}.nc"
         if path not in runs:
             such_as = f", such as {runs[0].removeprefix('runs/').removesuffix('.nc')}" if runs else ""
             raise Refused(
-                f"--only {asked}: the deposit has no such run; allowed: {SMALLEST}, or one of its "
-                f"{counted(len(runs), 'run')}{such_as}"
+                f"--only {name}: the deposit has no such run; expected {SMALLEST}, or one of its "
+                f"{format_count(len(runs), 'run')}{such_as}"
             )
         found.append(path)
     return list(dict.fromkeys(found))
@@ -125,7 +115,7 @@ def _smallest(deposit: Path, runs: list[str]) -> str:
     for run in sorted(runs, key=lambda run: sizes[run]):
         if _is_complete(deposit, run):
             return run
-    raise Refused(f"--only {SMALLEST}: no run of the deposit is complete; allowed: the name of a run that has steps")
+    raise Refused(f"--only {SMALLEST}: no run of the deposit is complete; expected the name of a run that has steps")
 
 
 def _is_complete(deposit: Path, run: str) -> bool:
@@ -138,13 +128,13 @@ def _is_complete(deposit: Path, run: str) -> bool:
 
 
 def with_surfaces(runs: Iterable[str], deposit: Path) -> list[str]:
-    """Return the paths of runs and of their surfaces, as far as the deposit has these."""
+    """Return the paths of runs, and of their surfaces if the deposit has them."""
     surfaces = dict.fromkeys("surfaces/{2}/{3}.nc".format(*run.split("/")) for run in runs)
     return [*runs, *(path for path in surfaces if (deposit / path).is_file())]
 
 
 def prepare(folder: Path, deposit: Path) -> Path:
-    """Copy configuration and inputs of a deposit to the folder of a rerun, unless they are there, and return the copy.
+    """Copy configuration and inputs of a deposit to the folder of a rerun, unless it has them; return the copy.
 
     Raises
     ------
@@ -153,15 +143,15 @@ def prepare(folder: Path, deposit: Path) -> Path:
         because it names files outside the deposit.
     """
     if folder.resolve().is_relative_to(deposit.resolve()):
-        raise Refused(f"--folder {folder}: is in the deposit, which is only read; allowed: another folder")
+        raise Refused(f"--folder {folder}: is in the deposit, which is only read; expected another folder")
     digest = f"{sha256_of(deposit / CHECKSUMS)}\n"
     begun, project = folder / _BEGUN, folder / _PROJECT
     if begun.is_file():
         if begun.read_text(encoding="ascii", errors="replace") != digest:
-            raise Refused(f"--folder {folder}: belongs to another deposit; allowed: a new or empty folder")
+            raise Refused(f"--folder {folder}: belongs to another deposit; expected a new or empty folder")
     else:
         if folder.is_dir() and any(folder.iterdir()):
-            raise Refused(f"--folder {folder}: has other files in it; allowed: a new or empty folder")
+            raise Refused(f"--folder {folder}: has other files in it; expected a new or empty folder")
         project.mkdir(parents=True)
         if (deposit / INPUTS).is_dir():
             shutil.copytree(deposit / INPUTS, project / INPUTS, copy_function=shutil.copyfile)

@@ -13,24 +13,25 @@ from urllib3 import Retry
 
 ZENODO = "https://zenodo.org"
 SANDBOX = "https://sandbox.zenodo.org"
-# For the connection, and for an answer, as checksums of large files take the server its time; in s.
+# Longest wait for the connection, and for an answer, in s; the server computes checksums of large files.
 _TIMEOUT = (20, 900)
+# HTTP statuses of a server that is busy or has failed.
 _FAILING = (429, 500, 502, 503, 504)
 # Longest text of a server that is shown, in characters.
 _LONGEST = 300
 _SCOPES = "deposit:write and deposit:actions"
-# What users can do about a status; the address of the server is put in.
+# Advice to users by HTTP status; the braces are replaced by the address of the server.
 _ADVICE = {
     401: f"make a token at {{}}/account/settings/applications/tokens/new/ with the scopes {_SCOPES}; the sandbox has "
-    "tokens of its own",
-    403: f"needed: a token with the scopes {_SCOPES}, and a draft or record of your own",
-    404: "is the number of the draft or record right?",
-    413: "the file is too large; Zenodo takes 50 GB a record",
+    "its own tokens",
+    403: f"use a token with the scopes {_SCOPES}, and your own draft or record",
+    404: "check the number of the draft or record",
+    413: "the file is too large; Zenodo accepts 50 GB per record",
 }
 
 
 class ZenodoError(Exception):
-    """The server refuses a request, or cannot be reached; the message says what to do."""
+    """The server refuses a request, or cannot be reached; the message gives advice."""
 
 
 class Draft(NamedTuple):
@@ -42,7 +43,7 @@ class Draft(NamedTuple):
     page : address of its page.
     bucket : path on the server to which files are sent.
     doi : the DOI reserved for it.
-    files : identifiers and MD5 of its files by their names; the MD5 is empty if the server does not report it.
+    files : identifier and MD5 of its files, by name; the MD5 is empty if the server does not report it.
     """
 
     number: str
@@ -52,14 +53,14 @@ class Draft(NamedTuple):
     files: dict[str, tuple[str, str]]
 
 
-# What can be repeated waits 0, 2, 4, 8, 16 s, or as long as the server asks for, up to five minutes.
+# Requests that can be repeated are, after 0, 2, 4, 8, 16 s, or after the time that the server asks for, at most 300 s.
 _PATIENCE = Retry(
     total=5, backoff_factor=1, status_forcelist=_FAILING, redirect=0, raise_on_status=False, retry_after_max=300
 )
 
 
 class _Bearer(requests.auth.AuthBase):
-    """The token in its header; set this way, no `.netrc` replaces it."""
+    """The token in the header of a request; set this way, no `.netrc` replaces it."""
 
     def __init__(self, token: str):
         self._token = token
@@ -80,9 +81,9 @@ def server_address(address: str) -> str:
     parts = urlsplit(address if "//" in address else f"https://{address}")
     plain = not (parts.username or parts.query or parts.fragment) and parts.path.rstrip("/") in ("", "/api")
     if parts.scheme not in ("http", "https") or not parts.hostname or not plain:
-        raise ValueError(f"{address!r} is not the address of a server; allowed: one such as {ZENODO}")
+        raise ValueError(f"{address!r} is not the address of a server; expected an address such as {ZENODO}")
     if parts.scheme == "http" and parts.hostname not in ("localhost", "127.0.0.1", "::1"):
-        raise ValueError(f"{address!r}: over http others could read the token; allowed: https")
+        raise ValueError(f"{address!r}: over http others could read the token; expected https")
     return f"{parts.scheme}://{parts.netloc}"
 
 
@@ -93,10 +94,10 @@ def md5_of(path: str | os.PathLike) -> str:
 
 
 class Zenodo:
-    """A server with a token for it. Every method raises `ZenodoError` if the server refuses or does not answer."""
+    """A server and a token for it. Every method raises `ZenodoError` if the server refuses or does not answer."""
 
     def __init__(self, address: str, token: str, patience: Retry | None = None):
-        """Keep the address, as `server_address` takes it, and the token; nothing is sent yet."""
+        """Take the address, as `server_address` does, and the token; nothing is sent yet."""
         self.address = server_address(address)
         self._token = token
         self._session = requests.Session()
@@ -112,9 +113,7 @@ class Zenodo:
         """Return an existing draft."""
         content = self._call("GET", f"/api/deposit/depositions/{quote(number, safe='')}")
         if content.get("submitted") is True or content.get("state") == "done":
-            raise ZenodoError(
-                f"{number} is published already; a new version of it is made with --new-version-of {number}"
-            )
+            raise ZenodoError(f"{number} is published already. Use --new-version-of {number} for a new version of it")
         return self._draft(content)
 
     def new_version(self, number: str) -> Draft:
@@ -123,7 +122,7 @@ class Zenodo:
         found = _text(content, "links", "latest_draft").rstrip("/").rpartition("/")[2]
         if found in ("", number):
             raise ZenodoError(
-                f"{self.address} gives no draft of a new version of {number}; if there is one already, continue it "
+                f"{self.address} returns no draft of a new version of {number}. If a draft exists already, continue it "
                 "with --draft"
             )
         return self.draft(found)
@@ -138,7 +137,9 @@ class Zenodo:
         with open(path, "rb") as file:
             received = _md5(self._call("PUT", f"{draft.bucket}/{quote(name)}", data=file))
         if received and received != md5:
-            raise ZenodoError(f"{name} has not arrived as it was sent: its MD5 is {md5}, that of the server {received}")
+            raise ZenodoError(
+                f"{name} did not arrive as it was sent: its MD5 is {md5}, that on the server is {received}"
+            )
         return bool(received)
 
     def remove(self, draft: Draft, name: str) -> None:
@@ -155,10 +156,10 @@ class Zenodo:
     def _draft(self, content: Mapping) -> Draft:
         number, bucket = _text(content, "id"), _text(content, "links", "bucket")
         if not number or not bucket:
-            raise ZenodoError(f"{self.address} does not answer as Zenodo does: a draft without number or bucket")
+            raise ZenodoError(f"{self.address} does not answer as Zenodo does: its draft has no number or no bucket")
         if not bucket.startswith(f"{self.address}/"):
-            # The token goes to nobody else.
-            raise ZenodoError(f"{self.address} wants the files to be sent to another server: {self._plain(bucket)}")
+            # The token must not reach another server.
+            raise ZenodoError(f"{self.address} asks to send the files to another server: {self._plain(bucket)}")
         listed = content.get("files")
         files = {
             _text(file, "filename") or _text(file, "key"): (_text(file, "id"), _md5(file))
@@ -176,9 +177,13 @@ class Zenodo:
                 method, f"{self.address}{path}", timeout=_TIMEOUT, allow_redirects=False, **content
             )
         except requests.RequestException as error:
-            raise ZenodoError(f"{self.address} cannot be reached, or breaks off: {self._plain(error)}") from None
+            raise ZenodoError(
+                f"{self.address} cannot be reached, or ended the connection: {self._plain(error)}"
+            ) from None
         if answer.is_redirect:
-            raise ZenodoError(f"{self.address} redirects to {self._plain(answer.headers['Location'])}; use that one")
+            raise ZenodoError(
+                f"{self.address} redirects to {self._plain(answer.headers['Location'])}. Use that address"
+            )
         if not answer.ok:
             raise ZenodoError(self._refusal(path, answer))
         try:
@@ -186,33 +191,33 @@ class Zenodo:
         except (ValueError, RecursionError):
             found = None
         if not isinstance(found, dict):
-            raise ZenodoError(f"{self.address} does not answer as Zenodo does: no mapping from {path}")
+            raise ZenodoError(f"{self.address} does not answer as Zenodo does: {path} is not a mapping")
         return found
 
     def _refusal(self, path: str, answer: requests.Response) -> str:
-        """Describe why the server refuses, in its own words, and what to do."""
+        """Describe why the server refuses, with its message and advice."""
         advice = _ADVICE.get(answer.status_code, "").format(self.address)
         if answer.status_code in _FAILING:
             advice = "it is busy or has failed; try again in a while"
         elif answer.status_code == 400 and path.endswith("/newversion"):
-            advice = "if there is a draft of a new version already, continue it with --draft"
-        told = self._plain(answer.text or answer.reason)
-        return f"{self.address} refuses {path} ({answer.status_code}): {'; '.join(filter(None, (told, advice)))}"
+            advice = "if a draft of a new version exists already, continue it with --draft"
+        reason = self._plain(answer.text or answer.reason)
+        return f"{self.address} refuses {path} ({answer.status_code}): {'; '.join(filter(None, (reason, advice)))}"
 
     def _plain(self, text: object) -> str:
-        """Shorten text of the server, and leave out the token, should the server repeat it."""
+        """Shorten text of the server, and remove the token if the server repeats it."""
         plain = " ".join(str(text).split()).replace(self._token, "…")
         return plain if len(plain) <= _LONGEST else f"{plain[: _LONGEST - 1]}…"
 
 
 def _text(content: Any, *keys: str) -> str:
-    """Text or number in nested mappings of an answer, as text; empty if there is none."""
+    """Return a text or number in nested mappings of an answer, as text; empty if there is none."""
     for key in keys:
         content = content.get(key) if isinstance(content, dict) else None
     return str(content) if isinstance(content, str | int) else ""
 
 
 def _md5(content: Mapping) -> str:
-    """The checksum that the server reports for a file, with or without the prefix `md5:`."""
-    kind, _, digits = _text(content, "checksum").rpartition(":")
-    return digits.lower() if kind in ("", "md5") else ""
+    """Return the checksum that the server reports for a file, with or without the prefix `md5:`."""
+    algorithm, _, digits = _text(content, "checksum").rpartition(":")
+    return digits.lower() if algorithm in ("", "md5") else ""

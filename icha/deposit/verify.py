@@ -1,7 +1,7 @@
-"""Verify deposits, which anybody may have made: nothing is read before names, kinds and sizes have been inspected.
+"""Verification of deposits from unknown makers.
 
-A zip is extracted into an empty folder, within `LIMITS`. Then every byte is compared with `SHA256SUMS`. Nothing in a
-deposit is executed.
+Nothing is read before names, kinds and sizes of files have been inspected. A zip is extracted into an empty folder,
+within limits. Then every byte is compared with `SHA256SUMS`. Nothing in a deposit is executed.
 """
 
 import contextlib
@@ -14,9 +14,9 @@ import zlib
 from collections.abc import Iterator
 from pathlib import Path
 
-from icha.support import in_words
+from icha.support import formatting
 from icha.support.checksums import sha256_of
-from icha.support.in_words import is_printable, printable
+from icha.support.formatting import is_printable, printable
 
 CHECKSUMS = "SHA256SUMS"
 # Files by which a deposit describes itself: to readers, as an RO-Crate, to Zenodo.
@@ -28,13 +28,13 @@ COMPUTED = (
     *("dataset", "runs", "surfaces", "references", "aggregated", "figures"),
     *("report.html", "checks.json", "verdict.txt"),
 )
-# Most bytes of a file that is read as a whole: the list of checksums, a configuration, metadata.
+# Largest file that is read as a whole (list of checksums, configuration, metadata), in bytes.
 LARGEST_TEXT = 64_000_000
-# Most bytes of a name that common file systems accept: of one part, of a path.
-_LONGEST_PART, _LONGEST_PATH = 255, 1000
-# Limits for a deposit from a stranger, which the option `LARGE` of the commands lifts: number of files; factor by which
-# a zip may grow when it is extracted, and bytes that it may have in any case. ICHA does not compress deposits; whoever
-# compresses one again gains a factor of about three.
+# Longest name and longest path that common file systems accept, in bytes.
+_LONGEST_NAME, _LONGEST_PATH = 255, 1000
+# Limits that the option `LARGE` of the commands lifts: number of files; factor by which a zip may grow when it is
+# extracted, and size in bytes that is accepted in any case. ICHA does not compress deposits; compression gains a factor
+# of about three.
 MOST_FILES, MOST_GROWTH, ALLOWANCE = 200_000, 50, 100_000_000
 LARGE = "--large"
 _LINE = re.compile(r"([0-9a-f]{64})  (.+)")
@@ -52,14 +52,14 @@ def whole_deposit(path: str | os.PathLike, *, large: bool = False) -> Iterator[P
     Parameters
     ----------
     path : its folder or its zip.
-    large : whether to accept more files and bytes than is good from a stranger.
+    large : True to accept more files and bytes than `MOST_FILES`, `MOST_GROWTH` and `ALLOWANCE`.
 
     Raises
     ------
     Damaged
         If files differ from their checksums, are missing or were added, or if the deposit cannot be read safely.
     OSError
-        If a zip cannot be extracted, for instance because there is no room.
+        If a zip cannot be extracted, for instance because the disk is full.
     """
     path = Path(path)
     with contextlib.ExitStack() as opened:
@@ -73,7 +73,7 @@ def whole_deposit(path: str | os.PathLike, *, large: bool = False) -> Iterator[P
 
 
 def verify_deposit(path: str | os.PathLike, *, large: bool = False) -> list[str]:
-    """List what is wrong with a deposit, one line each; the list is empty if it is whole. Parameters: `whole_deposit`.
+    """List the problems of a deposit, one line each; empty if it is whole. Parameters as of `whole_deposit`.
 
     Folders without files do not count, as in git and in the list of checksums.
     """
@@ -99,30 +99,31 @@ def read_text(folder: Path, name: str) -> str:
     """
     size = (folder / name).stat().st_size
     if size > LARGEST_TEXT:
-        raise ValueError(f"{name}: has {in_words.size(size)}; allowed: {in_words.size(LARGEST_TEXT)}")
+        raise ValueError(f"{name}: has {formatting.size(size)}; expected at most {formatting.size(LARGEST_TEXT)}")
     return (folder / name).read_text(encoding="utf-8")
 
 
 def problem_with_name(name: str) -> str:
-    """Explain why a path must not be in a deposit; empty if it leads to the same place on every system."""
-    parts = name.split("/")
+    """Explain why a path must not be in a deposit; empty if it names the same file on every system."""
+    names = name.split("/")
     if name.startswith("/") or re.match("[A-Za-z]:", name):
         return "is an absolute path"
-    if any(part in ("", ".", "..") for part in parts):
-        return "leads elsewhere, or nowhere"
+    if any(each in ("", ".", "..") for each in names):
+        return "leads out of its folder, or to no file"
     if "\\" in name:
         return "has a backslash, which separates folders on other systems"
     if not is_printable(name):
         return "has invisible characters"
-    if len(name.encode()) > _LONGEST_PATH or max(len(part.encode()) for part in parts) > _LONGEST_PART:
+    if len(name.encode()) > _LONGEST_PATH or max(len(each.encode()) for each in names) > _LONGEST_NAME:
         return "is too long"
     return ""
 
 
 def _extract(path: Path, folder: Path, large: bool) -> Path:
-    """Extract a zip into an empty folder and return the single folder in it; links become files, and nothing leads out.
+    """Extract a zip into an empty folder and return the single folder in it.
 
-    Python's zipfile leaves out what leads out of the folder, and reads no more bytes of a file than are declared.
+    Python's zipfile removes `..` and roots from names, makes plain files of links, and reads no more bytes of a file
+    than are declared.
     """
     name = printable(path.name)
     if not path.is_file():
@@ -135,26 +136,26 @@ def _extract(path: Path, folder: Path, large: bool) -> Path:
                 raise Damaged(_too_many(len(entries)))
             if unpacked > MOST_GROWTH * packed + ALLOWANCE and not large:
                 raise Damaged(
-                    f"{name}: unpacks from {in_words.size(packed)} to {in_words.size(unpacked)}; allowed: "
-                    f"{MOST_GROWTH} times its size and {in_words.size(ALLOWANCE)}, or more with {LARGE}"
+                    f"{name}: unpacks from {formatting.size(packed)} to {formatting.size(unpacked)}; expected "
+                    f"at most {MOST_GROWTH} times its size and {formatting.size(ALLOWANCE)}. Use {LARGE} to accept more"
                 )
             if unpacked > free:
                 raise OSError(
-                    f"{folder.parent}: {in_words.size(unpacked)} are needed to extract {name}, and "
-                    f"{in_words.size(free)} are free; set TMPDIR to a folder with more room"
+                    f"{folder.parent}: {name} needs {formatting.size(unpacked)} unpacked, and {formatting.size(free)} "
+                    "are free. Set TMPDIR to a folder with more space"
                 )
             archive.extractall(folder)
     except (zipfile.BadZipFile, NotImplementedError, RuntimeError, EOFError, zlib.error) as error:
         # Damaged, or encrypted, or compressed by an unknown method.
         raise Damaged(f"{name}: not a readable zip archive: {printable(error)}") from None
-    held = sorted(os.listdir(folder))
-    if len(held) != 1 or not (folder / held[0]).is_dir():
-        raise Damaged(f"{name}: holds {printable(', '.join(held[:5]) or 'nothing')}; allowed: a single folder")
-    return folder / held[0]
+    found = sorted(os.listdir(folder))
+    if len(found) != 1 or not (folder / found[0]).is_dir():
+        raise Damaged(f"{name}: contains {printable(', '.join(found[:5]) or 'nothing')}; expected a single folder")
+    return folder / found[0]
 
 
 def _too_many(count: int) -> str:
-    return f"holds {count:,} files or more; allowed: {MOST_FILES:,}, or more with {LARGE}"
+    return f"contains {count:,} files or more; expected at most {MOST_FILES:,}. Use {LARGE} to accept more"
 
 
 def _problems(folder: Path, large: bool) -> Iterator[str]:
@@ -162,7 +163,7 @@ def _problems(folder: Path, large: bool) -> Iterator[str]:
     found, special = _inspect(folder, large)
     yield from (f"{printable(name)}: {problem}" for name, problem in special.items())
     if CHECKSUMS not in found:
-        yield f"{CHECKSUMS}: is missing, so this is no whole deposit"
+        yield f"{CHECKSUMS}: is missing, so this is not a whole deposit"
         return
     try:
         lines = read_text(folder, CHECKSUMS).splitlines()
@@ -173,9 +174,9 @@ def _problems(folder: Path, large: bool) -> Iterator[str]:
     for number, line in enumerate(lines, 1):
         listed = _LINE.fullmatch(line)
         if listed is None or problem_with_name(listed[2]):
-            yield f"{CHECKSUMS}, line {number}: {line[:80]!r} is no checksum of a file in this folder"
+            yield f"{CHECKSUMS}, line {number}: {line[:80]!r} is not a checksum of a file in this folder"
         elif listed[2] in expected:
-            yield f"{CHECKSUMS}, line {number}: {listed[2]} is named twice"
+            yield f"{CHECKSUMS}, line {number}: {listed[2]} is listed twice"
         else:
             expected[listed[2]] = listed[1]
     for name, digest in expected.items():
@@ -183,20 +184,20 @@ def _problems(folder: Path, large: bool) -> Iterator[str]:
             if name not in special:
                 yield f"{name}: is missing"
         elif sha256_of(folder / name) != digest:
-            yield f"{name}: was changed: its checksum is another one"
+            yield f"{name}: was changed: its checksum differs"
     for name in sorted(found - set(expected) - {CHECKSUMS}):
         yield f"{printable(name)}: was added: it is not in {CHECKSUMS}"
 
 
 def _inspect(folder: Path, large: bool) -> tuple[set[str], dict[str, str]]:
-    """List the files below a folder, and what is wrong with names and kinds of others; links are not followed."""
+    """List the files below a folder, and problems with names and kinds of others; links are not followed."""
     found: set[str] = set()
     problems: dict[str, str] = {}
     pending = [""]
     while pending:
-        inside = pending.pop()
-        for entry in os.scandir(folder / inside):
-            name = f"{inside}{entry.name}"
+        parent = pending.pop()
+        for entry in os.scandir(folder / parent):
+            name = f"{parent}{entry.name}"
             if entry.is_dir(follow_symlinks=False):
                 pending.append(f"{name}/")
             elif not entry.is_file(follow_symlinks=False):

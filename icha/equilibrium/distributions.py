@@ -1,10 +1,10 @@
-"""Distributions of gap and pressure over the nominal area, and the part of every cell that is in contact."""
+"""Distributions of gap and pressure over the nominal area, and the contact area of every grid cell."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from icha.asperity.law import SpotLaw
+from icha.asperity.jkr import JKR
 from icha.contact.model import GAPS_PER_DECADE, PRESSURE_BINS, gap_bins
 from icha.equilibrium.sites import ContactState, Spots
 from icha.half_space.grid_displacement import DisplacementField, row_blocks, windows
@@ -15,10 +15,15 @@ from icha.surfaces.surface import Surface
 
 @dataclass(frozen=True, eq=False)
 class GapDistribution:
-    """P(u) over the nominal area: bin edges in m, density in 1/m; overlap is the area fraction of negative gaps.
+    """Distribution P(u) of the gap over the nominal area.
 
-    beyond_edges: part of the nominal area by which A/A0 exceeds what spots cover of it: where they reach over the edges
-    of a free square, and where two that came apart overlap.
+    Attributes
+    ----------
+    edges : (bins + 1,) float, edges of the bins, m.
+    density : (bins,) float, 1/m.
+    overlap_fraction : area fraction of negative gaps, where the model lets the surfaces overlap.
+    beyond_edges : A/A0 less the area fraction that spots cover. Spots may reach over the edges of a free square, and
+        two spots that have split may overlap.
     """
 
     edges: np.ndarray
@@ -29,7 +34,14 @@ class GapDistribution:
 
 @dataclass(frozen=True, eq=False)
 class PressureDistribution:
-    """P(p) over the nominal area: bin edges in Pa, density in 1/Pa, area-weighted mean pressure of each bin in Pa."""
+    """Distribution P(p) of the pressure over the nominal area.
+
+    Attributes
+    ----------
+    edges : (bins + 1,) float, edges of the bins, Pa.
+    density : (bins,) float, 1/Pa.
+    mean : (bins,) float, area-weighted mean pressure of each bin, Pa.
+    """
 
     edges: np.ndarray
     density: np.ndarray
@@ -37,80 +49,77 @@ class PressureDistribution:
 
 
 def contact_cover(surface: Surface, spots: Spots) -> np.ndarray:
-    """Fraction of every node's cell that lies in contact, (n, n), exact for discs.
+    """Return the fraction of every node's cell that is in contact, (n, n) float, exact for discs.
 
-    Its mean is the contact area fraction to rounding, since spots are disjoint; for a free square, without what lies
-    beyond its edges.
+    Its mean is the contact area fraction up to rounding, because spots are disjoint; on a free square without the area
+    beyond the edges.
     """
-    grid, centres, radii = surface.grid, spots.position, spots.contact_radius
-    period, free = surface.period, surface.free
-    parts = on_cores(lambda rows: _cover(period, grid, centres, radii, rows, free)[0], row_blocks(grid))
-    return np.concatenate(parts)
+    cover, _ = _cover_grid(surface.period, surface.grid, spots.position, spots.contact_radius, surface.free)
+    return cover
 
 
 def nodes_in_discs(period: float, grid: int, centres: np.ndarray, radii: np.ndarray, free: bool = False) -> np.ndarray:
-    """Whether each node of a grid, (n, n) of bool, lies inside a disc: centres (m, 2) and radii (m,) in m.
+    """Return whether each node of a grid lies inside a disc, (n, n) bool.
 
-    free: whether the discs are single, or repeat with the period.
+    centres : (m, 2), radii : (m,), m; free : whether the discs are single, or repeat with the period.
     """
-    parts = on_cores(lambda rows: _cover(period, grid, centres, radii, rows, free)[1], row_blocks(grid))
-    return np.concatenate(parts)
+    _, inside = _cover_grid(period, grid, centres, radii, free)
+    return inside
 
 
-def gap_distribution(law: SpotLaw, surface: Surface, state: ContactState) -> GapDistribution:
-    """P(u) from the gap field; cells on the edge of a spot count with the part that lies outside.
+def _cover_grid(period, grid, centres, radii, free):
+    """Return the results of `_cover` for all rows of a grid."""
+    blocks = on_cores(lambda rows: _cover(period, grid, centres, radii, rows, free), row_blocks(grid))
+    return tuple(np.concatenate(parts) for parts in zip(*blocks, strict=True))
 
-    integral of P(u) + A/A0 + overlap = 1 + beyond_edges. Where the node of a cell lies inside a spot, the outer part of
-    the cell has gap zero: it is the spot's edge. The last bin also counts what lies beyond it. The field is never held
-    as a whole.
+
+def gap_distribution(law: JKR, surface: Surface, state: ContactState) -> GapDistribution:
+    """Return P(u) from the gaps of all grid cells; a cell on the edge of a spot counts with its part outside the spot.
+
+    The integral of P(u) + A/A0 + overlap is 1 + beyond_edges. If the node of a cell lies inside a spot, the part of the
+    cell outside has gap zero: it is the spot's edge. The last bin includes larger gaps. The field is evaluated in
+    blocks of rows, never as a whole.
     """
     edges = gap_bins(surface)
-    spots = state.spots
-    field = DisplacementField(
-        law,
-        surface.period,
-        surface.grid,
-        spots.position,
-        spots.contact_radius,
-        spots.radius_of_curvature,
-        surface.free,
-    )
+    spots, a = state.spots, state.spots.contact_radius
+    period, grid, free = surface.period, surface.grid, surface.free
+    field = DisplacementField(law, period, grid, spots.position, a, spots.radius_of_curvature, free)
 
-    def nodes_per_bin(rows, w):
+    def count_cells(rows, w):
         u = w + (state.separation - surface.heights[rows])
-        cover, inside = _cover(surface.period, surface.grid, spots.position, spots.contact_radius, rows, surface.free)
+        cover, inside = _cover(period, grid, spots.position, a, rows, free)
         u[inside] = 0.0
-        # The first place is for the overlap.
-        place = np.where(u < 0, 0, _gap_bin(u, edges) + 1).ravel()
+        # Bin 0 is the overlap.
+        index = np.where(u < 0, 0, _gap_bin(u, edges) + 1).ravel()
         cut = np.flatnonzero(cover)
-        hidden = np.bincount(place[cut], weights=np.clip(cover.ravel()[cut], 0.0, 1.0), minlength=len(edges))
-        return np.bincount(place, minlength=len(edges)) - hidden, np.sum(cover), np.sum(np.maximum(cover - 1.0, 0.0))
+        hidden = np.bincount(index[cut], weights=np.clip(cover.ravel()[cut], 0.0, 1.0), minlength=len(edges))
+        return np.bincount(index, minlength=len(edges)) - hidden, np.sum(cover), np.sum(np.maximum(cover - 1.0, 0.0))
 
-    content, covered, twice = zip(*field.in_blocks(nodes_per_bin), strict=True)
-    content = np.sum(content, axis=0) / surface.grid**2
-    beyond = float(sum(twice)) / surface.grid**2
-    if surface.free:
-        area = np.sum(np.pi * spots.contact_radius**2) / surface.period**2
-        beyond += max(float(area - sum(covered) / surface.grid**2), 0.0)
+    content, covered, twice = zip(*field.map_blocks(count_cells), strict=True)
+    content = np.sum(content, axis=0) / grid**2
+    beyond = float(sum(twice)) / grid**2
+    if free:
+        area = np.sum(np.pi * a**2) / period**2
+        beyond += max(float(area - sum(covered) / grid**2), 0.0)
     return GapDistribution(edges, content[1:] / np.diff(edges), float(content[0]), beyond)
 
 
 def _gap_bin(u, edges):
-    """Index of the bin edges[i] <= u < edges[i + 1] of every gap; the last bin holds what is larger."""
+    """Return the bin edges[i] <= u < edges[i + 1] of every gap; the last bin includes larger gaps."""
     last = len(edges) - 2
     decade = np.log10(np.maximum(u / edges[1], 1.0))
     index = np.minimum(decade * GAPS_PER_DECADE + 1, last).astype(np.intp)
-    # Next to an edge the logarithm may round to the wrong side.
+    # Close to an edge the logarithm may round to the wrong side.
     index -= u < edges[index]
     index += (u >= edges[index + 1]) & (index < last)
     return index
 
 
-def pressure_distribution(law: SpotLaw, surface: Surface, spots: Spots) -> PressureDistribution:
-    """P(p) over the nominal area from the closed form for every spot (no grid).
+def pressure_distribution(law: JKR, surface: Surface, spots: Spots) -> PressureDistribution:
+    """Return P(p) over the nominal area from the closed form for every spot, without a grid.
 
-    integral of P(p) = A/A0; the sum of density, width and mean over the bins = F/A0. The last bin, which ends at 500 E*
-    h'_rms, also counts what lies beyond it.
+    The integral of P(p) is A/A0; the sum of density times width times mean over the bins is F/A0. The last bin, which
+    ends at 500 E* h'_rms, includes larger pressures.
     """
     edges = PRESSURE_BINS * (law.material.contact_modulus * surface.rms_slope)
     a, R = spots.contact_radius, spots.radius_of_curvature
@@ -120,7 +129,7 @@ def pressure_distribution(law: SpotLaw, surface: Surface, spots: Spots) -> Press
         for k, p in enumerate([*edges[:-1], max(edges[-1], largest)]):
             areas, forces = law.pressure_distribution(p, a, R)
             area[k], force[k] = np.sum(areas), np.sum(forces)
-        # The edge of a JKR spot reaches minus infinity; what lies below the first edge belongs to the first bin.
+        # The pressure at the edge of a JKR spot is minus infinity: the first bin includes all lower pressures.
         area[0] = force[0] = 0.0
     content, load = np.diff(area), np.diff(force)
     mean = np.divide(load, content, out=np.zeros(len(content)), where=content > 0)
@@ -128,21 +137,20 @@ def pressure_distribution(law: SpotLaw, surface: Surface, spots: Spots) -> Press
 
 
 def _cover(period, grid, centres, radii, rows, free=False):
-    """Of a range of rows: the fraction of every cell in contact, and whether the node lies inside a spot."""
+    """Return for a range of rows the fraction of every cell in contact, and whether its node lies inside a spot."""
     if free:
-        # In a grid of twice the side nothing comes back from beyond the edges.
+        # In a cell of twice the side no spot returns at the opposite edge.
         parts = _cover(cell_of(period, free), cell_of(grid, free), centres, radii, rows)
         return tuple(part[:, :grid] for part in parts)
     spacing = period / grid
     cover = np.zeros((rows.stop - rows.start) * grid)
     inside = np.zeros(len(cover), dtype=bool)
-    # Discs of like size share the width of their windows, a power of two of cells.
+    # Discs of similar size share the width of their windows, a power of two of cells.
     width = 2 ** np.ceil(np.log2(radii / spacing + 2)).astype(int)
     for cells in np.unique(width):
         same = np.flatnonzero((width == cells) & (radii > 0))
-        own = radii[same]
         for window in windows(centres[same], (cells - 1) * spacing, grid, period, rows):
-            a = own[window.spot][:, None]
+            a = radii[same][window.spot][:, None]
             left = np.concatenate([window.dx - 0.5 * spacing, window.dx[:, -1:] + 0.5 * spacing], axis=1)
             below = [_disc_below(left, (window.dy + side * spacing)[:, None], a) for side in (-0.5, 0.5)]
             np.add.at(cover, window.node.ravel(), np.diff(below[1] - below[0], axis=1).ravel() / spacing**2)
@@ -151,11 +159,11 @@ def _cover(period, grid, centres, radii, rows, free=False):
 
 
 def _disc_below(x, y, a):
-    """Area of the disc of radius a around the origin that lies left of x and below y."""
+    """Return the area of the disc of radius a around the origin that lies left of x and below y."""
     x, y = np.clip(x, -a, a), np.clip(y, -a, a)
     left = _disc_left(x, a)
     below = _disc_left(y, a)
-    # The four parts into which the lines at x and y cut the disc: Q is left and below.
+    # The lines at x and y cut the disc into four parts; this one is left and below.
     corner = x**2 + y**2 < a**2
     quarter = 0.5 * (left + below) + x * y - 0.25 * np.pi * a**2
     # A corner outside the disc leaves one of the four parts empty.
@@ -168,5 +176,5 @@ def _disc_below(x, y, a):
 
 
 def _disc_left(x, a):
-    """Area of the disc left of x, -a <= x <= a."""
+    """Return the area of the disc left of x, -a <= x <= a."""
     return a**2 * (0.5 * np.pi + np.arcsin(x / a)) + x * np.sqrt(np.maximum(a**2 - x**2, 0.0))

@@ -1,4 +1,4 @@
-"""Interacting asperities: the model of contact of Violano & Afferrante, which a path is followed with."""
+"""Interacting asperities: the contact model of Violano & Afferrante, in the form that a path follows."""
 
 from __future__ import annotations
 
@@ -9,61 +9,70 @@ import numpy as np
 
 from icha.asperity.jkr import JKR
 from icha.asperity.material import Material
-from icha.contact.model import AREA_FRACTION, PRESSURE, Control, Events, largest_tension, summit_counts
+from icha.contact.model import AREA_FRACTION, PRESSURE, Control, Events, count_summits, largest_tension
 from icha.contact.models import DEFAULT_MODEL, MODELS, PathAccuracy
 from icha.equilibrium.distributions import gap_distribution, pressure_distribution
-from icha.equilibrium.equations import derivative, held_value, stored_energy
-from icha.equilibrium.equilibrium import equilibrium
-from icha.equilibrium.sites import ContactState, Problem, untouched
+from icha.equilibrium.equations import nominal_derivative, nominal_value, radius_response
+from icha.equilibrium.sites import ContactState, Problem, Sites
+from icha.equilibrium.solver import find_equilibrium
 from icha.half_space.free_square import mean_displacement
 from icha.surfaces.summits import LARGEST_DEPARTURE, SummitCoverage, find_summits, paraboloid_departure
 from icha.surfaces.surface import Surface
 
-# How much of the surface contact may cover: targets are met up to a quarter of it, looked for somewhat beyond.
+# Largest contact area fraction of a state. Targets are allowed up to 0.25; the search for them goes somewhat beyond.
 _LARGEST_AREA = 1.5 * 0.25
-# At such a rate to the separation the approach of a spot rises, as the surfaces part, on an unstable branch only.
-_RUNAWAY = 10.0
+# Rate of the approach to the mean separation on unloading, above which a spot is on an unstable branch.
+_UNSTABLE_RESPONSE = 10.0
 
 
 @dataclass(frozen=True, eq=False)
 class InteractingAsperities(Problem):
     """Asperities that interact through the half-space and unite where they overlap: a `ContactModel`.
 
-    Quantities of a state are those of its spots (`ContactState.spots`).
+    The quantities of a state are those of its spots (`ContactState.spots`).
     """
 
     @property
     def largest_area_fraction(self) -> float:
-        """Contact area over nominal area beyond which spots have lost their identity."""
+        """Contact area fraction above which spots have lost their identity."""
         return _LARGEST_AREA
 
     @property
     def path_accuracy(self) -> PathAccuracy:
-        """Accuracy to which a path resolves its events."""
+        """Accuracy to which a path resolves events."""
         return MODELS[DEFAULT_MODEL].accuracy
 
     def untouched(self) -> ContactState:
-        """The state at which the first asperity is about to make contact."""
-        return untouched(self)
+        """Return the state in which the first asperity is about to make contact."""
+        asperities = self.asperities
+        separation = float(np.max(asperities.height - self.jump_in))
+        return ContactState(
+            separation=separation,
+            sites=Sites.none(self.law, asperities),
+            contact_radius=np.empty(0),
+            site_of_asperity=np.full(len(asperities), -1),
+            last_approach=asperities.height - separation,
+            last_separation=np.full(len(asperities), separation),
+        )
 
     def equilibrium(
         self, state: ContactState, separation: float, control: Control | None = None, *, let_go: int = 0
     ) -> ContactState:
-        """The contact brought to another mean separation (m), or to a given load or area; as of `ContactModel`."""
-        return equilibrium(self, state, separation, control, spots_let_go=let_go)
+        """Find the equilibrium at another mean separation (m), load or area; see `ContactModel`."""
+        return find_equilibrium(self, state, separation, control, break_first=let_go)
 
     def pressure(self, state: ContactState) -> float:
-        """Total force over nominal area, Pa."""
-        return held_value(self, PRESSURE, state.spots.contact_radius, state.spots.radius_of_curvature)
+        """Return the force over the nominal area, Pa."""
+        return nominal_value(self, PRESSURE, state.spots.contact_radius, state.spots.radius_of_curvature)
 
     def area_fraction(self, state: ContactState) -> float:
-        """Total contact area over nominal area."""
-        return held_value(self, AREA_FRACTION, state.spots.contact_radius, state.spots.radius_of_curvature)
+        """Return the contact area over the nominal area."""
+        return nominal_value(self, AREA_FRACTION, state.spots.contact_radius, state.spots.radius_of_curvature)
 
     def mean_gap(self, state: ContactState) -> float:
-        """Mean over the square of separation and displacement, m; of a periodic surface the mean separation.
+        """Return the mean gap, m: the mean separation of a periodic surface.
 
-        Of a free square the spots act as forces at their centres.
+        On a free square the mean displacement is added, with the spots as forces at their centres.
         """
         if not self.asperities.free:
             return state.separation
@@ -72,50 +81,70 @@ class InteractingAsperities(Problem):
         return state.separation + mean_displacement(self.asperities.period, self.contact_modulus, spots.position, force)
 
     def spot_count(self, state: ContactState) -> int:
-        """Number of contact spots."""
+        """Return the number of contact spots."""
         return len(state.spots)
 
     def stiffness(self, state: ContactState) -> float:
-        """-dp/du of the present spots, Pa/m, from the tangent of the equilibrium."""
+        """Return -dp/du of the present spots, Pa/m."""
         return 0.0 - self.slope(PRESSURE, state)
 
     def slope(self, quantity: str, state: ContactState) -> float:
-        """Derivative of a quantity that can be held with respect to the mean separation, at unchanged contacts."""
-        return derivative(self, quantity, state)
+        """Return the derivative of the pressure or area fraction with respect to the mean separation.
+
+        It follows from the responses of the approaches, for unchanged contacts.
+        """
+        sites, c = state.sites, state.in_contact
+        a, R = state.contact_radius[c], sites.radius_of_curvature[c]
+        growth = radius_response(self.law, a, R, sites.approach[c], sites.jump_off[c]) * sites.response[c]
+        return float(np.sum(nominal_derivative(self, quantity, a, R) * growth))
 
     def stored_energy(self, state: ContactState) -> float:
-        """Elastic energy less that of adhesion over nominal area, J/m^2 (`icha.equilibrium.equations`)."""
-        return stored_energy(self, state)
+        """Return the elastic energy less the energy of adhesion over the nominal area, J/m^2; zero out of contact.
+
+        Every spot has the work that would make it alone, and half the work of its force on the displacement by the
+        others. As in eq. (4), force and displacement are those at the centres of the spots. So the interaction of spots
+        of unlike size is only nearly reciprocal: along a path without events the energy changes by the work done up to
+        a part of the order of (a/r)^2 of that interaction.
+        """
+        spots, law = state.spots, self.law
+        a, R = spots.contact_radius, spots.radius_of_curvature
+        displaced = spots.height - state.separation - spots.approach
+        return float(np.sum(law.energy(a, R) + 0.5 * law.force(a, R) * displaced)) / self.area
 
     def is_unstable(self, state: ContactState) -> bool:
-        """Whether a spot would come closer as the surfaces part."""
-        return bool(np.max(state.responses, initial=0.0) > _RUNAWAY)
+        """Return whether a spot would approach as the surfaces part."""
+        return bool(np.max(state.sites.response[state.in_contact], initial=0.0) > _UNSTABLE_RESPONSE)
 
     def events_between(self, before: ContactState, after: ContactState) -> Events:
-        """The events on the path from one state to a later one."""
-        return Events.joined(after.history[len(before.history) :])
+        """Return the events on the path from one state to a later one."""
+        return Events.concatenate(after.history[len(before.history) :])
 
     def observables(self, surface: Surface) -> AsperityObservables:
-        """What a run keeps of the states on the surface that is pressed."""
+        """Return the observables of the states on a surface."""
         return AsperityObservables(self, surface)
 
 
 @dataclass(frozen=True, eq=False)
 class AsperityObservables:
-    """Observables of a contact of asperities and of the surface that they are on, beyond those of every model."""
+    """Observables of interacting asperities, in addition to those of every contact model.
+
+    Parameters
+    ----------
+    contact : contact of the asperities.
+    surface : surface on which they are.
+    """
 
     contact: InteractingAsperities
     surface: Surface
 
     def of_contact(self) -> dict:
-        """What holds for all states."""
-        return summit_counts(self.contact.asperities)
+        """Return what is the same in all states."""
+        return count_summits(self.contact.asperities)
 
     def of_step(self, state: ContactState) -> dict:
-        """Error of the equilibrium, events so far, and how far Wu's formula is known to hold."""
+        """Return the residual, the numbers of events, and the part of single spots outside Wu's formula."""
         law, spots = self.contact.law, state.spots
-        single = spots.members == 1
-        verified = law.is_jump_in_verified(spots.radius_of_curvature[single])
+        verified = law.is_jump_in_verified(spots.radius_of_curvature[spots.members == 1])
         outside = np.count_nonzero(~verified) / max(len(verified), 1)
         return {
             "residual": state.residual,
@@ -128,7 +157,7 @@ class AsperityObservables:
         }
 
     def of_snapshot(self, state: ContactState) -> dict:
-        """Distributions of gap and pressure, and the spots."""
+        """Return the distributions of gap and pressure, and the spots."""
         law, spots = self.contact.law, state.spots
         gaps = gap_distribution(law, self.surface, state)
         pressures = pressure_distribution(law, self.surface, spots)
@@ -149,22 +178,21 @@ class AsperityObservables:
         }
 
     def reasons_against(self, separations: Iterable[float], pressed: ContactState | None) -> list[str]:
-        """Reasons why asperities do not stand for the surface in its first loading."""
+        """Return the reasons why the asperities do not represent the surface in the first loading."""
         reasons = SummitCoverage.of(self.surface, self.contact.asperities).reasons_against(separations)
-        if pressed is not None and (departure := self._departure(pressed)) > LARGEST_DEPARTURE:
+        if pressed is None:
+            return reasons
+        spots = pressed.spots
+        single = spots.members == 1
+        departure = paraboloid_departure(
+            self.surface, spots.position[single], spots.contact_radius[single], spots.radius_of_curvature[single]
+        )
+        if departure > LARGEST_DEPARTURE:
             reasons.append(
                 "the tops are not parabolic over the contact spots: their depth at the edges differs by a factor of "
                 f"{np.exp(departure):.2g} on average, expected at most {np.exp(LARGEST_DEPARTURE):.2g}"
             )
         return reasons
-
-    def _departure(self, state: ContactState) -> float:
-        """Departure of the surface from the paraboloids of the spots of one summit."""
-        spots = state.spots
-        single = spots.members == 1
-        return paraboloid_departure(
-            self.surface, spots.position[single], spots.contact_radius[single], spots.radius_of_curvature[single]
-        )
 
     @property
     def largest_tension(self) -> float:
@@ -174,5 +202,5 @@ class AsperityObservables:
 
 
 def contact_of(surface: Surface, material: Material) -> InteractingAsperities:
-    """The contact of a surface and a material; raises `ValueError` if the surface has no summits."""
+    """Return the contact of a surface and a material; raise `ValueError` if the surface has no summits."""
     return InteractingAsperities(JKR(material), find_summits(surface), surface.rms_height, surface.rms_slope)

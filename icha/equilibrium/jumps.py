@@ -1,9 +1,9 @@
-"""Jumps into contact and out of it.
+"""Jumps of asperities into contact and out of it.
 
-Jump-in: free asperities whose approach reaches that at which contact forms, eq. (3), become sites. Without adhesion
-contact forms at an approach of zero and without a jump: there all asperities are sites that may come into contact, and
-the iteration decides which do. Jump-off: spots past the end of their stable branch break contact, and united ones fall
-into their asperities. Those of them that have a stable state of the law stay in contact.
+Jump-in: free asperities whose approach reaches the jump-in approach, eq. (3), become sites. Without adhesion contact
+forms at an approach of zero and without a jump: there all asperities that may come into contact are candidates, and the
+iteration decides which of them do. Jump-off: spots past the end of their stable branch break contact, and unions
+release their asperities. Those of them that have a stable state of the law stay in contact.
 """
 
 from dataclasses import replace
@@ -13,181 +13,185 @@ import numpy as np
 from icha.asperity.coalescence import covering_spot
 from icha.contact.model import JUMP_IN, JUMP_OFF, SPLIT
 from icha.equilibrium.equations import Point
-from icha.equilibrium.search import Search
-from icha.equilibrium.sites import CONTACT, TRIAL
+from icha.equilibrium.iteration_state import IterationState
+from icha.equilibrium.sites import CANDIDATE, CONTACT
 from icha.half_space.interaction import displacement_at
 
-# Free asperities are looked at that can have come into contact since they were last looked at: their approach grows by
-# at most so many times the fall of the separation; and, as spots jump, by so much at once, in h_rms and in the largest
-# jump-off approach: on the way to an equilibrium that is a guess, at the equilibrium a bound.
+# Largest and probable growth of the approach of a free asperity, relative to the fall of the separation.
 _FASTEST_APPROACH = 3.0
 _PROBABLE_APPROACH = 1.2
+# Growth of the approach by jumps of other spots, in h_rms and in the largest jump-off approach: a guess that serves on
+# the way to an equilibrium, and a bound that serves at the equilibrium.
 _SUDDEN_GUESS = 0.02, 2.0
 _SUDDEN_BOUND = 1.0, 10.0
+# Relative difference of the distances from jump-off up to which spots break contact together.
+_SAME_STRENGTH = 1e-3
 
 
-def with_candidates(search: Search, separation: float) -> Search:
-    """Without adhesion: with sites of the asperities that will probably come into contact at a separation, m."""
-    fall = search.seen_at - separation
-    hopeful = search.seen + _PROBABLE_APPROACH * fall + _sudden(search.problem, _SUDDEN_GUESS) > 0
-    candidates = np.flatnonzero(hopeful & search.free)
-    # Where contact was lost the approach is not known, but small.
-    expected = np.where(np.isfinite(fall), search.seen + fall, 0.0)
-    return _admitted(search, candidates, TRIAL, expected[candidates])
+def add_candidates(state: IterationState, separation: float) -> IterationState:
+    """Add the asperities that will probably come into contact at a separation, m, as candidates; without adhesion."""
+    fall = state.last_separation - separation
+    growth = _PROBABLE_APPROACH * fall + _sudden_growth(state.problem, _SUDDEN_GUESS)
+    candidates = np.flatnonzero((state.last_approach + growth > 0) & state.free)
+    # The approach of an asperity that has lost contact is not known, but small.
+    expected = np.where(np.isfinite(fall), state.last_approach + fall, 0.0)
+    return _add_sites(state, candidates, CANDIDATE, expected[candidates])
 
 
-def jump_in(search: Search, point: Point, margin: float) -> tuple[Search, bool]:
-    """Sites of the free asperities beyond jump-in by more than the margin (m); and whether there were any.
+def jump_in(state: IterationState, point: Point, margin: float) -> tuple[IterationState, bool]:
+    """Let the free asperities that are beyond their jump-in approach by more than a margin, m, jump into contact.
 
-    Those that lie under a spot are taken into it. What has just fallen out of a united spot was in contact, and stays
-    so wherever there is a stable state.
+    An asperity under a spot is taken into that spot. An asperity that has just been released from a union was in
+    contact, and stays in contact if it has a stable state.
+
+    Returns
+    -------
+    The new state, and whether any asperity has jumped in.
     """
-    problem, law, asperities = search.problem, search.problem.law, search.problem.asperities
-    spots = np.flatnonzero((point.a > 0) & search.sites.present)
-    a, there = point.a[spots], search.sites.position[spots]
-    search, looked_at = _looked_at(search, point, spots, margin)
-    fell = search.fallen[looked_at] >= 0
-    needed = problem.jump_in[looked_at] + margin
-    needed[fell] = law.jump_off_approach(asperities.radius_of_curvature[looked_at[fell]])
-    ready = search.seen[looked_at] >= needed
+    problem, law, asperities = state.problem, state.problem.law, state.problem.asperities
+    spots = np.flatnonzero((point.a > 0) & state.sites.present)
+    state, evaluated = _evaluate_approaches(state, point, spots, margin)
+    released = state.released_from[evaluated] >= 0
+    threshold = problem.jump_in[evaluated] + margin
+    threshold[released] = law.jump_off_approach(asperities.radius_of_curvature[evaluated[released]])
+    ready = state.last_approach[evaluated] >= threshold
     if not problem.adhesive:
-        ready &= search.seen[looked_at] > 0
-    locked, holder = search.locked.copy(), search.holder.copy()
-    locked[looked_at[fell & ~ready]] = True
-    ready = looked_at[ready]
-    barred = locked[ready]
-    pending, ready = int(np.count_nonzero(barred)), ready[~barred]
-    under = covering_spot(asperities.position[ready], there, a, asperities.cell)
-    holder[ready[under >= 0]] = spots[under[under >= 0]]
-    ready = _first_of_each_group(search, ready[under < 0])
-    source = search.fallen[ready]
-    none = np.full(len(search.fallen), -1)
-    search = replace(search, locked=locked, holder=holder, pending=pending, fallen=none)
+        ready &= state.last_approach[evaluated] > 0
+    barred, site_of_asperity = state.barred.copy(), state.site_of_asperity.copy()
+    barred[evaluated[released & ~ready]] = True
+    ready = evaluated[ready]
+    pending, ready = int(np.count_nonzero(barred[ready])), ready[~barred[ready]]
+    under = covering_spot(asperities.position[ready], state.sites.position[spots], point.a[spots], asperities.cell)
+    site_of_asperity[ready[under >= 0]] = spots[under[under >= 0]]
+    ready = _largest_of_each_group(state, ready[under < 0])
+    source = state.released_from[ready]
+    none = np.full(len(state.released_from), -1)
+    state = replace(state, barred=barred, site_of_asperity=site_of_asperity, pending=pending, released_from=none)
     if not len(ready):
-        return search, False
-    stay, joining = np.unique(source[source >= 0]), ready[source < 0]
-    search = search.noting(SPLIT, search.sites.position[stay], search.sites.members[stay])
+        return state, False
+    splits, jumping = np.unique(source[source >= 0]), ready[source < 0]
+    state = state.with_events(SPLIT, state.sites.position[splits], state.sites.members[splits])
     if problem.adhesive:
-        # What approaches further before it is found is pressed, which sets nothing free.
-        R = asperities.radius_of_curvature[joining]
-        energy = -law.energy(law.contact_radius(problem.jump_in[joining], R), R)
-        search = search.noting(JUMP_IN, asperities.position[joining], 1, energy, joining)
-    return _admitted(search, ready, CONTACT if problem.adhesive else TRIAL, search.seen[ready]), True
+        # The energy is released at the jump-in approach; any further approach is work done on the spot.
+        R = asperities.radius_of_curvature[jumping]
+        energy = -law.energy(law.contact_radius(problem.jump_in[jumping], R), R)
+        state = state.with_events(JUMP_IN, asperities.position[jumping], 1, energy, jumping)
+    return _add_sites(state, ready, CONTACT if problem.adhesive else CANDIDATE, state.last_approach[ready]), True
 
 
-def _sudden(problem, reach):
-    """By how much the approach of an asperity can grow at once, m."""
+def _sudden_growth(problem, reach):
+    """Return by how much the approach of an asperity may grow by jumps of other spots, m."""
     heights, jumps = reach
     largest_jump = -problem.law.jump_off_approach(np.max(problem.asperities.radius_of_curvature))
     return heights * problem.rms_height + jumps * largest_jump
 
 
-def _looked_at(search, point, spots, margin):
-    """The search with the approaches of the free asperities that can have come into contact, and which these are."""
-    problem, asperities, sites = search.problem, search.problem.asperities, search.sites
-    reach = search.seen + _FASTEST_APPROACH * np.abs(search.seen_at - point.separation)
-    reach += _sudden(problem, _SUDDEN_GUESS if margin > 0 else _SUDDEN_BOUND)
-    looked_at = np.flatnonzero((reach >= problem.jump_in) & search.free)
+def _evaluate_approaches(state, point, spots, margin):
+    """Evaluate the approaches of the free asperities that may have come into contact; return their indices too."""
+    problem, asperities, sites = state.problem, state.problem.asperities, state.sites
+    reach = state.last_approach + _FASTEST_APPROACH * np.abs(state.last_separation - point.separation)
+    reach += _sudden_growth(problem, _SUDDEN_GUESS if margin > 0 else _SUDDEN_BOUND)
+    evaluated = np.flatnonzero((reach >= problem.jump_in) & state.free)
     w = displacement_at(
         problem.law,
         asperities.period,
-        asperities.position[looked_at],
+        asperities.position[evaluated],
         sites.position[spots],
         point.a[spots],
         sites.radius_of_curvature[spots],
         sites.half_space.ewald.once,
     )
-    seen, seen_at = search.seen.copy(), search.seen_at.copy()
-    seen[looked_at] = asperities.height[looked_at] - point.separation - w
-    seen_at[looked_at] = point.separation
-    return replace(search, seen=seen, seen_at=seen_at), looked_at
+    last_approach, last_separation = state.last_approach.copy(), state.last_separation.copy()
+    last_approach[evaluated] = asperities.height[evaluated] - point.separation - w
+    last_separation[evaluated] = point.separation
+    return replace(state, last_approach=last_approach, last_separation=last_separation), evaluated
 
 
-def _first_of_each_group(search, joining):
-    """Of asperities (k,) that would lie in each other's contacts, the largest; the others have to wait."""
-    asperities = search.problem.asperities
-    if len(joining) < 2:
-        return joining
-    position = asperities.position[joining]
-    a = search.problem.law.contact_radius(search.seen[joining], asperities.radius_of_curvature[joining])
+def _largest_of_each_group(state, jumping):
+    """Return those asperities (k,) that would not lie inside the contact of a larger one of them."""
+    asperities = state.problem.asperities
+    if len(jumping) < 2:
+        return jumping
+    position = asperities.position[jumping]
+    a = state.problem.law.contact_radius(state.last_approach[jumping], asperities.radius_of_curvature[jumping])
     under = covering_spot(position, position, a, asperities.cell, larger_than=a)
-    return joining[under < 0]
+    return jumping[under < 0]
 
 
-def _admitted(search, asperity, status, approach):
-    """With sites of free asperities (k,) with approaches (k,), m."""
+def _add_sites(state, asperity, status, approach):
+    """Make free asperities (k,) sites with approaches (k,), m."""
     if not len(asperity):
-        return search
-    asperities, holder = search.problem.asperities, search.holder
+        return state
+    asperities, site_of_asperity = state.problem.asperities, state.site_of_asperity
     if status == CONTACT:
-        holder = holder.copy()
-        holder[asperity] = len(search.sites) + np.arange(len(asperity))
-    sites = search.sites.extended(
-        search.problem.law,
+        site_of_asperity = site_of_asperity.copy()
+        site_of_asperity[asperity] = len(state.sites) + np.arange(len(asperity))
+    sites = state.sites.append(
+        state.problem.law,
         position=asperities.position[asperity],
         height=asperities.height[asperity],
         radius_of_curvature=asperities.radius_of_curvature[asperity],
         asperity=asperity,
         members=np.ones(len(asperity), dtype=int),
-        parts=np.full(len(asperity), None),
+        union=np.full(len(asperity), None),
         approach=approach,
         status=status,
-        known=False,
+        was_in_contact=False,
     )
-    return replace(search, sites=sites, holder=holder)
+    return replace(state, sites=sites, site_of_asperity=site_of_asperity)
 
 
-# Spots whose distances from jump-off differ by this part are equal.
-_SAME_STRENGTH = 1e-3
+def jump_off(state: IterationState, point: Point, margin: float) -> IterationState:
+    """Break the contact of all spots past jump-off by more than a margin, m.
 
-
-def jump_off(search: Search, point: Point, margin: float) -> Search:
-    """All spots past jump-off by more than the margin (m) let go; without adhesion united ones out of contact.
-
-    Those that have come in this search go before the others, which may well stay without them.
+    Without adhesion only unions have to break contact: a single asperity out of contact does no harm. Spots that have
+    come into contact during this search break contact first: without them the others may well stay.
     """
-    sites = search.sites
-    off = sites.status == CONTACT
-    if search.problem.adhesive:
-        newly_made = off & ~sites.known
-        off &= point.approach < sites.jump_off - margin
-        if np.any(newly_made & (point.approach < sites.jump_off)):
-            off &= newly_made
-    else:  # a single asperity out of contact is harmless
-        off &= (point.approach <= 0) & (sites.asperity < 0) & (margin == 0)
-    return _broken(search, off) if off.any() else search
+    sites = state.sites
+    breaking = sites.status == CONTACT
+    if state.problem.adhesive:
+        new = breaking & ~sites.was_in_contact
+        breaking &= point.approach < sites.jump_off - margin
+        if np.any(new & (point.approach < sites.jump_off)):
+            breaking &= new
+    else:
+        breaking &= (point.approach <= 0) & (sites.asperity < 0) & (margin == 0)
+    return _break_contact(state, breaking) if breaking.any() else state
 
 
-def let_go(search: Search, separation: float, count: int) -> Search:
-    """Break the contact of `count` spots, those that would reach jump-off first, and of their equals."""
-    sites = search.sites
-    here = sites.approach - sites.response * (separation - search.start.separation)
+def break_weakest(state: IterationState, separation: float, count: int) -> IterationState:
+    """Break the contact of the `count` spots that would reach jump-off first, and of those equally close to it."""
+    sites = state.sites
+    approach = sites.approach - sites.response * (separation - state.start.separation)
     rate = np.maximum(-sites.response, 1e-3)
-    left = np.where(sites.status == CONTACT, (here - sites.jump_off) / rate, np.inf)
-    last = np.partition(left, count - 1)[count - 1]
-    return _broken(search.at(here), left <= last * (1 + _SAME_STRENGTH))
+    rise = np.where(sites.status == CONTACT, (approach - sites.jump_off) / rate, np.inf)
+    last = np.partition(rise, count - 1)[count - 1]
+    return _break_contact(state.with_approach(approach), rise <= last * (1 + _SAME_STRENGTH))
 
 
-def _broken(search, off):
-    """Without the contact of spots (n,). Asperities of united ones fall back, if they have not done so here before;
-    the others may not come back at this separation. An asperity that jumped in during this search and lets go again was
-    never in contact."""
-    sites, law = search.sites, search.problem.law
-    came = np.isin(sites.asperity, search.jumped_in) & off
-    spots = np.flatnonzero(off & ~came)
+def _break_contact(state, breaking):
+    """Break the contact of spots, given by a mask (n,).
+
+    Asperities of unions are released, if they have not been released during this search; all others may not make
+    contact again at this separation. An asperity that jumped in during this search was never in contact: its jump is
+    removed from the log.
+    """
+    sites, law = state.sites, state.problem.law
+    new = np.isin(sites.asperity, state.jumped_in) & breaking
+    spots = np.flatnonzero(breaking & ~new)
     R = sites.radius_of_curvature[spots]
     energy = law.energy(law.jump_off_radius(R), R)
-    search = search.forgetting_jumps_in(sites.asperity[came])
-    search = search.noting(JUMP_OFF, sites.position[spots], sites.members[spots], energy)
-    # A holder -1 looks up the last.
-    freed, united = np.append(off, False)[search.holder], np.append(off & (sites.asperity < 0), False)
-    falls = united[search.holder] & ~search.has_fallen
+    state = state.without_jumps_in(sites.asperity[new])
+    state = state.with_events(JUMP_OFF, sites.position[spots], sites.members[spots], energy)
+    # -1 takes the last entry.
+    freed = np.append(breaking, False)[state.site_of_asperity]
+    released = np.append(breaking & (sites.asperity < 0), False)[state.site_of_asperity] & ~state.was_released
     return replace(
-        search,
-        sites=sites.removed(off),
-        holder=np.where(freed, -1, search.holder),
-        seen_at=np.where(freed, np.inf, search.seen_at),  # their approach is not known
-        fallen=np.where(falls, search.holder, search.fallen),
-        has_fallen=search.has_fallen | falls,
-        locked=search.locked | (freed & ~falls),
+        state,
+        sites=sites.remove(breaking),
+        site_of_asperity=np.where(freed, -1, state.site_of_asperity),
+        last_separation=np.where(freed, np.inf, state.last_separation),  # the approach is not known
+        released_from=np.where(released, state.site_of_asperity, state.released_from),
+        was_released=state.was_released | released,
+        barred=state.barred | (freed & ~released),
     )

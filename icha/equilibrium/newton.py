@@ -1,7 +1,7 @@
-"""Newton's method for the equations of equilibrium, without events, by an inexact Krylov solver.
+"""Newton's method for the equations of equilibrium between events, with an inexact Krylov solver.
 
-It runs over sites: the spots and, without adhesion, the asperities that may come into contact. There a negative
-approach means no force, and the iteration decides which sites are in contact.
+The unknowns belong to sites: the spots and, without adhesion, the candidates for contact. A candidate with a negative
+approach carries no force, and the iteration decides which candidates come into contact.
 """
 
 from dataclasses import replace
@@ -11,91 +11,114 @@ from scipy.sparse.linalg import LinearOperator, gmres
 
 from icha.contact.model import NotConverged
 from icha.contact.models import DEFAULT_MODEL, MODELS
-from icha.equilibrium.equations import Equations, Point, gradient_by_radius, radius_response
+from icha.equilibrium.equations import Equations, Point, nominal_derivative, radius_response
 from icha.equilibrium.sites import CONTACT
 
+# Largest number of halvings of a Newton step.
 _MAX_HALVINGS = 8
+# Largest error of the response of the approaches to the separation.
 _STIFFNESS_ERROR = MODELS[DEFAULT_MODEL].stiffness_error
-# Relative errors of the linear solves: of most, and of those repeated with the exact operator.
+# Relative errors of most linear solves, and of those that are repeated with the exact operator.
 _LINEAR_TOLERANCE = 3e-3
 _EXACT_TOLERANCE = 1e-6
+# Number of solves for the response: first with the approximate operator, then with the exact one.
+_APPROXIMATE_SOLVES, _EXACT_SOLVES = 8, 4
 # Largest dimension of a Krylov space.
 _KRYLOV = 50
-# Longest change of the separation in a step, in h_rms.
-_LONGEST_CHANGE = 0.2
-# Below so many jump-off radii a Newton step back is one of the radius.
+# Largest change of the separation in a step, in h_rms.
+_LARGEST_CHANGE = 0.2
+# Contact radius, in jump-off radii, below which a step towards jump-off is a step of the radius.
 _NEAR_JUMP_OFF = 1.5
-# So large a part of a step that leads back over jump-off may be lost by ending there.
-_NEXT_TO_JUMP_OFF = 0.2
+# Largest fraction of a step from beyond jump-off back into contact that is lost when the step stops at jump-off.
+_PAST_JUMP_OFF = 0.2
 
 
-def descend(equations: Equations, point: Point, size: float) -> tuple[Point, bool, bool]:
-    """A Newton step, shortened until the error falls below its `size`; or, where it does not, the point as it was.
+def newton_step(equations: Equations, point: Point, size: float) -> tuple[Point, bool, bool]:
+    """Take a Newton step, shortened until the error falls below its present `size`.
 
-    Also returns whether it falls, and whether a rough solution of the linear equations was not enough.
+    Returns
+    -------
+    The new point, or the old one if no step reduces the error; whether the error falls; and whether the linear
+    equations had to be solved exactly.
     """
     for exact in (False, True):
-        step, du = _step(equations, point, exact)
-        for halving in range(_MAX_HALVINGS):
-            fraction = 0.5**halving
-            approach = _moved(equations, point, fraction * step)
-            new = equations.at(approach, point.separation + fraction * du, point.interaction)
-            if equations.size(new) < (1 - 0.1 * fraction) * size:
+        step, separation_step = _solve_step(equations, point, exact)
+        for halvings in range(_MAX_HALVINGS):
+            fraction = 0.5**halvings
+            approach = _take_step(equations, point, fraction * step)
+            new = equations.evaluate(approach, point.separation + fraction * separation_step, point.interaction)
+            if equations.error_size(new) < (1 - 0.1 * fraction) * size:
                 return new, True, exact
             point = replace(point, interaction=new.interaction)
     return point, False, True
 
 
-def response(equations: Equations, point: Point) -> np.ndarray:
-    """d(delta)/du of every site (n,): the solution of (1 + W' da/d(delta)) x = -1."""
+def solve_response(equations: Equations, point: Point) -> np.ndarray:
+    """Solve (1 + W' da/d(delta)) x = -1 for x = d(delta)/du, the response of every site to the separation, (n,)."""
     sites = equations.sites
-    full = np.full(len(sites), -1.0)
-    part, _, exact, product = _linearised(equations, point)
-    if not len(part):
-        return full
-    x = sites.response[part]
-    for attempt in range(12):
+    response = np.full(len(sites), -1.0)
+    present, _, exact, approximate = _linearise(equations, point)
+    if not len(present):
+        return response
+    x = sites.response[present]
+    for solves in range(_APPROXIMATE_SOLVES + _EXACT_SOLVES):
         defect = -1.0 - x - exact(x)
         if np.max(np.abs(defect)) <= _STIFFNESS_ERROR:
-            full[part] = x
-            return full
-        operator, tolerance = (product, _LINEAR_TOLERANCE) if attempt < 8 else (exact, _EXACT_TOLERANCE)
-        x = x + _solve(lambda y, operator=operator: y + operator(y), defect, tolerance)
-    raise NotConverged(f"the response of {len(part)} spots to the separation was not found")
+            response[present] = x
+            return response
+        product, tolerance = (
+            (approximate, _LINEAR_TOLERANCE) if solves < _APPROXIMATE_SOLVES else (exact, _EXACT_TOLERANCE)
+        )
+        x = x + _solve_linear(lambda y, product=product: y + product(y), defect, tolerance)
+    raise NotConverged(f"the response of {len(present)} spots to the separation was not found")
 
 
-def _linearised(equations, point):
-    """Where the unknowns are, da/d(delta) there, and the products of W' da/d(delta), exact and approximate."""
+def _linearise(equations, point):
+    """Linearise the displacements.
+
+    Returns
+    -------
+    Indices of the present sites; da/d(delta) there; and two functions that multiply by W' da/d(delta), an exact and an
+    approximate one.
+    """
     sites = equations.sites
-    part = np.flatnonzero(sites.present)
-    a, R = point.a[part], sites.radius_of_curvature[part]
-    off, approach = sites.jump_off[part], point.approach[part]
-    # Who is about to be drawn back over jump-off behaves as on the near side.
-    approach = np.where(_drawn_back(sites, point)[part] & equations.problem.adhesive, off, approach)
-    slope = radius_response(equations.problem.law, a, R, approach, off)
+    present = np.flatnonzero(sites.present)
+    a, R = point.a[present], sites.radius_of_curvature[present]
+    jump_off, approach = sites.jump_off[present], point.approach[present]
+    # A spot that is about to return over jump-off behaves as on the stable branch.
+    approach = np.where(_returns_to_contact(sites, point)[present] & equations.problem.adhesive, jump_off, approach)
+    slope = radius_response(equations.problem.law, a, R, approach, jump_off)
     tangent = point.interaction.tangent(point.a)
 
-    def spread(x):
-        full = np.zeros(len(sites))
-        full[part] = slope * x
-        return full
+    def radius_change(x):
+        change = np.zeros(len(sites))
+        change[present] = slope * x
+        return change
 
-    return part, slope, lambda x: tangent(spread(x))[part], lambda x: tangent.nearly(spread(x))[part]
+    def exact(x):
+        return tangent(radius_change(x))[present]
+
+    def approximate(x):
+        return tangent.approximate(radius_change(x))[present]
+
+    return present, slope, exact, approximate
 
 
-def _step(equations, point, exact):
-    """Change of the approaches (n,) and of the separation."""
+def _solve_step(equations, point, exact):
+    """Solve the linear equations for the changes of the approaches (n,) and of the separation, m."""
     problem, sites, control = equations.problem, equations.sites, equations.control
-    part, slope, *products = _linearised(equations, point)
-    product, tolerance = (products[0], _EXACT_TOLERANCE) if exact else (products[1], _LINEAR_TOLERANCE)
-    size = len(part)
-    step, du = np.zeros(len(sites)), 0.0
+    present, slope, exact_product, approximate_product = _linearise(equations, point)
+    product, tolerance = (exact_product, _EXACT_TOLERANCE) if exact else (approximate_product, _LINEAR_TOLERANCE)
+    size = len(present)
+    step = np.zeros(len(sites))
     if control is None:
-        step[part] = _solve(lambda x: x + product(x), -point.error[part], tolerance)
-        return step, du
-    # The separation is an unknown too; in terms of what the last response leaves, the bordered matrix is near one.
-    last = sites.response[part]
-    gradient = slope * gradient_by_radius(problem, control.quantity, point.a[part], sites.radius_of_curvature[part])
+        step[present] = _solve_linear(lambda x: x + product(x), -point.error[present], tolerance)
+        return step, 0.0
+    # The separation is one more unknown. After the change of variables by the last response the bordered matrix is
+    # close to one.
+    last = sites.response[present]
+    R = sites.radius_of_curvature[present]
+    gradient = slope * nominal_derivative(problem, control.quantity, point.a[present], R)
     rate = float(np.sum(gradient * last))
     if rate == 0:
         raise NotConverged(f"{control.quantity} does not depend on the separation")
@@ -104,53 +127,54 @@ def _step(equations, point, exact):
         y = x[:size] + x[size] * last
         return np.append(y + product(y) + x[size], np.sum(gradient * y) / rate)
 
-    x = _solve(bordered, np.append(-point.error[part], -point.miss / rate), tolerance)
-    longest = _LONGEST_CHANGE * problem.rms_height
-    du = float(np.clip(x[size], -longest, longest))
-    step[part] = x[:size] + du * last
-    return step, du
+    x = _solve_linear(bordered, np.append(-point.error[present], -point.miss / rate), tolerance)
+    largest = _LARGEST_CHANGE * problem.rms_height
+    separation_step = float(np.clip(x[size], -largest, largest))
+    step[present] = x[:size] + separation_step * last
+    return step, separation_step
 
 
-def _moved(equations, point, step):
-    """Approaches (n,) after a step of theirs.
+def _take_step(equations, point, step):
+    """Return the approaches (n,) after a step.
 
-    At jump-off the radius goes with the square root of the approach that is left; in terms of the radius the equations
-    are smooth there. So a step towards jump-off is taken as one of the radius, and one back over it ends there
-    first, and then solves the quadratic equation that the radius obeys.
+    Close to jump-off the radius changes with the square root of the distance from it; in terms of the radius the
+    equations are smooth there. So a step towards jump-off is taken as a step of the radius. A step from beyond jump-off
+    back into contact first stops at jump-off, and then solves the quadratic equation that the radius obeys.
     """
-    moved = point.approach + step
+    approach = point.approach + step
     if not equations.problem.adhesive:
-        return moved
+        return approach
     sites, law = equations.sites, equations.problem.law
-    off = sites.jump_off
-    drawn_back = _drawn_back(sites, point)
-    moved = np.where((point.approach < off) & ~drawn_back, np.minimum(moved, off), moved)
-    part = np.flatnonzero(sites.present & ((step < 0) & (point.approach > off) | drawn_back))
-    R, a = sites.radius_of_curvature[part], point.a[part]
-    lowest = law.jump_off_radius(R)
-    near = a < _NEAR_JUMP_OFF * lowest
-    part, R, a, lowest = part[near], R[near], a[near], lowest[near]
-    change = radius_response(law, a, R, np.maximum(point.approach, off)[part], off[part]) * step[part]
-    # Where the radius ends, what is left of the error is made up by the approach alone.
-    left = 1 - np.minimum((lowest - a) / np.where(change < 0, change, -1.0), 1.0)
+    jump_off = sites.jump_off
+    returns = _returns_to_contact(sites, point)
+    approach = np.where((point.approach < jump_off) & ~returns, np.minimum(approach, jump_off), approach)
+    close = np.flatnonzero(sites.present & ((step < 0) & (point.approach > jump_off) | returns))
+    lowest = law.jump_off_radius(sites.radius_of_curvature[close])
+    small = point.a[close] < _NEAR_JUMP_OFF * lowest
+    close, lowest = close[small], lowest[small]
+    R, a = sites.radius_of_curvature[close], point.a[close]
+    stable = np.maximum(point.approach, jump_off)[close]
+    change = radius_response(law, a, R, stable, jump_off[close]) * step[close]
+    # Where the radius has reached its lowest value, the approach alone removes the rest of the error.
+    rest = 1 - np.minimum((lowest - a) / np.where(change < 0, change, -1.0), 1.0)
     reached = law.approach(np.maximum(a + change, lowest), R)
-    moved[part] = reached + np.where(change < 0, left * np.minimum(step, -point.error)[part], 0.0)
-    back = drawn_back[part]
-    part, far = part[back], np.maximum(reached[back] - off[part[back]], 1e-300)
-    lacking = point.approach[part] - point.error[part] - off[part]
-    slope = lacking / np.sqrt(far)
-    moved[part] = off[part] + (0.5 * (np.sqrt(slope**2 + 4 * lacking) - slope)) ** 2
-    return moved
+    approach[close] = reached + np.where(change < 0, rest * np.minimum(step, -point.error)[close], 0.0)
+    back = returns[close]
+    close, distance = close[back], np.maximum(reached[back] - jump_off[close[back]], 1e-300)
+    lacking = point.approach[close] - point.error[close] - jump_off[close]
+    slope = lacking / np.sqrt(distance)
+    approach[close] = jump_off[close] + (0.5 * (np.sqrt(slope**2 + 4 * lacking) - slope)) ** 2
+    return approach
 
 
-def _drawn_back(sites, point):
-    """Whether a spot is next to jump-off, on the far side, and drawn back over it (n,)."""
+def _returns_to_contact(sites, point):
+    """Return whether a spot is a little past jump-off and its error drives it back, (n,) bool."""
     gap = sites.jump_off - point.approach
-    return (sites.status == CONTACT) & (gap >= 0) & (gap < -_NEXT_TO_JUMP_OFF * point.error)
+    return (sites.status == CONTACT) & (gap >= 0) & (gap < -_PAST_JUMP_OFF * point.error)
 
 
-def _solve(apply, b, tolerance):
-    """Solve apply(x) = b approximately; the caller checks the answer by the error of the equations."""
+def _solve_linear(apply, b, tolerance):
+    """Solve apply(x) = b approximately; the error of the equations shows how well."""
     size = len(b)
     operator = LinearOperator((size, size), matvec=apply, dtype=float)
     x, _ = gmres(operator, b, rtol=tolerance, atol=0.0, restart=min(size, _KRYLOV), maxiter=2)

@@ -1,4 +1,4 @@
-"""The problem, the sites where contact is or may form in the iteration, and states of the contact; all immutable."""
+"""Contact problem, sites where contact exists or may form, and equilibrium states; all of them immutable."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from icha.asperity.law import SpotLaw
+from icha.asperity.jkr import JKR
 from icha.contact.model import Events
 from icha.half_space.ewald import HalfSpace
 from icha.surfaces.summits import Asperities
@@ -15,21 +15,25 @@ from icha.surfaces.summits import Asperities
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """Asperities in contact with a half-space.
+    """Asperities in contact with an elastic half-space.
 
-    law: of one spot. rms_height: the length that makes errors of an equilibrium dimensionless, m. rms_slope: of the
-    surface. jump_in:
-    the asperities' jump-in approaches (n,), m.
+    Attributes
+    ----------
+    law : law of one spot.
+    asperities : summits of the surface, n of them.
+    rms_height : rms height of the surface, the unit of the errors of an equilibrium, m.
+    rms_slope : rms slope of the surface.
+    jump_in : (n,) float, approaches at which the asperities jump into contact, m.
     """
 
-    law: SpotLaw
+    law: JKR
     asperities: Asperities
     rms_height: float
     rms_slope: float = 1.0
     jump_in: np.ndarray = field(init=False)
 
     def __post_init__(self):
-        """Evaluate the asperities' jump-in approaches once."""
+        """Evaluate the jump-in approaches once."""
         object.__setattr__(self, "jump_in", self.law.jump_in_approach(self.asperities.radius_of_curvature))
 
     @property
@@ -53,49 +57,57 @@ class Problem:
         return self.contact_modulus * self.rms_slope
 
 
-# Status of a site: in contact; without adhesion, one that may come into contact; one that is no more.
-CONTACT, TRIAL, GONE = 1, 2, 3
-# Sites are arranged anew when they have grown by this factor, or so large a part of them is gone.
+# Status of a site: in contact; without adhesion, a candidate for contact; or removed from the problem.
+CONTACT, CANDIDATE, REMOVED = 1, 2, 3
+# The half-space is set up again when the number of sites has grown by this factor, or this part of them is removed.
 _GROWTH = 1.5
-_GONE_PART = 0.25
+_REMOVED_PART = 0.25
 
 
 @dataclass(frozen=True, eq=False)
 class Union:
-    """Two spots that have become one: what they were, the contact radius of the united one, and that at which they
-    just touch, m.
+    """Two spots that have coalesced, as they were just before; the union can be undone.
 
-    position (2, 2), height, radius of curvature and contact radius, asperity, members (2,); parts: those of spots that
-    are unions themselves.
+    Attributes
+    ----------
+    union_radius : contact radius of the union when it was made, m.
+    touching_radius : contact radius of the union below which the two spots would no longer overlap, m.
+    contact_radius : (2,) float, contact radii of the two spots, m.
+    columns : the other properties of the two spots, by the names of `Sites.UNITED`.
     """
 
-    united_radius: float
-    touching: float
-    position: np.ndarray
-    height: np.ndarray
-    radius_of_curvature: np.ndarray
+    union_radius: float
+    touching_radius: float
     contact_radius: np.ndarray
-    asperity: np.ndarray
-    members: np.ndarray
-    parts: np.ndarray
+    columns: dict[str, np.ndarray]
 
     def asperities(self) -> list[list[int]]:
-        """The asperities of either of the two."""
+        """Return the indices of the asperities of either spot."""
         return [
-            [own] if part is None else [each for one in part.asperities() for each in one]
-            for own, part in zip(self.asperity.tolist(), self.parts, strict=True)
+            [index] if union is None else [each for spot in union.asperities() for each in spot]
+            for index, union in zip(self.columns["asperity"].tolist(), self.columns["union"], strict=True)
         ]
 
 
 @dataclass(frozen=True, eq=False)
 class Sites:
-    """Table of sites, arrays of length n, and the half-space with a point at every one.
+    """Table of n sites, and the half-space with a point at every site.
 
-    position (n, 2), height, radius_of_curvature, jump_off (approach): m. asperity: its index, -1 for united spots.
-    members: asperities united in it. parts: the Union that it is, None for others.
-    parted: number of the union out of which a spot has come, -1 for others. status: CONTACT, TRIAL or GONE. approach:
-    the last one known, m. response: d(delta)/du. known: whether it was in contact before the search. arranged: number
-    of sites when the half-space was made.
+    Attributes
+    ----------
+    position : (n, 2) float, m.
+    height, radius_of_curvature : (n,) float, m.
+    jump_off : (n,) float, approaches at which the spots jump out of contact, m.
+    asperity : (n,) int, index of the asperity; -1 for a union.
+    members : (n,) int, number of asperities in the spot.
+    union : (n,) object, `Union` of a site that is one; None for others.
+    split_number : (n,) int, number of the split that a spot comes from, counted along the path; -1 for others.
+    status : (n,) int, CONTACT, CANDIDATE or REMOVED.
+    approach : (n,) float, last known approach, m.
+    response : (n,) float, derivative of the approach with respect to the mean separation.
+    was_in_contact : (n,) bool, whether the site was in contact before the present search for equilibrium.
+    half_space : elastic half-space.
+    arranged : number of sites when the half-space was set up.
     """
 
     position: np.ndarray
@@ -104,96 +116,90 @@ class Sites:
     jump_off: np.ndarray
     asperity: np.ndarray
     members: np.ndarray
-    parts: np.ndarray
-    parted: np.ndarray
+    union: np.ndarray
+    split_number: np.ndarray
     status: np.ndarray
     approach: np.ndarray
     response: np.ndarray
-    known: np.ndarray
+    was_in_contact: np.ndarray
     half_space: HalfSpace
     arranged: int
 
-    _ARRAYS = (
-        *("position", "height", "radius_of_curvature", "jump_off", "asperity", "members", "parts", "parted"),
-        *("status", "approach", "response", "known"),
-    )
+    # Columns that a union records of its spots.
+    UNITED = ("position", "height", "radius_of_curvature", "asperity", "members", "union")
 
     def __len__(self) -> int:
-        """Number of sites."""
+        """Return the number of sites."""
         return len(self.height)
 
     @classmethod
-    def none(cls, law: SpotLaw, asperities: Asperities) -> Sites:
-        """No sites yet."""
-        empty, index = np.empty(0), np.empty(0, dtype=int)
-        return cls(
-            position=np.empty((0, 2)),
-            height=empty,
-            radius_of_curvature=empty,
-            jump_off=empty,
-            asperity=index,
-            members=index,
-            parts=np.empty(0, dtype=object),
-            parted=index,
-            status=np.empty(0, dtype=np.int8),
-            approach=empty,
-            response=empty,
-            known=np.empty(0, dtype=bool),
-            half_space=HalfSpace.at(np.empty((0, 2)), asperities.period, law.material.contact_modulus, asperities.free),
-            arranged=0,
-        )
+    def none(cls, law: JKR, asperities: Asperities) -> Sites:
+        """Return a table without sites."""
+        kinds = {"asperity": int, "members": int, "union": object, "split_number": int, "status": np.int8}
+        kinds |= {"was_in_contact": bool}
+        arrays: dict = {name: np.empty(0, kinds.get(name, float)) for name in _ARRAYS} | {"position": np.empty((0, 2))}
+        modulus = law.material.contact_modulus
+        half_space = HalfSpace.at(arrays["position"], asperities.period, modulus, asperities.free)
+        return cls(**arrays, half_space=half_space, arranged=0)
 
     @property
     def present(self) -> np.ndarray:
-        """Whether each site is in contact or may be (n,)."""
-        return self.status != GONE
+        """Whether each site is in contact or a candidate, (n,) bool."""
+        return self.status != REMOVED
 
-    def extended(self, law: SpotLaw, *, status, known, parted=-1, **more) -> Sites:
-        """With k more sites after the present ones: status, known and parted one for all, the other arrays (k, ...)."""
+    def append(self, law: JKR, *, status, was_in_contact, split_number=-1, **more) -> Sites:
+        """Return the table with k more sites; the named arguments hold for all of them, other arrays are (k, ...)."""
         count = len(more["height"])
         more |= {
             "jump_off": law.jump_off_approach(more["radius_of_curvature"]),
-            "parted": np.full(count, parted),
+            "split_number": np.full(count, split_number),
             "status": np.full(count, status, dtype=np.int8),
             "response": np.full(count, -1.0),
-            "known": np.full(count, known),
+            "was_in_contact": np.full(count, was_in_contact),
         }
-        arrays = {name: np.concatenate([getattr(self, name), more[name]]) for name in self._ARRAYS}
+        arrays = {name: np.concatenate([getattr(self, name), more[name]]) for name in _ARRAYS}
         if not len(self):
-            return self._arranged(arrays)
+            return self._arrange(arrays)
         return Sites(**arrays, half_space=self.half_space.extended(more["position"]), arranged=self.arranged)
 
-    def removed(self, which) -> Sites:
-        """With sites, given by a mask or indices, gone."""
+    def remove(self, which) -> Sites:
+        """Return the table with the status of some sites, given by a mask or indices, set to REMOVED."""
         status = self.status.copy()
-        status[which] = GONE
+        status[which] = REMOVED
         return replace(self, status=status)
 
-    def compacted(self) -> tuple[Sites, np.ndarray | None]:
-        """Without those that are gone, where they are many, the near field chosen for the number of the others.
+    def compact(self) -> tuple[Sites, np.ndarray | None]:
+        """Return the table without its removed sites if there are many, and the new index of every site.
 
-        And the new index of every site (n + 1,), -1 for those that are gone and in the last place; None where nothing
-        has changed.
+        The index is (n + 1,) int, -1 for removed sites and in the last place; None if the table is unchanged.
         """
-        gone = self.status == GONE
-        if len(gone) <= _GROWTH * self.arranged and np.count_nonzero(gone) <= _GONE_PART * len(gone):
+        removed = self.status == REMOVED
+        if len(self) <= _GROWTH * self.arranged and np.count_nonzero(removed) <= _REMOVED_PART * len(self):
             return self, None
-        stay = np.flatnonzero(~gone)
-        index = np.full(len(gone) + 1, -1)
-        index[stay] = np.arange(len(stay))
-        return self._arranged({name: getattr(self, name)[stay] for name in self._ARRAYS}), index
+        present = np.flatnonzero(~removed)
+        index = np.full(len(self) + 1, -1)
+        index[present] = np.arange(len(present))
+        return self._arrange({name: getattr(self, name)[present] for name in _ARRAYS}), index
 
-    def _arranged(self, arrays):
+    def _arrange(self, arrays):
+        """Return a table with these arrays and a new half-space, whose near field suits the number of sites."""
         ewald = self.half_space.ewald
         half_space = HalfSpace.at(arrays["position"], ewald.side, ewald.contact_modulus, ewald.free)
         return Sites(**arrays, half_space=half_space, arranged=len(arrays["height"]))
 
 
+_ARRAYS = tuple(name for name in Sites.__match_args__ if name not in ("half_space", "arranged"))
+
+
 @dataclass(frozen=True, eq=False)
 class Spots:
-    """Contact spots: asperities in contact, single or coalesced. Arrays of length m.
+    """Contact spots, single asperities or unions.
 
-    position (m, 2), height, radius_of_curvature, contact_radius, approach: m. members: asperities merged into it.
+    Attributes
+    ----------
+    position : (m, 2) float, centres, m.
+    height, radius_of_curvature, contact_radius, approach : (m,) float, m.
+    members : (m,) int, number of asperities in each spot.
     """
 
     position: np.ndarray
@@ -204,28 +210,35 @@ class Spots:
     members: np.ndarray
 
     def __len__(self) -> int:
-        """Number of spots."""
+        """Return the number of spots."""
         return len(self.height)
 
 
 @dataclass(frozen=True, eq=False)
 class ContactState:
-    """An equilibrium.
+    """Equilibrium of all contact spots.
 
-    separation: mean separation u, m. sites: n of them, and their contact_radius (n,), m, zero where there is no
-    contact. Arrays of the asperities' length: holder, the site that an asperity is, or is part of, or was found under,
-    -1 where free; seen, its approach (m) when it was last looked at, at the separation seen_at (m).
-    Event counts accumulate along the path; history: the events of every equilibrium of the path up to here.
-    pending: free asperities beyond their jump-in approach that were left free because they had broken contact at
-    the same separation before.
+    Attributes
+    ----------
+    separation : mean separation u, m.
+    sites : table of sites, n of them.
+    contact_radius : (n,) float, zero out of contact, m.
+    site_of_asperity : (asperities,) int, site that an asperity is, or was merged into, or lies under; -1 if free.
+    last_approach : (asperities,) float, approach of an asperity when it was evaluated last, m.
+    last_separation : (asperities,) float, mean separation at that time, m; inf if the approach is not known.
+    residual : largest error of the equilibrium, in h_rms.
+    jump_ins, jump_offs, coalescences, splits : number of events along the path up to this state.
+    pending : number of free asperities beyond their jump-in approach; they have broken contact at this separation, and
+        may not make it again.
+    history : events of every equilibrium of the path up to this state.
     """
 
     separation: float
     sites: Sites
     contact_radius: np.ndarray
-    holder: np.ndarray
-    seen: np.ndarray
-    seen_at: np.ndarray
+    site_of_asperity: np.ndarray
+    last_approach: np.ndarray
+    last_separation: np.ndarray
     residual: float = 0.0
     jump_ins: int = 0
     jump_offs: int = 0
@@ -236,44 +249,19 @@ class ContactState:
 
     @cached_property
     def in_contact(self) -> np.ndarray:
-        """The sites in contact, indices."""
+        """Indices of the sites in contact."""
         return np.flatnonzero(self.sites.status == CONTACT)
 
     @cached_property
     def spots(self) -> Spots:
-        """The sites in contact."""
-        sites, c = self.sites, self.in_contact
-        return Spots(
-            position=sites.position[c],
-            height=sites.height[c],
-            radius_of_curvature=sites.radius_of_curvature[c],
-            contact_radius=self.contact_radius[c],
-            approach=sites.approach[c],
-            members=sites.members[c],
-        )
-
-    @property
-    def responses(self) -> np.ndarray:
-        """d(delta)/du of the spots."""
-        return self.sites.response[self.in_contact]
+        """Sites in contact."""
+        names = ("position", "height", "radius_of_curvature", "approach", "members")
+        columns = {name: getattr(self.sites, name)[self.in_contact] for name in names}
+        return Spots(contact_radius=self.contact_radius[self.in_contact], **columns)
 
     @cached_property
-    def owner(self) -> np.ndarray:
-        """For every asperity the index of the spot that it is, or is part of, or lies under; -1 where free."""
+    def spot_of_asperity(self) -> np.ndarray:
+        """Index of the spot that each asperity is, or was merged into, or lies under; -1 if free."""
         spot = np.full(len(self.sites) + 1, -1)
         spot[self.in_contact] = np.arange(len(self.in_contact))
-        return spot[self.holder]  # a holder -1 looks up the last
-
-
-def untouched(problem: Problem) -> ContactState:
-    """The state at which the first asperity is about to make contact."""
-    asperities = problem.asperities
-    separation = float(np.max(asperities.height - problem.jump_in))
-    return ContactState(
-        separation=separation,
-        sites=Sites.none(problem.law, asperities),
-        contact_radius=np.empty(0),
-        holder=np.full(len(asperities), -1),
-        seen=asperities.height - separation,
-        seen_at=np.full(len(asperities), separation),
-    )
+        return spot[self.site_of_asperity]  # -1 takes the last entry

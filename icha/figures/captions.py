@@ -1,7 +1,8 @@
-"""Captions of the figures: their text, and the runs that a figure lacks or draws apart, counted in the dataset."""
+"""Captions of the figures: their texts, and the numbers of runs that a figure lacks or marks."""
 
 from __future__ import annotations
 
+import itertools
 import tomllib
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -25,7 +26,7 @@ def _texts() -> dict[str, str]:
 
 
 def caption_of(name: str) -> str:
-    """Return what a figure shows, for those who look at it."""
+    """Return the caption of a figure."""
     return _texts()[name].format_map(_texts())
 
 
@@ -34,44 +35,44 @@ def count_runs(campaign: xr.DataTree, studies: Sequence[str]) -> str:
 
     Returns
     -------
-    Sentences for the end of a caption; "" where all runs are complete and the asperity model is applicable to them.
+    Sentences for the end of a caption; "" if all runs are complete and the asperity model is applicable to them.
     """
     found: list[str] = []
     for name in studies:
         if name in campaign.children:
-            study, several = campaign[name].to_dataset(), f" of study {name}" if len(studies) > 1 else ""
-            found += [*_missing_runs(study, several), *_runs_not_applicable(study, several)]
+            study, suffix = campaign[name].to_dataset(), f" of study {name}" if len(studies) > 1 else ""
+            found += [*_missing_runs(study, suffix), *_runs_not_applicable(study, suffix)]
     return " ".join(found)
 
 
-def _missing_runs(study: xr.Dataset, several: str) -> Iterator[str]:
+def _missing_runs(study: xr.Dataset, suffix: str) -> Iterator[str]:
     """Count by model and material the runs that did not complete or whose checks failed."""
     from icha.datasets.variables.campaign import COMPUTED_RUNS, FAILED_CHECKS, INCOMPLETE, MISSING
 
     status = study["status"].transpose("model", "material", ...)
-    seeds = "seeds" if status.sizes["surface"] == status.sizes["rms_slope"] == 1 else "runs"
-    for model in study["model"].values.tolist():
-        for material in study["material"].values.tolist():
-            own = status.sel(model=model, material=material).values
-            asked = int(np.isin(own, (*COMPUTED_RUNS, MISSING)).sum())
-            ended, checks = int(np.isin(own, (INCOMPLETE, MISSING)).sum()), int((own == FAILED_CHECKS).sum())
-            parts = [f"{ended} of {asked} {seeds} of material {material} did not complete"] if ended else []
-            if checks:
-                parts.append(f"{checks} of {asked} {seeds} of material {material} failed their checks")
-            if parts:
-                by = "" if model == DEFAULT_MODEL else f" by {MODELS[model].words}"
-                yield f"{' and '.join(parts)}{several}{by}: see Failed runs."
+    unit = "seeds" if status.sizes["surface"] == status.sizes["rms_slope"] == 1 else "runs"
+    for model, material in itertools.product(study["model"].values.tolist(), study["material"].values.tolist()):
+        found = status.sel(model=model, material=material).values
+        asked = int(np.isin(found, (*COMPUTED_RUNS, MISSING)).sum())
+        counts = {"did not complete": (INCOMPLETE, MISSING), "failed their checks": (FAILED_CHECKS,)}
+        words = [
+            f"{count} of {asked} {unit} of material {material} {what}"
+            for what, states in counts.items()
+            if (count := int(np.isin(found, states).sum()))
+        ]
+        if words:
+            by = "" if model == DEFAULT_MODEL else f" by {MODELS[model].words}"
+            yield f"{' and '.join(words)}{suffix}{by}: see Failed runs."
 
 
-def _runs_not_applicable(study: xr.Dataset, several: str) -> Iterator[str]:
-    """Count the complete runs that the asperity model is not applicable to, by reason."""
+def _runs_not_applicable(study: xr.Dataset, suffix: str) -> Iterator[str]:
+    """Count by reason the complete runs to which the asperity model is not applicable."""
     from icha.datasets.variables.campaign import COMPLETE
 
-    if "applicability" not in study:  # which campaigns of earlier versions lack
+    if "applicability" not in study:  # as in campaigns of earlier versions
         return
     complete = study["status"].transpose(*LABELS).values == COMPLETE
     reasons = study["applicability"].transpose(*LABELS).values[complete].tolist()
     for reason, count in Counter(map(str, reasons)).items():
         if reason:
-            runs = "run is" if count == 1 else "runs are"
-            yield f"{count} {runs} marked{several}: {reason}."
+            yield f"{count} {'run is' if count == 1 else 'runs are'} marked{suffix}: {reason}."

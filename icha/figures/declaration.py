@@ -1,12 +1,12 @@
-"""The declaration of a figure: what a campaign may ask of it, and what it is drawn from.
+"""The declaration of a figure: its options in a configuration, and the data that it is drawn from.
 
 A module `fig<number>_<words>` of this folder is a figure: it has a `DECLARATION` and a function `figure` that draws it.
-Nothing else knows its name, for `icha.figures.registry` finds it. Reading a configuration imports all of them, so that
-they import libraries for drawing, and modules that need xarray, only where they draw.
+Nothing else knows its name, because `icha.figures.registry` finds it. Reading a configuration imports all of them.
+Therefore they import libraries for drawing, and modules that need xarray, only inside the functions that draw.
 
 The function `figure` takes the data of its `inputs`, and as keywords the `arguments` of its options, which describe
-them. It raises ValueError where the campaign has no such study, run or snapshot, naming what there is, and
-`icha.figures.select.NothingToDraw` where no run of what it shows is complete.
+them. It raises ValueError if the campaign has no such study, run or snapshot, naming those that it has, and
+`icha.figures.select.NothingToDraw` if no run that it shows is complete.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from typing import Any
 
 from pydantic import Field
 
-from icha.contact.models import MODELS, REFERENCE_MODEL, first_of
+from icha.contact.models import MODELS, REFERENCE_MODEL, first_model
 from icha.datasets import results
 from icha.datasets.labels import RunLabels
 from icha.path.states import Snapshot
@@ -33,32 +33,32 @@ class FigureOptions(Section):
     """The section of a figure in a configuration."""
 
     def problems(self, campaign: Campaign) -> Iterator[Problem]:
-        """What keeps the figure from being drawn although each of its values is allowed by itself."""
+        """Yield what keeps the figure from being drawn although each of its values is valid by itself."""
         yield from ()
 
     def studies_of(self, campaign: Campaign) -> tuple[str, ...]:
-        """The studies whose runs it shows."""
+        """Return the studies whose runs it shows."""
         return ()
 
     def arguments(self) -> dict[str, Any]:
-        """Arguments of the function that draws it, other than data."""
+        """Return arguments of the function that draws it, other than data."""
         return self.model_dump(exclude_none=True)
 
 
 def dataset_only(campaign: Campaign, options: FigureOptions, files: results.ResultFiles) -> Inputs:
-    """The inputs of a figure of the campaign dataset alone."""
+    """Return the inputs of a figure of the campaign dataset alone."""
     return {"campaign": files.path(results.DATASET)}
 
 
 @dataclass(frozen=True)
 class Declaration:
-    """What a figure is, but for its drawing.
+    """What a figure is, apart from its drawing.
 
     Parameters
     ----------
-    description : what it shows, in a line, for those who write configurations.
+    description : what it shows, in a line, for authors of configurations.
     options : the model of its section; its first line of documentation is part of the schema.
-    inputs : the files of its arguments. Results are read; of other files the paths are handed over.
+    inputs : the files of its arguments. Results are read; of other files the paths are passed on.
     arguments : arguments that the rest of the configuration gives, beside those of the options.
     holds_topography : whether it takes memory for arrays of the surface's size.
     """
@@ -70,7 +70,7 @@ class Declaration:
     holds_topography: bool = False
 
 
-# --- options that several figures have, with what keeps them from being drawn ---
+# --- options that several figures have ---
 
 
 class StudyFigure(FigureOptions):
@@ -79,26 +79,26 @@ class StudyFigure(FigureOptions):
     study: Name = Field(description="Name of the study that is drawn.")
 
     def studies_of(self, campaign: Campaign) -> tuple[str, ...]:
-        """The one."""
+        """Return the study."""
         return (self.study,)
 
     def problems(self, campaign: Campaign) -> Iterator[Problem]:
-        """A study that is not there; and, if it is, what is wrong with it."""
+        """Yield the problem of an unknown study, or those of its own."""
         yield from unknown(("study",), self.study, campaign.studies)
         if self.study in campaign.studies:
             yield from self.study_problems(campaign, campaign.studies[self.study])
 
     def study_problems(self, campaign: Campaign, study: Any) -> Iterator[Problem]:
-        """What is asked for that the study does not have."""
-        for key, there in (
+        """Yield what is requested that the study does not have."""
+        for key, present in (
             ("surface", study.surfaces),
             ("seed", study.seeds),
             ("material", study.materials),
             ("rms_slope", study.rms_slopes),
         ):
             value = getattr(self, key, None)
-            if value is not None and value not in there:
-                yield (key,), value, f"is not in study {self.study!r}; allowed: {listed(there)}"
+            if value is not None and value not in present:
+                yield (key,), value, f"is not in study {self.study!r}; expected one of {listed(present)}"
 
 
 class TruthFigure(StudyFigure):
@@ -111,19 +111,19 @@ class TruthFigure(StudyFigure):
     )
 
     def studies_of(self, campaign: Campaign) -> tuple[str, ...]:
-        """The study, and the one beside it."""
+        """Return the study, and the one beside it."""
         return tuple(dict.fromkeys(filter(None, (self.study, self.boundary_elements))))
 
     def problems(self, campaign: Campaign) -> Iterator[Problem]:
-        """A study beside it that is not there, or has no runs by boundary elements."""
+        """Yield the problem of a study beside it that is unknown, or has no runs by boundary elements."""
         yield from super().problems(campaign)
-        beside = self.boundary_elements
-        if beside is None:
+        if self.boundary_elements is None:
             return
-        yield from unknown(("boundary_elements",), beside, campaign.studies)
-        if beside in campaign.studies and REFERENCE_MODEL not in campaign.studies[beside].models:
-            reason = f"has no runs by boundary elements; allowed: a study with {REFERENCE_MODEL!r} among its `models`"
-            yield ("boundary_elements",), beside, reason
+        location, name = ("boundary_elements",), self.boundary_elements
+        yield from unknown(location, name, campaign.studies)
+        if name in campaign.studies and REFERENCE_MODEL not in campaign.studies[name].models:
+            expected = f"expected a study with {REFERENCE_MODEL!r} among its `models`"
+            yield location, name, f"has no runs by boundary elements; {expected}"
 
 
 class SnapshotFigure(StudyFigure):
@@ -134,19 +134,18 @@ class SnapshotFigure(StudyFigure):
     )
 
     def study_problems(self, campaign: Campaign, study: Any) -> Iterator[Problem]:
-        """A snapshot that is not there is one more."""
+        """Yield in addition the problem of a study without the snapshot."""
         yield from super().study_problems(campaign, study)
         snapshots = campaign.snapshots_of(self.study)
         if snapshots == []:
-            yield ("study",), self.study, "keeps no snapshot to draw; allowed: a study with one"
-        if self.snapshot is not None and self.snapshot.target not in (snapshots or []):
-            there = listed(f"{kind} {value:g}" for kind, value in snapshots or [])
+            yield ("study",), self.study, "keeps no snapshot to draw; expected a study with `snapshots`"
+        elif self.snapshot is not None and self.snapshot.target not in (snapshots or []):
+            kept = listed(f"{kind} {value:g}" for kind, value in snapshots or []) or "none, since it names none"
             kind, value = self.snapshot.target
-            reason = f"is no snapshot of study {self.study!r}; allowed: {there or 'none, for the study names none'}"
-            yield ("snapshot",), f"{kind} {value:g}", reason
+            yield ("snapshot",), f"{kind} {value:g}", f"is not kept by study {self.study!r}; expected one of: {kept}"
 
     def arguments(self) -> dict[str, Any]:
-        """The snapshot by its kind and target."""
+        """Return the snapshot as its kind and target."""
         arguments = super().arguments()
         if arguments.pop("snapshot", None) is not None:
             arguments["kind"], arguments["target"] = self.snapshot.target
@@ -164,23 +163,18 @@ class RunFigure(StudyFigure):
     )
 
     def arguments(self) -> dict[str, Any]:
-        """The surface by its name, for `surface` is its dataset."""
+        """Return the surface by its name, because the argument `surface` is its dataset."""
         arguments = super().arguments()
         if "surface" in arguments:
             arguments["surface_name"] = arguments.pop("surface")
         return arguments
 
     def run(self, campaign: Campaign) -> RunLabels:
-        """The run that is shown: of the study's that are asked for the first with adhesion, or the first of all."""
-        model = first_of(campaign.studies[self.study].models)
-        runs = [
-            run
-            for run in (RunLabels(self.study, model, *contact) for contact in campaign.contacts(self.study))
-            if self.surface in (None, run.surface)
-            and self.seed in (None, run.seed)
-            and self.rms_slope in (None, run.rms_slope)
-            and self.material in (None, run.material)
-        ]
+        """Return the run that is shown: the first with adhesion, or the first of all, of those requested."""
+        model = first_model(campaign.studies[self.study].models)
+        wanted = self.model_dump(include={"surface", "seed", "rms_slope", "material"}, exclude_none=True)
+        runs = [RunLabels(self.study, model, *contact) for contact in campaign.contacts(self.study)]
+        runs = [run for run in runs if wanted.items() <= run._asdict().items()]
         return next((run for run in runs if campaign.materials[run.material].surface_energy > 0), runs[0])
 
 
@@ -188,25 +182,20 @@ class ComparedFigure(StudyFigure):
     """A figure that compares a study's runs with boundary elements."""
 
     def study_problems(self, campaign: Campaign, study: Any) -> Iterator[Problem]:
-        """A study without boundary elements is one more."""
+        """Yield in addition the problem of a study without boundary elements at the same loads."""
         yield from super().study_problems(campaign, study)
-        if not is_compared(campaign, self.study):
-            if set(study.models) == set(MODELS):
-                reason = (
-                    f"has boundary elements, but its targets are {study.targets.last[0]}s, and errors are compared at "
-                    "the same load; allowed: a study with both `models` and reduced_pressures for targets"
-                )
-            else:
-                reason = (
-                    "has no boundary elements beside it; allowed: a study with both `models` and reduced pressures "
-                    "for targets, or one that an entry of finite_range names"
-                )
-            yield ("study",), self.study, reason
-
-
-def is_compared(campaign: Campaign, study: str) -> bool:
-    """Whether there are boundary elements beside the runs of a study, in either limit of the range."""
-    return campaign.compares_models(study) or is_solved_at_finite_range(campaign, study)
+        if campaign.compares_models(self.study) or is_solved_at_finite_range(campaign, self.study):
+            return
+        reason = (
+            "has no boundary elements beside it; expected a study with both `models` and reduced pressures as targets, "
+            "or one that an entry of finite_range names"
+        )
+        if set(study.models) == set(MODELS):
+            reason = (
+                f"has boundary elements, but its targets are {study.targets.last[0]}s, and errors are compared at the "
+                "same load; expected a study with both `models` and reduced_pressures as targets"
+            )
+        yield ("study",), self.study, reason
 
 
 def is_solved_at_finite_range(campaign: Campaign, study: str) -> bool:
@@ -215,26 +204,24 @@ def is_solved_at_finite_range(campaign: Campaign, study: str) -> bool:
 
 
 def finite_range_error(campaign: Campaign, study: str, files: results.ResultFiles) -> Inputs:
-    """The error against boundary elements at a finite range as an input, where there are any beside a study."""
+    """Return the error against boundary elements at a finite range as an input, if a study has any beside it."""
     return {"model_error": files.path(results.MODEL_ERROR)} if is_solved_at_finite_range(campaign, study) else {}
 
 
-def not_unloaded(campaign: Campaign, location: tuple, name: str, *, in_part: bool) -> Iterator[Problem]:
-    """A study that does not come back, in figures of the way back; if `in_part` it need not come back all the way."""
-    if name not in campaign.studies:
-        return
-    study = campaign.studies[name]
-    if not (study.unload or (in_part and study.turning_points)):
-        yield location, name, "is not unloaded; allowed: a study with `unload: true`"
+def not_unloaded(campaign: Campaign, location: tuple, name: str, *, partly: bool) -> Iterator[Problem]:
+    """Yield the problem of a study that does not unload completely, or if `partly` not at all."""
+    study = campaign.studies.get(name)
+    if study is not None and not (study.unload or (partly and study.turning_points)):
+        yield location, name, "is not unloaded; expected a study with `unload: true`"
 
 
 def studies_problems(campaign: Campaign, key: str, names: Iterable[str]) -> Iterator[Problem]:
-    """What is wrong with a list of studies that come back all the way."""
+    """Yield the problems of a list of studies that must unload completely."""
     for index, name in enumerate(names):
         yield from unknown((key, index), name, campaign.studies)
-        yield from not_unloaded(campaign, (key, index), name, in_part=False)
+        yield from not_unloaded(campaign, (key, index), name, partly=False)
 
 
 def campaign_and_model_error(campaign: Campaign, options: ComparedFigure, files: results.ResultFiles) -> Inputs:
-    """The inputs of a figure of the error of the model: the campaign has the materials, which have their colours."""
+    """Return the inputs of a figure of the error of the model; the campaign has the colours of the materials."""
     return {"campaign": files.path(results.DATASET), "model_error": files.path(results.MODEL_ERROR)}

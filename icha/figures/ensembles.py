@@ -1,13 +1,15 @@
-"""Means over seeds in figures: lines with bands and points with bars, or the single seeds where these are few."""
+"""Means over seeds: lines with bands and points with bars, or the single seeds where these are few."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import itertools
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from icha.figures.looks import FEWER_SEEDS, NUMBER_PLACES
+from icha.figures.legends import FEWER_SEEDS, write_seed_count
+from icha.figures.select import ContactRuns
 from icha.figures.style import GREY, legend_handle
 from icha.support.statistics import ENOUGH, ensemble
 
@@ -21,13 +23,11 @@ _MEAN_MARKERS = 8
 _SEED_LINE = {"ls": "-", "lw": 0.5, "alpha": 0.5, "zorder": 1.6}
 _SEED_DOT = {"ls": "none", "marker": ".", "ms": 5, "mew": 0, "alpha": 0.5, "zorder": 2.5}
 _BARS = {"elinewidth": 0.6, "capsize": 1.5}
-# A cross over a hollow mark, and the number of seeds beside it, in points.
-_CROSS = {"ls": "none", "marker": "x", "mew": 0.7}
-_NUMBER = {"fontsize": 6.5, "textcoords": "offset points", "annotation_clip": True}
-# Points with bars are this far in front of what their look says.
+_CROSS = {"ls": "none", "marker": "x", "mew": 0.7, "label": FEWER_SEEDS}
+# Marks of means over fewer seeds are this far in front of points with bars, which lie in front of their own zorder.
 _BEFORE_POINTS = 0.101
-_SHADE = 0.22
-_FEW_BANDS = 3
+# Opacity of the bands of up to so many lines in a panel; of more they are paler.
+_SHADE, _FEW_BANDS = 0.22, 3
 
 
 def draw_members(
@@ -41,19 +41,20 @@ def draw_members(
     asked: int = 0,
     **alone: object,
 ) -> None:
-    """Draw the values (members, k) of an ensemble: their mean with its band or the members; with `alone` the only one.
+    """Draw the mean of the members (members, k) of an ensemble with their scatter, or a single member by itself.
 
     Parameters
     ----------
-    positive : whether the axis is logarithmic, so that the band is positive and zeros have no place.
-    lines : number of lines of the panel; the more there are, the paler are the bands.
-    asked : number of members asked for; where a mean has fewer, its marks show it (`mark_fewer`).
+    positive : whether the axis is logarithmic, so that the band is positive and zeros are left out.
+    lines : number of lines in the panel.
+    asked : number of members asked for; marks of means over fewer show it (`mark_fewer`).
+    alone : look of a single member, beside `look`.
     """
     if len(members) == 1:
         axes.plot(x, members[0], **alone, **look)
         mark_fewer(axes, x, members[0], np.isfinite(members), look, asked, alone.get("markevery", 1))
         return
-    over, known = ensemble(members), np.isfinite(members)
+    mean, known = ensemble(members).mean, np.isfinite(members)
     draw_scatter(axes, x, members, look["color"], positive=positive, lines=lines)
     every = max(1, -(-len(x) // _MEAN_MARKERS))
     breaks = _changes(known)
@@ -61,8 +62,8 @@ def draw_members(
     if len(breaks):
         at = np.arange(0, len(x), every)
         marked = (at + np.searchsorted(breaks, at, side="right")).tolist()
-    axes.plot(*_break_lines(breaks, x, over.mean), **{"lw": 0.9} | look | {"ls": "-", "markevery": marked})
-    mark_fewer(axes, x, over.mean, known, look, asked, every)
+    axes.plot(*_break_lines(breaks, x, mean), **{"lw": 0.9} | look | {"ls": "-", "markevery": marked})
+    mark_fewer(axes, x, mean, known, look, asked, every)
 
 
 def _changes(known):
@@ -80,6 +81,8 @@ def mark_fewer(
 ) -> None:
     """Draw the marks of means over fewer members than asked for hollow and crossed, with n beside them.
 
+    Successive points that are means over the same members have one n, beside the last of them.
+
     Parameters
     ----------
     x, y : (k,) float, the means.
@@ -87,33 +90,21 @@ def mark_fewer(
     look : look of the marks, arguments of `Axes.plot`.
     asked : number of members asked for, of all points or of each.
     every : one in so many points has a mark.
-
-    Notes
-    -----
-    Points in a row that are means over the same members have one n, beside the last or the first of them.
     """
-    from matplotlib.patheffects import withStroke
-
     counts = known.sum(axis=0)
     fewer = (counts > 0) & (counts < asked) & np.isfinite(y)
     if not fewer.any():
         return
-    stretches = [own for own in np.split(np.arange(len(counts)), _changes(known)) if fewer[own].any()]
-    stretches = [own[fewer[own]] for own in stretches]
+    stretches = [own[fewer[own]] for own in np.split(np.arange(len(counts)), _changes(known)) if fewer[own].any()]
     marks = np.unique(np.concatenate([[*own[own % every == 0], own[0], own[-1]] for own in stretches]))
     look = {name: look[name] for name in ("color", "mec", "mew", "ms", "marker", "zorder") if name in look}
     colour, order = look.get("color", look.get("mec")), look.get("zorder", 2) + _BEFORE_POINTS
     if look.get("marker") not in (None, "none", "+", "x", "1", "2", "3", "4"):
         axes.plot(x[marks], y[marks], **look | {"ls": "none", "mfc": "white", "zorder": order})
-    cross = {"color": colour, "ms": look.get("ms", _SEED_DOT["ms"]), "zorder": order + 0.001, "label": FEWER_SEEDS}
+    cross = {"color": colour, "ms": look.get("ms", _SEED_DOT["ms"]), "zorder": order + 0.001}
     axes.plot(x[marks], y[marks], **cross | _CROSS)
-    halo = [withStroke(linewidth=1.5, foreground="white")]
     for own in stretches:
-        # Beside the last mark of one stretch and the first of the next; the legend moves those that lie on each other.
-        place = NUMBER_PLACES[sum(text.get_text().startswith("n=") for text in axes.texts) % 2]
-        at = own[-1] if place.right > 0 else own[0]
-        beside = {"ha": place.align, "color": colour, "zorder": order + 1, "path_effects": halo} | _NUMBER
-        axes.annotate(f"n={counts[at]}", (x[at], y[at]), (place.right, place.up), **beside)
+        write_seed_count(axes, counts[own[-1]], x[own[-1]], y[own[-1]], color=colour, zorder=order + 1)
 
 
 def draw_scatter(
@@ -125,79 +116,123 @@ def draw_scatter(
     """
     x, over = np.broadcast_to(x, members.shape), ensemble(members)
     if over.count.min(initial=len(members)) < ENOUGH:
-        if members.shape[1] == 1:
-            dashes = _SEED_DOT  # of a single point there is no line
+        # A single point has no line.
+        look = _SEED_LINE | (_SEED_DOT if members.shape[1] == 1 else dashes)
         for own, member in zip(x, members, strict=True):
-            axes.plot(
-                own, np.where(member > 0, member, np.nan) if positive else member, color=colour, **_SEED_LINE | dashes
-            )
+            axes.plot(own, np.where(member > 0, member, np.nan) if positive else member, color=colour, **look)
         return
     limits = axes.dataLim.frozen()
-    look = {"alpha": _SHADE * min(1.0, _FEW_BANDS / lines), "lw": 0, "zorder": 1.5}
     band = _break_lines(_changes(np.isfinite(members)), x.mean(axis=0), *over.band(positive=positive))
-    axes.fill_between(*band, color=colour, **look)
+    axes.fill_between(*band, color=colour, alpha=_SHADE * min(1.0, _FEW_BANDS / lines), lw=0, zorder=1.5)
     axes.dataLim.set(limits)
 
 
 def draw_points(
-    axes: Axes, x: np.ndarray, members: np.ndarray, look: dict, *, positive: bool, asked: int | np.ndarray = 0
+    axes: Axes,
+    x: np.ndarray,
+    members: np.ndarray,
+    look: dict,
+    *,
+    positive: bool,
+    asked: int | np.ndarray = 0,
 ) -> ErrorbarContainer:
-    """Draw the means of an ensemble (members, k; NaN where a member has none) with bars, or with its members."""
-    over = ensemble(members)
-    low, high = over.band(positive=positive)
-    return draw_means(axes, (x, None), (over.mean, (low, high)), over.count, (x, members), look, asked)
+    """Draw the means of an ensemble with bars where there are enough members, and else with the members.
 
-
-def draw_means(
-    axes: Axes, x: tuple, y: tuple, counts: np.ndarray, members: tuple, look: dict, asked: int | np.ndarray = 0
-) -> ErrorbarContainer:
-    """Draw points with bars where they are of enough members, and with their members where these are few.
-
-    A line joins neighbouring points that are means over the same members alone.
+    A line joins neighbouring points only if they are means over the same members.
 
     Parameters
     ----------
-    x, y : of all points the mean, and lower and upper end of its band, or None.
-    counts : numbers of members of the points.
-    members : x (k,) or (members, k), and y (members, k), of the members.
+    x : (k,) or (members, k) float; of members that differ in x, the means have bars along x as well.
+    members : (members, k) float, NaN where a member has no value.
+    positive : whether values are positive, so that their bars are.
     asked : number of members asked for, of all points or of each; marks of means over fewer show it (`mark_fewer`).
     """
+    known = np.isfinite(members)
+    x = np.where(known, x, np.nan)
+    means = [ensemble(values) for values in (x, members)]
+    counts = means[1].count
     few = (counts > 1) & (counts < ENOUGH)
-    own = [np.where(few, values, np.nan) for values in np.broadcast_arrays(*members)]
     if few.any():
-        axes.plot(*(values.ravel() for values in own), color=look["color"], **_SEED_DOT)
-    known = np.isfinite(members[1])
+        dots = (np.where(few, values, np.nan).ravel() for values in (x, members))
+        axes.plot(*dots, color=look["color"], **_SEED_DOT)
     breaks = _changes(known) if look.get("ls", "-") != "none" else []
     bars = {}
-    for name, (mean, band) in (("xerr", x), ("yerr", y)):
-        if band is not None and (counts >= ENOUGH).any():
-            lengths = np.array([mean - band[0], band[1] - mean])
-            (bars[name],) = _break_lines(breaks, np.where(counts >= ENOUGH, lengths, np.nan))
-    handle = axes.errorbar(*_break_lines(breaks, x[0], y[0]), **bars, **_BARS | look)
-    mark_fewer(axes, x[0], y[0], known, look, asked)
+    for name, over, above_zero in zip(("xerr", "yerr"), means, (True, positive), strict=True):
+        low, high = over.band(positive=above_zero)
+        # A coordinate that all members share, such as a slope, has no bar.
+        if (counts >= ENOUGH).any() and (name == "yerr" or np.any(high - low > 1e-9 * np.abs(low))):
+            lengths = np.where(counts >= ENOUGH, [over.mean - low, high - over.mean], np.nan)
+            (bars[name],) = _break_lines(breaks, lengths)
+    x, y = (over.mean for over in means)
+    handle = axes.errorbar(*_break_lines(breaks, x, y), **bars, **_BARS | look)
+    mark_fewer(axes, x, y, known, look, asked)
     return handle
 
 
+class Points:
+    """States of a line of points, each a mean over its seeds, in the order of x.
+
+    Means are over the seeds that all points have, or over each point's own if they share none.
+
+    Parameters
+    ----------
+    groups : the runs of each point.
+    quantities : names of x and of one or several y of a run.
+    factor : unit of y, by which they are multiplied.
+
+    Attributes
+    ----------
+    members : (quantities, seeds, k) float, values of every seed; NaN where a point lacks it.
+    same_seeds : whether all points are of the same seeds.
+    asked : (k,) int, numbers of seeds asked for.
+    """
+
+    def __init__(self, groups: Sequence[ContactRuns], *quantities: str, factor: float = 1.0):
+        """Arrange the values by seed."""
+        common = set.intersection(*(set(group.runs) for group in groups))
+        seeds = sorted(common or set().union(*(group.runs for group in groups)))
+        members = np.full((len(quantities), len(seeds), len(groups)), np.nan)
+        for (i, name), (j, seed), (k, group) in itertools.product(*map(enumerate, (quantities, seeds, groups))):
+            if seed in group.runs:
+                members[i, j, k] = float(group.runs[seed][name]) * (factor if i else 1.0)
+        order = np.argsort(ensemble(members[0]).mean, kind="stable")
+        self.members = members[..., order]
+        self.same_seeds = bool(common)
+        self.asked = np.array([group.asked for group in groups])[order]
+
+    @property
+    def means(self) -> np.ndarray:
+        """Means over the seeds, (quantities, k)."""
+        return ensemble(self.members, axis=1).mean
+
+    @property
+    def counts(self) -> list[int]:
+        """Numbers of seeds that the means are over, (k,)."""
+        return np.isfinite(self.members[0]).sum(axis=0).tolist()
+
+    def draw(self, axes: Axes, look: dict, quantity: int = 1) -> ErrorbarContainer:
+        """Draw one of the quantities against the first."""
+        return draw_points(axes, self.members[0], self.members[quantity], look, positive=True, asked=self.asked)
+
+
 def lines_handles(counts: Iterable[int]) -> dict[str, Line2D]:
-    """What the legend says of lines of so many seeds; nothing of single ones."""
+    """Return what the legend says of lines of so many seeds; nothing of single ones."""
     band = legend_handle(color=GREY, alpha=0.35, lw=6, solid_capstyle="butt")
-    seeds = legend_handle(color=GREY, **_SEED_LINE)
-    return _handles(counts, ("mean and 95 % band", band), ("single seeds beside their mean", seeds))
+    return _handles(counts, ("mean and 95 % band", band), legend_handle(color=GREY, **_SEED_LINE))
 
 
 def points_handles(counts: Iterable[int]) -> dict[str, Line2D]:
-    """What the legend says of points of so many seeds; nothing of single ones."""
+    """Return what the legend says of points of so many seeds; nothing of single ones."""
     bars = legend_handle(color=GREY, marker="|", ls="none", ms=8)
-    seeds = legend_handle(color=GREY, **_SEED_DOT)
-    return _handles(counts, ("means, bars 95 %", bars), ("single seeds beside their mean", seeds))
+    return _handles(counts, ("means, bars 95 %", bars), legend_handle(color=GREY, **_SEED_DOT))
 
 
-def _handles(counts, enough, few):
+def _handles(counts, enough, seeds):
     counts = sorted({int(count) for count in counts if count > 1})
     found = {}
     for (words, handle), own in (
         (enough, [count for count in counts if count >= ENOUGH]),
-        (few, [count for count in counts if count < ENOUGH]),
+        (("single seeds beside their mean", seeds), [count for count in counts if count < ENOUGH]),
     ):
         if own:
             span = f"{own[0]}" if len(own) == 1 else f"{own[0]}–{own[-1]}"

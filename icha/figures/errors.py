@@ -11,7 +11,8 @@ from icha.datasets.labels import place_of, surfaces_and_slopes
 from icha.datasets.variables.model_error import FINITE_RANGE
 from icha.figures.curves import PRESSURE_LABEL
 from icha.figures.ensembles import draw_points, points_handles
-from icha.figures.looks import Looks, interfaces_of, legend_below, words_handle
+from icha.figures.legends import legend_below, words_handle
+from icha.figures.looks import Looks, interfaces_of
 from icha.figures.select import NothingToDraw, asked_of_entry, study_errors
 from icha.figures.style import DASHES, GREY, legend_handle, logarithmic_axes, material_label, new_panels, number, styled
 from icha.support.statistics import ensemble
@@ -57,7 +58,7 @@ class Quantity(NamedTuple):
 class _Curve(NamedTuple):
     """The errors of an entry for one contact, of the runs to which the asperity model is applicable or of the others.
 
-    Parameters
+    Attributes
     ----------
     name : name of the entry.
     errors : the errors along seeds and loads.
@@ -70,12 +71,22 @@ class _Curve(NamedTuple):
     contact: tuple[str, str, float]
     applicable: bool
 
+    @property
+    def truth(self) -> str:
+        """Which boundary elements the model is compared with."""
+        return self.errors.attrs["truth"]
+
+    @property
+    def has_cohesive_zone(self) -> bool:
+        """Whether boundary elements attract out of contact, so that they have a second area."""
+        return self.truth == FINITE_RANGE and float(self.errors["surface_energy"]) > 0
+
 
 @styled
 def draw_errors(
     campaign: xr.DataTree, model_error: xr.DataTree, *, study: str, quantities: tuple[Quantity, ...]
 ) -> Figure:
-    """A panel for every quantity, with a curve for every surface, slope and material: means over the seeds.
+    """Draw quantities of the model error against load, a panel for each, for every surface, slope and material.
 
     Parameters
     ----------
@@ -106,7 +117,7 @@ def draw_errors(
             same = [each for each in own if each[2:] == curve[2:]]
             name, dashes = _words(curve, same, looks, own_rows=own_rows)
             look = looks.look(curve.contact, applicable=curve.applicable) | {"ls": dashes}
-            handle = _draw_curve(row, curve.errors, quantities, look, _APART ** (k - (len(own) - 1) / 2), counts)
+            handle = _draw_curve(row, curve, quantities, look, _APART ** (k - (len(own) - 1) / 2), counts)
             if curve.applicable:
                 named.setdefault(name, handle)
         if own_rows:
@@ -114,7 +125,7 @@ def draw_errors(
     _finish(panels, quantities)
     if len(named) == 1 or looks.scale:
         named.pop("", None)
-    if any(each.other for each in quantities) and any(has_cohesive_zone(curve.errors) for curve in curves):
+    if any(each.other for each in quantities) and any(curve.has_cohesive_zone for curve in curves):
         named[_OTHER_NAME] = legend_handle(color=GREY, **_OTHER)
     named |= points_handles(counts)
     for quantity in quantities:
@@ -124,48 +135,50 @@ def draw_errors(
 
 
 def _curves(model_error, study, quantities):
-    """What there is to be drawn of a study; raises what `draw_errors` does."""
+    """Return the curves of all entries that compare the runs of a study."""
     entries = study_errors(model_error, study)
     if not entries:
-        there = sorted({str(node.attrs["study"]) for node in model_error.children.values()})
-        raise ValueError(f"no boundary elements beside study {study!r}; there are some for {', '.join(there)}")
+        compared = ", ".join(sorted({str(node.attrs["study"]) for node in model_error.children.values()}))
+        raise ValueError(f"no boundary elements beside study {study!r}; there are some for {compared}")
+    variables = {variable for each in quantities for variable in (each.name, each.other) if variable}
     found = []
     for (name, errors), applicable in itertools.product(entries.items(), (True, False)):
-        values = of_applicability(errors, applicable)
-        for material, place in itertools.product(errors["material"].values.tolist(), surfaces_and_slopes(errors)):
-            labels = dict(zip(("surface", "rms_slope"), place, strict=True)) | {"material": material}
-            own = values.isel(place_of(errors, labels))
+        for material, (surface, slope) in itertools.product(errors["material"].values, surfaces_and_slopes(errors)):
+            labels = {"surface": surface, "rms_slope": slope, "material": material}
+            own = errors.isel(place_of(errors, labels))
+            runs = (own["applicability"] == "") == applicable if "applicability" in own else applicable
+            own = own.assign({variable: own[variable].where(runs) for variable in variables})
             # Not all combinations of an entry are asked for.
             if any(np.isfinite(own[each.name].values).any() for each in quantities):
-                found.append(_Curve(name, own, (material, *place), applicable))
+                found.append(_Curve(name, own, (material, surface, slope), applicable))
     if not found:
         raise NothingToDraw(f"study {study}: no run beside boundary elements is complete, so there is nothing to draw")
     return found
 
 
 def _words(curve, same, looks, *, own_rows):
-    """Name of a curve in the legend, and dashes of its line, beside the other curves of the `same` contact.
+    """Return name and dashes of a curve beside the other curves of the `same` contact.
 
     Those are solutions of the same states at a finite range, or on another grid.
     """
-    again, truths = same.index(curve), [each.errors.attrs["truth"] for each in same]
+    again, truths = same.index(curve), [each.truth for each in same]
     name = looks.place_name(curve.contact[1:]) if own_rows else looks.name(curve.contact)
     words = [] if looks.scale else [name] if name else []
-    words += ["at finite range"] if len(set(truths)) > 1 and truths[again] == FINITE_RANGE else []
-    words += [curve.name] if truths.index(truths[again]) < again else []
+    words += ["at finite range"] if len(set(truths)) > 1 and curve.truth == FINITE_RANGE else []
+    words += [curve.name] if truths.index(curve.truth) < again else []
     return ", ".join(words), DASHES[again % len(DASHES)]
 
 
-def _draw_curve(row, errors, quantities, look, apart, counts):
-    """Draw a curve in all panels of a row; returns its handle, and adds to `counts` numbers of seeds of its points."""
-    p, asked = errors["reduced_pressure"].values * apart, int(asked_of_entry(errors))
+def _draw_curve(row, curve, quantities, look, apart, counts):
+    """Draw a curve in all panels of a row; return its handle, and add to `counts` numbers of seeds of its points."""
+    p, asked = curve.errors["reduced_pressure"].values * apart, int(asked_of_entry(curve.errors))
+    errors = curve.errors.transpose("seed", ...)
     for ax, quantity in zip(row, quantities, strict=True):
-        members = quantity.factor * errors[quantity.name].transpose("seed", ...).values
+        members = quantity.factor * errors[quantity.name].values
         handle = draw_points(ax, p, members, look, positive=quantity.positive, asked=asked)
         counts.update(np.isfinite(members).sum(axis=0).tolist())
-        if quantity.other and has_cohesive_zone(errors):
-            mean = ensemble(errors[quantity.other].transpose("seed", ...).values).mean
-            ax.plot(p, quantity.factor * mean, color=look["color"], **_OTHER)
+        if quantity.other and curve.has_cohesive_zone:
+            ax.plot(p, quantity.factor * ensemble(errors[quantity.other].values).mean, color=look["color"], **_OTHER)
     return handle
 
 
@@ -185,19 +198,3 @@ def _finish(panels, quantities):
     for ax, quantity in zip(panels[-1], quantities, strict=True):
         ax.set_xlabel(PRESSURE_LABEL)
         ax.set_ylim(*quantity.limits)
-
-
-def of_applicability(errors: xr.Dataset, applicable: bool) -> xr.Dataset:
-    """An entry with the values of the runs to which the asperity model is applicable, or of the others, alone."""
-    if "applicability" not in errors:
-        return errors if applicable else errors.where(False)
-    keep = (errors["applicability"] == "") == applicable
-    along_seeds = [
-        name for name, values in errors.data_vars.items() if "seed" in values.dims and values.dtype.kind == "f"
-    ]
-    return errors.assign({name: errors[name].where(keep) for name in along_seeds})
-
-
-def has_cohesive_zone(errors: xr.Dataset) -> bool:
-    """Whether boundary elements attract out of contact, so that they have a second area."""
-    return errors.attrs["truth"] == FINITE_RANGE and bool((errors["surface_energy"] > 0).any())

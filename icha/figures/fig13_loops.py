@@ -10,14 +10,22 @@ from pydantic import Field
 
 from icha.contact.models import REFERENCE_MODEL
 from icha.datasets import results
-from icha.datasets.labels import ContactLabels, RunLabels
+from icha.datasets.labels import ContactLabels
 from icha.datasets.variables.model_error import FINITE_RANGE, SHORT_RANGE
 from icha.figures.curves import AREA_LABEL, PRESSURE_LABEL, SEPARATION_LABEL
 from icha.figures.declaration import Campaign, Declaration, Inputs, TruthFigure, not_unloaded
 from icha.figures.ensembles import draw_scatter, lines_handles, mark_fewer
-from icha.figures.hysteresis import BRANCH_DASHES, ROUNDING, looks_of, pull_off_step, unloaded_runs
-from icha.figures.looks import MODEL_MARKERS, WAY_BACK_MARKERS, legend_below, words_handle
-from icha.figures.select import asked_seeds, branches, is_applicable, pick, runs_by_boundary_elements, ways_back
+from icha.figures.hysteresis import ROUNDING, Leg, mean_legs, pull_off_step, unloaded_runs
+from icha.figures.legends import legend_below, words_handle
+from icha.figures.looks import BRANCH_DASHES, MODEL_MARKERS, UNLOADING_MARKERS, looks_of_studies
+from icha.figures.select import (
+    ContactRuns,
+    branches,
+    group_by_contact,
+    pick,
+    runs_by_boundary_elements,
+    unloading_legs,
+)
 from icha.figures.style import GREY, legend_handle, new_panels, slope_label, styled
 from icha.support.values import Label, Problem, Seed
 
@@ -35,7 +43,7 @@ class LoopsFigure(TruthFigure):
     def problems(self, campaign: Campaign) -> Iterator[Problem]:
         """A study that does not come back is one more."""
         yield from super().problems(campaign)
-        yield from not_unloaded(campaign, ("study",), self.study, in_part=True)
+        yield from not_unloaded(campaign, ("study",), self.study, partly=True)
 
 
 def inputs(campaign: Campaign, options: LoopsFigure, files: results.ResultFiles) -> Inputs:
@@ -69,51 +77,12 @@ _PULL_OFF = {"ls": "none", "mec": "black", "mew": 0.7, "ms": 4.6, "zorder": 6}
 _TRUTH = {"ls": "none", "ms": 3.6, "mew": 0.7, "zorder": 5}
 
 
-class _Way(NamedTuple):
-    """A leg of a loop: its branch, separation, load and area, and of several seeds also load and area of each."""
-
-    branch: str
-    values: dict[str, np.ndarray]
-    members: dict[str, np.ndarray]
-
-
 class _Loop(NamedTuple):
-    """The runs of a contact.
+    """The runs of a contact, the legs that are drawn of them, and boundary elements of the same contact."""
 
-    Parameters
-    ----------
-    labels : labels of the first run.
-    runs : a run for every seed.
-    ways : what is drawn of them.
-    truths : boundary elements of the same contact.
-    asked : number of seeds asked for.
-    applicable : whether the asperity model is applicable.
-    """
-
-    labels: RunLabels
-    runs: list[xr.Dataset]
-    ways: list[_Way]
+    runs: ContactRuns
+    legs: list[Leg]
     truths: list[xr.Dataset]
-    asked: int
-    applicable: bool
-
-
-def _ways(runs):
-    """The legs of a run; of several seeds their means at common separations."""
-    from icha.analysis.common_loads import at_common_displacements
-
-    legs = [list(branches(run)) for run in runs]
-    if len(runs) == 1 or len({len(own) for own in legs}) > 1:
-        return [_Way(name, {axis: leg[axis].values for axis in _COLUMNS}, {}) for own in legs for name, leg in own]
-    found = []
-    for members in zip(*legs, strict=True):
-        separation, values = at_common_displacements([leg for _, leg in members])
-        means = {name: of_seeds.mean(axis=0) for name, of_seeds in values.items()}
-        found.append(_Way(members[0][0], means | {"reduced_separation": separation}, values))
-    return found
-
-
-_COLUMNS = ("reduced_separation", "reduced_pressure", "contact_area_fraction")
 
 
 @styled
@@ -136,54 +105,49 @@ def figure(
     seed : left out, the first that has boundary elements, or else the mean over all.
     """
     drawn, surface, seed = _loops(campaign, study, boundary_elements or study, loops or (), surface, seed)
-    slopes = sorted({loop.labels.rms_slope for loop in drawn}, reverse=True)
-    contacts = {loop.labels._replace(seed=None) for loop in drawn}
+    slopes = sorted({loop.runs.labels.rms_slope for loop in drawn}, reverse=True)
+    contacts = {loop.runs.contact for loop in drawn}
     own_rows = len(contacts) > _MOST_LOOPS and 1 < len(slopes) < len(contacts)
-    # Where every slope has its panels, they need not tell them apart in another way.
-    drawn = [(loop, (loop.labels.material, surface, None if own_rows else loop.labels.rms_slope)) for loop in drawn]
-    looks = looks_of(campaign, [study], [contact for _, contact in drawn])
+    # If every slope has its panels, they need not tell them apart in another way.
+    contacts = [(*loop.runs.contact[:2], None if own_rows else loop.runs.labels.rms_slope) for loop in drawn]
+    looks = looks_of_studies(campaign, [study], contacts)
 
     rows = [[slope] for slope in slopes] if own_rows else [slopes]
     fig, panels = new_panels(2.7 * len(rows), len(rows))
     for row, shown in zip(panels, rows, strict=True):
         own = [
-            (loop, looks.look(contact, applicable=loop.applicable))
-            for loop, contact in drawn
-            if loop.labels.rms_slope in shown
+            (loop, looks.look(contact, applicable=loop.runs.applicable))
+            for loop, contact in zip(drawn, contacts, strict=True)
+            if loop.runs.labels.rms_slope in shown
         ]
         _draw_row(row, own, turn=len(shown) > 1)
         if own_rows:
             row[-1].set_title(slope_label(shown[0]), loc="right")
     for ax, axis in zip(panels[-1], (_LOADS, _AREAS), strict=True):
         ax.set_xlabel(axis.x_label)
-    _say_which(panels[0, 0], surface, seed)
-    handles = _handles(looks, [loop for loop, _ in drawn], marked=len(rows[0]) > 1)
-    handles |= _others(campaign[study].to_dataset(), seed)
+    title = f"surface {surface}" + ("" if seed is None else f", seed {seed}")
+    panels[0, 0].set_title(title, loc="right", parse_math=False)
+    handles = _handles(looks, drawn, marked=len(rows[0]) > 1) | _others(campaign[study].to_dataset(), seed)
     legend_below(fig, handles, scale=looks.scale, panels=panels.ravel())
     return fig
 
 
 def _loops(campaign, study, beside, loops, surface, seed):
-    """The loops of a surface and seed, those to which the asperity model is not applicable apart; surface and seed."""
+    """Return the loops of a surface and seed, and which surface and seed (None: all) these are."""
     runs = unloaded_runs(campaign, study)
-    surface = pick("surface", surface, list(dict.fromkeys(labels.surface for labels, _ in runs)))
-    others = [run for _, run in runs_by_boundary_elements(campaign, beside) if ways_back(run)]
+    surface = pick("surface", surface, [labels.surface for labels, _ in runs])
+    others = [run for _, run in runs_by_boundary_elements(campaign, beside) if unloading_legs(run)]
     truths = _truths(study, runs, [*others, *loops])
     runs = [(labels, run) for labels, run in runs if labels.surface == surface]
     if seed is None:
         seed = next((labels.seed for labels, _ in runs if labels in truths), None)
     else:
-        pick("seed", seed, list(dict.fromkeys(labels.seed for labels, _ in runs)))
-    dataset = campaign[study].to_dataset()
-    members: dict[tuple, dict[RunLabels, xr.Dataset]] = {}
-    for labels, run in runs:
-        if seed in (None, labels.seed):
-            members.setdefault((labels._replace(seed=None), is_applicable(run)), {})[labels] = run
+        pick("seed", seed, [labels.seed for labels, _ in runs])
     found = []
-    for (_, applicable), own in members.items():
-        first, of_seeds = next(iter(own)), list(own.values())
-        asked = asked_seeds(dataset, first) if seed is None else 1
-        found.append(_Loop(first, of_seeds, _ways(of_seeds), truths.get(first, []), asked, applicable))
+    for group in group_by_contact(campaign, [each for each in runs if seed in (None, each[0].seed)]):
+        legs = mean_legs([list(branches(run)) for run in group.runs.values()])
+        group = group if seed is None else group._replace(asked=1)
+        found.append(_Loop(group, legs, truths.get(group.labels, [])))
     return found, surface, seed
 
 
@@ -197,11 +161,6 @@ def _draw_row(row, loops, *, turn):
         ax.set_ylabel(axis.y_label)
         ax.xaxis.set_major_locator(MaxNLocator(5))
     _enlarge(*row, loops)
-
-
-def _say_which(ax, surface, seed):
-    """Name above a panel the surface that is drawn, and the seed unless it is a mean over them."""
-    ax.set_title(f"surface {surface}" + ("" if seed is None else f", seed {seed}"), loc="right", parse_math=False)
 
 
 def _others(dataset, seed):
@@ -227,53 +186,49 @@ _AREAS = _Axis("reduced_pressure", "contact_area_fraction", PRESSURE_LABEL, AREA
 
 
 def _draw(ax, loop, look, axis, *, turn, lines):
-    """Draw a loop, a mark at its pull-off, and one where it turns first if that is wanted or the loop lacks seeds."""
+    """Draw a loop and a mark at its pull-off, and one at its first turn if that is wanted or the loop lacks seeds."""
     colour = look["color"]
-    for way in loop.ways:
-        x, y = way.values[axis.x], way.values[axis.y]
-        dashes = BRANCH_DASHES[way.branch]
+    for leg in loop.legs:
+        x, y = leg.values[axis.x], leg.values[axis.y]
+        dashes = BRANCH_DASHES[leg.branch]
         ax.plot(x, y, ls=dashes, color=colour, **_LOOP)
-        if way.members:
-            members = way.members.get(axis.x, x), way.members[axis.y]
+        if leg.members:
+            members = leg.members.get(axis.x, x), leg.members[axis.y]
             draw_scatter(ax, *members, colour, positive=False, lines=lines, ls=dashes)
+    runs = loop.runs.runs.values()
     marked = []
-    if turn or len(loop.runs) < loop.asked:
-        ends = [run.isel(step=int(np.flatnonzero(run["leg"].values == 0)[-1])) for run in loop.runs]
+    if turn or len(runs) < loop.runs.asked:
+        ends = [run.isel(step=int(np.flatnonzero(run["leg"].values == 0)[-1])) for run in runs]
         marked.append((ends, look | {"ls": "none", "zorder": 5}))
-    pulls = [run.isel(step=at) for run in loop.runs if (at := pull_off_step(run)) is not None]
+    pulls = [run.isel(step=at) for run in runs if (at := pull_off_step(run)) is not None]
     if pulls:
         marked.append((pulls, look | _PULL_OFF))
     for states, mark in marked:
-        x, y = _mean_point(states, axis)
+        x, y = (np.mean([[float(state[name])] for state in states], axis=0) for name in (axis.x, axis.y))
         ax.plot(x, y, **mark)
-        mark_fewer(ax, np.array([x]), np.array([y]), np.ones((len(states), 1), bool), mark, loop.asked)
+        mark_fewer(ax, x, y, np.ones((len(states), 1), bool), mark, loop.runs.asked)
     for truth in loop.truths:
         for branch, markers in _CROSSES.items():
-            way = truth.isel(step=truth["branch"].values == branch)
+            states = truth.isel(step=truth["branch"].values == branch)
             marker = markers[_truth_name(truth)]
-            ax.plot(way[axis.x], way[axis.y], color=colour, marker=marker, markevery=_APART, **_TRUTH)
-
-
-def _mean_point(states, axis):
-    """Where a mark of states of all seeds stands."""
-    return tuple(float(np.mean([float(state[name]) for state in states])) for name in (axis.x, axis.y))
+            ax.plot(states[axis.x], states[axis.y], color=colour, marker=marker, markevery=_APART, **_TRUTH)
 
 
 def _enlarge(left, right, loops):
     """Insets around zero load, if the tension is there but small."""
     from matplotlib.ticker import MaxNLocator
 
-    ways = [way for loop, _ in loops for way in loop.ways]
-    pressures = np.concatenate([way.values["reduced_pressure"] for way in ways])
+    legs = [leg.values for loop, _ in loops for leg in loop.legs]
+    pressures, separations, areas = (
+        np.concatenate([leg[name] for leg in legs])
+        for name in ("reduced_pressure", "reduced_separation", "contact_area_fraction")
+    )
     tension = -pressures.min()
     if not ROUNDING * pressures.max() < tension < _SMALL_TENSION * pressures.max():
         return
     reach = np.array([-1, 1]) * _REACH * tension
-    separations, areas = (
-        np.concatenate([way.values[name] for way in ways]) for name in ("reduced_separation", "contact_area_fraction")
-    )
-    near = (np.abs(pressures) <= reach[1]) & (areas > 0)
-    separations, areas = separations[near], areas[near]
+    enlarged = (np.abs(pressures) <= reach[1]) & (areas > 0)
+    separations, areas = separations[enlarged], areas[enlarged]
     room = 0.06 * np.ptp(separations)
     right.set_ylim(top=_HEADROOM * right.dataLim.y1)
     for ax, axis, corner, limits in (
@@ -298,8 +253,8 @@ def _handles(looks, loops, *, marked):
     handles = looks.handles(**_LOOP, **({} if marked else {"marker": "none"}))
     for branch, dashes in BRANCH_DASHES.items():
         handles[branch] = legend_handle(color=GREY, ls=dashes, **_LOOP)
-    handles |= lines_handles(len(loop.runs) for loop in loops)
-    if any(pull_off_step(run) is not None for loop in loops for run in loop.runs):
+    handles |= lines_handles(len(loop.runs.runs) for loop in loops)
+    if any(pull_off_step(run) is not None for loop in loops for run in loop.runs.runs.values()):
         handles["pull-off"] = legend_handle(marker="o", mfc=GREY, **_PULL_OFF)
     for name in dict.fromkeys(_truth_name(truth) for loop in loops for truth in loop.truths):
         for branch, markers in _CROSSES.items():
@@ -307,7 +262,7 @@ def _handles(looks, loops, *, marked):
     return handles
 
 
-_CROSSES = {"loading": MODEL_MARKERS, "unloading": WAY_BACK_MARKERS}
+_CROSSES = {"loading": MODEL_MARKERS, "unloading": UNLOADING_MARKERS}
 
 
 def _truth_name(truth):

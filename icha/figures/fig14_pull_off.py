@@ -11,9 +11,10 @@ from pydantic import Field
 
 from icha.figures.curves import plausible
 from icha.figures.declaration import Campaign, Declaration, StudyFigure, not_unloaded, studies_problems
-from icha.figures.ensembles import points_handles
-from icha.figures.hysteresis import averages_of, detached_lines, draw_averages, looks_of, say_which_model
-from icha.figures.looks import legend_below
+from icha.figures.ensembles import Points, points_handles
+from icha.figures.hysteresis import detached_lines, name_model
+from icha.figures.legends import legend_below
+from icha.figures.looks import looks_of_studies
 from icha.figures.style import GREY, ONE_COLUMN, TWO_COLUMNS, new_panels, number, slope_label, styled, unit_for
 from icha.support.values import Problem, list_of_names
 
@@ -42,7 +43,7 @@ class PullOffFigure(StudyFigure):
         """Studies of the second panel that are not there, and studies that do not come back, are more."""
         yield from studies_problems(campaign, "load_studies", self.load_studies or ())
         yield from super().problems(campaign)
-        yield from not_unloaded(campaign, ("study",), self.study, in_part=False)
+        yield from not_unloaded(campaign, ("study",), self.study, partly=False)
 
 
 DECLARATION = Declaration(
@@ -71,26 +72,27 @@ def figure(
     if len(loaded_slopes) == 1:
         # The panel's title names it, and the lines look like those of (a).
         by_load = detached_lines(campaign, load_studies, along_slopes=True)
-    looks = looks_of(campaign, [study, *load_studies], [contact for contact, _ in (*by_slope, *by_load)])
-    every = itertools.chain.from_iterable(line.values() for line in (*by_slope.values(), *by_load.values()))
-    largest = max(float(run[quantity]) for seeds in every for run in seeds.values())
+    looks = looks_of_studies(campaign, [study, *load_studies], [contact for contact, _ in (*by_slope, *by_load)])
+    points = itertools.chain(*by_slope.values(), *by_load.values())
+    largest = max(float(run[quantity]) for point in points for run in point.runs.values())
     factor, unit = unit_for(largest, "Pa") if quantity == "pull_off_pressure" else (1.0, "")
 
     fig, [panels] = new_panels(2.9, columns=2 if by_load else 1, width=TWO_COLUMNS if by_load else ONE_COLUMN)
     counts = []
     for ax, x, drawn in zip(panels, ("rms_slope", "largest_reduced_pressure"), (by_slope, by_load), strict=False):
-        means = {key: averages_of(campaign, line, x, quantity, factor) for key, line in drawn.items()}
-        for (contact, applicable), line in means.items():
-            draw_averages(ax, line, **looks.look(contact, applicable=applicable) | _LINE)
-            counts += line.over.count[:, 0].tolist()
-        _scale(ax, np.concatenate([line.y for line in means.values()]))
+        lines = {key: Points(line, x, quantity, factor=factor) for key, line in drawn.items()}
+        for (contact, applicable), line in lines.items():
+            line.draw(ax, looks.look(contact, applicable=applicable) | _LINE)
+            counts += line.counts
+        loads, values = np.concatenate([line.means for line in lines.values()], axis=1)
+        _scale(ax, values)
         ax.set_ylabel(_QUANTITIES[quantity] + (f" ({unit})" if unit else ""))
-    _label_slopes(panels[0], sorted({labels.rms_slope for line in by_slope.values() for labels in line}))
+    _label_slopes(panels[0], sorted({point.labels.rms_slope for line in by_slope.values() for point in line}))
     if by_load:
-        _label_loads(panels[1], np.concatenate([line.x for line in means.values()]))
+        _label_loads(panels[1], loads)
         if len(loaded_slopes) == 1:
             panels[1].set_title(slope_label(*loaded_slopes), loc="right")
-    say_which_model(panels[0], campaign, [study, *load_studies])
+    name_model(panels[0], campaign, [study, *load_studies])
     legend_below(fig, looks.handles(**_LINE) | points_handles(counts), scale=looks.scale, panels=panels)
     return fig
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -10,10 +10,11 @@ from pydantic import Field
 
 from icha.figures.curves import plausible
 from icha.figures.declaration import Campaign, Declaration, FigureOptions, studies_problems
-from icha.figures.ensembles import points_handles
-from icha.figures.hysteresis import averages_of, detached_lines, draw_averages, looks_of, say_which_model
-from icha.figures.looks import legend_below
-from icha.figures.select import NothingToDraw
+from icha.figures.ensembles import Points, points_handles
+from icha.figures.hysteresis import detached_lines, name_model
+from icha.figures.legends import legend_below
+from icha.figures.looks import looks_of_studies
+from icha.figures.select import ContactRuns, NothingToDraw
 from icha.figures.style import GREY, logarithmic_axes, new_panels, styled, unit_for
 from icha.support.values import Flag, Problem, list_of_names
 
@@ -62,9 +63,13 @@ _PALE = 0.35
 
 
 class LinearFit(NamedTuple):
-    """A straight line by least squares, its coefficient of determination, and the exponent of a power law.
+    """A straight line by least squares.
 
-    The coefficient is None where y is constant, the exponent where x or y is not positive.
+    Attributes
+    ----------
+    slope, intercept : coefficients of the line.
+    r_squared : coefficient of determination; None if y is constant.
+    exponent : that of a power law through the same points; None if x or y is not positive.
     """
 
     slope: float
@@ -80,7 +85,7 @@ def figure(campaign: xr.DataTree, *, studies: Sequence[str], over_surface_energy
 
     studies = list(dict.fromkeys(studies))
     runs = detached_lines(campaign, studies)
-    looks = looks_of(campaign, studies, [contact for contact, _ in runs])
+    looks = looks_of_studies(campaign, studies, [contact for contact, _ in runs])
     sticky = {key: line for key, line in runs.items() if looks.adhesive(key[0][0])}
     if over_surface_energy and not sticky:
         raise NothingToDraw(f"studies {', '.join(studies)}: no run with adhesion, so no surface energy to compare with")
@@ -88,7 +93,7 @@ def figure(campaign: xr.DataTree, *, studies: Sequence[str], over_surface_energy
     widths = (1.25, 1) if sticky else (1,)
     fig, [(loss, *parts)] = new_panels(3.1, columns=len(widths), width_ratios=widths)
     handles, counts = _draw_losses(loss, campaign, sticky if over_surface_energy else runs, looks, over_surface_energy)
-    say_which_model(loss, campaign, studies)
+    name_model(loss, campaign, studies)
     if sticky:
         shown = _draw_parts(*parts, sticky, looks)
         handles |= {PARTS[name][0]: Patch(ec="black", lw=0.5, **PARTS[name][1]) for name in shown}
@@ -100,27 +105,28 @@ def _draw_losses(ax, campaign, runs, looks, over_surface_energy):
     """Draw the losses of all lines with their fits; returns what the legend shows, and numbers of seeds."""
     quantity = "hysteresis_loss_over_surface_energy" if over_surface_energy else "hysteresis_loss"
     area = "largest_contact_area_fraction"
-    largest = max(np.abs(averages_of(campaign, line, area, quantity).y).max() for line in runs.values())
+    largest = max(np.abs(Points(line, quantity).means).max() for line in runs.values())
     factor, unit = (1.0, "") if over_surface_energy else unit_for(largest, "J/m²")
-    drawn = {key: averages_of(campaign, line, area, quantity, factor) for key, line in runs.items()}
+    drawn = {key: Points(line, area, quantity, factor=factor) for key, line in runs.items()}
     handles = looks.handles(ls="none") if looks.scale else {}
     for (contact, applicable), line in drawn.items():
-        handle = draw_averages(ax, line, **looks.look(contact, applicable=applicable) | {"ls": "none"})
+        handle = line.draw(ax, looks.look(contact, applicable=applicable) | {"ls": "none"})
         if not applicable:
             continue
-        fit = linear_fit(line.x, line.y) if line.same_seeds else None
+        x, y = line.means
+        fit = linear_fit(x, y) if line.same_seeds else None
         if fit is not None:
-            along = np.linspace(line.x.min(), line.x.max(), _FIT_POINTS)
+            along = np.linspace(x.min(), x.max(), _FIT_POINTS)
             ax.plot(along, fit.intercept + fit.slope * along, color=looks.colour(contact), lw=0.9, zorder=2)
         if not looks.scale:
             handles[looks.name(contact) + _words(fit)] = handle
-    x, y = (np.concatenate([getattr(line, name) for line in drawn.values()]) for name in "xy")
-    if all(len(plausible(values)) == len(values) and values.max() > _SPAN * values.min() for values in (x, y)):
+    means = np.concatenate([line.means for line in drawn.values()], axis=1)
+    if all(len(plausible(values)) == len(values) and values.max() > _SPAN * values.min() for values in means):
         logarithmic_axes(ax)
     ax.axhline(0, color=GREY, lw=0.6, zorder=1)
     ax.set_xlabel(r"contact area at the largest load  $A/A_0$")
     ax.set_ylabel(r"hysteresis loss over $\Delta\gamma$" if over_surface_energy else f"hysteresis loss ({unit})")
-    return handles, np.concatenate([line.over.count[:, 0] for line in drawn.values()])
+    return handles, [count for line in drawn.values() for count in line.counts]
 
 
 def linear_fit(x: np.ndarray, y: np.ndarray) -> LinearFit | None:
@@ -148,12 +154,14 @@ def _words(fit):
     return ": " + ", ".join(words) if words else ""
 
 
-def shares(line: Mapping[object, Mapping[int, xr.Dataset]]) -> dict[str, float]:
-    """Parts of the loss at the largest load of a line, means over the seeds, over the sum of their magnitudes."""
-    top = max(
-        line.values(), key=lambda seeds: np.mean([float(run["largest_reduced_pressure"]) for run in seeds.values()])
-    )
-    found = {name: np.mean([float(run[name]) for run in top.values()]) for name in PARTS}
+def shares(line: Sequence[ContactRuns]) -> dict[str, float]:
+    """Return the parts of the loss at the largest load of a line, means over the seeds, over their total magnitude."""
+
+    def mean(point, name):
+        return np.mean([float(run[name]) for run in point.runs.values()])
+
+    top = max(line, key=lambda point: mean(point, "largest_reduced_pressure"))
+    found = {name: mean(top, name) for name in PARTS}
     total = sum(map(abs, found.values()))
     return {name: value / total if total > 0 else 0.0 for name, value in found.items()}
 
@@ -166,16 +174,8 @@ def _draw_parts(ax, runs, looks):
         above, below = 0.0, 0.0
         for name in shown:
             share = 100 * bar[name]
-            ax.bar(
-                place,
-                share,
-                0.8,
-                bottom=above if share > 0 else below,
-                ec="black",
-                lw=0.4,
-                alpha=None if applicable else _PALE,
-                **PARTS[name][1],
-            )
+            bar_look = {"ec": "black", "lw": 0.4, "alpha": None if applicable else _PALE} | PARTS[name][1]
+            ax.bar(place, share, 0.8, bottom=above if share > 0 else below, **bar_look)
             above, below = above + max(share, 0), below + min(share, 0)
         look = looks.look(contact, applicable=applicable)
         ax.plot(place, -0.055, transform=ax.get_xaxis_transform(), clip_on=False, **look | {"ls": "none"})

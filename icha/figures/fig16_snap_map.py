@@ -1,4 +1,4 @@
-"""Fig. 16: where and when contacts form and break on the way in and on the way back."""
+"""Fig. 16: where and when spots form and break in loading and unloading."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ import numpy as np
 from icha.datasets import results
 from icha.figures.curves import SEPARATION_LABEL
 from icha.figures.declaration import Campaign, Declaration, Inputs, RunFigure, not_unloaded
-from icha.figures.hysteresis import BRANCH_DASHES
-from icha.figures.looks import NOT_APPLICABLE_ALONE, legend_below, words_handle
+from icha.figures.legends import legend_below, words_handle
+from icha.figures.looks import BRANCH_DASHES, NOT_APPLICABLE_ALONE
 from icha.figures.maps import block_means, draw_whole
-from icha.figures.select import NothingToDraw, is_applicable, run_on_topography, ways_back
+from icha.figures.select import NothingToDraw, is_applicable, run_on_topography, unloading_legs
 from icha.figures.style import (
     BLACK,
     GREY,
@@ -36,13 +36,13 @@ class SnapMapFigure(RunFigure):
     """A figure of the events of one run; what is left out is the study's first."""
 
     def problems(self, campaign: Campaign) -> Iterator[Problem]:
-        """A study that does not come back is one more."""
+        """Yield the problem of a study that does not unload."""
         yield from super().problems(campaign)
-        yield from not_unloaded(campaign, ("study",), self.study, in_part=True)
+        yield from not_unloaded(campaign, ("study",), self.study, partly=True)
 
 
 def inputs(campaign: Campaign, options: SnapMapFigure, files: results.ResultFiles) -> Inputs:
-    """The runs, and the topography of the one that is drawn."""
+    """Return the runs, and the topography of the one that is drawn."""
     return {"campaign": files.path(results.DATASET), "surface": files.path(results.SURFACE, options.run(campaign))}
 
 
@@ -55,8 +55,14 @@ DECLARATION = Declaration(
 
 
 class _Kind(NamedTuple):
-    """An event: what it is called with and without adhesion, on which branch it is on the map, its look, and the width
-    of its curve.
+    """A kind of events.
+
+    Attributes
+    ----------
+    names : its names with and without adhesion.
+    branch : the branch whose events the map shows.
+    look : look of its marks.
+    width : width of its curve.
     """
 
     names: tuple[str, str]
@@ -75,7 +81,7 @@ _KINDS = {
     "coalescence": _Kind(("union",) * 2, "loading", {"marker": "D", "mfc": "none", "mec": BLACK}, 0.6),
     "split": _Kind(("union undone",) * 2, "unloading", {"marker": "+", "mec": _RED}, 0.6),
 }
-# Of so many events the marks have this size in points; of more they cover about the same part of the map.
+# Size of the marks of up to so many events, in points; the marks of more cover about the same area together.
 _FEW = 60
 _SIZE = 5.0
 _LEAST_SIZE = 1.6
@@ -85,8 +91,8 @@ _LEAST_SIZE = 1.6
 def figure(campaign: xr.DataTree, surface: xr.Dataset, *, study: str, **which: object) -> Figure:
     """Draw the events of one run over its topography, which `surface` must be, and against the separation."""
     labels, run = run_on_topography(campaign, study, surface, **which)
-    if not ways_back(run):
-        raise NothingToDraw(f"study {study}: no run was unloaded, so there is no way back to draw")
+    if not unloading_legs(run):
+        raise NothingToDraw(f"study {study}: no run was unloaded, so there is no unloading to draw")
     events = _events(run)
     fig, [(where, when)] = new_panels(3.1, width_ratios=(1.3, 1))
     handles = _draw_places(where, run, surface, events)
@@ -99,7 +105,7 @@ def figure(campaign: xr.DataTree, surface: xr.Dataset, *, study: str, **which: o
 
 
 def _draw_places(ax, run, surface, events):
-    """Draw events over the topography; returns what the legend shows, by name."""
+    """Draw events over the topography; return what the legend shows, by name."""
     adhesive = float(run["surface_energy"]) > 0
     heights = surface["height"].transpose("y", "x").values * float(run["rms_height"]) / float(surface["rms_height"])
     period = float(run["period"])
@@ -110,24 +116,19 @@ def _draw_places(ax, run, surface, events):
     # Light, so that the marks show.
     look = {"origin": "lower", "cmap": "gray", "vmin": -2.2 * highest, "vmax": highest}
     image = draw_whole(ax, block_means(heights) * height, len(heights), side, **look)
-    marks = {
-        name: np.flatnonzero((events["kind"] == name) & (events["branch"] == kind.branch))
-        for name, kind in _KINDS.items()
-    }
-    size = max(_LEAST_SIZE, _SIZE * min(1.0, (_FEW / max(map(len, marks.values()), default=1)) ** 0.5))
+    marks = {name: (events["kind"] == name) & (events["branch"] == kind.branch) for name, kind in _KINDS.items()}
+    most = max(np.count_nonzero(shown) for shown in marks.values())
+    size = max(_LEAST_SIZE, _SIZE * min(1.0, (_FEW / max(most, 1)) ** 0.5))
     handles = {}
-    for name, own in marks.items():
-        kind = _KINDS[name]
+    for name, kind in _KINDS.items():
+        shown = marks[name]
         # A ring around a dot and a square around a cross: what formed and broke at the same place.
         ring = 1.6 if name in ("jump_off", "coalescence") else 1.0
         look = {"ls": "none", "ms": ring * size, "mew": 0.9} | kind.look
-        (points,) = ax.plot(events["x"][own] * length, events["y"][own] * length, **look)
-        if len(own):
-            handles[f"{kind.names[0 if adhesive else 1]} ({len(own)})"] = points
-    ax.set_xlim(0, side)
-    ax.set_ylim(0, side)
-    ax.set_xlabel(f"x ({length_unit})")
-    ax.set_ylabel(f"y ({length_unit})")
+        (points,) = ax.plot(events["x"][shown] * length, events["y"][shown] * length, **look)
+        if shown.any():
+            handles[f"{kind.names[0 if adhesive else 1]} ({np.count_nonzero(shown)})"] = points
+    ax.set(xlim=(0, side), ylim=(0, side), xlabel=f"x ({length_unit})", ylabel=f"y ({length_unit})")
     ax.tick_params(direction="out", top=False, right=False)
     bar = ax.figure.colorbar(image, ax=ax, shrink=0.9, pad=0.02, aspect=28)
     bar.set_label(f"height ({height_unit})")
@@ -136,14 +137,16 @@ def _draw_places(ax, run, surface, events):
 
 
 def _draw_counts(ax, events):
-    """Draw how many events of every kind there have been on every branch."""
+    """Draw the number of events of every kind so far against the separation on every branch."""
     from matplotlib.ticker import MaxNLocator
 
     for name, kind in _KINDS.items():
         for branch, dashes in BRANCH_DASHES.items():
-            own = (events["kind"] == name) & (events["branch"] == branch)
-            if own.any():
-                _draw_count(ax, events["separation"][own], color=kind.look["mec"], ls=dashes, lw=kind.width)
+            separation = events["separation"][(events["kind"] == name) & (events["branch"] == branch)]
+            if len(separation):
+                steps, counts = np.append(separation[0], separation), np.arange(len(separation) + 1)
+                look = {"color": kind.look["mec"], "ls": dashes, "lw": kind.width, "drawstyle": "steps-post"}
+                ax.plot(steps, counts, **look)
     most = max((line.get_ydata()[-1] for line in ax.get_lines()), default=1)
     if most > _FEW:
         logarithmic_axes(ax, "y")
@@ -163,7 +166,7 @@ def _events(run):
     )
     steps = run["event_step"].values.astype(int)
     leg = run["leg"].sel(step=steps).values
-    back = ways_back(run)[-1]["leg"].values[-1]
+    back = unloading_legs(run)[-1]["leg"].values[-1]
     own = (leg == 0) | (leg == back)
     return {
         "kind": np.array([names[int(value)] for value in kind.values], dtype=object)[own],
@@ -172,8 +175,3 @@ def _events(run):
         "y": run["event_y"].values[own],
         "separation": run["event_separation"].values[own] / float(run["rms_height"]),
     }
-
-
-def _draw_count(ax, separation, **look):
-    """Draw how many events there have been, from none on, in the order in which they come."""
-    ax.plot(np.append(separation[0], separation), np.arange(len(separation) + 1), drawstyle="steps-post", **look)

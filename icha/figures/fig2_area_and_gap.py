@@ -2,30 +2,32 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from icha.datasets import results
-from icha.datasets.labels import place_of
+from icha.datasets.labels import place_of, surfaces_and_slopes
 from icha.datasets.variables.model_error import FINITE_RANGE
 from icha.figures.curves import (
     AREA_LABEL,
     PRESSURE_LABEL,
     UNLOADING,
-    Line,
+    Curve,
     add_legend,
-    contact_of,
+    area_points,
+    cross_look,
     draw_curves,
     gap_label,
+    gap_points,
     plausible,
     study_curves,
     whose_theories,
 )
 from icha.figures.declaration import Campaign, Declaration, Inputs, StudyFigure, finite_range_error
 from icha.figures.ensembles import draw_members, mark_fewer
-from icha.figures.looks import MODEL_MARKERS
-from icha.figures.select import asked_of_entry, finite_range_errors
+from icha.figures.select import asked_of_entry, errors_of_run, finite_range_errors
 from icha.figures.style import BLACK, GREY, TWO_COLUMNS, logarithmic_axes, new_figure, panel_label, styled
 from icha.support.statistics import ensemble
 
@@ -35,7 +37,7 @@ if TYPE_CHECKING:
 
 
 def inputs(campaign: Campaign, options: StudyFigure, files: results.ResultFiles) -> Inputs:
-    """The runs, theories for their first surface, and boundary elements at a finite range beside them, if any."""
+    """Return the runs, theories for their first surface, and boundary elements at a finite range, if any."""
     theories = files.path(results.THEORIES, surface=campaign.studies[options.study].surfaces[0])
     found = {"campaign": files.path(results.DATASET), "references": theories}
     return found | finite_range_error(campaign, options.study, files)
@@ -47,9 +49,9 @@ DECLARATION = Declaration(
     inputs=inputs,
 )
 
-# Height of the panels of differences, in heights of those above them.
+# Height of the panels of differences over that of the panels above them.
 _LOWER = 0.42
-# Loads that both models are given are the same to this part, for each has its tolerance.
+# Largest relative difference of loads that are the same, since each model has its tolerance.
 _SAME_LOAD = 1e-6
 
 
@@ -69,14 +71,13 @@ def figure(
     dataset, entries = campaign[study].to_dataset(), finite_range_errors(model_error, study)
     differences = _differences(curves, entries, references)
     fig = new_figure(TWO_COLUMNS, 4.5)
-    rows = ["ab", "c" + ("d" if differences[1] else "b")]
-    axes = fig.subplot_mosaic(";".join(rows), height_ratios=(1, _LOWER))
+    mosaic = "ab;cd" if differences[1] else "ab;cb"
+    axes = fig.subplot_mosaic(mosaic, height_ratios=(1, _LOWER))
     left, right = axes["a"], axes["b"]
-    back = {left: lambda p, area, gap, slope: (p, area), right: lambda p, area, gap, slope: (p, gap)}
-    (p, areas), (_, gaps) = draw_curves(curves, {left: _areas, right: _separations}, back=back)
+    (p, areas), (_, gaps) = draw_curves(curves, {left: area_points, right: gap_points}, unloading=True)
     if curves.unloaded:
         left.plot([], [], color=GREY, label="unloading", **UNLOADING)
-    states = [(p, areas, gaps), *_draw_solutions(left, right, curves.looks, entries)]
+    states = [(p, areas, gaps), *_draw_solutions([left, right], curves.looks, entries)]
     pressures, areas, gaps = (plausible(np.concatenate(values)) for values in zip(*states, strict=True))
     x = (pressures.min() / 1.6, pressures.max() * 1.6)
     if references is not None:
@@ -89,116 +90,110 @@ def figure(
     _label_separations(right, gaps)
     left.set_ylabel(AREA_LABEL)
     right.set_ylabel(gap_label(dataset))
-    for ax, difference in zip((axes["c"], axes.get("d")), differences, strict=True):
-        if ax is not None:
-            _draw_difference(ax, difference, len(curves.lines))
+    for letter, difference in zip("cd", differences, strict=True):
+        if difference:
+            _draw_difference(axes[letter], difference, len(curves.lines))
     for letter, ax in axes.items():
         ax.set_xlim(x)
         panel_label(ax, letter)
-    for letter, below in (("a", "c"), ("b", "d")):
-        axes[letter].tick_params(labelbottom=below not in axes)
-        axes.get(below, axes[letter]).set_xlabel(PRESSURE_LABEL)
+        lowest = letter in mosaic.split(";")[1]
+        ax.tick_params(labelbottom=lowest)
+        ax.set_xlabel(PRESSURE_LABEL if lowest else "")
     add_legend(fig, [left, right], curves, whose_theories(dataset) if references is not None else {})
     return fig
 
 
 def _label_separations(ax, gaps):
-    """Label the separations by plain numbers, round ones where they span less than two powers of ten."""
+    """Label the separations by plain numbers, round ones if they span less than two powers of ten."""
     from matplotlib.ticker import FuncFormatter, NullFormatter
 
     ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     ax.yaxis.set_minor_formatter(NullFormatter())
     if np.log10(gaps.max() / gaps.min()) < 1.5:
-        ax.set_yticks(
-            [t for t in (0.05, 0.1, 0.2, 0.3, 0.5, 0.7, 1, 1.5, 2, 3, 5) if gaps.min() / 1.4 < t < gaps.max() * 1.4]
-        )
+        low, high = ax.get_ylim()
+        ax.set_yticks([tick for tick in (0.05, 0.1, 0.2, 0.3, 0.5, 0.7, 1, 1.5, 2, 3, 5) if low < tick < high])
 
 
 class _Difference(NamedTuple):
-    """What is drawn of a quantity in its lower panel: of every line loads and values (members, k) and how many members
-    were asked for, and the label.
+    """The difference of a quantity of all lines from a reference.
+
+    Attributes
+    ----------
+    drawn : of every line the loads, the values in per cent (members, loads), and the number of members asked for.
+    label : label of the axis.
     """
 
-    drawn: list[tuple[Line, np.ndarray, np.ndarray, int]]
+    drawn: list[tuple[Curve, np.ndarray, np.ndarray, int]]
     label: str
 
 
 def _differences(curves, entries, references):
-    """The differences of contact area and separation in per cent, from boundary elements or else from theories."""
+    """Return the differences of contact area and separation from boundary elements or else from theories."""
     from icha.references.persson import persson_area
 
     # The limit of a short range comes first: the other one with adhesion only bounds it.
-    truths = {contact_of(line): line for line in curves.beside}
+    truths = {truth.contact: truth for truth in curves.beside}
     areas, separations = [], []
     for line in curves.lines:
-        if truth := truths.get(contact_of(line)):
+        if truth := truths.get(line.contact):
             asked = min(line.asked, truth.asked)
-            areas.append((line, *_from_runs(line.runs, truth.runs, _areas, logarithmic=True), asked))
-            separations.append((line, *_from_runs(line.runs, truth.runs, _separations, logarithmic=False), asked))
-        elif (errors := _errors_of(line.labels, entries.values())) is not None:
-            load, asked = errors["reduced_pressure"].values, asked_of_entry(errors)
-            own = errors.sel(seed=[int(run["seed"]) for run in line.runs if int(run["seed"]) in errors["seed"].values])
-            areas.append((line, load, 100 * _by_seed(own["area_error"]), asked))
-            separations.append((line, load, 100 * _by_seed(own["separation_error"]), asked))
+            areas.append((line, *_from_runs(line.runs, truth.runs, area_points, logarithmic=True), asked))
+            separations.append((line, *_from_runs(line.runs, truth.runs, gap_points, logarithmic=False), asked))
+            continue
+        for errors in errors_of_run(entries, line.labels, "surface", "rms_slope", "material"):
+            if np.isfinite(errors["area_error"].values).any():
+                errors = errors.dropna("reduced_pressure", how="all", subset=["area_error"])
+                load, asked = errors["reduced_pressure"].values, asked_of_entry(errors)
+                own = errors.sel(seed=[seed for seed in line.runs if seed in errors["seed"].values])
+                areas.append((line, load, _per_cent(own["area_error"]), asked))
+                separations.append((line, load, _per_cent(own["separation_error"]), asked))
+                break
     if areas:
         return [
             _Difference(areas, r"$A/A_{\mathrm{BEM}}-1$  (%)"),
             _Difference(separations, r"$\bar{u}/\bar{u}_{\mathrm{BEM}}-1$  (%)"),
         ]
-    found = [_Difference(_from_theory(curves.lines, _areas, persson_area), r"$A/A_{\mathrm{Persson}}-1$  (%)")]
+    found = [_Difference(_from_theory(curves.lines, area_points, persson_area), r"$A/A_{\mathrm{Persson}}-1$  (%)")]
     if references is None or "persson_reduced_separation" not in references:
         return [*found, None]
     known = (np.log(references["reduced_pressure"].values), references["persson_reduced_separation"].values)
-    drawn = _from_theory(curves.lines, _separations, lambda p: np.interp(np.log(p), *known))
+    drawn = _from_theory(curves.lines, gap_points, lambda p: np.interp(np.log(p), *known))
     return [*found, _Difference(drawn, r"$\bar{u}/\bar{u}_{\mathrm{Persson}}-1$  (%)")]
 
 
 def _from_runs(runs, truths, points, *, logarithmic):
-    """Loads, and differences in per cent (seeds, loads), of runs from those by boundary elements with the same seed.
+    """Return loads, and differences (seeds, loads) of runs from those by boundary elements with the same seed.
 
     They are at the runs' own loads as far as boundary elements reach, between whose stops values are interpolated.
     """
     from icha.analysis.common_loads import at_common_loads, interpolated
 
-    by_seed, members = {int(truth["seed"]): truth for truth in truths}, []
-    for run in runs:
-        if int(run["seed"]) in by_seed:
-            (load, values), (true_load, true_values) = points(run), points(by_seed[int(run["seed"])])
-            pressed = true_load > 0
-            if pressed.any():
-                true_load, true_values = true_load[pressed], true_values[pressed]
-                at = np.clip(load, true_load.min(), true_load.max())
-                reached = np.isclose(at, load, rtol=_SAME_LOAD, atol=0)
-                true_values = interpolated(true_load, true_values, at[reached], logarithmic=logarithmic)
-                members.append((load[reached], 100 * (values[reached] / true_values - 1)))
+    members = []
+    for seed in [seed for seed in runs if seed in truths]:
+        (load, values), (true_load, true_values) = points(runs[seed]), points(truths[seed])
+        pressed = true_load > 0
+        if pressed.any():
+            true_load, true_values = true_load[pressed], true_values[pressed]
+            at = np.clip(load, true_load.min(), true_load.max())
+            reached = np.isclose(at, load, rtol=_SAME_LOAD, atol=0)
+            true_values = interpolated(true_load, true_values, at[reached], logarithmic=logarithmic)
+            members.append((load[reached], 100 * (values[reached] / true_values - 1)))
     return at_common_loads(members, logarithmic=False) if members else (np.empty(0), np.empty((0, 0)))
 
 
-def _errors_of(labels, entries):
-    """The error of the runs of a line from the first of some entries that has it, or None."""
-    for errors in entries:
-        try:
-            at = place_of(errors, {label: getattr(labels, label) for label in ("surface", "rms_slope", "material")})
-        except KeyError:
-            continue
-        own = errors.isel(at)
-        if np.isfinite(own["area_error"].values).any():
-            return own.dropna("reduced_pressure", how="all", subset=["area_error"])
-    return None
-
-
-def _by_seed(values):
-    """Values (seeds, loads) of the seeds that have any."""
-    return values.dropna("seed", how="all").transpose("seed", "reduced_pressure").values
+def _per_cent(errors):
+    """Return errors (seeds, loads) in per cent, of the seeds that have any."""
+    return 100 * errors.dropna("seed", how="all").transpose("seed", "reduced_pressure").values
 
 
 def _from_theory(lines, points, theory):
+    """Return the differences of all lines from a function of the reduced pressure."""
     from icha.analysis.common_loads import at_common_loads
 
     found = []
     for line in lines:
         members = []
-        for run in line.runs:
+        for run in line.runs.values():
             load, values = points(run)
             load, values = load[load > 0], values[load > 0]
             members.append((load, 100 * (values / theory(load) - 1)))
@@ -217,79 +212,61 @@ def _draw_difference(ax, difference, lines):
     ax.set_ylabel(difference.label)
 
 
-def _areas(run):
-    return run["reduced_pressure"].values, run["contact_area_fraction"].values
-
-
-def _separations(run):
-    return run["reduced_pressure"].values, run["reduced_separation"].values
-
-
-def _draw_solutions(left, right, looks, entries):
-    """Mark the states of boundary elements at a finite range, means over their seeds; returns loads and values."""
-    states = []
-    for errors in entries.values():
-        for material in errors["material"].values.tolist():
-            own, adhesive = errors.sel(material=material), float(errors["surface_energy"].sel(material=material)) > 0
-            members = [
-                own[f"{quantity}_boundary_elements"].transpose("seed", ..., "reduced_pressure").values
-                for quantity in ("contact_area_fraction", "reduced_separation")
-            ]
-            area, gap = (ensemble(values).mean for values in members)
-            asked = np.broadcast_to(asked_of_entry(own)[..., None], area.shape)
-            p = np.broadcast_to(own["reduced_pressure"].values, area.shape)
-            # Of measured surfaces each has its own slope, and no states at those of others.
-            there = np.isfinite(area)
-            # The larger ones show behind the others where the results agree, as the runs' markers do.
-            look = {"ls": "none", "mew": 1.0, "ms": 8 if adhesive else 11, "zorder": 6 + adhesive}
-            look |= {"marker": MODEL_MARKERS[FINITE_RANGE], "mec": looks.colours.get(material, GREY)}
-            states.append((p[there], area[there], gap[there]))
-            known = np.isfinite(members[0])[:, there]
-            for ax, values in zip((left, right), states[-1][1:], strict=True):
+def _draw_solutions(panels, looks, entries):
+    """Mark the states of boundary elements at a finite range, means over their seeds; return loads and values."""
+    states, quantities = [], ("contact_area_fraction", "reduced_separation")
+    for errors in entries:
+        for (surface, slope), material in itertools.product(surfaces_and_slopes(errors), errors["material"].values):
+            labels = {"material": material, "surface": surface, "rms_slope": slope}
+            own = errors.isel(place_of(errors, labels)).transpose("seed", ...)
+            members = [own[f"{name}_boundary_elements"].values for name in quantities]
+            # A surface has no states at the slopes of others.
+            known = np.isfinite(members[0])
+            p = own["reduced_pressure"].values
+            if not known.any():
+                continue
+            means = [ensemble(values).mean for values in members]
+            solved = known.any(axis=0)
+            states.append((p[solved], *(values[solved] for values in means)))
+            look = cross_look(looks, (material, surface, slope), FINITE_RANGE)
+            for ax, values in zip(panels, states[-1][1:], strict=True):
                 ax.plot(states[-1][0], values, **look)
-                mark_fewer(ax, states[-1][0], values, known, look, asked[there])
-    for ax in (left, right) if states else ():
-        ax.plot([], [], **look | {"mec": GREY, "ms": 8}, label=FINITE_RANGE)
+                mark_fewer(ax, states[-1][0], values, known[:, solved], look, int(asked_of_entry(own)))
+    if states:
+        for ax in panels:
+            ax.plot([], [], **look | {"color": GREY, "mec": GREY, "ms": 8}, label=FINITE_RANGE)
     return states
 
 
 def _draw_references(left, right, references, limits):
     """Draw theories of rough contact and published points within the limits of the loads."""
-    p = references["reduced_pressure"].values
+    p, black = references["reduced_pressure"].values, {"color": BLACK, "lw": 1, "zorder": 2}
     shown = (p >= limits[0] / 1.5) & (p <= limits[1] * 1.5)
-    look = {"color": BLACK, "lw": 1, "zorder": 2}
-    left.plot(p[shown], references["persson_area_fraction"].values[shown], label="Persson", **look)
+    left.plot(p[shown], references["persson_area_fraction"].values[shown], label="Persson", **black)
     linear = references["linear_pressure"].values
-    own = linear >= limits[0] / 1.5
-    area = references["bush_gibson_thomas_area_fraction"].values
-    left.plot(linear[own], area[own], label="Bush, Gibson & Thomas", **look | {"ls": "--", "color": GREY})
+    touching = linear >= limits[0] / 1.5
+    area = references["bush_gibson_thomas_area_fraction"].values[touching]
+    left.plot(linear[touching], area, label="Bush, Gibson & Thomas", **black | {"ls": "--", "color": GREY})
     if "gfmd_reduced_pressure" in references:
         points = (references["gfmd_reduced_pressure"].values, references["gfmd_area_fraction"].values)
         left.plot(*points, "x", color=BLACK, ms=6, mew=1.2, label="GFMD, no adhesion", zorder=5)
     if "persson_reduced_separation" in references:
-        separation = references["persson_reduced_separation"].values
-        right.plot(p[shown], separation[shown], label="Yang & Persson", **look)
+        right.plot(p[shown], references["persson_reduced_separation"].values[shown], label="Yang & Persson", **black)
 
 
 def _draw_separate_summits(left, right, references, dataset, colours):
-    """Thin lines of the theories of separate summits, where the references have them; Fuller & Tabor by material."""
-    area, look = references.get("summit_area_fraction"), {"lw": 0.8, "zorder": 1.8}
-    dashes = {"Greenwood & Williamson": (0, (5, 2, 1, 2)), "Fuller & Tabor": (0, (1, 1.5))}
+    """Draw theories of separate summits as thin lines, if the references have them; Fuller & Tabor by material."""
     curves = []
     if "greenwood_williamson_reduced_pressure" in references:
-        values = [references[f"greenwood_williamson_reduced_{name}"].values for name in ("pressure", "separation")]
-        curves.append(("Greenwood & Williamson", GREY, *values))
-    if "fuller_tabor_reduced_pressure" in references:
-        for k, name in enumerate(references["fuller_tabor_material"].values.tolist()):
-            slope = float(references["fuller_tabor_rms_slope"][k])
-            if name in colours and np.isclose(slope, dataset["rms_slope"].values, rtol=1e-9).any():
-                own = references.isel(fuller_tabor_curve=k)
-                values = [own[f"fuller_tabor_reduced_{quantity}"].values for quantity in ("pressure", "separation")]
-                curves.append(("Fuller & Tabor", colours[name], *values))
-    for name, colour, p, separation in curves:
-        pushed = p > 0
-        for ax, values in ((left, area.values), (right, separation)):
-            ax.plot(p[pushed], values[pushed], color=colour, ls=dashes[name], **look)
-    for name in dict.fromkeys(name for name, *_ in curves):
-        for ax in (left, right):
-            ax.plot([], [], color=GREY, ls=dashes[name], label=name, **look)
+        curves.append(("Greenwood & Williamson", (0, (5, 2, 1, 2)), GREY, "greenwood_williamson", references))
+    for k in range(references.sizes.get("fuller_tabor_curve", 0)):
+        own = references.isel(fuller_tabor_curve=k)
+        material, slope = str(own["fuller_tabor_material"].values), float(own["fuller_tabor_rms_slope"])
+        if material in colours and np.isclose(slope, dataset["rms_slope"].values, rtol=1e-9).any():
+            curves.append(("Fuller & Tabor", (0, (1, 1.5)), colours[material], "fuller_tabor", own))
+    for label, dashes, colour, name, theory in curves:
+        p, separation = (theory[f"{name}_reduced_{quantity}"].values for quantity in ("pressure", "separation"))
+        look = {"ls": dashes, "lw": 0.8, "zorder": 1.8}
+        for ax, values in ((left, theory["summit_area_fraction"].values), (right, separation)):
+            ax.plot(p[p > 0], values[p > 0], color=colour, **look)
+            ax.plot([], [], color=GREY, label=label, **look)

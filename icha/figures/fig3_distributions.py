@@ -8,13 +8,12 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from icha.datasets import results
-from icha.datasets.labels import place_of
 from icha.datasets.variables.model_error import FINITE_RANGE, SHORT_RANGE
 from icha.figures.curves import add_snapshot_legend, plausible, snapshot_looks
 from icha.figures.declaration import Campaign, Declaration, Inputs, SnapshotFigure, finite_range_error
 from icha.figures.ensembles import draw_members
 from icha.figures.looks import BESIDE_LINE, MODEL_MARKERS
-from icha.figures.select import finite_range_errors, first_line, same_snapshots_by_boundary_elements
+from icha.figures.select import errors_of_run, finite_range_errors, snapshots_of_materials
 from icha.figures.style import BLACK, logarithmic_axes, new_panels, styled
 
 if TYPE_CHECKING:
@@ -59,15 +58,14 @@ def figure(
     """
     from icha.analysis.model_error import state_of
 
-    lines = first_line(campaign, study, kind, target)
+    lines = snapshots_of_materials(campaign, study, kind, target)
     dataset = campaign[study].to_dataset()
     each_look, looks = snapshot_looks(campaign, study, lines)
     fig, [(left, right)] = new_panels(3.1)
     lowest, highest, top, beside, floor = -0.3, 0.3, 0.0, [], []
-    truths = same_snapshots_by_boundary_elements(campaign, lines)
-    for line, truth, look in zip(lines, truths, each_look, strict=True):
+    for line, look in zip(lines, each_look, strict=True):
         u, densities = gap_densities(line.members)
-        drawn = {"positive": True, "lines": len(lines), "asked": line.asked}
+        drawn = {"positive": True, "lines": len(lines), "asked": line.runs.asked}
         draw_members(left, u, densities, look, **drawn, markevery=1 + len(u) // _MOST_MARKERS)
         floor.append(plausible(densities.mean(axis=0)).min())
         p, densities = pressure_densities(line.members)
@@ -78,7 +76,8 @@ def figure(
         top = density.max(initial=top)
         loads = [float(state_of(run, at)["reduced_pressure"]) for run, at in line.members]
         load = float(np.mean(loads))
-        distributions = _of_boundary_elements(truth, _solutions(finite_range_errors(model_error, study), line, loads))
+        solutions = _solutions(finite_range_errors(model_error, study), line.runs, loads)
+        distributions = _of_boundary_elements(line.truths, solutions)
         if distributions:
             _draw_beside(left, right, distributions, look["color"])
             top = max(top, distributions.pressures[1].max(initial=0.0))
@@ -124,10 +123,10 @@ class _Beside(NamedTuple):
     pressures: tuple[np.ndarray, np.ndarray]
 
 
-def _of_boundary_elements(truth, solutions):
+def _of_boundary_elements(truths, solutions):
     """Means over the seeds of the distributions of runs in the limit of a short range, or of solutions; or None."""
-    if truth.members:
-        (u, gaps), (p, pressures) = gap_densities(truth.members), joined_pressure_densities(truth.members)
+    if truths:
+        (u, gaps), (p, pressures) = gap_densities(truths), joined_pressure_densities(truths)
         return _Beside(SHORT_RANGE, (u, gaps.mean(axis=0)), (p, pressures.mean(axis=0)))
     if not solutions:
         return None
@@ -207,25 +206,15 @@ def _joined(edges, contents, least):
     return low, high, np.diff(held[:, bounds], axis=1) / (high - low)
 
 
-def _solutions(entries, line, loads):
-    """The first boundary-element solutions of the states of a line's members that have some."""
-    labels = [line.labels._replace(seed=int(run["seed"])) for run, _ in line.members]
-    found = (_solution(entries, each, load) for each, load in zip(labels, loads, strict=True))
-    return [truth for truth in found if truth is not None]
-
-
-def _solution(entries, labels, load):
-    """The first boundary-element solution of a run's state at a reduced pressure, or None."""
-    for errors in entries.values():
-        try:
-            at = place_of(
-                errors, {label: getattr(labels, label) for label in ("surface", "seed", "rms_slope", "material")}
-            )
-        except KeyError:
-            continue
-        loads = np.flatnonzero(np.isclose(errors["reduced_pressure"].values, load, rtol=1e-6))
-        if len(loads):
-            truth = errors.isel(at | {"reduced_pressure": loads[0]})
-            if np.isfinite(truth["gap_density"].values).all():
-                return truth
-    return None
+def _solutions(entries, runs, loads):
+    """Return the first boundary-element solutions of the states at reduced pressures of some runs that have some."""
+    found = []
+    for seed, load in zip(runs.runs, loads, strict=True):
+        labels = runs.labels._replace(seed=seed)
+        for errors in errors_of_run(entries, labels, "surface", "seed", "rms_slope", "material"):
+            at = np.isclose(errors["reduced_pressure"].values, load, rtol=1e-6)
+            solution = errors.isel(reduced_pressure=at)
+            if at.any() and np.isfinite(solution["gap_density"].values[:1]).all():
+                found.append(solution.isel(reduced_pressure=0))
+                break
+    return found

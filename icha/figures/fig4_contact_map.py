@@ -26,7 +26,7 @@ class MapFigure(SnapshotFigure, RunFigure):
 
 
 def inputs(campaign: Campaign, options: MapFigure, files: results.ResultFiles) -> Inputs:
-    """The runs, the topography of the one that is drawn, and boundary elements of its state, if there are any.
+    """Return the runs, the topography, and boundary elements of the same state, if there are any.
 
     Those in the limit of a short range are another run of the study, whose file has the maps; they come first.
     """
@@ -39,46 +39,39 @@ def inputs(campaign: Campaign, options: MapFigure, files: results.ResultFiles) -
 
 
 def finest_solution(campaign: Campaign, options: MapFigure) -> SolutionLabels | None:
-    """The finest solution by boundary elements at a finite range of the state that is drawn, if there is any."""
-    snapshots = campaign.snapshots_of(options.study) or [campaign.studies[options.study].targets.last]
+    """Return the finest solution by boundary elements at a finite range of the state that is drawn, if any."""
+    targets = campaign.snapshots_of(options.study) or [campaign.studies[options.study].targets.last]
     if options.snapshot is not None:
-        kind, value = options.snapshot.target
-    elif {kind for kind, _ in snapshots} == {"reduced_pressure"}:
-        kind, value = min(snapshots)  # the first one that is met
-    else:
+        targets = [options.snapshot.target]
+    if {kind for kind, _ in targets} != {"reduced_pressure"}:
         return None
+    _, value = min(targets)  # the first that is met
     _, _, *contact = options.run(campaign)
-    finest_first = sorted(campaign.finite_range.items(), key=lambda each: -each[1].refinement)
-    return next(
-        (
-            SolutionLabels(label, options.study, *contact, value)
-            for label, entry in finest_first
-            if kind == "reduced_pressure" and entry.study == options.study
-            if value in entry.reduced_pressures and tuple(contact) in campaign.solved(entry)
-        ),
-        None,
-    )
+    for label, entry in sorted(campaign.finite_range.items(), key=lambda each: -each[1].refinement):
+        solved = entry.study == options.study and value in entry.reduced_pressures
+        if solved and tuple(contact) in campaign.solved(entry):
+            return SolutionLabels(label, options.study, *contact, value)
+    return None
 
 
 DECLARATION = Declaration(
     description="Contact spots over the topography.", options=MapFigure, inputs=inputs, holds_topography=True
 )
 
-# The enlarged view shows a quarter of the period, halved as often as it is wider than so many radii of the spots, and
-# at least so many cells.
+# The enlarged view shows a quarter of the period. It is halved while it is wider than this number of mean radii of the
+# spots and has more than twice this number of cells.
 _ZOOM = 4
 _WIDEST_IN_RADII = 40
 _LEAST_CELLS = 64
 # More spots than this are drawn as an image in PDF files as well.
 _MANY_SPOTS = 2000
-# Outline of a spot in the map, as part of its radius, so that it does not hide small ones, and at most, in points; and
-# points to the side of the map, about.
+# Outlines in the map, as fractions of the radius, so that they do not hide small spots, and at most, in points; and
+# about the width of the map, in points.
 _OUTLINE = 0.25
 _WIDEST_OUTLINE = 0.35
 _PANEL = 190
 _RED = (0.9, 0.0, 0.05)
-# What is in contact at a node: nothing, ICHA, boundary elements, both.
-# As in the enlarged part, asperities are red and boundary elements black.
+# By what is in contact at a node: nothing, asperities, boundary elements, both.
 _STATES = (("", "white"), ("asperities only", _RED), ("boundary elements only", "black"), ("both", "0.72"))
 
 
@@ -104,28 +97,29 @@ def figure(
     truth : the same run by boundary elements in the limit of a short range, with its maps, if there is one.
     which : which run of the study (`icha.figures.select.run_on_topography`).
     """
+    from icha.analysis.model_error import state_of
     from icha.datasets.campaign import find_snapshot
 
     labels, run = run_on_topography(campaign, study, surface, **which)
     at = find_snapshot(run, kind, target)
+    state = state_of(run, at)
+    pressure, area = (float(state[name]) for name in ("reduced_pressure", "contact_area_fraction"))
     solved = None
-    if solution is not None:
-        solved = _of_solution(labels, run, at, solution)
-    elif truth is not None:
-        solved = _of_run(labels, run, at, truth)
+    if truth is not None or solution is not None:
+        solved = _solved(labels, run, at, pressure, truth, solution)
     view = _view(run, at, surface)
 
     fig, panels = new_panels(*(3.35, 1) if solved is None else (6.9, 2))
     whole, enlarged = panels[0, 0], panels[0, 1] if solved is None else panels[1, 0]
     image = _draw_spots_over_topography(whole, enlarged, view)
     enlarged.set_title(f"enlarged ×{view.zoom}", loc="right")
-    area = rf"$A/A_0$ = {float(_state(run, at)['contact_area_fraction']):.3f}"
-    fig.suptitle(_title(campaign[study].to_dataset(), labels, run, at), fontsize="medium")
-    if solved is None:
-        whole.set_title(area, loc="right")
-    else:
+    area = rf"$A/A_0$ = {area:.3f}"
+    whole.set_title(area if solved is None else f"asperities, {area}", loc="right")
+    if solved is not None:
         _draw_solution(panels, view, run, at, solved)
-        whole.set_title(f"asperities, {area}", loc="right")
+    load = rf"$F/(E^{{\ast}}h_{{\mathrm{{rms}}}}^{{\prime}}A_0)$ = {number(pressure)}"
+    title = f"{labels.surface}, {material_label(campaign[study].to_dataset(), labels.material)}, {load}"
+    fig.suptitle(title if is_applicable(run) else f"{title}\n{NOT_APPLICABLE_ALONE}", fontsize="medium")
     _frame(panels, enlarged, view)
     bar = fig.colorbar(image, ax=panels, shrink=0.92 if solved is None else 0.46, pad=0.015, aspect=28)
     bar.set_label(f"height ({view.height_unit})")
@@ -133,65 +127,59 @@ def figure(
 
 
 class _Solved(NamedTuple):
-    """Contact of boundary elements: the part in contact of every node along y and x, A/A0, and which they are."""
+    """Contact by boundary elements.
 
-    contact: xr.DataArray
+    Attributes
+    ----------
+    contact : (n, n) float along y and x, fraction of every node in contact.
+    area : contact area over nominal area.
+    name : name of the boundary elements in legends.
+    """
+
+    contact: np.ndarray
     area: float
     name: str
 
 
-def _state(run, at):
-    from icha.analysis.model_error import state_of
-
-    return state_of(run, at)
-
-
-def _title(dataset, labels, run, at):
-    """Surface, material and load of a snapshot, and whether the model is not applicable."""
-    load = number(float(_state(run, at)["reduced_pressure"]))
-    load = rf"$F/(E^{{\ast}}h_{{\mathrm{{rms}}}}^{{\prime}}A_0)$ = {load}"
-    warning = "" if is_applicable(run) else f"\n{NOT_APPLICABLE_ALONE}"
-    return f"{labels.surface}, {material_label(dataset, labels.material)}, {load}{warning}"
-
-
-def _of_run(labels, run, at, truth):
-    """The state of a run by boundary elements that a run keeps as its snapshot `at`; None if it failed before."""
+def _solved(labels, run, at, pressure, truth, solution):
+    """Return the state of boundary elements that is a run's snapshot `at`; None if they ended before."""
+    from icha.analysis.model_error import check_same_contact, state_of
     from icha.datasets.campaign import find_snapshot
 
-    _check_contact(labels, run, truth)
-    asked = str(run["snapshot_kind"].values[at]), float(run["snapshot_target"].values[at])
     try:
-        state = _state(truth, find_snapshot(truth, *asked))
-    except ValueError:
-        return None
-    contact = state["contact_map"].rename(row="y", column="x")
-    return _Solved(contact, float(state["contact_area_fraction"]), SHORT_RANGE)
-
-
-def _of_solution(labels, run, at, solution):
-    """The state that a solution by boundary elements is of, which must be the one that is drawn."""
-    _check_contact(labels, run, solution)
-    shown, solved = float(_state(run, at)["reduced_pressure"]), float(solution["target_reduced_pressure"])
-    if not np.isclose(shown, solved, rtol=1e-6):
-        raise ValueError(f"{labels}: boundary elements of reduced pressure {solved:g} for a snapshot at {shown:g}")
-    return _Solved(solution["contact"], float(solution["contact_area_fraction"]), FINITE_RANGE)
-
-
-def _check_contact(labels, run, truth):
-    """Raise ValueError unless boundary elements are of the contact that is drawn."""
-    from icha.analysis.model_error import check_same_contact
-
-    try:
-        check_same_contact(run, truth)
+        check_same_contact(run, truth if solution is None else solution)
     except ValueError as error:
         raise ValueError(f"{labels}: the boundary elements given are of another contact: {error}") from None
+    if solution is None:
+        kind, target = (run[name].values[at] for name in ("snapshot_kind", "snapshot_target"))
+        try:
+            state = state_of(truth, find_snapshot(truth, str(kind), float(target)))
+        except ValueError:
+            return None
+        contact, name = state["contact_map"].transpose("row", "column"), SHORT_RANGE
+    else:
+        solved = float(solution["target_reduced_pressure"])
+        if not np.isclose(pressure, solved, rtol=1e-6):
+            raise ValueError(f"{labels}: boundary elements of reduced pressure {solved:g} for one of {pressure:g}")
+        state, contact, name = solution, solution["contact"].transpose("y", "x"), FINITE_RANGE
+    return _Solved(contact.values.astype(float), float(state["contact_area_fraction"]), name)
 
 
 class _View(NamedTuple):
     """Topography and spots in the units of the axes, and the window that is enlarged.
 
-    `heights` (n, n) are those of the surface's file, `scale` times them those of the run in its unit, of which `look`
-    has the limits; `circles` are rows of x, y and radius; `corner` is the window's lower left one.
+    Attributes
+    ----------
+    heights : (n, n) float along y and x, those of the surface's file.
+    scale : factor from them to the heights of the run in `height_unit`.
+    height_unit : unit of heights.
+    look : arguments of `Axes.imshow` for heights.
+    side : side of the surface in `length_unit`.
+    length_unit : unit of the axes.
+    circles : (m, 3) float, x, y and radius of the spots.
+    zoom : side over that of the window.
+    corner : (2,) float, lower left corner of the window.
+    window : side of the window.
     """
 
     heights: np.ndarray
@@ -219,16 +207,13 @@ def _view(run, at, surface):
     radius = spots["spot_radius"].values
     x, y = spots["spot_x"].values * length, spots["spot_y"].values * length
     side, n = period * length, len(heights)
-    # The mean radius over the area of contact.
     typical = float(np.sum(radius**3) / np.sum(radius**2)) if radius.any() else period
     zoom = _ZOOM
     while period / zoom > _WIDEST_IN_RADII * typical and n / (2 * zoom) >= _LEAST_CELLS:
         zoom *= 2
     window = side / zoom
-    middle = np.array([side, side]) / 2
-    if len(radius):
-        largest = int(np.argmax(radius))
-        middle = np.array([x[largest], y[largest]])
+    largest = int(np.argmax(radius)) if len(radius) else None
+    middle = np.array([side, side]) / 2 if largest is None else np.array([x[largest], y[largest]])
     return _View(
         heights,
         factor * height,
@@ -265,15 +250,14 @@ def _draw_solution(panels, view, run, at, solved):
     from icha.analysis.model_error import contact_of_spots, jaccard
 
     (_, beside), (enlarged, compared) = panels
-    part = solved.contact.transpose("y", "x").values.astype(float)
-    contact, fine = part >= 0.5, len(part)
+    contact, fine = solved.contact >= 0.5, len(solved.contact)
     spots_cover = contact_of_spots(run, at, fine)
     draw_whole(beside, block_means(view.heights) * view.scale, len(view.heights), view.side, **view.look)
     red = LinearSegmentedColormap.from_list("contact", [(*_RED, 0.0), (*_RED, 0.9)])
     look = {"origin": "lower", "cmap": red, "vmin": 0, "vmax": 1}
-    draw_whole(beside, block_means(part), fine, view.side, **look)
-    own, borders = _window(part, view.side / fine, view.corner, view.window)
-    enlarged.contour(own, [0.5], extent=borders, origin="lower", colors="black", linewidths=0.9)
+    draw_whole(beside, block_means(solved.contact), fine, view.side, **look)
+    contour, borders = _window(solved.contact, view.side / fine, view.corner, view.window)
+    enlarged.contour(contour, [0.5], extent=borders, origin="lower", colors="black", linewidths=0.9)
     palette = np.array([to_rgb(colour) for _, colour in _STATES])
     draw_whole(compared, block_means(palette[1 * spots_cover + 2 * contact]), fine, view.side, origin="lower")
     keys = [Patch(fc=colour, label=name) for name, colour in _STATES if name]

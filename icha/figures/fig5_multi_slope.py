@@ -7,7 +7,15 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from icha.datasets import results
-from icha.figures.curves import AREA_LABEL, PRESSURE_LABEL, UNLOADING, add_legend, draw_curves, study_curves
+from icha.figures.curves import (
+    AREA_LABEL,
+    PRESSURE_LABEL,
+    UNLOADING,
+    add_legend,
+    area_points,
+    draw_curves,
+    study_curves,
+)
 from icha.figures.declaration import Campaign, Declaration, Inputs, TruthFigure
 from icha.figures.style import BLACK, DASHES, GREY, legend_handle, material_label, new_panels, styled
 from icha.support.input_files import read_columns
@@ -86,8 +94,7 @@ def figure(
             line._replace(look=line.look | {"mfc": "none", "ms": size[line.labels.material]}) for line in curves.lines
         ]
         curves = curves._replace(lines=own)
-    back = {left: lambda p, area, gap, slope: (p, area), right: lambda p, area, gap, slope: (p * slope, area)}
-    draw_curves(curves, {left: _points, right: _points_at_load}, back=back)
+    draw_curves(curves, {left: area_points, right: _points_at_load}, unloading=True)
     for k, (table, known) in enumerate(zip(tables, measurements, strict=True)):
         _draw_measured(left, right, table, known, colours.get(known["material"], BLACK), DASHES[k % len(DASHES)])
     left.set_xlabel(PRESSURE_LABEL)
@@ -114,10 +121,6 @@ def _draw_measured(left, right, table, known, colour, dashes):
     left.plot(pressure, area, label=known["label"], **look)
     if slope is not None:
         right.plot(pressure * slope, area, **look)
-
-
-def _points(run):
-    return run["reduced_pressure"].values, run["contact_area_fraction"].values
 
 
 def _points_at_load(run):

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 from pydantic import Field
 
 from icha.figures.declaration import Campaign, Declaration, StudyFigure
-from icha.figures.looks import NOT_APPLICABLE_ALONE, Scale, legend_below
+from icha.figures.legends import legend_below
+from icha.figures.looks import NOT_APPLICABLE_ALONE, Scale
 from icha.figures.maps import circles_in_cell, draw_spots
 from icha.figures.select import is_applicable, pick, study_runs
 from icha.figures.style import new_panels, number, slope_label, styled, unit_for

@@ -12,7 +12,7 @@ from icha.figures.curves import add_snapshot_legend, snapshot_looks
 from icha.figures.declaration import Declaration, SnapshotFigure
 from icha.figures.ensembles import draw_members
 from icha.figures.looks import BESIDE_LINE, MODEL_MARKERS
-from icha.figures.select import first_line, same_snapshots_by_boundary_elements
+from icha.figures.select import snapshots_of_materials
 from icha.figures.style import logarithmic_axes, new_panels, styled, unit_for
 
 if TYPE_CHECKING:
@@ -34,23 +34,24 @@ _CURVE_POINTS = 300
 @styled
 def figure(campaign: xr.DataTree, *, study: str, kind: str | None = None, target: float | None = None) -> Figure:
     """Draw the patch sizes of every material on the first surface and slope of a study, means over the seeds."""
-    lines = first_line(campaign, study, kind, target)
+    lines = snapshots_of_materials(campaign, study, kind, target)
     dataset = campaign[study].to_dataset()
     each_look, looks = snapshot_looks(campaign, study, lines)
     fig, [(left, right)] = new_panels(3.1, sharex=True)
-    truths = same_snapshots_by_boundary_elements(campaign, lines)
     period = float(lines[0].members[0][0]["period"])
     factor, unit = unit_for(period, "m")
     cell = (period * factor) ** 2
-    for line, truth, look in zip(lines, truths, each_look, strict=True):
-        areas, true_areas = ([patch_areas(run, at) * factor**2 for run, at in each.members] for each in (line, truth))
+    for line, look in zip(lines, each_look, strict=True):
+        areas, true_areas = (
+            [patch_areas(run, at) * factor**2 for run, at in members] for members in (line.members, line.truths)
+        )
         smooth = look | {"marker": "none", "lw": 1.4 * look["lw"]}
         for ax, points, own, marker in (
             (left, patch_density, look, MODEL_MARKERS[SHORT_RANGE]),
             (right, patches_above, smooth, "none"),
         ):
-            draw_members(ax, *points(areas, cell), own, positive=True, lines=len(lines), asked=line.asked)
-            if truth.members:
+            draw_members(ax, *points(areas, cell), own, positive=True, lines=len(lines), asked=line.runs.asked)
+            if line.truths:
                 area, values = points(true_areas, cell)
                 ax.plot(area, values.mean(axis=0), color=look["color"], marker=marker, **BESIDE_LINE)
     for ax in (left, right):
@@ -58,7 +59,7 @@ def figure(campaign: xr.DataTree, *, study: str, kind: str | None = None, target
         ax.set_xlabel(f"patch area  $A$ ({unit}²)")
     left.set_ylabel(f"number density  $n(A)$ ({unit}$^{{-4}}$)")
     right.set_ylabel(f"patches larger than $A$ ({unit}$^{{-2}}$)")
-    beside = [SHORT_RANGE] if any(truth.members for truth in truths) else []
+    beside = [SHORT_RANGE] if any(line.truths for line in lines) else []
     add_snapshot_legend(fig, [left, right], dataset, lines, looks, beside)
     return fig
 

@@ -1,16 +1,15 @@
-"""The one style of lines in all figures of a campaign: colours, markers, scales of colours, legends.
+"""Colours and markers of lines, the same in all figures of a campaign.
 
 A colour is a material, a marker a model: closed shapes are asperities, open ones are without adhesion, crosses are
-boundary elements. Where a figure has several surfaces and slopes, the shapes of the closed markers tell them apart. Of
-many materials, or of many surfaces and slopes, those have colours of a scale instead.
+boundary elements. If a figure has several surfaces and slopes, the shapes of the closed markers tell them apart. If
+there are many materials, or many surfaces and slopes, they have the colours of a scale instead.
 """
 
 from __future__ import annotations
 
-import itertools
 import re
-from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -38,7 +37,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
 
-# Material, surface and rms slope of a line; None: slopes are not told apart.
+# Material, surface and rms slope of a line; the slope is None if slopes are not told apart.
 Contact = tuple[str, str, float | None]
 
 # Okabe and Ito's colours without black, which is for theories, and darker ones of the same hues.
@@ -47,9 +46,10 @@ MATERIAL_COLOURS += ("#004166", "#803800", "#005A42", "#80436A", "#805800", "#2B
 PLACE_MARKERS = ("o", "s", "^", "D", "v", "p", "*")
 
 ASPERITIES_NAME = MODELS["asperities"].words
-# By what legends call the models. Boundary elements have another cross in unloading.
+# By the names of the models in legends. Boundary elements have another cross in unloading.
 MODEL_MARKERS = {ASPERITIES_NAME: "o", SHORT_RANGE: "+", FINITE_RANGE: "1"}
-WAY_BACK_MARKERS = {SHORT_RANGE: "x", FINITE_RANGE: "2"}
+UNLOADING_MARKERS = {SHORT_RANGE: "x", FINITE_RANGE: "2"}
+BRANCH_DASHES = {"loading": "-", "unloading": (0, (4, 2))}
 # Lines of boundary elements beside those of asperities.
 BESIDE_LINE = {"ls": (0, (3, 2)), "lw": 0.8, "ms": 5, "mew": 0.8, "zorder": 5}
 
@@ -57,17 +57,15 @@ BESIDE_LINE = {"ls": (0, (3, 2)), "lw": 0.8, "ms": 5, "mew": 0.8, "zorder": 5}
 MOST_COLOURS = len(COLOURS)
 # More lines than this are drawn thin.
 FEW_LINES = 6
-# Of curves that lie on each other all stay visible: without adhesion they are widest, and of several materials each is
+# All of several curves that coincide stay visible: without adhesion they are widest, and of several materials each is
 # narrower than the one before. Sizes of markers in points, width of lines in sizes of markers.
 _BARE_SIZE, _ADHESIVE_SIZE, _LEAST_SIZE, _NARROWER = 6.0, 4.6, 1.8, 0.75
 _LINE_WIDTH = 0.22
-# Part of a colour that is left in its pale one.
+# Fraction of a colour that is left in its pale one.
 _PALENESS = 0.4
 
-# Labels of what is drawn of incomplete ensembles and of runs that are no use as predictions, and how legends show it.
-FEWER_SEEDS = "crossed: mean over n seeds, fewer than asked for"
+# Label of lines to which the asperity model is not applicable, and its form in figures of a single run.
 NOT_APPLICABLE = "pale: asperity model not applicable"
-# The same in figures of a single run, of which nothing is pale.
 NOT_APPLICABLE_ALONE = "asperity model not applicable"
 
 
@@ -89,21 +87,25 @@ class Looks:
         self.contacts = list(dict.fromkeys(contacts))
         self.interfaces = interfaces
         self.materials = list(dict.fromkeys(material for material, *_ in self.contacts))
-        self.places = list(dict.fromkeys((surface, slope) for _, surface, slope in self.contacts))
+        self.places = list(dict.fromkeys(tuple(place) for _, *place in self.contacts))
         self.many_places = len(self.places) > MOST_COLOURS
         self.by_place = self.many_places or (by_place and len(self.places) > 1)
         self.scale: Scale | None = None
         palette = material_colours(campaign)
         self.colours = {material: BLACK if self.many_places else palette[material] for material in self.materials}
+        self._place_colours = {}
         if self.by_place:
             scale = places_scale(self.places)
-            self.of_place = dict(zip(self.places, scale.colours, strict=True))
+            self._place_colours = dict(zip(self.places, scale.colours, strict=True))
             self.scale = scale if self.many_places else None
         elif len(self.materials) > MOST_COLOURS:
             self.scale = materials_scale(interfaces, self.materials)
             self.colours = dict(zip(self.materials, self.scale.colours, strict=True))
         self._markers = place_markers(self.places)
-        self._sizes = _marker_sizes(interfaces, self.materials)
+        self._sizes = {}
+        for adhesive, largest in ((False, _BARE_SIZE), (True, _ADHESIVE_SIZE)):
+            alike = [material for material in self.materials if self.adhesive(material) == adhesive]
+            self._sizes |= {name: max(largest * _NARROWER**rank, _LEAST_SIZE) for rank, name in enumerate(alike)}
 
     def adhesive(self, material: str) -> bool:
         """Whether a material has surface energy."""
@@ -112,9 +114,7 @@ class Looks:
     def colour(self, contact: Contact) -> str:
         """Return the colour of a line; of a contact without a line that of its material, or grey."""
         material, *place = contact
-        if self.by_place and tuple(place) in self.of_place:
-            return self.of_place[tuple(place)]
-        return self.colours.get(material, GREY)
+        return self._place_colours.get(tuple(place)) or self.colours.get(material, GREY)
 
     def look(self, contact: Contact, *, applicable: bool = True) -> dict:
         """Return arguments of `Axes.plot` for a line; pale if the asperity model is not applicable."""
@@ -129,17 +129,17 @@ class Looks:
             "ms": size,
             "lw": _LINE_WIDTH * size,
             "zorder": 3 + adhesive + 0.01 * rank,
-            # Where surfaces and slopes have the colours of a scale, materials have the shapes.
+            # If surfaces and slopes have the colours of a scale, materials have the shapes.
             "marker": PLACE_MARKERS[rank % len(PLACE_MARKERS)] if self.many_places else self._markers[tuple(place)],
         }
         if self.scale:
             look |= {"lw": 0.6, "ms": 0.6 * size, "mew": 0.6}
         elif len(self.contacts) > FEW_LINES:
             look |= {"lw": 0.6, "ms": 0.8 * size}
-        return look if applicable else pale_look(look)
+        return look if applicable else _pale(look)
 
     def handles(self, **changed: object) -> dict[str, Line2D]:
-        """Return what the legend names of the lines, in looks that are `changed`, but for what the scale tells."""
+        """Return what the legend names of the lines, in looks that are `changed`, apart from what the scale names."""
         first = self.places[0]
         if self.by_place and not self.many_places:
             return {self.name(each): legend_handle(**self.look(each) | changed) for each in self.contacts}
@@ -151,7 +151,7 @@ class Looks:
                 look = self.look((material, *first)) | grey | changed
                 found[material_label(self.interfaces, material)] = legend_handle(**look)
         if len(self.places) > 1 and not self.many_places:
-            grey = {"ls": "none", "color": GREY, "mec": GREY, "mfc": "white", "mew": 0.9, "ms": 5}
+            grey = {"ls": "none", "color": GREY, "mfc": "white", "mew": 0.9, "ms": 5}
             for place, marker in self._markers.items():
                 if name := self.place_name(place):  # of surfaces and slopes that are told apart
                     found[name] = legend_handle(**grey | {"marker": marker})
@@ -159,26 +159,30 @@ class Looks:
 
     def place_name(self, place: tuple[str, float | None]) -> str:
         """Return surface and rms slope of a line in words, as far as the figure has several."""
-        return _place_name(place, self.places)
+        surface, slope = place
+        surfaces, slopes = (set(each) for each in zip(*self.places, strict=True))
+        words = [surface] if len(surfaces) > 1 else []
+        return ", ".join([*words, slope_label(slope)] if slope is not None and len(slopes) > 1 else words)
 
     def name(self, contact: Contact) -> str:
         """Return what tells a line apart from the others of its figure."""
         material, *place = contact
-        parts = [material_label(self.interfaces, material), self.place_name(tuple(place))]
-        # A single material is not named where surfaces and slopes have the colours.
-        parts = parts[1:] if self.by_place and len(self.materials) == 1 and parts[1] else parts
-        return ", ".join(filter(None, parts))
+        place = self.place_name(tuple(place))
+        # A single material is not named if surfaces and slopes have the colours.
+        if place and self.by_place and len(self.materials) == 1:
+            return place
+        return ", ".join(filter(None, [material_label(self.interfaces, material), place]))
 
 
-def _place_name(place, places):
-    surface, slope = place
-    surfaces, slopes = (set(each) for each in zip(*places, strict=True))
-    parts = [surface] if len(surfaces) > 1 else []
-    return ", ".join(parts + ([slope_label(slope)] if slope is not None and len(slopes) > 1 else []))
+def looks_of_studies(campaign: xr.DataTree, studies: Sequence[str], contacts: Iterable[Contact]) -> Looks:
+    """Return looks of lines of some studies; lines of a single material have the colours of surfaces and slopes."""
+    contacts = list(contacts)
+    interfaces = interfaces_of(campaign[study].to_dataset() for study in studies)
+    return Looks(campaign, interfaces, contacts, by_place=len({material for material, *_ in contacts}) == 1)
 
 
 def material_colours(campaign: xr.DataTree) -> dict[str, str]:
-    """A colour for every material of a campaign dataset, in the order in which its studies name them.
+    """Return a colour for every material of a campaign dataset, in the order in which its studies name them.
 
     No two materials of a study have the same one, unless it has more of them than there are colours.
     """
@@ -195,27 +199,18 @@ def material_colours(campaign: xr.DataTree) -> dict[str, str]:
 
 
 def place_markers(places: Iterable[tuple[str, float | None]]) -> dict[tuple, str]:
-    """A marker for every surface and rms slope (None: not told apart); the steepest of a surface comes first."""
+    """Return a marker for every surface and rms slope; the steepest of a surface comes first."""
     places = list(dict.fromkeys(places))
     surfaces = list(dict.fromkeys(surface for surface, _ in places))
     ordered = sorted(places, key=lambda place: (surfaces.index(place[0]), -(place[1] or 0)))
     return {place: PLACE_MARKERS[k % len(PLACE_MARKERS)] for k, place in enumerate(ordered)}
 
 
-def _marker_sizes(interfaces, materials):
-    """Sizes of the markers of materials, so that none hides another."""
-    sizes = {}
-    for adhesive, largest in ((False, _BARE_SIZE), (True, _ADHESIVE_SIZE)):
-        own = [name for name in materials if (float(interfaces["surface_energy"].sel(material=name)) > 0) == adhesive]
-        sizes |= {name: max(largest * _NARROWER**rank, _LEAST_SIZE) for rank, name in enumerate(own)}
-    return sizes
-
-
 def interfaces_of(datasets: Iterable[xr.Dataset]) -> xr.Dataset:
-    """Modulus, surface energy and range of the materials of several datasets."""
+    """Return modulus, surface energy and range of the materials of several datasets."""
     import xarray as xr
 
-    names = ["contact_modulus", "surface_energy", "interaction_range"]
+    names = [name for name, *_ in _QUANTITIES]
     found = {}
     for dataset in datasets:
         for material in dataset["material"].values.tolist():
@@ -223,17 +218,12 @@ def interfaces_of(datasets: Iterable[xr.Dataset]) -> xr.Dataset:
     return xr.concat(found.values(), "material", coords="minimal", compat="override")
 
 
-def pale_look(look: dict) -> dict:
-    """Look of runs to which the asperity model is not applicable: open and in a lighter colour than others have."""
+def _pale(look):
+    """Return the look of a line to which the asperity model is not applicable: open, and in a lighter colour."""
     from matplotlib.colors import to_hex, to_rgb
 
     colour = to_hex([1 - _PALENESS * (1 - part) for part in to_rgb(look["color"])])
     return look | {"color": colour, "mec": colour, "mfc": "white", "label": NOT_APPLICABLE}
-
-
-def model_handle(name: str, **look: object) -> Line2D:
-    """What a legend shows of a model."""
-    return legend_handle(**{"ls": "none", "marker": MODEL_MARKERS[name], "color": GREY, "mec": GREY, "ms": 6} | look)
 
 
 # --- colours of what is too many to be named one by one, such as the surfaces of a study that varies a parameter ---
@@ -311,113 +301,3 @@ def _beginning(names):
     first, last = min(names), max(names)
     alike = next(k for k in range(len(first) + 1) if first[: k + 1] != last[: k + 1])
     return re.sub(r"[-+.\d]*$", "", first[:alike])
-
-
-# --- legends, which stand below the panels, off the data ---
-
-# More names than this are written smaller.
-_MANY_NAMES = 12
-# Inches that an entry takes beside its name, and a character of it, in 8 point; and of the height of a row.
-_BESIDE, _CHARACTER, _ROW = 0.7, 0.062, 0.155
-_MOST_COLUMNS = 4
-_PALE_GREY = "0.72"
-
-
-def legend_below(
-    figure: Figure, handles: Mapping[str, object], *, scale: Scale | None = None, panels: Sequence[Axes] = ()
-) -> None:
-    """Add a legend below the panels, in as many columns as have room; the figure grows by its height.
-
-    Parameters
-    ----------
-    figure : the figure, in which all else is drawn.
-    handles : what the legend shows, by name.
-    scale : a scale of colours, if any, that is added beside the `panels`.
-    panels : the axes beside which the scale stands.
-    """
-    if scale:
-        scale.draw(figure, list(panels))
-    handles = dict(handles) | _marks(figure)
-    if handles:
-        size = 8 if len(handles) <= _MANY_NAMES else 7
-        lengths = [_printed_length(name) * size / 8 for name in handles]
-        columns = next(
-            (count for count in range(_MOST_COLUMNS, 1, -1) if _width(lengths, count) < figure.get_figwidth()), 1
-        )
-        rows = -(-len(handles) // columns)
-        figure.set_figheight(figure.get_figheight() + 0.06 + _ROW * size / 8 * rows)
-        figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=columns, fontsize=size)
-    _spread_numbers(figure)
-
-
-def _marks(figure):
-    """What the legend says of crossed and pale marks, as far as a panel has some."""
-    shown = named_handles(figure.axes)
-    ring = {"ls": "none", "marker": "o", "ms": 5, "mew": 0.9, "mfc": "white"}
-    looks = {
-        FEWER_SEEDS: (
-            legend_handle(color=GREY, **ring),
-            legend_handle(color=GREY, **ring | {"marker": "x", "mew": 0.7}),
-        ),
-        NOT_APPLICABLE: legend_handle(color=_PALE_GREY, **ring | {"ls": "-", "lw": 0.9}),
-    }
-    return {name: look for name, look in looks.items() if name in shown}
-
-
-def named_handles(panels: Iterable[Axes]) -> dict[str, object]:
-    """What is named in some panels, each name once."""
-    found: dict[str, object] = {}
-    for axes in panels:
-        for handle, name in zip(*axes.get_legend_handles_labels(), strict=True):
-            found.setdefault(name, handle)
-    return found
-
-
-def words_handle(text: str) -> dict[str, object]:
-    """An explanation in a legend, without a look of its own."""
-    return {text: legend_handle(color=GREY, ls="none")}
-
-
-def _width(lengths, columns):
-    """Inches that so many columns of names take, at most as many as there are names."""
-    parts = np.array_split(lengths, min(columns, len(lengths)))
-    return sum(_BESIDE + _CHARACTER * max(part) for part in parts)
-
-
-def _printed_length(name):
-    """About how many characters a name has when its formulas are set."""
-    return len(re.sub(r"\\mathrm|\\prime|\\ast|\\bar|[{}$^_]", "", name).replace(r"\Delta\gamma", "Δγ"))
-
-
-class NumberPlace(NamedTuple):
-    """Where the number of seeds stands beside a mark: points to the right and up, and how it is aligned."""
-
-    right: float
-    up: float
-    align: str
-
-
-NUMBER_PLACES = tuple(
-    NumberPlace(sign * right, up, "left" if sign > 0 else "right")
-    for (right, up), sign in itertools.product(((5, -8), (5, 5), (9, -2), (5, -17), (5, 14)), (1, -1))
-)
-
-
-def _spread_numbers(figure):
-    """Move numbers of seeds that would lie on each other, or out of their panel, to another side of their mark."""
-    panels = [each for axes in figure.axes for each in (axes, *axes.child_axes)]
-    numbers = [(axes, text) for axes in panels for text in axes.texts if text.get_text().startswith("n=")]
-    if len(numbers) < 2:
-        return
-    figure.draw_without_rendering()
-    taken = []
-    for axes, text in numbers:
-        frame, boxes = axes.get_window_extent(), {}
-        for place in NUMBER_PLACES:
-            text.set(ha=place.align, position=(place.right, place.up))
-            boxes[place] = text.get_window_extent()
-        free = [place for place, box in boxes.items() if not any(box.overlaps(other) for other in taken)]
-        inside = [place for place in free if frame.contains(*boxes[place].min) and frame.contains(*boxes[place].max)]
-        place = (inside or free or NUMBER_PLACES)[0]
-        text.set(ha=place.align, position=(place.right, place.up))
-        taken.append(boxes[place])

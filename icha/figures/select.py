@@ -1,17 +1,16 @@
-"""Picking what a figure shows out of a campaign dataset.
+"""Select what a figure shows from a campaign dataset.
 
-All functions raise ValueError where the campaign has no such study, run or snapshot, naming what there is.
+All functions raise ValueError if the campaign has no such study, run or snapshot; the message names those it has.
 """
 
 from __future__ import annotations
 
-import contextlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from icha.contact.models import REFERENCE_MODEL, first_of
+from icha.contact.models import REFERENCE_MODEL, first_model
 from icha.datasets.labels import LABELS, RunLabels, place_of, slopes_of
 from icha.datasets.variables.model_error import FINITE_RANGE
 from icha.figures.style import number, slope_label
@@ -24,12 +23,51 @@ class NothingToDraw(ValueError):
     """A study has no complete run of the kind that a figure shows; the message says what is lacking."""
 
 
+class ContactRuns(NamedTuple):
+    """The complete runs of one contact by one model, one for each seed.
+
+    Runs to which the asperity model is not applicable are apart from the others.
+
+    Attributes
+    ----------
+    labels : labels of the first run.
+    runs : the runs, by seed.
+    asked : number of seeds that the study asks for.
+    applicable : whether the asperity model is applicable to the runs.
+    """
+
+    labels: RunLabels
+    runs: dict[int, xr.Dataset]
+    asked: int
+    applicable: bool
+
+    @property
+    def contact(self) -> tuple[str, str, float]:
+        """Material, surface and rms slope."""
+        return self.labels.material, self.labels.surface, self.labels.rms_slope
+
+
+def group_by_contact(campaign: xr.DataTree, runs: Iterable[tuple[RunLabels, xr.Dataset]]) -> list[ContactRuns]:
+    """Group runs of the campaign that differ only in their seed."""
+    found: dict[tuple, ContactRuns] = {}
+    for labels, run in runs:
+        key = labels._replace(seed=None), is_applicable(run)
+        if key not in found:
+            asked = asked_seeds(campaign[labels.study].to_dataset(), labels)
+            found[key] = ContactRuns(labels, {}, asked, key[1])
+        found[key].runs[labels.seed] = run
+    return list(found.values())
+
+
 def study_runs(
     campaign: xr.DataTree, study: str, *, ragged: bool = True, model: str | None = None
 ) -> list[tuple[RunLabels, xr.Dataset]]:
-    """All complete runs of a study by a model, left out that which is shown (`shown_model`), at least one.
+    """Return all complete runs of a study by a model, at least one.
 
-    Without their spots and events, which take long, if not `ragged`.
+    Parameters
+    ----------
+    ragged : whether the runs have their spots and events, which take long to select.
+    model : left out, the `shown_model` of the study.
 
     Raises
     ------
@@ -80,7 +118,7 @@ def is_applicable(run: xr.Dataset) -> bool:
 
 def shown_model(study: xr.Dataset) -> str:
     """The model whose runs figures show first of a study: asperities, or else the study's first."""
-    return first_of(study["model"].values.tolist())
+    return first_model(study["model"].values.tolist())
 
 
 def _check_study(campaign, study):
@@ -88,18 +126,14 @@ def _check_study(campaign, study):
         raise ValueError(f"no study {study!r} in this campaign; there are {', '.join(campaign.children)}")
 
 
-def pick(labels: str, wanted, there: list):
-    """`wanted` if it is there, the first one if nothing is wanted.
-
-    Raises
-    ------
-    ValueError
-        Naming what there is.
-    """
+def pick(label: str, wanted, present: Sequence):
+    """Return `wanted` if it is among the values of a label, or the first of them if nothing is wanted."""
     if wanted is None:
-        return there[0]
-    if wanted not in there:
-        raise ValueError(f"no {labels} {wanted!r} in this study; there are {', '.join(map(str, there))}")
+        return present[0]
+    if wanted not in present:
+        raise ValueError(
+            f"no {label} {wanted!r} in this study; there are {', '.join(map(str, dict.fromkeys(present)))}"
+        )
     return wanted
 
 
@@ -112,7 +146,9 @@ def pick_run(
     rms_slope: float | None = None,
     material: str | None = None,
 ) -> tuple[RunLabels, xr.Dataset]:
-    """The first run asked for of a study and its `shown_model`, with adhesion if there is one and no material is named.
+    """Return the first run of a study and its `shown_model` with these labels.
+
+    If no material is named, the first one with adhesion is preferred.
 
     Raises
     ------
@@ -123,45 +159,41 @@ def pick_run(
     from icha.datasets.variables.campaign import COMPLETE
 
     _check_study(campaign, study)
-    model = shown_model(campaign[study].to_dataset())
-    runs = [labels for labels in run_labels(campaign) if (labels.study, labels.model) == (study, model)]
-    runs = [labels for labels in runs if surface in (None, labels.surface) and seed in (None, labels.seed)]
-    runs = [labels for labels in runs if rms_slope is None or np.isclose(rms_slope, labels.rms_slope)]
+    dataset = campaign[study].to_dataset()
+    model = shown_model(dataset)
+    runs = [
+        labels
+        for labels in run_labels(campaign)
+        if (labels.study, labels.model) == (study, model)
+        and surface in (None, labels.surface)
+        and seed in (None, labels.seed)
+        and (rms_slope is None or np.isclose(rms_slope, labels.rms_slope))
+    ]
     if not runs:
         raise ValueError(f"study {study}: no run of surface {surface}, seed {seed}, rms slope {rms_slope}")
-    energy = campaign[study]["surface_energy"]
-    adhesive = [labels.material for labels in runs if float(energy.sel(material=labels.material)) > 0]
-    material = pick("material", material, adhesive + [labels.material for labels in runs])
+    adhesive_first = sorted(runs, key=lambda labels: dataset["surface_energy"].sel(material=labels.material) <= 0)
+    material = pick("material", material, [labels.material for labels in adhesive_first])
     labels = next(labels for labels in runs if labels.material == material)
-    status = campaign[study]["status"].isel(run_place(campaign[study].to_dataset(), labels))
-    if int(status) != COMPLETE:
+    if dataset["status"].isel(run_place(dataset, labels)) != COMPLETE:
         raise NothingToDraw(f"{labels}: this run is not complete, so there is nothing to draw")
     return labels, select_run(campaign, labels)
 
 
 def run_on_topography(
-    campaign: xr.DataTree, study: str, topography: xr.Dataset, *, surface_name: str | None = None, **which: object
+    campaign: xr.DataTree, study: str, topography: xr.Dataset, *, surface_name: str | None = None, **labels: object
 ) -> tuple[RunLabels, xr.Dataset]:
-    """The run that `pick_run` finds, if a surface file's dataset is its topography.
-
-    Raises
-    ------
-    NothingToDraw
-        If it is not complete.
-    ValueError
-        If there is no such study or run, or the surface is another one's.
-    """
-    labels, run = pick_run(campaign, study, surface=surface_name, **which)
+    """Return the run of `pick_run`; raise ValueError unless a surface file's dataset is its topography."""
+    own, run = pick_run(campaign, study, surface=surface_name, **labels)
     same = np.isclose(float(topography["period"]), float(run["period"]), rtol=1e-9)
     if not same or int(topography["grid"]) != int(run["grid"]):
-        raise ValueError(f"{labels}: the surface given has another period or grid")
-    if "seed" in topography and int(topography["seed"]) != labels.seed:
-        raise ValueError(f"{labels}: the surface given has seed {int(topography['seed'])}")
-    return labels, run
+        raise ValueError(f"{own}: the surface given has another period or grid")
+    if "seed" in topography and int(topography["seed"]) != own.seed:
+        raise ValueError(f"{own}: the surface given has seed {int(topography['seed'])}")
+    return own, run
 
 
 def path_steps(run: xr.Dataset) -> xr.Dataset:
-    """The first loading's stops in the study's list of targets, without those added for snapshots of another kind."""
+    """Return the first loading's steps at the study's targets, without those added for snapshots of another kind."""
     from icha.datasets.campaign import loading_stops
 
     run = run.isel(step=loading_stops(run).values)
@@ -171,67 +203,66 @@ def path_steps(run: xr.Dataset) -> xr.Dataset:
 
 
 def branches(run: xr.Dataset) -> Iterator[tuple[str, xr.Dataset]]:
-    """Name and steps of every leg of a run, in their order; a leg begins with the last step of the one before."""
+    """Yield branch and steps of every leg of a run in order; a leg begins with the last step of the one before."""
     legs = run["leg"].values
     for leg in np.unique(legs):
-        own = np.flatnonzero(legs == leg)
-        yield str(run["branch"].values[own[0]]), run.isel(step=slice(max(own[0] - 1, 0), own[-1] + 1))
+        steps = np.flatnonzero(legs == leg)
+        yield str(run["branch"].values[steps[0]]), run.isel(step=slice(max(steps[0] - 1, 0), steps[-1] + 1))
 
 
-def ways_back(run: xr.Dataset) -> list[xr.Dataset]:
-    """The legs on which a run is unloaded, each from its turning point on; none of a run that only loads."""
-    return [leg for name, leg in branches(run) if name == "unloading"]
+def unloading_legs(run: xr.Dataset) -> list[xr.Dataset]:
+    """Return the legs of a run that unload, each from its turning point on."""
+    return [leg for branch, leg in branches(run) if branch == "unloading"]
 
 
 class Snapshots(NamedTuple):
-    """The runs of one contact, one for every seed, and where their snapshots of one kind and target are.
+    """The runs of one contact, and the snapshots of the same state that they keep.
 
-    `asked` is the number of seeds asked for, `applicable` whether the asperity model is applicable to the runs.
+    Attributes
+    ----------
+    runs : the runs.
+    members : each run, and the position of its snapshot.
+    truths : the same by boundary elements, of those seeds that have it; none if the runs are by boundary elements.
     """
 
-    labels: RunLabels
+    runs: ContactRuns
     members: list[tuple[xr.Dataset, int]]
-    asked: int = 0
-    applicable: bool = True
+    truths: list[tuple[xr.Dataset, int]]
 
 
-def first_line(
+def snapshots_of_materials(
     campaign: xr.DataTree, study: str, kind: str | None = None, target: float | None = None
 ) -> list[Snapshots]:
-    """Of every material on the first surface and slope of a study a snapshot of every seed, by its `shown_model`.
-
-    Runs to which the asperity model is not applicable are apart from the others of their material.
-    """
+    """Return a snapshot of every run of the `shown_model` on the first surface and slope of a study."""
     from icha.datasets.campaign import find_snapshot
 
-    runs, dataset = study_runs(campaign, study), campaign[study].to_dataset()
-    first = runs[0][0]
-    found: dict[tuple[str, bool], Snapshots] = {}
-    for labels, run in runs:
-        if (labels.surface, labels.rms_slope) == (first.surface, first.rms_slope):
-            key = labels.material, is_applicable(run)
-            own = found.setdefault(key, Snapshots(labels, [], asked_seeds(dataset, labels), key[1]))
-            own.members.append((run, find_snapshot(run, kind, target)))
-    return list(found.values())
-
-
-def same_snapshots_by_boundary_elements(campaign: xr.DataTree, lines: Sequence[Snapshots]) -> list[Snapshots]:
-    """For every line by asperities the same snapshot by boundary elements, of those seeds that keep it, if any."""
-    from icha.datasets.campaign import find_snapshot
-
-    found = [line._replace(labels=line.labels._replace(model=REFERENCE_MODEL), members=[]) for line in lines]
-    first = lines[0].labels
-    if first.model == REFERENCE_MODEL:
-        return found
-    truths = runs_by_boundary_elements(campaign, first.study, ragged=True)
-    for line, beside in zip(lines, found, strict=True):
-        run, at = line.members[0]
-        asked = str(run["snapshot_kind"].values[at]), float(run["snapshot_target"].values[at])
-        for labels, truth in truths:
-            if labels._replace(seed=beside.labels.seed) == beside.labels:
-                with contextlib.suppress(ValueError):  # a run that does not keep it
-                    beside.members.append((truth, find_snapshot(truth, *asked)))
+    groups = group_by_contact(campaign, study_runs(campaign, study))
+    first = groups[0].labels
+    truths = {} if first.model == REFERENCE_MODEL else dict(runs_by_boundary_elements(campaign, study, ragged=True))
+    found = []
+    for group in groups:
+        if group.contact[1:] != (first.surface, first.rms_slope):
+            continue
+        members = [(run, find_snapshot(run, kind, target)) for run in group.runs.values()]
+        run, at = members[0]
+        state = str(run["snapshot_kind"].values[at]), float(run["snapshot_target"].values[at])
+        same_contact = (
+            truth
+            for labels, truth in truths.items()
+            if labels._replace(seed=None) == group.labels._replace(seed=None, model=REFERENCE_MODEL)
+        )
+        found.append(Snapshots(group, members, [(run, at) for run in same_contact for at in _positions(run, *state)]))
     return found
+
+
+def _positions(run, kind, target):
+    """Position of a snapshot, or nothing if the run does not keep it."""
+    from icha.datasets.campaign import find_snapshot
+
+    try:
+        return [find_snapshot(run, kind, target)]
+    except ValueError:
+        return []
 
 
 def name_of_place(dataset: xr.Dataset, surface: str, rms_slope: float) -> str:
@@ -257,19 +288,27 @@ def snapshot_label(run: xr.Dataset, snapshot: int) -> str:
 
 
 def study_errors(model_error: xr.DataTree | None, study: str) -> dict[str, xr.Dataset]:
-    """The entries of a model error that compare the runs of a study, by name; none where no error is given."""
+    """Return the entries of a model error that compare the runs of a study, by name; none if no error is given."""
     entries = model_error.children if model_error is not None else {}
     return {name: node.to_dataset() for name, node in entries.items() if node.attrs["study"] == study}
 
 
-def finite_range_errors(model_error: xr.DataTree | None, study: str) -> dict[str, xr.Dataset]:
-    """Those of `study_errors` that compare with boundary elements at a finite range."""
-    entries = study_errors(model_error, study)
-    return {name: errors for name, errors in entries.items() if errors.attrs["truth"] == FINITE_RANGE}
+def finite_range_errors(model_error: xr.DataTree | None, study: str) -> list[xr.Dataset]:
+    """Return those of `study_errors` that compare with boundary elements at a finite range."""
+    return [errors for errors in study_errors(model_error, study).values() if errors.attrs["truth"] == FINITE_RANGE]
+
+
+def errors_of_run(entries: Iterable[xr.Dataset], labels: RunLabels, *names: str) -> Iterator[xr.Dataset]:
+    """Yield those of some entries of a model error that have a run, at its labels of these names."""
+    for errors in entries:
+        try:
+            yield errors.isel(place_of(errors, {name: getattr(labels, name) for name in names}))
+        except KeyError:
+            continue
 
 
 def asked_of_entry(errors: xr.Dataset) -> np.ndarray:
-    """Numbers of seeds that an entry of a model error compares, whatever became of their runs, along other labels."""
+    """Return numbers of seeds that an entry of a model error compares, complete or not, along its other labels."""
     from icha.datasets.variables.campaign import NOT_IN_DESIGN
 
     return (errors["status"] != NOT_IN_DESIGN).sum("seed").values

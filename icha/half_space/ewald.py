@@ -1,13 +1,13 @@
-"""The split of the sum over spots and their periodic images, as Ewald's, and the half-space with points in it.
+"""Ewald sums for the displacement of a half-space by forces at points and by their periodic images.
 
-A point force F displaces the half-space by F/(pi E* r); summed over all periodic images, with the uniform
-counter-pressure that keeps the mean displacement zero, the sum is split as Ewald's: the smooth part
-erf(alpha r)/r goes through its Fourier series, (2/(E* q)) erfc(q/(2 alpha)) per mode and cell area, by non-uniform
-FFTs; the rest is short-ranged and pairwise.
+A point force F displaces the half-space by F/(pi E* r). All periodic images are summed, with the uniform
+counter-pressure that keeps the mean displacement zero. The sum is split as Ewald's. The smooth half, erf(alpha r)/r, is
+evaluated by its Fourier series, (2/(E* q)) erfc(q/(2 alpha)) per mode and cell area, with non-uniform FFTs. The
+short-ranged half is summed pairwise.
 
-A square on a free half-space, which extends beyond it and is not loaded elsewhere, is put into a cell of twice its
-side, where the direct way between any two of its points is the shortest one. The displacement by images and
-counter-pressure is subtracted again (`icha.half_space.free_square`), so that the plain sum of F/(pi E* r) remains.
+A square on a free half-space is not loaded outside the square. It is put into a cell of twice its side, where the
+direct line between two of its points is shorter than that to any image. The displacement by images and counter-pressure
+is subtracted again (`icha.half_space.free_square`), so that the plain sum of F/(pi E* r) remains.
 """
 
 from __future__ import annotations
@@ -24,22 +24,22 @@ from scipy.special import erf, erfc
 from icha.half_space.free_square import basis, image_field, interpolated
 from icha.surfaces.square import cell_of, periodic_difference
 
-# Cut of both halves of the Ewald sum: erfc(4.3) = 1.2e-9.
+# Value of alpha r at which both halves of the Ewald sum are cut off, erfc(4.3) = 1.2e-9, and tolerance of the FFTs.
 _CUT = 4.3
 _NUFFT_TOLERANCE = 1e-9
-# The same for the operator of a linear solve, which only has to bring the next iterate closer: erfc(2.75) = 1e-4.
+# The same for the operator of a linear solve, which need not be accurate: erfc(2.75) = 1e-4.
 _LOOSE_CUT = 2.75
 _LOOSE_NUFFT_TOLERANCE = 1e-4
-# Points within the near field where the pairs serve many sums, and where they serve one.
+# Number of points within the near field if its pairs serve many sums, and if they serve one.
 NEIGHBOURS = 60
 NEIGHBOURS_ONCE = 20
-# Where the window holds the exact displacement, the moments' fields, which it replaces, stay at their values at this
-# distance, in mean spacings of the points: they are singular at r = 0.
+# Distance, in mean spacings of the points, below which the fields of the moments are constant. They are singular at
+# r = 0, and exact displacements replace them there.
 _FLOOR = 0.05
 
 
 def _smooth(r, alpha):
-    """erf(alpha r)/r and its plane Laplacian; r >= 0."""
+    """Return erf(alpha r)/r and its plane Laplacian; r >= 0."""
     x = alpha * r
     tiny = x < 0.05
     safe = np.where(tiny, 1.0, r)
@@ -55,29 +55,24 @@ def _smooth(r, alpha):
 
 
 def smooth_mode(q, alpha, contact_modulus, period):
-    """Displacement of a mode of wave number q > 0 by a unit point force and its images, the smooth half."""
+    """Return the smooth half of the displacement by a unit point force and its images, at wave number q > 0."""
     return 2 / (contact_modulus * q * period**2) * erfc(q / (2 * alpha))
 
 
 def short_mean(alpha, contact_modulus, period):
-    """Mean displacement by a unit point force and its images, the short-ranged half; the smooth half has none."""
+    """Return the mean of the short-ranged half of the displacement by a unit point force and its images."""
     return 2 / (np.sqrt(np.pi) * contact_modulus * alpha * period**2)
 
 
-def _distance(first, second, period):
-    difference = periodic_difference(first, second, period)
-    return np.sqrt(difference[:, 0] ** 2 + difference[:, 1] ** 2)
-
-
 class _SmoothSum:
-    """The smooth half of the Ewald sum as non-uniform FFTs between points.
+    """Smooth half of the Ewald sum, as non-uniform FFTs between points.
 
-    The plans are expensive and depend on the number of modes alone; points are set when they change.
+    The FFT plans are expensive and depend on the number of modes alone; points are set when they change.
     """
 
-    def __init__(self, period, alpha, contact_modulus, cut, tolerance, kind=np.complex128):
-        """kind: of the numbers that are summed; in single precision these are of order one."""
-        self._period, self._kind, self._real = period, kind, np.empty(0, kind).real.dtype
+    def __init__(self, period, alpha, contact_modulus, cut, tolerance, dtype=np.complex128):
+        """Prepare the FFTs; dtype: complex type of the sums."""
+        self._period, self._dtype, self._real = period, np.dtype(dtype), np.empty(0, dtype).real.dtype
         highest = int(np.ceil(cut * alpha * period / np.pi))
         k = np.arange(-highest, highest + 1) * (2 * np.pi / period)
         q2 = k[:, None] ** 2 + k[None, :] ** 2
@@ -88,18 +83,8 @@ class _SmoothSum:
         self._green = (green / self._unit).astype(self._real)
         self._laplacian = -q2 * self._green
         # One thread: the order of summation, and with it every bit of the result, is then fixed.
-        self._plans = [
-            finufft.Plan(
-                transform,
-                q2.shape,
-                eps=tolerance,
-                isign=sign,
-                nthreads=1,
-                upsampfac=1.25,
-                dtype=np.dtype(kind).name,
-            )
-            for transform, sign in ((1, -1), (2, 1))
-        ]
+        options = {"eps": tolerance, "nthreads": 1, "upsampfac": 1.25, "dtype": self._dtype.name}
+        self._plans = [finufft.Plan(kind, q2.shape, isign=sign, **options) for kind, sign in ((1, -1), (2, 1))]
         self._points = [None, None]
 
     def _set_points(self, which, points):
@@ -109,7 +94,7 @@ class _SmoothSum:
             self._points[which] = points
 
     def __call__(self, sources, targets, force, moment=None):
-        """Displacement (m) at the targets, of forces (N) and second moments (N m^2) at the sources."""
+        """Return the displacement (m) at the targets by forces (N) and second moments (N m^2) at the sources."""
         largest, second = (0.0 if m is None else np.max(np.abs(m), initial=0.0) for m in (force, moment))
         if not len(targets) or not (largest or second):
             return np.zeros(len(targets))
@@ -117,9 +102,10 @@ class _SmoothSum:
         self._set_points(1, targets)
         collect, distribute = self._plans
         if not second:
-            modes = collect.execute((force / largest).astype(self._kind)) * self._green
+            modes = collect.execute((force / largest).astype(self._dtype)) * self._green
             return self._unit * largest * distribute.execute(modes).real
-        # Both real sets travel as one complex set: its spectrum c holds F as the part with c(-k) = conj c(k).
+        # Both real sets are transformed as one complex set. In its spectrum c the part with c(-k) = conj c(k) belongs
+        # to the forces.
         scale = largest / second or 1.0
         c = collect.execute(force + 1j * (scale * moment))
         mirrored = np.conj(c[::-1, ::-1])
@@ -127,27 +113,17 @@ class _SmoothSum:
         return self._unit * distribute.execute(modes).real
 
 
-def _point_kernels(r, alpha, contact_modulus):
-    """Short-ranged displacement at distances r > 0 by unit moments k = 0, 1, 2: three arrays like r.
-
-    erfc(alpha r)/r, its plane Laplacian, and 1/r^5.
-    """
-    scale = 1 / (np.pi * contact_modulus)
-    inverse, x2 = 1 / r, (alpha * r) ** 2
-    gauss = 2 * alpha / np.sqrt(np.pi) * scale * np.exp(-x2)
-    force = erfc(alpha * r)
-    force *= scale * inverse
-    inverse *= inverse
-    moment = (force + gauss) * inverse
-    moment += 2 * alpha**2 * gauss
-    return force, moment, scale * inverse**2 / r
-
-
 @dataclass(frozen=True, eq=False)
 class Ewald:
-    """How the sum is split: reach of the near field and floor of the moments' fields (m), and the smooth sums.
+    """Split of the sum into a smooth and a short-ranged half.
 
-    period: of the sum, m. free: whether only the quarter [0, period/2]^2 counts, without the effect of its images.
+    Attributes
+    ----------
+    period : period of the sum, m.
+    contact_modulus : E*, Pa.
+    reach : radius of the near field, in which the short-ranged half is summed, m.
+    floor : distance below which the fields of the moments are constant, m.
+    free : whether the points lie in the quarter [0, period/2]^2, on a free half-space.
     """
 
     period: float
@@ -157,10 +133,10 @@ class Ewald:
     free: bool = False
 
     @classmethod
-    def of(cls, period, contact_modulus, count, neighbours, free=False):
-        """A split that suits a number of points; the near field is never wider than half the cell.
+    def choose(cls, period, contact_modulus, count, neighbours, free=False):
+        """Choose the split for `count` points, with some neighbours in the near field.
 
-        period: side of the square, m; free: whether it is single.
+        period : side of the square, m; free : whether the square is single.
         """
         spacing = period / np.sqrt(max(count, 1))
         cell = cell_of(period, free)
@@ -173,11 +149,11 @@ class Ewald:
         return 0.5 * self.period if self.free else self.period
 
     def bases(self, points):
-        """Polynomials for the images' displacement at points (n, 2), or by spots there; None if images stay."""
+        """Return the polynomials for the displacement by images at points (n, 2); None on a periodic surface."""
         return (basis(points[:, 1], self.period), basis(points[:, 0], self.period)) if self.free else None
 
-    def by_images(self, sources, targets, moments):
-        """Displacement (n,) at the targets by the images of the sources, both as `bases` gives them."""
+    def image_displacement(self, sources, targets, moments):
+        """Return the displacement (n,) at the targets by the images of the sources; both given by their `bases`."""
         field = image_field(*sources, moments, self.period, self.contact_modulus)
         return interpolated(field, *targets)
 
@@ -188,70 +164,83 @@ class Ewald:
 
     @cached_property
     def smooth(self):
-        """The smooth sum, accurate."""
+        """Accurate smooth sum."""
         return _SmoothSum(self.period, self.alpha, self.contact_modulus, _CUT, _NUFFT_TOLERANCE)
 
     @cached_property
     def loose(self):
-        """The smooth sum, to a thousandth."""
+        """Smooth sum that is accurate to a thousandth."""
         return _SmoothSum(
             self.period, self.alpha, self.contact_modulus, _LOOSE_CUT, _LOOSE_NUFFT_TOLERANCE, np.complex64
         )
 
     @property
     def loose_reach(self):
-        """Radius of the near field that matters to the loose sum, m."""
+        """Radius of the near field of the loose sum, m."""
         return self.reach * _LOOSE_CUT / _CUT
 
     @cached_property
     def once(self):
-        """The split for a sum whose pairs are used only once."""
+        """Split for a sum whose pairs are used only once."""
         return replace(self, reach=self.reach * np.sqrt(NEIGHBOURS_ONCE / NEIGHBOURS))
 
     @cached_property
     def mean(self):
-        """Mean displacement of the short-ranged half by a unit force, m/N."""
+        """Mean of the short-ranged half by a unit force, m/N."""
         return short_mean(self.alpha, self.contact_modulus, self.period)
 
     @cached_property
-    def own_smooth(self):
-        """Smooth parts at r = 0, which the sum over modes holds for a point's own site."""
+    def self_displacement(self):
+        """Smooth half at r = 0 by a unit force and second moment, which the Fourier series includes."""
         value, laplacian = _smooth(np.zeros(1), self.alpha)
         scale = 1 / (np.pi * self.contact_modulus)
         return scale * value[0], scale * laplacian[0]
 
     def kernels(self, r):
-        """Short-ranged displacement at distances r by unit moments k = 0, 1, 2."""
-        return _point_kernels(np.maximum(r, self.floor), self.alpha, self.contact_modulus)
+        """Return the short-ranged displacement at distances r by unit moments k = 0, 1, 2, three arrays.
+
+        They are erfc(alpha r)/r, its plane Laplacian, and 1/r^5, over pi E*.
+        """
+        r, alpha, scale = np.maximum(r, self.floor), self.alpha, 1 / (np.pi * self.contact_modulus)
+        inverse, x2 = 1 / r, (alpha * r) ** 2
+        gauss = 2 * alpha / np.sqrt(np.pi) * scale * np.exp(-x2)
+        force = erfc(alpha * r)
+        force *= scale * inverse
+        inverse *= inverse
+        moment = (force + gauss) * inverse
+        moment += 2 * alpha**2 * gauss
+        return force, moment, scale * inverse**2 / r
 
     def replaced(self, r):
-        """Whole displacement at distances r by unit moments k = 0, 1, 2, as the sum over points gives it."""
-        held = np.maximum(r, self.floor)
-        force, moment = 1 / held, 1 / held**3
-        fourth = np.where(r <= self.reach, 1 / held**5, 0.0)
+        """Return the whole displacement at distances r by unit moments k = 0, 1, 2, as the Ewald sum gives it."""
+        raised = np.maximum(r, self.floor)
+        force, moment = 1 / raised, 1 / raised**3
+        fourth = np.where(r <= self.reach, 1 / raised**5, 0.0)
         low = np.flatnonzero(r < self.floor)
         if len(low):
-            # Below the floor only the short-ranged part stays at its value there.
-            here, there = _smooth(r[low], self.alpha), _smooth(held[low], self.alpha)
-            force[low] += here[0] - there[0]
-            moment[low] += here[1] - there[1]
+            # Below the floor only the short-ranged half is constant.
+            smooth, smooth_at_floor = _smooth(r[low], self.alpha), _smooth(raised[low], self.alpha)
+            force[low] += smooth[0] - smooth_at_floor[0]
+            moment[low] += smooth[1] - smooth_at_floor[1]
         scale = 1 / (np.pi * self.contact_modulus)
         return scale * force, scale * moment, scale * fourth
 
 
 @dataclass(frozen=True, eq=False)
 class HalfSpace:
-    """The displacement at points by forces and moments at the same points, each without its own field.
+    """Half-space with forces and moments at n points, and its displacement at the same points.
 
-    Parameters
+    The displacement at a point leaves out that by the point's own force.
+
+    Attributes
     ----------
-    ewald : the split of the sum.
-    points : (n, 2), m.
-    pairs : near pairs as (later, earlier, distance), each pair once.
+    ewald : split of the sum.
+    points : (n, 2) float, m.
+    pairs : near pairs as three arrays (later, earlier, distance), each pair once.
     near : three (n, n) lower triangular matrices, the short-ranged displacement by the moments k = 0, 1, 2.
     near_transposed : their transposes.
-    near_loose : the displacement by forces, accurate to a thousandth, and its transpose.
-    bases : of the points, for their images on a free half-space.
+    near_loose : matrix of the displacement by forces, accurate to a thousandth, and its transpose.
+    bases : polynomials of the points for their images on a free half-space; None on a periodic surface.
     """
 
     ewald: Ewald
@@ -264,19 +253,19 @@ class HalfSpace:
 
     @cached_property
     def tree(self):
-        """The points, by where they are."""
+        """Search tree of the points."""
         return cKDTree(self.points, boxsize=self.ewald.period)
 
     @classmethod
     def at(cls, points, period, contact_modulus, free=False) -> HalfSpace:
-        """The half-space with (n, 2) points in m, in a square of side `period` (m) that repeats or is single (free)."""
-        ewald = Ewald.of(period, contact_modulus, len(points), NEIGHBOURS, free)
+        """Return the half-space with points (n, 2), m, in a square of side `period`, m, that is periodic or free."""
+        ewald = Ewald.choose(period, contact_modulus, len(points), NEIGHBOURS, free)
         points = np.mod(points, ewald.period)
         found = cKDTree(points, boxsize=ewald.period).query_pairs(ewald.reach, output_type="ndarray")
-        return cls._assembled(ewald, points, None, found.max(axis=1), found.min(axis=1))
+        return cls._assemble(ewald, points, None, found.max(axis=1), found.min(axis=1))
 
     def extended(self, points) -> HalfSpace:
-        """With more points (k, 2) after the present ones."""
+        """Return the half-space with more points (k, 2) after the present ones."""
         known, period = len(self.points), self.ewald.period
         points = np.mod(points, period)
         tree = cKDTree(points, boxsize=period)
@@ -284,13 +273,14 @@ class HalfSpace:
         among = tree.query_pairs(self.ewald.reach, output_type="ndarray")
         later = np.concatenate([across["i"], among.max(axis=1)]) + known
         earlier = np.concatenate([across["j"], among.min(axis=1) + known])
-        return self._assembled(self.ewald, np.concatenate([self.points, points]), self, later, earlier)
+        return self._assemble(self.ewald, np.concatenate([self.points, points]), self, later, earlier)
 
     @classmethod
-    def _assembled(cls, ewald, points, before, later, earlier):
-        """Append the pairs of the points that the half-space `before` does not have."""
+    def _assemble(cls, ewald, points, before, later, earlier):
+        """Append the pairs of the points that the half-space `before` does not have; without one, all pairs."""
         n, known = len(points), 0 if before is None else len(before.points)
-        r = _distance(points[later], points[earlier], ewald.period)
+        difference = periodic_difference(points[later], points[earlier], ewald.period)
+        r = np.sqrt(difference[:, 0] ** 2 + difference[:, 1] ** 2)
         rows = scipy.sparse.coo_matrix((r, (later - known, earlier)), shape=(n - known, n)).tocsr()
         later, earlier, r = np.repeat(np.arange(known, n), np.diff(rows.indptr)), rows.indices, rows.data
         start, kernels = rows.indptr, ewald.kernels(r)
@@ -308,25 +298,25 @@ class HalfSpace:
         return cls(ewald, points, (later, earlier, r), near, transposed, (loose, loose.T), bases)
 
     def displacement(self, force, moment, fourth):
-        """Displacement (n,) in m by forces (N), second (N m^2) and fourth moments (N m^4), each (n,)."""
+        """Return the displacement (n,), m, by forces (N), second (N m^2) and fourth moments (N m^4), each (n,)."""
         w = self.ewald.smooth(self.points, self.points, force, moment)
         for lower, upper, strength in zip(self.near, self.near_transposed, (force, moment, fourth), strict=True):
             w += lower @ strength
             w += upper @ strength
-        own = self.ewald.own_smooth
-        w -= own[0] * force + own[1] * moment
+        by_force, by_moment = self.ewald.self_displacement
+        w -= by_force * force + by_moment * moment
         w -= self.ewald.mean * np.sum(force)
         if self.bases is not None:
-            w -= self.ewald.by_images(self.bases, self.bases, (force, moment))
+            w -= self.ewald.image_displacement(self.bases, self.bases, (force, moment))
         return w
 
-    def nearly(self, force):
-        """Displacement by forces alone, to a thousandth: enough for the operator of a linear solve."""
+    def approximate_displacement(self, force):
+        """Return the displacement by forces alone to a thousandth, which suffices for a linear solve."""
         w = self.ewald.loose(self.points, self.points, force)
         for half in self.near_loose:
             w += half @ force
-        w -= self.ewald.own_smooth[0] * force
+        w -= self.ewald.self_displacement[0] * force
         w -= self.ewald.mean * np.sum(force)
         if self.bases is not None:
-            w -= self.ewald.by_images(self.bases, self.bases, (force,))
+            w -= self.ewald.image_displacement(self.bases, self.bases, (force,))
         return w

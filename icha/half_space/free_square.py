@@ -1,9 +1,8 @@
-"""A single square on a free half-space: how to remove the images from a periodic sum in a quarter of its cell.
+"""Single square on a free half-space: removal of the images from a periodic sum.
 
-A square on a free half-space is put into a periodic cell of twice its side. There the nearest image of a point is as
-far from the square as the square is wide, so that the images' displacement is smooth. It is interpolated by Lagrange's
-polynomials through a few Chebyshev nodes (the error falls as 5.8^-n) and subtracted from the periodic sum, which leaves
-the plain sum of 1/r.
+The square lies in a periodic cell of twice its side. The nearest image of a point is as far from the square as the
+square is wide, so that the displacement by images is smooth. It is interpolated by Lagrange polynomials through a few
+Chebyshev nodes (the error falls as 5.8^-n) and subtracted from the periodic sum; the plain sum of 1/r remains.
 """
 
 from functools import lru_cache
@@ -11,20 +10,20 @@ from functools import lru_cache
 import numpy as np
 from scipy.special import erf, erfc
 
-# Chebyshev nodes along a side: their remainder is 2e-14 of the images' displacement.
+# Number of Chebyshev nodes along a side; the remainder is 2e-14 of the displacement by images.
 _NODES = 18
-# Split of the table's own Ewald sum and how far its halves go; erfc(6) = 2e-17.
+# Wave number of the Ewald sum of the table, in 1/cell, and cuts of its halves, in cells and modes: erfc(6) = 2e-17.
 _ALPHA = 3.0
 _REACH = 3
 _HIGHEST = 6
 
 
 def basis(x, cell: float) -> np.ndarray:
-    """Lagrange's polynomials at x (n,), m, in [0, cell/2]: (n, nodes)."""
-    there, weight, _ = _chebyshev()
-    ways = np.asarray(x)[:, None] / cell - there
-    on_node = ways == 0
-    terms = weight / np.where(on_node, 1.0, ways)
+    """Return the Lagrange polynomials at x (n,), m, in [0, cell/2]: (n, nodes)."""
+    nodes, weight, _ = _chebyshev()
+    distance = np.asarray(x)[:, None] / cell - nodes
+    on_node = distance == 0
+    terms = weight / np.where(on_node, 1.0, distance)
     values = terms / np.sum(terms, axis=1, keepdims=True)
     hit = on_node.any(axis=1)
     values[hit] = on_node[hit]
@@ -32,14 +31,19 @@ def basis(x, cell: float) -> np.ndarray:
 
 
 def image_field(by, bx, moments, cell: float, contact_modulus: float) -> np.ndarray:
-    """Displacement (nodes, nodes), m, by all images of some spots, at the nodes of y and x.
+    """Return the displacement (nodes, nodes), m, by all images of some spots at the Chebyshev nodes of y and x.
 
-    It includes the uniform displacement that makes the periodic sum's mean zero. by, bx: `basis` of the spots; moments:
-    their M_k = integral of p s^(2k) / (4^k k!^2), N m^(2k), for k = 0, 1, …; each (m,).
+    It includes the uniform displacement that makes the mean of the periodic sum zero.
+
+    Parameters
+    ----------
+    by, bx : (m, nodes) float, `basis` of the spots.
+    moments : for k = 0, 1, …: (m,) float, integral of p s^(2k) / (4^k k!^2), N m^(2k).
+    cell : period of the sum, m.
     """
     _, _, second = _chebyshev()
     field = np.zeros((_NODES, _NODES))
-    # The k-th moment acts by the k-th power of the Laplacian.
+    # The k-th moment acts by the k-th power of the Laplacian: Horner's rule.
     for k, moment in enumerate(reversed(moments)):
         if k:
             field = (second @ field + field @ second.T) / cell**2
@@ -49,19 +53,19 @@ def image_field(by, bx, moments, cell: float, contact_modulus: float) -> np.ndar
 
 
 def interpolated(field, by, bx) -> np.ndarray:
-    """The field at points of the bases by, bx, (n,)."""
+    """Interpolate a field of `image_field` to points with the bases by, bx: (n,)."""
     return np.einsum("ia,ia->i", by @ field, bx)
 
 
 @lru_cache(maxsize=1)
 def _chebyshev():
-    """Nodes in [0, 1/2], barycentric weights, and the matrix of the second derivative."""
+    """Return the nodes in [0, 1/2], the barycentric weights, and the matrix of the second derivative."""
     k = np.arange(_NODES)
     nodes = 0.25 * (1 - np.cos(np.pi * k / (_NODES - 1)))
     weight = (-1.0) ** k
     weight[[0, -1]] *= 0.5
-    ways = nodes[:, None] - nodes + np.eye(_NODES)
-    first = weight / weight[:, None] / ways
+    distance = nodes[:, None] - nodes + np.eye(_NODES)
+    first = weight / weight[:, None] / distance
     np.fill_diagonal(first, 0.0)
     np.fill_diagonal(first, -np.sum(first, axis=1))
     return nodes, weight, first @ first
@@ -69,16 +73,16 @@ def _chebyshev():
 
 @lru_cache(maxsize=1)
 def _table():
-    """Images' potential in a unit cell at every node by a unit strength at every node, (nodes^2, nodes^2)."""
+    """Return the potential by images at every node by a unit source at every node, in a unit cell, as a matrix."""
     nodes, _, _ = _chebyshev()
-    ways, index = np.unique(np.round(np.abs(nodes[:, None] - nodes), 15), return_inverse=True)
+    distance, index = np.unique(np.round(np.abs(nodes[:, None] - nodes), 15), return_inverse=True)
     index = index.reshape(_NODES, _NODES)
-    potential = image_potential(ways[:, None], ways)
+    potential = image_potential(distance[:, None], distance)
     return potential[index[:, None, :, None], index[None, :, None, :]].reshape(_NODES**2, _NODES**2)
 
 
 def image_potential(y, x):
-    """Sum of 1/r over all images of a unit cell but the own one, less the uniform background; |x|, |y| <= 1/2."""
+    """Return the sum of 1/r over all images of a unit cell less the uniform background; |x|, |y| <= 1/2."""
     r = np.hypot(y, x)
     safe = np.where(r > 0, r, 1.0)
     potential = -np.where(r > 0, erf(_ALPHA * safe) / safe, 2 * _ALPHA / np.sqrt(np.pi))
@@ -96,17 +100,17 @@ def image_potential(y, x):
 
 
 def mean_displacement(side: float, contact_modulus: float, position, force) -> float:
-    """Mean displacement of a square of a free half-space by point forces (n,) at (n, 2) in it, m.
+    """Return the mean displacement of a square of a free half-space by point forces (n,) at (n, 2) in it, m.
 
-    By reciprocity it is that of the points under a uniform pressure on the square, whose four rectangles around a point
-    give x asinh(y/x) + y asinh(x/y) each.
+    By reciprocity it is the displacement of the points by a uniform pressure on the square. Each of the four rectangles
+    around a point contributes x asinh(y/x) + y asinh(x/y).
     """
-    x, y = ([along, side - along] for along in np.clip(position.T, 0.0, side))
-    potential = sum(_corner(one, other) for one in x for other in y)
+    x, y = ([distance, side - distance] for distance in np.clip(position.T, 0.0, side))
+    potential = sum(_corner_potential(width, height) for width in x for height in y)
     return float(np.sum(force * potential)) / (np.pi * contact_modulus * side**2)
 
 
-def _corner(x, y):
-    """Integral of 1/r over a rectangle, r from one of its corners."""
+def _corner_potential(x, y):
+    """Integrate 1/r over a rectangle of sides x, y; r is the distance from a corner."""
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.where(x > 0, x * np.arcsinh(y / x), 0.0) + np.where(y > 0, y * np.arcsinh(x / y), 0.0)

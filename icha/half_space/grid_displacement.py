@@ -1,13 +1,13 @@
 """Displacement of the half-space at all nodes of a grid, and the nodes around every spot.
 
-The sum over spots and images is split as in `icha.half_space.ewald`: a smooth half through its Fourier series and
-a short-ranged half around every spot. A field has as many targets as nodes, so that its cost is the area of the windows
-around the spots. More moments of a spot's pressure make the windows smaller: four moments represent it from five radii
-on. In return, the smooth half of a large spot must be smooth on the scale of that spot. So spots are put into groups of
-similar size, and every group has a Fourier series of its own length.
+The sum over spots and images is split as in `icha.half_space.ewald`: a smooth half by its Fourier series, and a
+short-ranged half in a window around every spot. There are as many targets as nodes, so that the area of the windows
+determines the cost. More moments of the pressure make the windows smaller: four moments represent a spot beyond five
+radii. In return, the smooth half of a large spot must be smooth on the scale of that spot. So spots of similar size
+form groups, and every group has a Fourier series of its own length.
 
-With the moments M_k = integral of p r^(2k) / (4^k k!^2) a spot far away displaces by sum_k M_k Lap^k (1/(pi E* r)),
-and its Fourier transform is that of a point with sum_k M_k (-q^2)^k in the place of its force.
+With the moments M_k = integral of p r^(2k) / (4^k k!^2) a spot displaces points far away by the sum over k of
+M_k Lap^k (1/(pi E* r)). Its Fourier transform is that of a point with the sum of M_k (-q^2)^k in place of its force.
 """
 
 import math
@@ -19,45 +19,51 @@ import numpy as np
 import scipy.fft
 from scipy.special import erf
 
-from icha.asperity.law import SpotLaw
+from icha.asperity.jkr import JKR
 from icha.half_space.ewald import short_mean, smooth_mode
 from icha.half_space.free_square import basis, image_field
 from icha.support.parallel import blocks, on_cores
 from icha.surfaces.square import cell_of
 
-# Cut of both halves of the Ewald sum: erfc(4.6) = 8e-11.
+# Value of alpha r at which both halves of the Ewald sum are cut off, erfc(4.6) = 8e-11, and tolerance of the FFTs.
 _CUT = 4.6
 _NUFFT_TOLERANCE = 1e-12
-# Radii of a spot from which its moments represent it, with an error of 1e-8 of the displacement at its edge.
+# Distance, in radii of a spot, beyond which its four moments represent it, up to 1e-8 of the displacement at its edge.
 _WINDOW = 5.0
 _MOMENTS = 4
 # Ratio of the windows of neighbouring groups of spots.
 _LADDER = math.sqrt(2)
-# Nodes of a block of rows, and of windows that are worked on at a time: what fits the processor's cache.
+# Number of nodes in a block of rows, and in the windows that are evaluated at a time: what fits the processor's cache.
 _BLOCK = 2**19
 _BATCH = 2**15
-# Below this (alpha r)^2 the smooth half comes from its power series, up to this power of (alpha r)^2.
+# Value of (alpha r)^2 below which the smooth half is a power series, and number of terms of that series.
 _SERIES_BELOW = 0.25
 _SERIES_LENGTH = 15
 
 
 def row_blocks(grid: int) -> list[slice]:
-    """The rows of a grid in blocks whose size depends on nothing but the grid."""
+    """Divide the rows of a grid into blocks whose size depends on the grid alone."""
     return blocks(grid, max(_BLOCK // grid, 1))
 
 
 @dataclass(frozen=True, eq=False)
 class DisplacementField:
-    """Displacement w of the half-space at the nodes of a regular grid, m, by rows: eq. (9)'s sum.
+    """Displacement w of the half-space by m spots at the nodes of a regular grid, the sum of eq. (9).
 
-    It is periodic and of zero mean; or, for a single square on a free half-space, the plain sum over the spots.
+    It is periodic and has zero mean; on a free half-space it is the plain sum over the spots. Inside a spot its own
+    part is the displacement under its contact.
 
-    centres: (m, 2), contact_radius and radius_of_curvature: (m,), all m. Inside a spot its own part is the displacement
-    under its contact. The grid need not be the surface's: a coarser one gives the values at every so-manieth node and
-    costs accordingly less.
+    Attributes
+    ----------
+    law : law of one spot.
+    period : side of the square, m.
+    grid : nodes along a side; it may be coarser than the grid of the surface.
+    centres : (m, 2) float, m.
+    contact_radius, radius_of_curvature : (m,) float, m.
+    free : whether the square is single.
     """
 
-    law: SpotLaw
+    law: JKR
     period: float
     grid: int
     centres: np.ndarray
@@ -67,26 +73,26 @@ class DisplacementField:
 
     @property
     def _cell(self):
-        """Period of the sum, m; of a single square it is in a cell of twice its side, without what the images do."""
+        """Period of the sum, m: for a single square twice its side; the effect of images is subtracted then."""
         return cell_of(self.period, self.free)
 
     @property
     def _nodes(self):
-        """Nodes along a side of that cell."""
+        """Number of nodes along the period of the sum."""
         return cell_of(self.grid, self.free)
 
-    def in_blocks(self, function) -> list:
-        """Results of `function(rows, w)` for all rows in blocks, in order; several threads work on them."""
+    def map_blocks(self, function) -> list:
+        """Return the results of `function(rows, w)` for all blocks of rows in order; several threads work on them."""
         if len(self.contact_radius):
-            # Before all threads want it.
+            # Evaluate these once, before several threads need them.
             _ = self._smooth_half, self.free and self._images
         return on_cores(lambda rows: function(rows, self.rows(rows)), row_blocks(self.grid))
 
     def rows(self, rows: slice) -> np.ndarray:
-        """Displacement w (rows.stop - rows.start, grid) at the nodes of a range of rows, m."""
+        """Return the displacement (rows.stop - rows.start, grid) at the nodes of a range of rows, m."""
         if not len(self.contact_radius):
             return np.zeros((rows.stop - rows.start, self.grid))
-        # Grids too coarse for the Fourier series are nodes of a finer one.
+        # A grid that is too coarse for the Fourier series is a part of a finer one.
         finer, half = self._smooth_half
         nodes = np.arange(rows.start, rows.stop) * finer
         w = scipy.fft.irfft(half[nodes], n=finer * self._nodes, axis=1, norm="forward", workers=1)[:, ::finer]
@@ -102,7 +108,7 @@ class DisplacementField:
 
     @cached_property
     def _images(self):
-        """Bases of the nodes, and the field of the images between them."""
+        """Polynomials of the rows and columns, and the displacement by images at the nodes of the polynomials."""
         nodes = basis(np.arange(self.grid) * (self.period / self.grid), self._cell)
         field = 0.0
         for group in self._groups:
@@ -113,9 +119,9 @@ class DisplacementField:
 
     @cached_property
     def _groups(self):
-        """Spots by the width of their windows: wide enough for their own radius and for few Fourier modes."""
+        """Groups of spots by the width of their windows: wide enough for their radii, and for few Fourier modes."""
         count, widest = len(self.contact_radius), 0.5 * self._cell
-        # As many modes as make the Fourier series and the windows about equally costly.
+        # This number of modes makes the Fourier series and the windows about equally costly.
         modes = min((2.0 * count * self._nodes**2) ** 0.25, (self._nodes - 1) // 2)
         narrowest = min(_CUT**2 / np.pi * self._cell / modes, widest)
         needed = np.clip(_WINDOW * self.contact_radius, narrowest, widest)
@@ -158,8 +164,8 @@ class DisplacementField:
         q2 = k[:, None] ** 2 + k[None, highest:] ** 2
         strength, factor = np.zeros(q2.shape, dtype=complex), np.ones(q2.shape)
         for even, odd in group.moments.T.reshape(-1, 2, len(group.spots)):
-            # Two real sets travel as one complex one: its spectrum c holds the first as the part with
-            # c(-k) = conj c(k). One thread: the order of summation, and with it every bit, is then fixed.
+            # Two real sets are transformed as one complex set. In its spectrum c the part with c(-k) = conj c(k)
+            # belongs to the first. With one thread the order of summation, and with it every bit, is fixed.
             c = finufft.nufft2d1(y, x, even + 1j * odd, (len(k), len(k)), eps=_NUFFT_TOLERANCE, isign=-1, nthreads=1)
             mirrored = np.conj(c[::-1, ::-1])[:, highest:]
             c = c[:, highest:]
@@ -173,7 +179,7 @@ class DisplacementField:
         return strength
 
     def _short_half(self, group, window):
-        """Exact displacement less the smooth half by the spots of the windows, shaped as the windows."""
+        """Return the exact displacement less the smooth half in the windows of spots, shaped as the windows."""
         spot = group.spots[window.spot]
         r2 = window.dy[:, None] ** 2 + window.dx**2
         a, R = self.contact_radius[spot][:, None], self.radius_of_curvature[spot][:, None]
@@ -187,9 +193,14 @@ class DisplacementField:
 
 @dataclass(frozen=True, eq=False)
 class _Group:
-    """Spots (m,) that share a window (m) and the alpha = _CUT/window of their smooth half (1/m).
+    """Spots of similar size.
 
-    moments : (m, 4) M_k alpha^(2k), N.
+    Attributes
+    ----------
+    spots : (m,) int, indices of the spots.
+    reach : half the width of their windows, m.
+    alpha : wave number of the split, 1/m.
+    moments : (m, 4) float, M_k alpha^(2k), N.
     """
 
     spots: np.ndarray
@@ -199,7 +210,7 @@ class _Group:
 
 
 def smooth_half(y, moments):
-    """Sum over k of moments[..., k] Lap^k (erf(x)/x), Lap in the plane, at y = x^2 (m, n); moments (m, 4)."""
+    """Return the sum over k of moments[:, k] Lap^k (erf(x)/x), Lap in the plane, at y = x^2 (m, n); moments (m, 4)."""
     coefficients = np.einsum("mk,kj->mj", moments, _SMOOTH_HALF)
     multipole, gauss, series = np.split(coefficients, [_MOMENTS, 3 * _MOMENTS - 2], axis=1)
     safe = np.maximum(y, _SERIES_BELOW)
@@ -207,7 +218,7 @@ def smooth_half(y, moments):
     value = _horner(multipole[:, :, None], inverse)
     value *= erf(np.sqrt(safe))
     value *= np.sqrt(inverse)
-    # The powers of the Gaussian's factor run from -3 to 2.
+    # The polynomial of the Gaussian has powers from -3 to 2.
     factor = _horner(gauss[:, _MOMENTS - 1 :, None], safe)
     factor += _horner(gauss[:, _MOMENTS - 2 :: -1, None], inverse) * inverse
     factor *= np.exp(-safe)
@@ -219,7 +230,7 @@ def smooth_half(y, moments):
 
 
 def _horner(coefficients, x):
-    """Polynomial in x with coefficients along the axis 1, lowest power first."""
+    """Evaluate polynomials in x with coefficients along axis 1, lowest power first."""
     value = coefficients[:, -1] * x
     for k in range(coefficients.shape[1] - 2, 0, -1):
         value += coefficients[:, k]
@@ -229,12 +240,14 @@ def _horner(coefficients, x):
 
 
 def _smooth_half_table():
-    """Coefficients of Lap^k (erf(x)/x), k = 0..3 (rows), in powers of y = x^2: (1) of the factor of erf(x)/x, falling
-    from y^0, (2) of that of exp(-y), from y^-3 to y^2, and (3) of the whole, rising from y^0.
+    """Return the coefficients of Lap^k (erf(x)/x), k = 0..3 (rows), in powers of y = x^2.
+
+    They belong to (1) the factor of erf(x)/x, falling from y^0, (2) the factor of exp(-y), from y^-3 to y^2, and (3)
+    the power series of the whole, rising from y^0.
 
     Lap^k (erf(x)/x) = (d_k y^-k) erf(x)/x - exp(-y) g_k(y) with Laurent polynomials g_k. In the plane
-    Lap y^j = 4 j^2 y^(j-1), from which d_(k+1) = (2k+1)^2 d_k, and with 2/sqrt(pi) exp(-y) the derivative of erf
-    the recurrence for g_k below.
+    Lap y^j = 4 j^2 y^(j-1), from which d_(k+1) = (2k+1)^2 d_k; with 2/sqrt(pi) exp(-y), the derivative of erf, the
+    recurrence for g_k below follows.
     """
     multipole = np.zeros((_MOMENTS, _MOMENTS))
     gauss = np.zeros((_MOMENTS, 2 * _MOMENTS - 2))
@@ -263,10 +276,13 @@ _SMOOTH_HALF = _smooth_half_table()
 
 @dataclass(frozen=True, eq=False)
 class Windows:
-    """Strips of nodes: parts of rows within reach of a spot.
+    """Strips of nodes: parts of rows within reach of spots.
 
-    spot : (m,) index of the spot. dy : (m,), dx : (m, n) way from its centre to the nodes, m. node : (m, n) index of
-    the nodes in the flattened block of rows.
+    Attributes
+    ----------
+    spot : (m,) int, index of the spot.
+    dy : (m,) float, dx : (m, n) float, distance from the centre of the spot to the nodes, m.
+    node : (m, n) int, index of the nodes in the flattened block of rows.
     """
 
     spot: np.ndarray
@@ -276,16 +292,16 @@ class Windows:
 
 
 def windows(centres, reach: float, grid: int, period: float, rows: slice):
-    """Yield the nodes of a range of rows less than `reach` (m) from each of the centres (m, 2) in x and in y.
+    """Yield the nodes of a range of rows within `reach` (m) of each of the centres (m, 2), in x and in y.
 
-    Nodes that are a little farther are among them, but none twice for one centre.
+    Some nodes are a little farther away; no node occurs twice for one centre.
     """
     spacing = period / grid
     ahead = int(reach / spacing) + 1
     width = min(2 * ahead + 1, grid)
     ahead = min(ahead, grid // 2)
     count = rows.stop - rows.start
-    # In cells; first row and column of every window, not yet brought into the cell.
+    # First row and column of every window, before periodic wrapping.
     first = np.rint(centres / spacing).astype(int) - ahead
     lag = np.mod(rows.start - first[:, 1], grid)
     meeting = np.flatnonzero((lag < width) | (lag + count > grid))

@@ -1,10 +1,10 @@
-"""Elastic interaction of contact spots: the displacement at every one by all others and all images, eq. (4)'s sum.
+"""Elastic interaction of contact spots: the displacement at each by all others and all images, the sum of eq. (4).
 
-A spot is not a point. Within eight of its radii its exact displacement is taken; farther away an axisymmetric pressure
-acts by its moments, integral of p s^(2k) (k = 0, 1, 2) with the weights 1, 1/4, 9/64, whose fields fall as 1/r, 1/r^3
-and 1/r^5. The third is only needed where the field is summed pairwise. Images farther than half the cell act by the
-first two. What depends on the positions alone, nearly everything, is computed once (`icha.half_space.ewald`); only the
-windows of exact displacement follow the radii.
+A spot is not a point. Within eight of its radii its exact displacement is used. Farther away its axisymmetric pressure
+acts by its moments, the integrals of p s^(2k) (k = 0, 1, 2) with the weights 1, 1/4 and 9/64, whose fields fall as 1/r,
+1/r^3 and 1/r^5. The third one matters only where the field is summed pairwise. Images farther than half the cell act by
+the first two. What depends on the positions alone is computed once (`icha.half_space.ewald`); this is nearly
+everything. Only the pairs with exact displacement follow the radii.
 """
 
 from __future__ import annotations
@@ -14,159 +14,169 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from icha.asperity.law import SpotLaw
+from icha.asperity.jkr import JKR
 from icha.half_space.ewald import NEIGHBOURS_ONCE, Ewald, HalfSpace
 
-# Radii of a spot within which its displacement is exact, and beyond which force and second moment suffice: in both
-# cases the remainder is below 1e-6 of the spot's displacement at the place, and below 1e-7 of its own approach.
+# Distances, in radii of a spot, within which its displacement is exact, and beyond which force and second moment
+# suffice. In both cases the remainder is below 1e-6 of the spot's displacement there, and below 1e-7 of its approach.
 _WINDOW = 8.0
 _WINDOW_OF_MOMENTS = 16.0
 
 
-def _pairs_beyond(tree, position, radius, ewald):
-    """Pairs (target, source, distance) beyond the near field at which large spots still act exactly.
+def _find_distant_pairs(tree, position, radius, ewald):
+    """Return (target, source, distance) of the pairs beyond the near field at which large spots act exactly.
 
-    tree: of the targets.
+    tree : of the targets; position (m, 2), radius (m,): centres and contact radii of the sources, m.
     """
     reach = np.minimum(_WINDOW_OF_MOMENTS * radius, 0.5 * ewald.period)
     wide = np.flatnonzero(reach > ewald.reach)
     found = [np.empty(0, dtype=[("i", np.intp), ("j", np.intp), ("v", float)])]
-    if len(wide):
-        octave = np.floor(np.log2(reach[wide] / ewald.reach))
-        for one in np.unique(octave):
-            group = wide[octave == one]
-            spots = cKDTree(position[group], boxsize=ewald.period)
-            pairs = tree.sparse_distance_matrix(spots, np.max(reach[group]), output_type="ndarray")
-            pairs["j"] = group[pairs["j"]]
-            found.append(pairs[(pairs["v"] > ewald.reach) & (pairs["v"] <= reach[pairs["j"]])])
+    octave = np.floor(np.log2(reach[wide] / ewald.reach))
+    for each in np.unique(octave):
+        group = wide[octave == each]
+        spots = cKDTree(position[group], boxsize=ewald.period)
+        pairs = tree.sparse_distance_matrix(spots, np.max(reach[group]), output_type="ndarray")
+        pairs["j"] = group[pairs["j"]]
+        found.append(pairs[(pairs["v"] > ewald.reach) & (pairs["v"] <= reach[pairs["j"]])])
     found = np.concatenate(found)
     return found["i"], found["j"], found["v"]
 
 
-@dataclass(frozen=True, eq=False)
-class NearPairs:
-    """The pairs at which a spot acts with its exact displacement, for spots up to given radii.
-
-    target, source: (k,) indices of points; r: (k,) distances, m. largest_radius: (n,) up to which they suffice, m.
-    replaced: the displacement by unit moments that is replaced there, three (k,).
-    """
-
-    target: np.ndarray
-    source: np.ndarray
-    r: np.ndarray
-    largest_radius: np.ndarray
-    replaced: tuple
-
-    @classmethod
-    def around(cls, half_space: HalfSpace, radius) -> NearPairs:
-        """Pairs for spots of up to `radius` (n,) at the half-space's points; none where it is zero."""
-        ewald = half_space.ewald
-        later, earlier, r = half_space.pairs
-        window = np.where(radius > 0, np.maximum(_WINDOW * radius, ewald.floor), -1.0)
-        close = np.flatnonzero(r <= np.max(window, initial=0.0))
-        later, earlier, r = later[close], earlier[close], r[close]
-        by_earlier, by_later = r <= window[earlier], r <= window[later]
-        far = _pairs_beyond(half_space.tree, half_space.points, radius, ewald)
-        r = np.concatenate([r[by_earlier], r[by_later], far[2]])
-        return cls(
-            np.concatenate([later[by_earlier], earlier[by_later], far[0]]),
-            np.concatenate([earlier[by_earlier], later[by_later], far[1]]),
-            r,
-            radius,
-            ewald.replaced(r),
-        )
+def _exact_window(a, ewald):
+    """Return the distance within which the displacement of each spot is exact, m; -1 for spots of radius zero."""
+    return np.where(a > 0, np.maximum(_WINDOW * a, ewald.floor), -1.0)
 
 
 @dataclass(frozen=True, eq=False)
 class Interaction:
-    """Displacement of the half-space at contact spots by all other spots and all images: eq. (4)'s sum.
+    """Displacement of the half-space at n contact spots by all other spots and all images.
 
-    Parameters
+    Attributes
     ----------
-    law : the law of one spot.
-    half_space : with a point at every spot.
-    radius_of_curvature : (n,) R of the spots, m.
-    pairs : at which a spot acts with its exact displacement.
+    law : law of one spot.
+    half_space : half-space with a point at every spot.
+    radius_of_curvature : (n,) float, m.
+    largest_radius : (n,) float, contact radii up to which the exact pairs suffice, m.
+    target, source : (k,) int, pairs of spots at which the source acts by its exact displacement.
+    r : (k,) float, distances of these pairs, m.
+    replaced : three (k,) arrays, displacement by unit moments, which the exact displacement replaces there.
     """
 
-    law: SpotLaw
+    law: JKR
     half_space: HalfSpace
     radius_of_curvature: np.ndarray
-    pairs: NearPairs
+    largest_radius: np.ndarray
+    target: np.ndarray
+    source: np.ndarray
+    r: np.ndarray
+    replaced: tuple
 
     @classmethod
-    def between(cls, law: SpotLaw, half_space: HalfSpace, radius_of_curvature, largest_radius) -> Interaction:
-        """With pairs for contact radii up to `largest_radius` (n,), m; none where it is zero."""
-        return cls(law, half_space, radius_of_curvature, NearPairs.around(half_space, largest_radius))
+    def between(cls, law: JKR, half_space: HalfSpace, radius_of_curvature, largest_radius) -> Interaction:
+        """Find the exact pairs for contact radii up to `largest_radius` (n,), m; zero for spots without any."""
+        ewald = half_space.ewald
+        later, earlier, r = half_space.pairs
+        window = _exact_window(largest_radius, ewald)
+        close = np.flatnonzero(r <= np.max(window, initial=0.0))
+        later, earlier, r = later[close], earlier[close], r[close]
+        by_earlier, by_later = r <= window[earlier], r <= window[later]
+        distant = _find_distant_pairs(half_space.tree, half_space.points, largest_radius, ewald)
+        r = np.concatenate([r[by_earlier], r[by_later], distant[2]])
+        return cls(
+            law,
+            half_space,
+            radius_of_curvature,
+            largest_radius,
+            np.concatenate([later[by_earlier], earlier[by_later], distant[0]]),
+            np.concatenate([earlier[by_earlier], later[by_later], distant[1]]),
+            r,
+            ewald.replaced(r),
+        )
 
     def displacement(self, a):
-        """Displacement w at the spots, m, for contact radii a (n,), each without its own (but with its images')."""
-        law, R, pairs = self.law, self.radius_of_curvature, self.pairs
+        """Return the displacement w (n,) at the spots for contact radii a (n,), m.
+
+        A spot's own displacement is left out, that of its images is included.
+        """
+        law, R, j = self.law, self.radius_of_curvature, self.source
         moments = law.force(a, R), law.second_moment(a, R), law.fourth_moment(a, R)
-        j, r = pairs.source, pairs.r
-        exact = law.displacement(r, a[j], R[j])
-        for moment, replaced in zip(moments, pairs.replaced, strict=True):
+        exact = law.displacement(self.r, a[j], R[j])
+        for moment, replaced in zip(moments, self.replaced, strict=True):
             exact -= moment[j] * replaced
-        return self.half_space.displacement(*moments) + np.bincount(pairs.target, exact, len(a))
+        return self.half_space.displacement(*moments) + np.bincount(self.target, exact, len(a))
 
     def tangent(self, a) -> Tangent:
-        """The linear map from changes of the contact radii a (n,), m, to changes of `displacement`.
+        """Return the linear map from changes of the contact radii to changes of the displacement, at radii a (n,), m.
 
-        Spots of zero radius have none: their change does not count.
+        A change of a spot of radius zero does not count.
         """
-        law, R, pairs = self.law, self.radius_of_curvature, self.pairs
-        there = a > 0
-        safe = np.where(there, a, 1.0)
+        law, R = self.law, self.radius_of_curvature
+        present = a > 0
+        safe = np.where(present, a, 1.0)
         moments = [
-            np.where(there, derivative(safe, R), 0.0)
+            np.where(present, derivative(safe, R), 0.0)
             for derivative in (law.force_derivative, law.second_moment_derivative, law.fourth_moment_derivative)
         ]
-        counts = np.flatnonzero(there[pairs.source])
-        j, r, target = pairs.source[counts], pairs.r[counts], pairs.target[counts]
+        counts = np.flatnonzero(present[self.source])
+        j, r, target = self.source[counts], self.r[counts], self.target[counts]
         exact = law.displacement_derivative(r, a[j], R[j])
-        fields = [moment[j] * replaced[counts] for moment, replaced in zip(moments, pairs.replaced, strict=True)]
-        nearly = exact - fields[0]
-        near = nearly - fields[1] - fields[2]
-        return Tangent(self.half_space, tuple(moments), target, j, near, nearly)
+        fields = [moment[j] * replaced[counts] for moment, replaced in zip(moments, self.replaced, strict=True)]
+        by_forces = exact - fields[0]
+        by_moments = by_forces - fields[1] - fields[2]
+        return Tangent(self.half_space, tuple(moments), target, j, by_moments, by_forces)
 
 
 @dataclass(frozen=True, eq=False)
 class Tangent:
-    """Derivative of the interaction with respect to the contact radii, as a linear operator."""
+    """Derivative of the displacement of an `Interaction` with respect to the contact radii, as a linear operator.
+
+    Attributes
+    ----------
+    half_space : half-space with n points.
+    moments : three (n,) arrays, derivatives of force, second and fourth moment.
+    target, source : (k,) int, pairs at which a correction is added.
+    by_moments : (k,) float, exact derivative less that of all three moments' fields.
+    by_forces : (k,) float, exact derivative less that of the forces' field.
+    """
 
     half_space: HalfSpace
     moments: tuple
     target: np.ndarray
     source: np.ndarray
-    near: np.ndarray
-    near_of_forces: np.ndarray
+    by_moments: np.ndarray
+    by_forces: np.ndarray
 
     def __call__(self, da):
-        """Change of displacement (n,) in m for changes `da` (n,) of the contact radii."""
+        """Return the change of the displacement for changes of the contact radii, both (n,), m."""
         w = self.half_space.displacement(*(m * da for m in self.moments))
-        return w + np.bincount(self.target, self.near * da[self.source], len(da))
+        return w + np.bincount(self.target, self.by_moments * da[self.source], len(da))
 
-    def nearly(self, da):
-        """The same to a thousandth, several times faster."""
-        w = self.half_space.nearly(self.moments[0] * da)
-        return w + np.bincount(self.target, self.near_of_forces * da[self.source], len(da))
+    def approximate(self, da):
+        """Return the same to a thousandth, several times faster."""
+        w = self.half_space.approximate_displacement(self.moments[0] * da)
+        return w + np.bincount(self.target, self.by_forces * da[self.source], len(da))
 
 
 def displacement_at(
-    law: SpotLaw, period: float, points, position, a, R, ewald: Ewald | None = None, *, free: bool = False
+    law: JKR, period: float, points, position, a, R, ewald: Ewald | None = None, *, free: bool = False
 ) -> np.ndarray:
-    """Displacement w (n,) in m at any points (n, 2) by spots, eq. (9)'s sum.
+    """Return the displacement w (n,) at any points by spots, the sum of eq. (9), m.
 
-    It is periodic and of zero mean; or, on a free half-space, the plain sum at points of the same square as the spots.
+    It is periodic and has zero mean; on a free half-space it is the plain sum at points of the same square. Inside a
+    spot its own part is the displacement under its contact.
 
-    position (m, 2), a and R (m,): centres, contact radii and radii of curvature of the spots, m. Inside a spot its own
-    part is the displacement under its contact. ewald: how to split the sum (then period and free are its own); None: as
-    suits the number of spots.
+    Parameters
+    ----------
+    period : side of the square, m.
+    points : (n, 2) float, m.
+    position : (m, 2) float, centres of the spots, m.
+    a, R : (m,) float, contact radii and radii of curvature, m.
+    ewald : split of the sum, which then defines period and free; None chooses one for the number of spots.
+    free : whether the square is single.
     """
-    w = np.zeros(len(points))
     if not len(points) or not len(a):
-        return w
-    ewald = ewald or Ewald.of(period, law.material.contact_modulus, len(a), NEIGHBOURS_ONCE, free)
+        return np.zeros(len(points))
+    ewald = ewald or Ewald.choose(period, law.material.contact_modulus, len(a), NEIGHBOURS_ONCE, free)
     period = ewald.period
     points, position = np.mod(points, period), np.mod(position, period)
     moments = law.force(a, R), law.second_moment(a, R), law.fourth_moment(a, R)
@@ -175,10 +185,9 @@ def displacement_at(
     target, source, r = pairs["i"], pairs["j"], pairs["v"]
     near = sum(kernel * moment[source] for kernel, moment in zip(ewald.kernels(r), moments, strict=True))
     w = np.bincount(target, near, len(points)).astype(float)
-    window = np.where(a > 0, np.maximum(_WINDOW * a, ewald.floor), -1.0)
-    close = np.flatnonzero(r <= window[source])
-    far = _pairs_beyond(tree, position, a, ewald)
-    target, source, r = (np.append(one[close], other) for one, other in zip((target, source, r), far, strict=True))
+    close = np.flatnonzero(r <= _exact_window(a, ewald)[source])
+    distant = _find_distant_pairs(tree, position, a, ewald)
+    target, source, r = (np.append(x[close], y) for x, y in zip((target, source, r), distant, strict=True))
     exact = law.displacement(r, a[source], R[source])
     for moment, replaced in zip(moments, ewald.replaced(r), strict=True):
         exact -= moment[source] * replaced
@@ -186,5 +195,5 @@ def displacement_at(
     w += ewald.smooth(position, points, *moments[:2])
     w -= ewald.mean * np.sum(moments[0])
     if ewald.free:
-        w -= ewald.by_images(ewald.bases(position), ewald.bases(points), moments[:2])
+        w -= ewald.image_displacement(ewald.bases(position), ewald.bases(points), moments[:2])
     return w

@@ -1,10 +1,8 @@
-"""The energy balance of a path, its waypoints, and the hysteresis of a whole cycle.
+"""Energy balance of a path: the work of every step, what is stored of it, and what is lost in jumps and unions.
 
-A part of the work done on a contact is stored, the rest is lost in jumps.
-
-Between two events the stored energy changes by the work done. An event, at a given separation, changes the energy at
-once; what it sets free is lost. Over a closed path the losses of all events make up the area of the loop, the integral
-of p over u.
+Between two events the stored energy changes by the work done. An event changes the stored energy at constant
+separation, and the energy that it releases is lost. Over a closed path the losses of all events add up to the area of
+the hysteresis loop, the integral of p over u.
 """
 
 from __future__ import annotations
@@ -20,47 +18,53 @@ from icha.path.targets import BETWEEN, Target
 
 
 def pressure_jump(width, change, slope, end_slope):
-    """By how much a change of the pressure over a step misses that along the tangents at its ends, Pa."""
+    """Return the part of a change of pressure that the tangents at both ends of the step do not explain, Pa."""
     return change - 0.5 * width * (slope + end_slope)
 
 
 def unresolved_work(width, pressure_jump):
-    """Bound of the error of the work of a step with events: they may all lie at either of its ends, J/m^2."""
+    """Bound the error of the work of a step whose events may happen anywhere in it, J/m^2."""
     return 0.5 * abs(width * pressure_jump)
 
 
 def integration_error(width, slope, end_slope):
-    """Bound of the error of the work of a step where it is smooth, J/m^2."""
+    """Bound the error of the work of a step without events, J/m^2."""
     return width**2 * abs(end_slope - slope) / 24
 
 
-# Of the work of a step, the part from which on its loss is that of its jumps, and not what is not reciprocal.
-_PLAIN_LOSS = 0.1
+# A loss of more than this part of the work of its step is a loss by jumps, not an error of the model's interaction.
+_CERTAIN_LOSS = 0.1
 
 
 @dataclass(frozen=True)
 class Step:
-    """From one equilibrium of a path to the next: work, change of energy and events.
+    """Change from one equilibrium of a path to the next.
 
-    width: change of the mean separation, m. work: done on the contact, -(integral of p du), J/m^2. gained: stored
-    energy, J/m^2. pressure_jump: by which events changed the pressure, Pa. integration_error: bound of the error
-    of the integral where it is smooth, J/m^2. sudden: whether there are events that may change the pressure.
+    Attributes
+    ----------
+    width : change of the mean separation, m.
+    work : work done on the contact, -(integral of p du), J/m^2.
+    stored : change of the stored energy, J/m^2.
+    pressure_jump : change of the pressure by events, Pa.
+    integration_error : bound of the error of the work without events, J/m^2.
+    has_jump : whether there are events that may change the pressure.
+    events : events of the step.
     """
 
     width: float
     work: float
-    gained: float
+    stored: float
     pressure_jump: float
     integration_error: float
-    sudden: bool
+    has_jump: bool
     events: Events
 
     @classmethod
     def between(cls, contact: ContactModel, before: State, after: State) -> Step:
-        """The step from one state to the next.
+        """Evaluate the step from one state to the next.
 
-        The integral is that of the cubic with the pressures and stiffnesses at both ends; jumps are taken to happen
-        half way.
+        The pressure is integrated as the cubic with the pressures and stiffnesses at both ends; jumps count as if they
+        happened in the middle of the step.
         """
         events = contact.events_between(before, after)
         width = after.separation - before.separation
@@ -71,39 +75,44 @@ class Step:
         return cls(
             width=width,
             work=-(0.5 * width * (p + q) + width**2 * (slope - end_slope) / 12),
-            gained=contact.stored_energy(after) - contact.stored_energy(before),
+            stored=contact.stored_energy(after) - contact.stored_energy(before),
             pressure_jump=pressure_jump(width, q - p, slope, end_slope) if jumps else 0.0,
             integration_error=integration_error(width, slope, end_slope),
-            sudden=bool(jumps),
+            has_jump=bool(jumps),
             events=events,
         )
 
     @property
-    def unites(self) -> bool:
-        """Whether spots have united or unions have been undone."""
+    def has_union(self) -> bool:
+        """Whether spots have coalesced or split."""
         return self.events.count(COALESCENCE) + self.events.count(SPLIT) > 0
 
     @property
-    def lost(self) -> float:
+    def loss(self) -> float:
         """Work that is not stored, J/m^2."""
-        return self.work - self.gained
-
-    def set_free(self, contact: ContactModel) -> float:
-        """Energy that the jumps of the step set free, as if every spot were alone, J/m^2."""
-        return float(np.abs(self.events.energy).sum()) / contact.area
+        return self.work - self.stored
 
     @property
     def unresolved(self) -> float:
-        """Bound of the error of the work, since it is not known where in the step its events happen, J/m^2."""
+        """Bound of the error of the work because events may happen anywhere in the step, J/m^2."""
         return unresolved_work(self.width, self.pressure_jump)
+
+    def jump_energy(self, contact: ContactModel) -> float:
+        """Return the energy that the jumps release, each as if its spot were alone, J/m^2."""
+        return float(np.abs(self.events.energy).sum()) / contact.area
 
 
 @dataclass(frozen=True)
 class EnergyBalance:
-    """Work done on a contact since first contact and what has been lost of it, by the kind of event, J/m^2.
+    """Work done on a contact since first contact, and its losses by kind of event, all J/m^2.
 
-    unattributed: lost without an event, or beside what jumps lose: errors of the integration, and what is not
-    reciprocal in a model's interaction.
+    Attributes
+    ----------
+    work : work done on the contact.
+    jump_in, jump_off : losses by jumps into and out of contact.
+    coalescence : loss by unions of spots and by their splitting.
+    load_jump : loss by jumps at constant load, under load control.
+    unattributed : all other losses: errors of the integration, and what is not reciprocal in the interaction.
     """
 
     work: float = 0.0
@@ -114,29 +123,29 @@ class EnergyBalance:
     unattributed: float = 0.0
 
     @property
-    def lost(self) -> float:
+    def loss(self) -> float:
         """Sum of all losses, J/m^2."""
         return self.jump_in + self.jump_off + self.coalescence + self.load_jump + self.unattributed
 
-    def after(self, contact: ContactModel, step: Step) -> EnergyBalance:
-        """The balance after one more step.
+    def add_step(self, contact: ContactModel, step: Step) -> EnergyBalance:
+        """Return the balance after one more step.
 
-        A step whose only events are jumps has lost its energy in them, if this is about what they would lose if their
-        spots were alone, or if it is not small compared with the work; both kinds of jumps share it as if every spot
-        were alone. Otherwise, where spots also united, and where one kind of jump gains what the other loses, jumps
-        have lost just what their spots would lose alone. The rest belongs to unions and their undoing, where there were
-        any, and is otherwise unattributed.
+        A step without unions loses its energy in its jumps if this loss is within a factor of two of what the same
+        spots would lose alone, or if it is not small compared with the work. Both kinds of jumps then share it in
+        proportion to what they would lose alone. In all other steps jumps lose exactly what their spots would lose
+        alone; this includes steps in which one kind of jump gains energy and the other loses it. The rest is a loss by
+        coalescence if there were unions, and else unattributed.
         """
-        events, united = step.events, step.unites
+        events, united = step.events, step.has_union
         jump_in, jump_off = (
             float(events.energy[events.kind == kind].sum()) / contact.area for kind in (JUMP_IN, JUMP_OFF)
         )
-        ratio = step.lost / ((jump_in + jump_off) or np.inf)
-        plain = 0.5 < ratio < 2 or abs(step.lost) > _PLAIN_LOSS * abs(step.work)
-        if not united and ratio and plain and jump_in * jump_off >= 0:
-            scale = step.lost / (jump_in + jump_off)
+        ratio = step.loss / ((jump_in + jump_off) or np.inf)
+        certain = 0.5 < ratio < 2 or abs(step.loss) > _CERTAIN_LOSS * abs(step.work)
+        if not united and ratio and certain and jump_in * jump_off >= 0:
+            scale = step.loss / (jump_in + jump_off)
             jump_in, jump_off = scale * jump_in, scale * jump_off
-        rest = step.lost - jump_in - jump_off
+        rest = step.loss - jump_in - jump_off
         return replace(
             self,
             work=self.work + step.work,
@@ -146,16 +155,24 @@ class EnergyBalance:
             unattributed=self.unattributed + (0.0 if united else rest),
         )
 
-    def after_load_jump(self, work: float, gained: float) -> EnergyBalance:
-        """The balance after a jump under load control, in which a constant pressure does work."""
-        return replace(self, work=self.work + work, load_jump=self.load_jump + work - gained)
+    def add_load_jump(self, contact: ContactModel, before: State, after: State, pressure: float) -> EnergyBalance:
+        """Return the balance after a jump at a constant pressure, Pa, which does work."""
+        work = -pressure * (after.separation - before.separation)
+        stored = contact.stored_energy(after) - contact.stored_energy(before)
+        return replace(self, work=self.work + work, load_jump=self.load_jump + work - stored)
 
 
 @dataclass(frozen=True, eq=False)
 class Waypoint:
-    """An equilibrium on a path: what it was asked to reach, and on which leg (0 the first loading, 1 back, …).
+    """Equilibrium on a path.
 
-    step: to it from the waypoint before, and balance: of the energy, on a cyclic path.
+    Attributes
+    ----------
+    target : target that it meets; of the kind BETWEEN if it lies between two targets.
+    state : state of the contact.
+    leg : number of the leg of the path: 0 for the first loading, 1 for the first unloading, and so on.
+    step : step from the waypoint before, on a cyclic path.
+    balance : energy balance, on a cyclic path.
     """
 
     target: Target
@@ -166,39 +183,39 @@ class Waypoint:
 
     @property
     def loading(self) -> bool:
-        """Whether the surfaces are being pressed together."""
+        """Whether the surfaces approach each other."""
         return self.leg % 2 == 0
 
 
-def between_stops(state: State, leg: int, step: Step | None = None) -> Waypoint:
-    """The waypoint of an equilibrium between the stops."""
+def waypoint_between(state: State, leg: int, step: Step | None = None) -> Waypoint:
+    """Return the waypoint of an equilibrium between two targets."""
     return Waypoint(Target(BETWEEN, state.separation), state, leg, step)
 
 
 _LOSSES = ("by_jump_in", "by_jump_off", "by_coalescence", "by_load_jump")
 
 
-def hysteresis(
+def summarise_loop(
     steps: Sequence[Mapping[str, float]],
     pull_off: int,
     material: Material,
     largest_tension: float,
     unattributed: float,
 ) -> dict[str, float]:
-    """Pull-off, detachment and losses, by the names of their variables.
+    """Return pull-off, detachment and losses of a closed loop, by the names of their variables.
 
     Parameters
     ----------
-    steps : the path's equilibria in order, each with pressure, separation, area and energies by their names.
-    pull_off : which of them has the largest tension of the last unloading.
+    steps : equilibria of the path in order, each with pressure, separation, area and energies by their names.
+    pull_off : index of the step with the largest tension of the last unloading.
     material : half-space and interface.
-    largest_tension : Pa, of all asperities at once.
-    unattributed : what is in no class of losses, J/m^2.
+    largest_tension : tension of all summits pulling their most at once, Pa.
+    unattributed : loss that belongs to no kind of event, J/m^2.
     """
     last, adhesive = steps[-1], material.surface_energy > 0
     touching = steps[max((k for k, step in enumerate(steps) if step["spot_count"]), default=0)]
     tension = max(0.0, -steps[pull_off]["nominal_pressure"])
-    # Nothing is stored at either end.
+    # No energy is stored at either end of the loop.
     loss = last["work"]
     losses = {f"loss_{name}": last[f"dissipated_{name}"] for name in _LOSSES}
     strength = 16 / (9 * np.sqrt(3)) * material.surface_energy / material.interaction_range

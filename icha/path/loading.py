@@ -1,90 +1,104 @@
-"""The first loading alone, from stop to stop, straight to the next one where that is near; and how far a path is."""
+"""First loading from target to target, and the record of how far a path has come."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from icha.contact.model import ContactModel, NotConverged, State
 from icha.path.energy_balance import Waypoint
-from icha.path.stops import SAME_EXCESS, SAME_SEPARATION, InsideJump, Queue, Stop, first_passed
+from icha.path.stops import SAME_EXCESS, SAME_SEPARATION, InsideJump, PendingTargets, TargetFunction, find_first_target
 from icha.path.targets import Target
 
-# A step that does not converge is halved down to this fraction of the longest one.
+# Shortest step after halvings, relative to the longest step.
 _SMALLEST_STEP = 2.0**-14
-# So many equilibria within a longest step, without a stop, and a path makes no progress.
+# Largest number of equilibria within a longest step and without a target: a path with more of them makes no progress.
 _MOST_EQUILIBRIA = 2000
 
 
-@dataclass(frozen=True, eq=False)
-class Course:
-    """Stops met so far, of how many; those that were missed, as they lie inside jumps.
+@dataclass(eq=False)
+class PathProgress:
+    """Record of how far a path has come; raises the error of a path that cannot continue.
 
-    longest: step of the separation, m. idle: equilibria since the last stop or since the separation `mark`, m, from
-    which the path has not come a longest step yet.
+    Attributes
+    ----------
+    contact : contact that the path follows.
+    total : number of targets of the first loading.
+    longest : longest step of the separation, m.
+    report : function that is called with a line of text at every target; None without one.
+    reached : number of targets met so far.
+    skipped : errors of the targets that lie inside jumps.
+    mark : separation from which equilibria are counted, m.
+    idle : number of equilibria since the last target, or since the separation `mark`, within a longest step.
     """
 
     contact: ContactModel
     total: int
     longest: float
-    progress: Callable[[str], None] | None = None
+    report: Callable[[str], None] | None = None
     reached: int = 0
-    missed: tuple[InsideJump, ...] = ()
+    skipped: list[InsideJump] = field(default_factory=list)
     mark: float = np.inf
     idle: int = 0
 
-    def after(self, state: State, loading: bool) -> Course:
-        """After one more equilibrium; refuses to go on where the path makes no progress."""
+    def record_equilibrium(self, state: State, loading: bool) -> None:
+        """Count one more equilibrium; raise `NotConverged` if the path makes no progress."""
         if abs(state.separation - self.mark) >= self.longest:
-            return replace(self, mark=state.separation, idle=0)
+            self.mark, self.idle = state.separation, 0
+            return
         if self.idle == _MOST_EQUILIBRIA:
             within = f"{self.longest / self.contact.rms_height:.3g} h_rms"
-            raise self.ended(state, loading, NotConverged(f"no progress: {self.idle} equilibria within {within}"))
-        return replace(self, idle=self.idle + 1)
+            raise self.path_error(state, loading, NotConverged(f"no progress: {self.idle} equilibria within {within}"))
+        self.idle += 1
 
-    def met(self, target: Target, state: State) -> Course:
-        """After one more stop."""
-        after = replace(self, reached=self.reached + 1, idle=0)
-        after.tell(f"stop {after.reached} of {self.total}: {target.named(6)}", state)
-        return after
+    def record_target(self, target: Target, state: State) -> None:
+        """Count and report one more target."""
+        self.reached, self.idle = self.reached + 1, 0
+        self.report_position(f"stop {self.reached} of {self.total}: {target.describe(6)}", state)
 
-    def without(self, jump: InsideJump) -> Course:
-        """After a stop that is left out."""
-        return replace(self, missed=(*self.missed, jump))
-
-    def tell(self, name: str, state: State) -> None:
-        """Tell where the path is."""
-        if self.progress is not None:
+    def report_position(self, name: str, state: State) -> None:
+        """Report the separation, contact area and number of spots of a state."""
+        if self.report is not None:
             contact = self.contact
-            self.progress(
+            self.report(
                 f"{name}, separation {state.separation / contact.rms_height:.4f} h_rms, "
                 f"A/A0 {contact.area_fraction(state):.4e}, {contact.spot_count(state)} spots"
             )
 
-    def require_covered(self, before: State, after: State, stop: Stop | None, waiting: Queue, loading: bool) -> None:
-        """Refuse a state that the model does not cover, at a stop or before stops that are still to come."""
+    def require_validity(
+        self, before: State, after: State, target: TargetFunction | None, pending: PendingTargets, loading: bool
+    ) -> None:
+        """Raise `NotConverged` if the model does not cover the state after a step.
+
+        target : the target that the state meets, if there is one; pending : targets that are still to be met.
+        """
         contact = self.contact
-        what = (stop or waiting.foremost[0]).target.named() if stop or waiting else "separation"
+        ahead = [target] if target else pending.next_of_each_kind
+        name = ahead[0].target.describe() if ahead else "separation"
         area = contact.area_fraction(after)
         if area > contact.largest_area_fraction:
-            reason = f"the contact area runs to {area:.2f} of the nominal one, beyond what the model covers,"
-            raise self.ended(before, loading, NotConverged(f"{reason} before {what}"))
-        if stop is None and contact.mean_gap(after) <= 0:
-            reason = f"the mean planes met before {what}, beyond what the model covers"
-            raise self.ended(after, loading, NotConverged(reason))
+            reason = f"the contact area grows to {area:.2f} of the nominal area, outside the range of the model,"
+            raise self.path_error(before, loading, NotConverged(f"{reason} before {name}"))
+        if target is None and contact.mean_gap(after) <= 0:
+            reason = f"the mean planes meet before {name}, outside the range of the model"
+            raise self.path_error(after, loading, NotConverged(reason))
 
-    def ended(self, state: State, loading: bool, *failures: NotConverged) -> NotConverged:
-        """Where the path ended and why; says so if the surfaces stick together by themselves."""
-        contact, failures = self.contact, (*self.missed, *failures)
+    def halve(self, step: float, failure: NotConverged, state: State, loading: bool) -> float:
+        """Return half the step after a failed solve; raise the error of the path if shorter steps do not help."""
+        if step / 2 < _SMALLEST_STEP * self.longest:
+            raise self.path_error(state, loading, failure) from failure
+        return step / 2
+
+    def path_error(self, state: State, loading: bool, *failures: NotConverged) -> NotConverged:
+        """Return the error of a path that ends in a state; it names surfaces that stick together by adhesion."""
+        contact, failures = self.contact, (*self.skipped, *failures)
         sticky = ""
-        # Without a load, adhesion alone has spread the contact, or the very first one does not come to rest.
-        lone = contact.spot_count(state) == 0 and not any(isinstance(failure, InsideJump) for failure in failures)
-        if contact.adhesive and loading and (contact.pressure(state) < 0 or lone):
-            sticky = (
-                "; the load is not yet compressive: the surface is sticky, adhesion is pulling it towards full contact"
-            )
+        # Adhesion alone has spread the contact, or prevents the first equilibrium.
+        no_equilibrium = contact.spot_count(state) == 0 and not any(isinstance(each, InsideJump) for each in failures)
+        if contact.adhesive and loading and (contact.pressure(state) < 0 or no_equilibrium):
+            sticky = "; the load is still tensile: the surface is sticky, adhesion pulls it towards full contact"
         return NotConverged(
             f"at a mean separation of {state.separation / contact.rms_height:.4f} h_rms, "
             f"A/A0 = {contact.area_fraction(state):.3g}, after {self.reached} of {self.total} stops: "
@@ -92,88 +106,89 @@ class Course:
         )
 
 
-def halved(step: float, longest: float, failure: NotConverged) -> float:
-    """Half the step, after an equilibrium was not found; raises the failure where no shorter step helps."""
-    if step / 2 < _SMALLEST_STEP * longest:
-        raise failure
-    return step / 2
-
-
-# How often a stop is gone to straight; and how much of a way that was too long is gone first, so that less is left, if
-# that is no short one, in longest steps.
-_TRIALS, _FIRST_PART, _LONG = 2, 0.6, 0.1
-# How many equilibria after one that was not found steps become longer again: what was too long once mostly is again.
+# Number of attempts to reach a target in one step.
+_TRIALS = 2
+# A step to a target that failed is shortened to this part if it is long, that is longer than `_LONG` longest steps.
+_FIRST_PART, _LONG = 0.6, 0.1
+# Number of equilibria after a failed step until steps become longer again: a step that failed usually fails again.
 _PATIENCE = 8
 
 
-def first_loading(contact: ContactModel, stops: list[Stop], longest: float, course: Course) -> Iterator[Waypoint]:
-    """The stops of a path that ends with the first loading; longest: step of the separation, m.
+def first_loading(
+    contact: ContactModel, targets: list[TargetFunction], longest: float, progress: PathProgress
+) -> Iterator[Waypoint]:
+    """Yield the targets of a path that ends with the first loading.
+
+    A target that is expected within a step is solved for at once; else the separation falls by a step.
+
+    Parameters
+    ----------
+    longest : longest step of the separation, m.
 
     Raises
     ------
     NotConverged
-        As `icha.path.follow.follow`.
+        As in `icha.path.follow.follow`.
     """
     state = first_contact = contact.untouched()
-    waiting, step, missed, found = Queue(stops, -1), longest, 0, 0
-    stop: Stop | None
-    while waiting:
+    pending, step, failed_trials, found = PendingTargets(targets, -1), longest, 0, 0
+    target: TargetFunction | None
+    while pending:
         if contact.spot_count(state) == 0 and state.separation > first_contact.separation:
-            state = first_contact  # nothing happens on the way there
-        nearest, expected = _nearest(waiting.foremost, state)
-        way = state.separation - expected
+            state = first_contact  # nothing happens above it
+        nearest, expected = _nearest_target(pending.next_of_each_kind, state)
+        distance = state.separation - expected
         try:
-            if way <= step and missed < _TRIALS:
-                stop, beyond = nearest, _straight(nearest, expected, waiting.foremost, state, step)
-                if beyond is None:
-                    # A shorter way helps; if it does not, the stop is looked for between two states.
-                    missed = missed + 1 if way > _LONG * longest else _TRIALS
-                    if missed < _TRIALS:
-                        step, found = _FIRST_PART * way, 0
+            if distance <= step and failed_trials < _TRIALS:
+                target = nearest
+                after = _solve_directly(nearest, expected, pending.next_of_each_kind, state, step)
+                if after is None:
+                    # Try a shorter step first; if that fails too, the target is bracketed by two states.
+                    failed_trials = failed_trials + 1 if distance > _LONG * longest else _TRIALS
+                    if failed_trials < _TRIALS:
+                        step, found = _FIRST_PART * distance, 0
                     continue
             else:
-                beyond = contact.equilibrium(state, state.separation - step)
-                stop, beyond = first_passed(waiting.foremost, state, beyond, -1)
+                after = contact.equilibrium(state, state.separation - step)
+                target, after = find_first_target(pending.next_of_each_kind, state, after, -1)
         except InsideJump as jump:
-            waiting.remove(jump.stop)
-            course, state, missed = course.without(jump), jump.before, 0
+            pending.remove(jump.target)
+            progress.skipped.append(jump)
+            state, failed_trials = jump.before, 0
             continue
         except NotConverged as failure:
-            try:
-                step, found = halved(step, longest, failure), 0
-            except NotConverged:
-                raise course.ended(state, True, failure) from failure
+            step, found = progress.halve(step, failure, state, loading=True), 0
             continue
         found += 1
         step = min(longest, 2 * step) if found >= _PATIENCE else step
-        course.require_covered(state, beyond, stop, waiting, True)
-        state, course = beyond, course.after(beyond, True)
-        if stop is None:
-            continue
-        waiting.remove(stop)
-        missed = 0
-        course = course.met(stop.target, state)
-        yield Waypoint(stop.target, state)
-    if course.missed:
-        raise course.ended(state, True)
+        progress.require_validity(state, after, target, pending, loading=True)
+        state = after
+        progress.record_equilibrium(state, loading=True)
+        if target is not None:
+            pending.remove(target)
+            failed_trials = 0
+            progress.record_target(target.target, state)
+            yield Waypoint(target.target, state)
+    if progress.skipped:
+        raise progress.path_error(state, True)
 
 
-def _nearest(waiting: list[Stop], state: State) -> tuple[Stop, float]:
-    """The stop that seems to come next, and the separation at which it is expected, m."""
-    expected = {stop: stop.expected_separation(state) for stop in waiting}
-    stop = max(expected, key=expected.__getitem__)
-    return stop, expected[stop]
+def _nearest_target(targets: list[TargetFunction], state: State) -> tuple[TargetFunction, float]:
+    """Return the target that is expected first, and the separation at which it is expected, m."""
+    expected = {target: target.predict_separation(state) for target in targets}
+    first = max(expected, key=expected.__getitem__)
+    return first, expected[first]
 
 
-def _straight(stop: Stop, expected: float, waiting: list[Stop], state: State, step: float) -> State | None:
-    """The state at a stop that seems no farther than a step; None if it is not met there after all, or not first."""
+def _solve_directly(target, expected, pending, state, step) -> State | None:
+    """Solve for the state at a target within a step, m; None if it is not found, or another target comes first."""
     try:
-        met = stop.meet(state, expected)
+        found = target.solve(state, expected)
     except NotConverged:
         return None
-    same = SAME_SEPARATION * stop.contact.rms_height
-    if stop.control and not state.separation - step <= met.separation <= state.separation + same:
+    same = SAME_SEPARATION * target.contact.rms_height
+    if target.control and not state.separation - step <= found.separation <= state.separation + same:
         return None
-    if any(other.excess(met) > SAME_EXCESS for other in waiting if other is not stop):
+    if any(other.excess(found) > SAME_EXCESS for other in pending if other is not target):
         return None
-    return met
+    return found

@@ -1,106 +1,96 @@
-"""What a path is asked to meet: separations, loads or areas within their ranges, and turning points between them."""
+"""Targets of a path: mean separations, loads or areas with their ranges, and turning points."""
 
 import itertools
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from icha.contact.model import AREA_FRACTION as HELD_AREA
+from icha.contact.model import AREA_FRACTION as CONTROLLED_AREA
 from icha.contact.model import PRESSURE, ContactModel, Control, State
-from icha.support.rules import LENGTH, NUMBER, POSITIVE, Real
+from icha.support.rules import LENGTH, NUMBER, POSITIVE, FloatRange
 
-# Beyond these the spots have lost their identity: soon after, the computed mean planes of a surface without
-# adhesion meet.
+# Largest reduced pressure and area fraction of a target. Beyond them asperities lose their identity, and soon after the
+# mean planes of a surface without adhesion meet.
 MAX_REDUCED_PRESSURE = 0.15
 MAX_AREA_FRACTION = 0.25
-# Smaller loads, but for none at all, and areas are less than the errors of the equilibria that have them.
+# Smallest reduced pressure (other than zero) and area fraction: smaller ones are less than the error of an equilibrium.
 LEAST_PRESSURE, LEAST_AREA = 1e-12, 1e-9
-# Shortest and longest step of the mean separation, in h_rms, that may be asked for, and the one taken if none is. With
-# the shortest a path has some ten thousand equilibria.
+# Limits of the longest step of the mean separation, in h_rms, and its default. With the smallest limit a path has some
+# ten thousand equilibria.
 MIN_STEP, MAX_STEP = 1e-4, 0.5
 DEFAULT_STEP = 0.15
-# Of the energy that jumps have set free so far, the part that may be unknown after a step for not knowing where in it
-# its events happened.
+# Largest unknown work of one step, relative to the energy that jumps have released so far. The work is unknown because
+# the events of a step may happen anywhere in it.
 UNRESOLVED_LOSS = 5e-4
 
-STEP = Real("h_rms", least=MIN_STEP, most=MAX_STEP)
+STEP = FloatRange("h_rms", least=MIN_STEP, most=MAX_STEP)
 
 
 @dataclass(frozen=True)
 class Quantity:
-    """A quantity that a path can be asked to meet.
+    """A quantity that a target prescribes.
 
-    Parameters
+    Attributes
     ----------
-    name : of one value, in targets and in files.
-    unit : of its values.
-    rule : values that a stop may have.
-    listed : argument of `Path` that lists stops of it; empty where there is none.
-    held : what a solve holds to meet it; None for the mean separation, which is imposed.
-    unit_of_held : attribute of the contact that is the unit of that, Pa; empty where it has none.
+    name : name in targets and in files.
+    rule : range of values that a target may have.
+    argument : argument of `Path` that lists such targets; empty if there is none.
+    controlled : quantity that the solver holds instead of the separation; None if the separation is imposed.
+    pressure_unit : attribute of the contact with the pressure that makes the value dimensionless; empty if none.
     """
 
     name: str
-    unit: str
-    rule: Real
-    listed: str = ""
-    held: str | None = None
-    unit_of_held: str = ""
+    rule: FloatRange
+    argument: str = ""
+    controlled: str | None = None
+    pressure_unit: str = ""
 
     def scale(self, contact: ContactModel) -> float:
-        """The unit of its values, in that of what is held."""
-        return getattr(contact, self.unit_of_held) if self.unit_of_held else 1.0
+        """Return the controlled quantity at a value of 1."""
+        return getattr(contact, self.pressure_unit) if self.pressure_unit else 1.0
 
-    def of(self, contact: ContactModel, state: State) -> float:
-        """The value of a state."""
-        if self.held == PRESSURE:
+    def evaluate(self, contact: ContactModel, state: State) -> float:
+        """Return the value of the quantity in a state."""
+        if self.controlled == PRESSURE:
             return contact.pressure(state) / self.scale(contact)
-        return state.separation if self.held is None else contact.area_fraction(state)
+        return state.separation if self.controlled is None else contact.area_fraction(state)
 
     def control(self, contact: ContactModel, value: float) -> Control | None:
-        """What a solve has to hold to meet a value; None for a separation."""
-        return None if self.held is None else Control(self.held, value * self.scale(contact))
+        """Return what the solver holds at a value; None for a separation."""
+        return None if self.controlled is None else Control(self.controlled, value * self.scale(contact))
 
 
 REDUCED_PRESSURE, RELATIVE_LOAD = "reduced_pressure", "relative_load"
 AREA_FRACTION, MEAN_SEPARATION = "area_fraction", "mean_separation"
+_PRESSURES = FloatRange(least=LEAST_PRESSURE, most=MAX_REDUCED_PRESSURE, model_ends=True)
+_AREAS = FloatRange(least=LEAST_AREA, most=MAX_AREA_FRACTION, model_ends=True)
 QUANTITIES = {
     quantity.name: quantity
     for quantity in (
-        Quantity(
-            REDUCED_PRESSURE,
-            "1",
-            Real(least=LEAST_PRESSURE, most=MAX_REDUCED_PRESSURE, model_ends=True),
-            "reduced_pressures",
-            PRESSURE,
-            "pressure_unit",
-        ),
-        Quantity(RELATIVE_LOAD, "1", POSITIVE, held=PRESSURE, unit_of_held="contact_modulus"),
-        Quantity(
-            AREA_FRACTION,
-            "1",
-            Real(least=LEAST_AREA, most=MAX_AREA_FRACTION, model_ends=True),
-            "area_fractions",
-            HELD_AREA,
-        ),
-        Quantity(MEAN_SEPARATION, "m", LENGTH, "mean_separations"),
+        Quantity(REDUCED_PRESSURE, _PRESSURES, "reduced_pressures", PRESSURE, "pressure_unit"),
+        Quantity(RELATIVE_LOAD, POSITIVE, "", PRESSURE, "contact_modulus"),
+        Quantity(AREA_FRACTION, _AREAS, "area_fractions", CONTROLLED_AREA),
+        Quantity(MEAN_SEPARATION, LENGTH, "mean_separations"),
     )
 }
-LOADS = tuple(name for name, quantity in QUANTITIES.items() if quantity.held == PRESSURE)
-# By the kind of their values, the arguments that list the stops of a path.
-LISTS = {name: quantity.listed for name, quantity in QUANTITIES.items() if quantity.listed}
-# What an equilibrium between the stops of a path is asked to reach: its mean separation.
+LOADS = (REDUCED_PRESSURE, RELATIVE_LOAD)
+# Kind of the waypoints between targets; their value is the mean separation.
 BETWEEN = "path"
-
-# Kinds of which values are in m; those of all others have no unit.
-IN_METRES = (*(name for name, quantity in QUANTITIES.items() if quantity.unit == "m"), BETWEEN)
+# Kinds whose values are in m; all others have no unit.
+IN_METRES = (MEAN_SEPARATION, BETWEEN)
 
 SEPARATION_CONTROL, LOAD_CONTROL = "separation", "load"
-CONTROLS = (SEPARATION_CONTROL, LOAD_CONTROL)
 
 
 @dataclass(frozen=True)
 class Target:
-    """One stop of a path: the kind of quantity, its value (SI units), and whether it is a snapshot."""
+    """A state that a path has to reach.
+
+    Attributes
+    ----------
+    kind : name of the prescribed quantity, a key of `QUANTITIES`; or BETWEEN.
+    value : prescribed value, SI units.
+    snapshot : whether the fields and spots of the state are stored.
+    """
 
     kind: str
     value: float
@@ -108,39 +98,39 @@ class Target:
 
     @property
     def quantity(self) -> Quantity:
-        """What is to be met."""
+        """Prescribed quantity."""
         return QUANTITIES[self.kind]
 
-    def named(self, digits: int | None = None) -> str:
-        """Kind and value in words."""
+    def describe(self, digits: int | None = None) -> str:
+        """Return kind and value as text."""
         return f"{self.kind} = {self.value:{f'.{digits}' if digits else ''}g}"
 
 
 @dataclass(frozen=True, init=False)
 class Path:
-    """Stops of a path, and the longest step between them.
+    """Targets of a path, and the longest step between them.
 
     Parameters
     ----------
     reduced_pressures : p/(E* h'_rms), increasing, in [1e-12, 0.15].
     area_fractions : A/A0, increasing, in [1e-9, 0.25].
     mean_separations : u in m, decreasing, in [1e-24, 1e9]. Exactly one of these three lists is given.
-    snapshots : pairs (kind, value), in any order, of states whose fields and spots are kept, with kind one of
-        "reduced_pressure", "relative_load" (F/(E* A0)), "area_fraction" and "mean_separation" (m). A snapshot is a stop
-        of its own, unless the list holds the same kind and value; the dataset has them in the order in which they are
-        met. None: the last stop of the list.
-    turning_points : pairs (kind, value) at which the path turns after its last stop: the first ends unloading, the
-        second loading, and so on. Kinds as for snapshots; loads may be tensile (negative) or zero.
-    unload : whether the path ends with complete separation, met by the stops once more on the way, but for those above
+    snapshots : pairs (kind, value), in any order, of states whose fields and spots are stored. The kind is
+        "reduced_pressure", "relative_load" (F/(E* A0)), "area_fraction" or "mean_separation" (m). A snapshot is an
+        additional target unless the list holds the same kind and value. The dataset has them in the order in which
+        the path reaches them. None: the last target of the list.
+    turning_points : pairs (kind, value) at which the path turns after its last target: the first one ends unloading,
+        the second one loading, and so on. Kinds as for snapshots; loads may be tensile (negative) or zero.
+    unload : whether the path ends with complete separation. Unloading meets the targets once more, except those above
         first contact.
-    control : "separation": the mean separation is imposed. "load": the load is; the state runs along the same curve
-        and jumps, at constant load, where it would have to turn back. Then all stops and turning points are loads.
+    control : "separation": the mean separation is imposed. "load": the load is imposed; the state follows the same
+        curve and jumps, at constant load, where the curve turns back. Then all targets and turning points are loads.
     max_step : longest change of the mean separation between two equilibria, in units of h_rms, in [1e-4, 0.5].
 
     Raises
     ------
     ValueError
-        Naming the argument whose value is not allowed.
+        If a value is out of range; the message names the argument.
     """
 
     targets: tuple[Target, ...]
@@ -161,123 +151,118 @@ class Path:
         control: str = SEPARATION_CONTROL,
         max_step: float = DEFAULT_STEP,
     ) -> None:
-        """Check the values and build the list of stops."""
-        kind, values = _one_list(reduced_pressures, area_fractions, mean_separations)
+        """Validate the values and build the list of targets."""
+        lists = {REDUCED_PRESSURE: reduced_pressures, AREA_FRACTION: area_fractions, MEAN_SEPARATION: mean_separations}
+        given = [kind for kind, values in lists.items() if values is not None]
+        if len(given) != 1:
+            names, found = (", ".join(QUANTITIES[kind].argument for kind in kinds) for kinds in (lists, given))
+            raise ValueError(f"{names}: expected exactly one of them, got {found or 'none'}")
+        (kind,) = given
         if not isinstance(unload, bool):
-            raise ValueError(f"unload: {unload!r} is neither True nor False")
-        if control not in CONTROLS:
-            raise ValueError(f"control: {control!r} must be one of {', '.join(CONTROLS)}")
-        max_step = STEP.checked("max_step", max_step)
-        values = _stops(LISTS[kind], kind, values)
-        wanted = _wanted([(kind, values[-1])] if snapshots is None else snapshots)
-        targets = [Target(kind, value, (kind, value) in wanted) for value in values]
-        listed = set(values)
-        targets += [Target(k, v, True) for k, v in wanted if k != kind or v not in listed]
-        turns = _turns(turning_points, targets[len(values) - 1])
+            raise ValueError(f"unload: expected True or False, got {unload!r}")
+        if control not in (SEPARATION_CONTROL, LOAD_CONTROL):
+            raise ValueError(f"control: {control!r} must be one of {SEPARATION_CONTROL}, {LOAD_CONTROL}")
+        max_step = STEP.validate("max_step", max_step)
+        values = _validate_list(kind, lists[kind])
+        recorded: list[tuple[str, float]] = _validate_snapshots(
+            [(kind, values[-1])] if snapshots is None else snapshots
+        )
+        targets = [Target(kind, value, (kind, value) in recorded) for value in values]
+        listed = {(kind, value) for value in values}
+        turns = _validate_turning_points(turning_points, targets[-1])
+        targets += [Target(*pair, True) for pair in recorded if pair not in listed]
         if control == LOAD_CONTROL:
             _require_loads((*targets, *turns), unload or bool(turns))
-        object.__setattr__(self, "targets", tuple(targets))
-        object.__setattr__(self, "turning_points", turns)
-        object.__setattr__(self, "unload", unload)
-        object.__setattr__(self, "control", control)
-        object.__setattr__(self, "max_step", max_step)
+        # A frozen dataclass sets its fields this way.
+        vars(self).update(
+            targets=tuple(targets), turning_points=turns, unload=unload, control=control, max_step=max_step
+        )
 
     @property
     def cyclic(self) -> bool:
-        """Whether the path goes on after the first loading."""
+        """Whether the path continues after the first loading."""
         return self.unload or bool(self.turning_points)
 
 
-def _one_list(*lists):
-    """Kind and values of the one list that is given."""
-    given = {kind: values for kind, values in zip(LISTS, lists, strict=True) if values is not None}
-    if len(given) != 1:
-        raise ValueError(
-            f"{', '.join(LISTS.values())}: exactly one must be given, "
-            f"not {', '.join(LISTS[kind] for kind in given) or 'none'}"
-        )
-    ((kind, values),) = given.items()
-    return kind, values
+def _validate_list(kind, values):
+    """Return the values of the list of targets, in strict order."""
+    name, rule, falls = QUANTITIES[kind].argument, QUANTITIES[kind].rule, kind == MEAN_SEPARATION
+    try:
+        # Bytes would be a list of numbers.
+        listed = None if isinstance(values, str | bytes) else list(values)
+    except TypeError:
+        listed = None
+    if listed is None:
+        raise ValueError(f"{name}: expected a list of numbers, got {values!r}")
+    values = [rule.validate(f"{name}[{k}]", value) for k, value in enumerate(listed)]
+    if not values:
+        raise ValueError(f"{name}: the list is empty; expected at least one number")
+    for k, (one, following) in enumerate(itertools.pairwise(values), start=1):
+        if not (following < one if falls else following > one):
+            order = "decreasing" if falls else "increasing"
+            raise ValueError(f"{name}[{k}]: {following!r} follows {one!r}; expected a strictly {order} list")
+    return values
 
 
-def _wanted(snapshots):
-    """Kinds and values of the snapshots."""
-    wanted = {}
-    for label, kind, value in _pairs("snapshots", snapshots):
-        value = QUANTITIES[kind].rule.checked(label, value)
-        if (kind, value) in wanted:
-            raise ValueError(f"{label}: {kind} {value!r} is given twice")
-        wanted[kind, value] = None
-    return wanted
+def _validate_snapshots(snapshots):
+    """Return kinds and values of the snapshots."""
+    recorded = []
+    for label, kind, value in _label_pairs("snapshots", snapshots):
+        pair = kind, QUANTITIES[kind].rule.validate(label, value)
+        if pair in recorded:
+            raise ValueError(f"{label}: {kind} {value!r} is given twice; remove one of them")
+        recorded.append(pair)
+    return recorded
 
 
-def _require_loads(targets, goes_back):
-    """Refuse what has no meaning where the load is imposed."""
-    for target in targets:
-        if target.kind not in LOADS:
+def _validate_turning_points(turning_points, last):
+    """Return the turning points; those of one kind must alternate below and above each other."""
+    turns = []
+    for k, (label, kind, value) in enumerate(_label_pairs("turning_points", turning_points)):
+        unloading = k % 2 == 0
+        rule = NUMBER if unloading and kind in LOADS else QUANTITIES[kind].rule
+        value = rule.validate(label, value)
+        if kind == REDUCED_PRESSURE and 0 < abs(value) < LEAST_PRESSURE:
             raise ValueError(
-                f"control: {LOAD_CONTROL!r} with the stop {target.kind} = {target.value:g}; allowed: stops and "
-                "turning points that are loads"
+                f"{label}: {value!r} is too small a load; expected 0, or an absolute value of at least "
+                f"{LEAST_PRESSURE:g}"
             )
-    if not goes_back:
-        raise ValueError(
-            f"control: {LOAD_CONTROL!r} without a way back; allowed: {SEPARATION_CONTROL!r}, or a path that unloads "
-            "or has turning points"
-        )
+        falls = unloading != (kind == MEAN_SEPARATION)
+        if kind == last.kind and not (value < last.value if falls else value > last.value):
+            raise ValueError(
+                f"{label}: {value!r} cannot end {'unloading' if unloading else 'loading'} that begins at "
+                f"{last.value!r}; expected {'less' if falls else 'more'} than that"
+            )
+        last = Target(kind, value)
+        turns.append(last)
+    return tuple(turns)
 
 
-def _pairs(name, pairs):
-    """Label, kind and value of every pair of a list."""
+def _label_pairs(name, pairs):
+    """Yield label, kind and value of every pair of a list."""
     if not isinstance(pairs, list | tuple):
-        raise ValueError(f"{name}: {pairs!r} is not a list of pairs (kind, value)")
+        raise ValueError(f"{name}: expected a list of pairs (kind, value), got {pairs!r}")
     for index, pair in enumerate(pairs):
         label = f"{name}[{index}]"
         try:
             kind, value = pair
         except (TypeError, ValueError):
-            raise ValueError(f"{label}: {pair!r} is not a pair (kind, value)") from None
+            raise ValueError(f"{label}: expected a pair (kind, value), got {pair!r}") from None
         if kind not in QUANTITIES:
             raise ValueError(f"{label}: kind {kind!r} must be one of {', '.join(QUANTITIES)}")
         yield label, kind, value
 
 
-def _turns(turning_points, last):
-    """The turning points, which lie before and beyond each other in turn, as far as they are of one kind."""
-    turns, before = [], last
-    for k, (label, kind, value) in enumerate(_pairs("turning_points", turning_points)):
-        tensile = kind in LOADS and k % 2 == 0
-        value = (NUMBER if tensile else QUANTITIES[kind].rule).checked(label, value)
-        if tensile and 0 < abs(value) < LEAST_PRESSURE and kind == REDUCED_PRESSURE:
+def _require_loads(targets, continues):
+    """Raise an error for whatever has no meaning where the load is imposed."""
+    for target in targets:
+        if target.kind not in LOADS:
             raise ValueError(
-                f"{label}: {value!r} is next to no load; allowed: 0, or an absolute value of at least "
-                f"{LEAST_PRESSURE:g}"
+                f"control: {LOAD_CONTROL!r} with the target {target.describe()}; expected only loads as targets and "
+                "turning points"
             )
-        if kind == before.kind:
-            opened = value > before.value if kind == MEAN_SEPARATION else value < before.value
-            if value == before.value or opened != (k % 2 == 0):
-                way = "unloading" if k % 2 == 0 else "loading"
-                side = "less" if (k % 2 == 0) != (kind == MEAN_SEPARATION) else "more"
-                raise ValueError(
-                    f"{label}: {value!r} cannot end {way} that begins at {before.value!r}; allowed: {side} than that"
-                )
-        before = Target(kind, value)
-        turns.append(before)
-    return tuple(turns)
-
-
-def _stops(name, kind, given):
-    try:
-        # Bytes would be numbers.
-        values = None if isinstance(given, str | bytes) else list(given)
-    except TypeError:
-        values = None
-    if values is None:
-        raise ValueError(f"{name}: {given!r} is not a list of numbers")
-    if not values:
-        raise ValueError(f"{name}: the list is empty")
-    values = [QUANTITIES[kind].rule.checked(f"{name}[{i}]", v) for i, v in enumerate(values)]
-    for i, (one, next_one) in enumerate(itertools.pairwise(values)):
-        if not (next_one < one if kind == MEAN_SEPARATION else next_one > one):
-            order = "decreasing" if kind == MEAN_SEPARATION else "increasing"
-            raise ValueError(f"{name}[{i + 1}]: {next_one!r} after {one!r}; the list must be strictly {order}")
-    return values
+    if not continues:
+        raise ValueError(
+            f"control: {LOAD_CONTROL!r} without unloading; expected {SEPARATION_CONTROL!r}, or a path that unloads or "
+            "has turning points"
+        )

@@ -61,9 +61,9 @@ def expected_summits(campaign: Campaign, name: str) -> float:
     if isinstance(section, SelfAffineSurface):
         moments = _moments(section)
         return section.period**2 * summit_density(moments.m2, moments.m4)
-    from icha.surfaces.summits import count_summits
+    from icha.surfaces.summits import locate_summits
 
-    return count_summits(_read(section))
+    return len(locate_summits(_read(section)))
 
 
 def rms_curvature(campaign: Campaign, name: str) -> float:

@@ -1,23 +1,22 @@
-"""Contact at a finite range of attraction, by boundary elements: Tamaas, which owes nothing to any code of ICHA's.
+"""Contact at a finite range of attraction, solved by the boundary-element code Tamaas.
 
-It comes with the package's extra `tamaas`; nothing outside `icha.references` needs it.
+Tamaas comes with the package's extra `tamaas` and shares no code with ICHA; nothing outside `icha.references` needs it.
 
 Tamaas (L. Frérot et al., J. Open Source Softw. 5 (2020) 2121, doi:10.21105/joss.02121) minimises the energy of an
-elastic half-space against the nodes of the topography: without adhesion in the pressures, at given load (I. A.
-Polonsky and L. M. Keer, Wear 231 (1999) 206, doi:10.1016/S0043-1648(99)00113-1); with adhesion in the gaps, at given
-mean gap (V. Rey, G. Anciaux and J.-F. Molinari, Comput. Mech. 60 (2017) 69, doi:10.1007/s00466-017-1392-5), the
-traction being (dgamma/rho) exp(-u/rho) outside a hard wall. Its load control ends in other states when there is
-adhesion, and calls them converged; so the mean gap that carries a given load is searched for.
+elastic half-space against the nodes of the topography. Without adhesion it minimises over the pressures at a given load
+(I. A. Polonsky and L. M. Keer, Wear 231 (1999) 206, doi:10.1016/S0043-1648(99)00113-1). With adhesion it minimises over
+the gaps at a given mean gap (V. Rey, G. Anciaux and J.-F. Molinari, Comput. Mech. 60 (2017) 69,
+doi:10.1007/s00466-017-1392-5); the traction outside a hard wall is (dgamma/rho) exp(-u/rho). Its load control converges
+to wrong states with adhesion, so ICHA searches for the mean gap that carries a given load.
 
-Contact is where the gap is zero. Around it a cohesive zone pulls, of which the law of Johnson, Kendall and Roberts
-knows the energy alone: there energy falls by dgamma times the contact area. The area with which that holds at a finite
-range is the derivative of the energy to the surface energy at fixed mean gap, the integral of exp(-u/rho) over the
-surface, here the energetic area. It is larger than the area of zero gap, and both tend to JKR's as the range vanishes,
-the energetic one much sooner.
+Contact is where the gap is zero, and a cohesive zone pulls around it. The law of Johnson, Kendall and Roberts lowers
+the energy by dgamma times the contact area. The area with which this holds at a finite range is the derivative of the
+energy with respect to the surface energy at fixed mean gap: the integral of exp(-u/rho), here the energetic area. It is
+larger than the area of zero gap. Both tend to the area of JKR as the range vanishes, the energetic one much sooner.
 """
 
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -31,22 +30,22 @@ from icha.asperity.cohesive_zone import longest_spacing, resolution_problem, str
 from icha.asperity.material import Material
 from icha.boundary_elements.patches import BEYOND_EDGES
 from icha.contact.model import GAP_BINS, PRESSURE_BINS, gap_bins
-from icha.datasets.attributes import COMPUTED, discovery
-from icha.datasets.build import bin_values, build, of
+from icha.datasets.attributes import COMPUTED, file_attributes
+from icha.datasets.build import bin_values, build_dataset, get_values
 from icha.datasets.variables.boundary_elements import SOLUTION
 from icha.datasets.variables.terms import MATERIAL, ROUGHNESS
-from icha.support.rules import LENGTH, POSITIVE, REFINEMENT, TOLERANCE
+from icha.support.rules import POSITIVE, REFINEMENT, TOLERANCE
 from icha.surfaces.surface import Surface
 
-# What is minimised is known to this relative error.
+# Relative error of the minimised energy at which Tamaas stops.
 DEFAULT_TOLERANCE = 1e-8
-# A load is met to this relative error by the search for its mean gap.
+# Relative error of the load that the search for its mean gap accepts, and solutions that it may take.
 LOAD_TOLERANCE = 2e-4
 _MAX_SOLVES = 20
 _MAX_ITERATIONS = 100_000
-# Between looks at a gap that has been open everywhere, and at one that has not.
+# Iterations between two checks of the gap: while it is open everywhere, and otherwise.
 _OPEN_ITERATIONS, _TOUCHING_ITERATIONS = 50, 1000
-# The first steps of the search, in h_rms: loads fall by a factor e over about this distance, on rough surfaces.
+# First step of the search, h_rms: on rough surfaces the load falls by a factor e over about this distance.
 _DECAY = 0.4
 _LONGEST_STEP = 0.3
 
@@ -60,15 +59,21 @@ REFERENCES = (
 
 
 class NotSolved(RuntimeError):
-    """Boundary elements at a finite range did not converge; the message says which."""
+    """Boundary elements at a finite range did not converge; the message names the state."""
 
 
 @dataclass(frozen=True, eq=False)
 class NodalState:
     """A contact at the nodes of its grid.
 
-    surface : on the grid of the solution. gap, m, and traction, Pa, positive in compression, and contact, whether the
-    gap is zero: (n, n). residual : the solver's criterion of convergence, a relative error. solves : that it took.
+    Attributes
+    ----------
+    surface : rough surface on the grid of the solution.
+    gap : (n, n), m.
+    traction : (n, n), Pa, positive in compression.
+    contact : (n, n) bool, whether the gap is zero.
+    residual : relative error that the solver reports.
+    solves : number of solutions that it took.
     """
 
     surface: Surface
@@ -90,21 +95,21 @@ class NodalState:
 
     @property
     def outside_pressure(self) -> float:
-        """Part of the nominal pressure that acts outside the contact, at most zero, Pa."""
+        """Nominal pressure of the traction outside the contact, zero or negative, Pa."""
         return float(self.traction[~self.contact].sum()) / self.contact.size
 
     def energetic_area_fraction(self, material: Material) -> float:
-        """Energy of adhesion over that of full contact: the mean of exp(-u/rho), 1 in contact."""
+        """Adhesion energy over that of full contact: the mean of exp(-u/rho), which is 1 in contact."""
         raw = np.count_nonzero(self.contact) / self.contact.size
         if material.surface_energy == 0:
             return raw
         return raw - self.outside_pressure * material.interaction_range / material.surface_energy
 
     def stored_energy(self, material: Material) -> float:
-        """Elastic energy less that of adhesion over the nominal area, J/m^2; 0 far apart.
+        """Elastic energy minus adhesion energy over the nominal area, J/m^2; 0 far apart.
 
-        The elastic one is half the mean of traction times displacement. Without a jump its derivative to the mean gap
-        is minus the nominal pressure.
+        The elastic energy is half the mean of traction times displacement. Between jumps the derivative of the sum with
+        respect to the mean gap is minus the nominal pressure.
         """
         displacement = self.gap + self.surface.heights
         displacement -= displacement.mean()
@@ -129,22 +134,22 @@ def finite_range_solution(
     surface, material : as for `icha.simulate`; with adhesion, traction decays over `material.interaction_range`.
     reduced_pressure : p/(E* h'_rms), positive.
     refinement : nodes per node of the surface's grid, along a side.
-    tolerance : relative error at which the solver may stop.
+    tolerance : relative error at which the solver stops.
     seed : recorded in the dataset.
-    progress : called with lines of text: first the numbers that say whether the grid resolves the attraction.
+    progress : called with lines of text; the first one has the numbers by which the grid resolves the attraction.
 
     Returns
     -------
-    xarray.Dataset of one state (`icha.datasets.variables.boundary_elements.SOLUTION`). Densities are over the nominal
-    area: the integral of `gap_density` and the raw area make 1, that of `pressure_density` is the raw area; the bins
-    are those of `icha.simulate`.
+    xarray.Dataset of one state (`icha.datasets.variables.boundary_elements.SOLUTION`). Densities refer to the nominal
+    area: the integral of `gap_density` plus the raw area is 1, that of `pressure_density` is the raw area. The bins are
+    those of `icha.simulate`.
 
     Raises
     ------
     ValueError
         If an argument is out of range, or the grid does not resolve the attraction.
     NotSolved
-        If the solver does not reach its tolerance, or no mean gap is found that carries the load.
+        If the solver does not reach its tolerance, or no mean gap carries the load.
     """
     state = contact_state(
         surface, material, reduced_pressure, refinement=refinement, tolerance=tolerance, progress=progress
@@ -161,75 +166,43 @@ def contact_state(
     tolerance: float = DEFAULT_TOLERANCE,
     progress: Callable[[str], None] | None = None,
 ) -> NodalState:
-    """The state of which `finite_range_solution` makes a dataset, node by node; arguments and errors are the same."""
-    target = POSITIVE.checked("reduced_pressure", reduced_pressure) * surface.rms_slope * material.contact_modulus
-    say = progress or silent
-    fine = resolved(surface, material, refinement, say)
-    state = _without_adhesion(fine, material, target, TOLERANCE.checked("tolerance", tolerance))
+    """Solve the contact at one load, as `finite_range_solution` does; return it node by node."""
+    target = POSITIVE.validate("reduced_pressure", reduced_pressure) * surface.rms_slope * material.contact_modulus
+    fine = refine(surface, material, refinement, progress)
+    state = _solve_nonadhesive(fine, material, target, TOLERANCE.validate("tolerance", tolerance))
     if material.surface_energy == 0:
         return state
-    return _carrying(GapContact(fine, material, tolerance, state.gap), target, state.mean_separation, say)
+    contact = GapContact(fine, material, tolerance, state.gap)
+    return _find_gap_at_load(contact, target, state.mean_separation, progress)
 
 
-def states_at_mean_separations(
-    surface: Surface,
-    material: Material,
-    mean_separations: Iterable[float],
-    *,
-    refinement: int = 1,
-    tolerance: float = DEFAULT_TOLERANCE,
-    progress: Callable[[str], None] | None = None,
-) -> Iterator[NodalState]:
-    """States of an adhesive contact at given mean gaps, in tension or compression, each from the last.
-
-    Parameters
-    ----------
-    mean_separations : m, positive, in any order: up and down show hysteresis.
-    surface, material, refinement, tolerance, progress : as for `finite_range_solution`.
-
-    Raises
-    ------
-    ValueError
-        If an argument is out of range, the material has no adhesion, or the grid does not resolve it.
-    NotSolved
-        If the solver does not reach its tolerance.
-    """
-    if material.surface_energy == 0:
-        raise ValueError("surface_energy: 0; without adhesion the load is given, not the mean gap")
-    fine = resolved(surface, material, refinement, progress or silent)
-    separations = [LENGTH.checked("mean_separations", separation) for separation in mean_separations]
-    contact = GapContact(fine, material, TOLERANCE.checked("tolerance", tolerance))
-    return (contact.at(separation) for separation in separations)
-
-
-def silent(line: str) -> None:
-    """Progress that nobody asked for."""
-
-
-def resolved(surface, material, refinement, say):
-    """The surface on the solution's grid, which has to resolve the attraction."""
+def refine(
+    surface: Surface, material: Material, refinement: int, progress: Callable[[str], None] | None = None
+) -> Surface:
+    """Return the surface on the grid of the solution, which must resolve the attraction; report it as progress."""
     surface.require_periodic("the solution by boundary elements")
-    fine = surface.refined(REFINEMENT.checked("refinement", refinement))
+    fine = surface.refined(REFINEMENT.validate("refinement", refinement))
     numbers = f"{fine.grid} nodes a side, spacing {fine.spacing:.4g} m"
     if material.surface_energy > 0:
         numbers += (
             f"; with adhesion at most {longest_spacing(material):.4g} m; sqrt(dgamma dx/E*)/range = "
             f"{strength_number(material, fine.spacing):.3g}"
         )
-    say(numbers)
+    if progress:
+        progress(numbers)
     if problem := resolution_problem(material, fine.spacing):
         raise ValueError(f"interaction_range: {problem}")
     return fine
 
 
 class _Solver:
-    """Tamaas on one surface, in its own units: lengths in h_rms, pressures in E*.
+    """Tamaas on one surface, in units of h_rms for lengths and E* for pressures.
 
-    variable: what is minimised over and whose mean is given, tamaas.PolonskyKeerRey.pressure or .gap.
+    `variable` is minimised over and its mean is given: tamaas.PolonskyKeerRey.pressure or .gap.
     """
 
     def __init__(self, fine, variable, tolerance):
-        # One thread: sums keep their order, and results their bytes.
+        # With one thread sums keep their order, and results their bytes.
         tamaas.initialize(1)
         self.tolerance = tolerance
         self.unit = fine.rms_height
@@ -240,50 +213,46 @@ class _Solver:
         self.solver.max_iter = _MAX_ITERATIONS
 
     def iterate(self, mean):
-        """Iterate towards a mean pressure or gap, at most `max_iter` times; the error reached."""
+        """Iterate at most `max_iter` times towards a mean pressure or gap; return the error."""
         try:
             with tamaas.utils.log_context(tamaas.LogLevel.error):
                 return self.solver.solve(mean)
         except tamaas.FloatingPointError as error:
             raise NotSolved(f"boundary elements: {error}") from None
 
-    def solve(self, mean):
-        """Solve for a mean pressure or gap; the error reached."""
-        return self.checked(self.iterate(mean))
-
-    def checked(self, residual):
-        """The error reached, which has to be within the tolerance."""
+    def require_converged(self, residual):
+        """Return the error; raise `NotSolved` if it exceeds the tolerance."""
         if not residual <= self.tolerance:
             raise NotSolved(f"boundary elements did not converge: error {residual:.3g}, tolerance {self.tolerance:g}")
         return residual
 
 
-def _without_adhesion(fine, material, pressure, tolerance):
-    """The state at a given mean pressure, Pa."""
+def _solve_nonadhesive(fine, material, pressure, tolerance):
+    """Solve the contact without adhesion at a mean pressure, Pa."""
     solver = _Solver(fine, tamaas.PolonskyKeerRey.pressure, tolerance)
-    residual = solver.solve(pressure / material.contact_modulus)
+    residual = solver.require_converged(solver.iterate(pressure / material.contact_modulus))
     traction = np.array(solver.model.traction)
     contact = traction > 0
     gap = solver.model.displacement - solver.heights
-    # The displacement is known up to a constant.
+    # Tamaas gives the displacement up to a constant.
     gap -= gap[contact].mean()
     return NodalState(fine, gap * solver.unit, traction * material.contact_modulus, contact, residual)
 
 
 class GapContact:
-    """States at given mean gaps; every solution starts from the last, the first from `gap` (m).
+    """Contact at given mean gaps; each solution starts from the last one, the first from `gap` (m).
 
-    Tamaas relates its error to what the contact carries; where nothing touches it iterates for ever on a solution that
-    it has. So it is stopped now and then, and a gap that is open everywhere is held against the law of the interface.
+    Tamaas divides its error by the load of the contact, so it does not stop where nothing touches. It is therefore
+    interrupted now and then, and a gap that is open everywhere is checked against the law of the interface.
     """
 
     def __init__(self, fine, material, tolerance, gap=None):
-        """Set the solver up."""
+        """Set up the solver."""
         self.fine, self.material = fine, material
         self.solver = _Solver(fine, tamaas.PolonskyKeerRey.gap, tolerance)
         unit = self.solver.unit
         if material.surface_energy > 0:
-            # Tamaas keeps a reference only.
+            # Tamaas holds only a reference, so the object must outlive this call.
             self.attraction = tamaas.ExponentialAdhesionFunctional(self.solver.heights)
             self.attraction.parameters = {
                 "rho": material.interaction_range / unit,
@@ -295,25 +264,25 @@ class GapContact:
         self.solves = 0
 
     def start_from(self, gap):
-        """Let the next solution start from a gap, m."""
+        """Start the next solution from a gap, m."""
         self.solver.model["gap"][:] = np.maximum(gap, 0.0) / self.solver.unit
 
-    def at(self, separation):
-        """The state at a mean gap, m."""
+    def solve(self, separation):
+        """Solve the contact at a mean gap, m."""
         unit, model = self.solver.unit, self.solver.model
         self.solves += 1
         if self.material.surface_energy == 0 and separation >= self.fine.heights.max():
             self.start_from(separation - self.fine.heights)
             nothing = np.zeros_like(self.fine.heights)
             return NodalState(self.fine, separation - self.fine.heights, nothing, nothing > 0, 0.0, self.solves)
-        residual = self._solved(separation / unit)
+        residual = self._iterate(separation / unit)
         gap, traction = np.array(model["gap"]), np.array(model.traction)
         return NodalState(
             self.fine, gap * unit, traction * self.material.contact_modulus, gap <= 0, residual, self.solves
         )
 
-    def _solved(self, mean):
-        """Solve for a mean gap, looking at the gap now and then; the error reached."""
+    def _iterate(self, mean):
+        """Solve for a mean gap with checks of the gap in between; return the error."""
         iterations = 0
         while iterations < _MAX_ITERATIONS:
             self.solver.solver.max_iter = _OPEN_ITERATIONS if self._is_open() else _TOUCHING_ITERATIONS
@@ -323,16 +292,15 @@ class GapContact:
                 residual = self._imbalance()
             if residual <= self.solver.tolerance:
                 break
-        return self.solver.checked(residual)
+        return self.solver.require_converged(residual)
 
     def _is_open(self):
-        """Whether nothing touches."""
         return np.min(self.solver.model["gap"]) > 0
 
     def _imbalance(self):
-        """Largest difference between traction and attraction over the interface's strength, where nothing touches.
+        """Largest difference of traction and attraction, over the strength of the interface, where nothing touches.
 
-        The half-space's traction is E* q/2 times the modes of its displacement; its mean is free.
+        The traction of the half-space is E* q/2 times the modes of its displacement; its mean is free.
         """
         gap, n = np.array(self.solver.model["gap"]), self.fine.grid
         q = np.pi * np.hypot(scipy.fft.fftfreq(n, 1 / n)[:, None], scipy.fft.rfftfreq(n, 1 / n)) / self.fine.period
@@ -344,27 +312,29 @@ class GapContact:
         return float(np.max(np.abs(traction / strength + attraction - attraction.mean())))
 
 
-def _carrying(contact, pressure, separation, say):
+def _find_gap_at_load(contact, pressure, separation, progress):
     """Search for the mean gap at which the mean traction is `pressure` (Pa), from a first guess (m)."""
     unit = contact.fine.rms_height
     tried: list[tuple[float, float]] = []
     mean_gap = separation / unit
     while len(tried) < _MAX_SOLVES:
-        state = contact.at(mean_gap * unit)
+        state = contact.solve(mean_gap * unit)
         error = state.nominal_pressure / pressure - 1
         tried.append((mean_gap, error))
-        say(f"mean gap {mean_gap:.8g} h_rms: load {1 + error:.6g} of the one asked for, error {state.residual:.2g}")
+        if progress:
+            progress(f"mean gap {mean_gap:.8g} h_rms: load {1 + error:.6g} of the target, error {state.residual:.2g}")
         if abs(error) <= LOAD_TOLERANCE:
             return state
         mean_gap = _next_gap(tried)
     raise NotSolved(
-        f"no mean gap was found that carries the load: {len(tried)} tries, the last at {tried[-1][0]:.8g} h_rms with "
-        f"{1 + tried[-1][1]:.6g} of it; nearest {min(abs(e) for _, e in tried):.2g} off, allowed {LOAD_TOLERANCE:g}"
+        f"no mean gap was found that carries the load: after {len(tried)} tries, the last at {tried[-1][0]:.8g} h_rms "
+        f"with {1 + tried[-1][1]:.6g} of it, the smallest relative error is {min(abs(e) for _, e in tried):.2g}; "
+        f"expected at most {LOAD_TOLERANCE:g}"
     )
 
 
 def _next_gap(tried):
-    """Secant in the load, kept within the mean gaps known to carry too much and too little."""
+    """Secant step in the load, limited to the interval between gaps that carry too much and too little."""
     gap, error = tried[-1]
     step = _DECAY * (math.log1p(error) if error > -0.9 else -1.0)
     if len(tried) > 1:
@@ -374,16 +344,16 @@ def _next_gap(tried):
     step = min(max(step, -_LONGEST_STEP), _LONGEST_STEP)
     too_much = max((g for g, e in tried if e > 0), default=None)
     too_little = min((g for g, e in tried if e < 0), default=None)
-    following = max(gap + step, 0.5 * gap)  # gaps are positive
-    if too_much is not None and too_little is not None and not too_much < following < too_little:
-        following = 0.5 * (too_much + too_little)
-    return following
+    next_gap = max(gap + step, 0.5 * gap)  # gaps are positive
+    if too_much is not None and too_little is not None and not too_much < next_gap < too_little:
+        next_gap = 0.5 * (too_much + too_little)
+    return next_gap
 
 
 def perimeter_correction(contact: np.ndarray) -> tuple[float, float]:
-    """Contact area fraction corrected by the perimeter, and the perimeter in spacings, of a periodic map of contact.
+    """Contact area fraction, corrected by the perimeter, and perimeter in spacings of a periodic contact map.
 
-    Nodes along the edge overestimate an area by (pi - 1 + ln 2)/24 of the perimeter times the spacing (Yastrebov,
+    Nodes along the edge overestimate the area by (pi - 1 + ln 2)/24 of the perimeter times the spacing (Yastrebov,
     Anciaux & Molinari 2017, eq. 9 there).
     """
     edges = sum(int(np.count_nonzero(contact != np.roll(contact, 1, axis))) for axis in (0, 1))
@@ -398,14 +368,14 @@ def _dataset(surface, material, state, target, tolerance, seed):
     gap_edges = gap_bins(surface)
     gaps, _ = np.histogram(np.clip(gap[~contact] / height, 0.0, GAP_BINS[-1]), GAP_BINS)
     inside = state.traction[contact] / unit
-    counted = np.clip(inside, PRESSURE_BINS[0], PRESSURE_BINS[-1])
-    count, _ = np.histogram(counted, PRESSURE_BINS)
-    load, _ = np.histogram(counted, PRESSURE_BINS, weights=inside)
+    clipped = np.clip(inside, PRESSURE_BINS[0], PRESSURE_BINS[-1])
+    count, _ = np.histogram(clipped, PRESSURE_BINS)
+    load, _ = np.histogram(clipped, PRESSURE_BINS, weights=inside)
     pressure = state.nominal_pressure
-    along = np.arange(fine.grid) * fine.spacing
+    coordinate = np.arange(fine.grid) * fine.spacing
     values = {
-        "x": along,
-        "y": along,
+        "x": coordinate,
+        "y": coordinate,
         "mean_separation": state.mean_separation,
         "nominal_pressure": pressure,
         "reduced_pressure": pressure / unit,
@@ -425,35 +395,37 @@ def _dataset(surface, material, state, target, tolerance, seed):
         "pressure_bin_mean": np.divide(load, count, out=np.zeros(len(load)), where=count > 0) * unit,
         **bin_values("pressure", PRESSURE_BINS * unit),
         "contact": contact,
-        **asked_for(surface, fine, material, tolerance, seed),
+        **describe_problem(surface, fine, material, tolerance, seed),
     }
     attrs = attributes(
         material,
         "Rough contact {} adhesion, boundary elements at finite range",
         "One state of a periodic rough surface against an elastic half-space, by boundary elements.",
     )
-    return build(SOLUTION, values, attrs)
+    return build_dataset(SOLUTION, values, attrs)
 
 
-def asked_for(surface: Surface, fine: Surface, material: Material, tolerance: float, seed: int) -> dict[str, Any]:
-    """Variables of a dataset that say what was solved: surface, its grid of the solution, material and settings."""
+def describe_problem(
+    surface: Surface, fine: Surface, material: Material, tolerance: float, seed: int
+) -> dict[str, Any]:
+    """Variables of a dataset that describe the problem: surface, grid of the solution, material and settings."""
     adhesive = material.surface_energy > 0
     return {
         "tolerance": tolerance,
         "refinement": fine.grid // surface.grid,
-        **of(fine, "grid", "spacing"),
+        **get_values(fine, "grid", "spacing"),
         "longest_spacing": longest_spacing(material) if adhesive else 0.0,
         "strength_number": strength_number(material, fine.spacing),
-        **of(material, *MATERIAL),
-        **of(surface, *ROUGHNESS, "period"),
+        **get_values(material, *MATERIAL),
+        **get_values(surface, *ROUGHNESS, "period"),
         "tabor_parameter": float(material.tabor_parameter(1 / surface.rms_curvature)),
         "seed": seed,
     }
 
 
 def attributes(material: Material, title: str, summary: str) -> dict[str, str]:
-    """Attributes of a dataset by Tamaas; in the title, braces become `with` or `without`."""
-    return discovery(
+    """Attributes of a dataset by Tamaas; braces in the title become `with` or `without`."""
+    return file_attributes(
         title.format("with" if material.surface_energy > 0 else "without"),
         summary,
         COMPUTED,

@@ -16,7 +16,7 @@ from scipy.special import erf
 
 # Share of the full-contact elastic energy that a small contact stores (Yang & Persson, gamma).
 YANG_PERSSON_GAMMA = 0.45
-# Wave numbers of the quadrature on either side of the roll-off; odd, for Simpson's rule.
+# Number of wave numbers of the quadrature on either side of the roll-off; odd for Simpson's rule.
 _POINTS = 401
 
 
@@ -49,7 +49,7 @@ def persson_mean_separation(reduced_pressure, spectrum):
     Parameters
     ----------
     reduced_pressure : p*, positive.
-    spectrum : `icha.surfaces.spectrum.SelfAffineSpectrum`; its isotropic continuum is meant, not its lattice.
+    spectrum : `icha.surfaces.spectrum.SelfAffineSpectrum`; its isotropic continuum is used, not its lattice.
     """
     return _over_wave_numbers(_stored_share, reduced_pressure, spectrum)
 
@@ -57,7 +57,7 @@ def persson_mean_separation(reduced_pressure, spectrum):
 def persson_stiffness(reduced_pressure, spectrum):
     r"""Contact stiffness -dp/du times h_rms/(E* h'_rms) at reduced pressures, in the theory of Yang & Persson (2008).
 
-    The derivative of `persson_mean_separation`, in closed form except for the integral over the wave numbers:
+    Derivative of `persson_mean_separation`, in closed form but for the integral over the wave numbers:
 
         -p du/dp = sqrt(pi) int dq q^2 C(q) w(q) [gamma + 3 (1 - gamma) P^2] exp(-(w p/E*)^2).
 
@@ -73,8 +73,8 @@ def _over_wave_numbers(share, reduced_pressure, spectrum):
     pressure = np.asarray(reduced_pressure, float)
     if np.any(pressure <= 0):
         raise ValueError("reduced_pressure: must be greater than 0")
-    # In units of q_L and of C0: only the shape of the spectrum matters, C is 1 and then falls. w grows without bound
-    # towards q_L, where the inner integral vanishes: nodes are spaced by the logarithm of q - q_L.
+    # Units are q_L for wave numbers and the value up to the roll-off for C. At q_L, w diverges and the inner integral
+    # vanishes, so nodes are spaced by the logarithm of q - q_L.
     rolloff = max(spectrum.period / spectrum.rolloff_wavelength, 1.0)
     cutoff = spectrum.period / spectrum.short_wavelength
     falling = -2 * (1 + spectrum.hurst)
@@ -87,7 +87,7 @@ def _over_wave_numbers(share, reduced_pressure, spectrum):
     shape = np.maximum(q / rolloff, 1.0) ** falling
 
     def moment(power, q):
-        """2 pi times the integral of k^power C from q_L to q, in terms of q - 1 for the sake of its rounding."""
+        """2 pi times the integral of k^power C from q_L to q; q - 1 instead of q limits rounding errors."""
         flat = np.expm1((power + 1) * np.log1p(np.minimum(q - 1, rolloff - 1))) / (power + 1)
         steep = np.log(np.maximum(q / rolloff, 1.0)) if rolloff > 1 else np.log1p(q - 1)
         exponent = power + falling + 1
@@ -96,7 +96,7 @@ def _over_wave_numbers(share, reduced_pressure, spectrum):
 
     slope2 = moment(3, q)
     w = np.sqrt(2 / slope2)
-    # The rms slope is the square root of the last slope2, in these units.
+    # In these units the rms slope is the square root of the last slope2.
     t = np.multiply.outer(pressure * np.sqrt(slope2[-1]), w)
     integrand = q**2 * shape * w * share(t) * above
     separation = np.sqrt(np.pi) * simpson(integrand, x=np.log(above), axis=-1)

@@ -1,7 +1,7 @@
-r"""Theories of separate summits: spheres on a rigid plane of heights, each in contact as if it were alone.
+r"""Theories of separate summits: spheres at given heights, each in contact with a plane as if it were alone.
 
-Pressures are reduced, p* = p/(E* h'_rms), and separations are those of the plane against the mean plane of the rough
-surface over h_rms: in these theories only the summits deform, so that this is the mean separation. Sources:
+Pressures are reduced, p* = p/(E* h'_rms). Separations are distances between the plane and the mean plane of the rough
+surface over h_rms; they are mean separations, because only the summits deform in these theories. Sources:
 
 - Bush, Gibson & Thomas: Wear 35 (1975) 87-111, doi:10.1016/0043-1648(75)90145-3.
 - Greenwood & Williamson: Proc. R. Soc. Lond. A 295 (1966) 300-319, doi:10.1098/rspa.1966.0242; with the summits of a
@@ -23,32 +23,32 @@ from icha.asperity.jkr import JKR
 from icha.asperity.material import Material
 from icha.surfaces.moments import SpectralMoments, summit_density
 
-# Slope of A/A0 against p* as p* -> 0.
-BUSH_GIBSON_THOMAS_SLOPE = np.sqrt(2 * np.pi)
-# Beyond this area summits are no longer separate.
+# Contact area fraction above which summits are no longer separate.
 SEPARATE_SUMMITS_AREA_LIMIT = 0.1
 
-# The variance of the summits' heights is less than that of all heights by this, over alpha: McCool's 0.8968.
+# McCool's 0.8968: relative reduction of the variance of summit heights against that of all heights, times alpha.
 _SUMMIT_VARIANCE = 1 - 3 * math.sqrt(3) + 16 / math.pi
 
-# In standard deviations from the mean summit: how far summits are summed up, and how far away the plane may be.
+# Largest distances from the mean summit, in standard deviations: of the summits in the sum, and of the plane.
 _FARTHEST_SUMMIT = 12.0
 _FARTHEST_PLANE = 10.0
-# Gauss-Legendre quadrature of that sum, between -1 and 1.
+# Gauss-Legendre quadrature of the sum, on [-1, 1].
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(400)
 
 
 def bush_gibson_thomas_area(reduced_pressure):
     """A/A0 = sqrt(2 pi) p*, the limit of small areas (Bush, Gibson & Thomas 1975)."""
-    return BUSH_GIBSON_THOMAS_SLOPE * np.asarray(reduced_pressure, float)
+    return np.sqrt(2 * np.pi) * np.asarray(reduced_pressure, float)
 
 
-class Summits(NamedTuple):
+class GaussianSummits(NamedTuple):
     """Summits as spheres of one radius at Gaussian heights.
 
+    Attributes
+    ----------
     density : number per area, m^-2.
     mean_height : above the mean plane of the surface, m.
-    deviation : standard deviation of their heights, m.
+    deviation : standard deviation of the heights, m.
     radius_of_curvature : m.
     """
 
@@ -58,8 +58,8 @@ class Summits(NamedTuple):
     radius_of_curvature: float
 
 
-def gaussian_summits(moments: SpectralMoments) -> Summits:
-    """The summits of an isotropic Gaussian surface: Nayak's means, as McCool (1986) uses them.
+def gaussian_summits(moments: SpectralMoments) -> GaussianSummits:
+    """Summits of an isotropic Gaussian surface: the means of Nayak, as McCool (1986) uses them.
 
     Density m4/(6 pi sqrt(3) m2), mean height 4 sqrt(m0/(pi alpha)), variance (1 - 0.8968/alpha) m0, and the radius of
     their mean curvature, 3 sqrt(pi)/(8 sqrt(m4)).
@@ -67,12 +67,14 @@ def gaussian_summits(moments: SpectralMoments) -> Summits:
     Raises
     ------
     ValueError
-        If Nayak's parameter is less than 3/2, which no isotropic surface has.
+        If Nayak's parameter is less than 3/2, the least of isotropic surfaces.
     """
     alpha = moments.nayak_parameter
     if alpha < 1.5 * (1 - 1e-9):
-        raise ValueError(f"spectral moments: Nayak's parameter is {alpha:.4g}, and at least 1.5 if they are isotropic")
-    return Summits(
+        raise ValueError(
+            f"spectral moments: Nayak's parameter is {alpha:.4g}; expected 1.5 or more, as of an isotropic surface"
+        )
+    return GaussianSummits(
         density=summit_density(moments.m2, moments.m4),
         mean_height=4 * math.sqrt(moments.m0 / (math.pi * alpha)),
         deviation=math.sqrt((1 - _SUMMIT_VARIANCE / alpha) * moments.m0),
@@ -101,11 +103,11 @@ def fuller_tabor_area(reduced_separation, moments: SpectralMoments, material: Ma
     ----------
     reduced_separation : of the plane, over h_rms, any shape.
     moments : of the surface, at its own rms slope.
-    material : its range of attraction plays no part.
-    pulled : whether the surfaces are pulled apart after every summit has been in contact. Then, as in Fuller & Tabor,
-        summits hold on until their approach falls to that of jump-off. When surfaces approach each other, which is
-        the default, the law has no attraction at a distance: a summit is in contact from approach 0 on, where it
-        jumps to the radius (2 pi dgamma R^2/E*)^(1/3) and is in tension.
+    material : its range of attraction is not used.
+    pulled : whether the surfaces separate after every summit has been in contact. Then, as in Fuller & Tabor, a summit
+        stays in contact until its approach falls to that of jump-off. In loading, which is the default, the law has no
+        attraction at a distance: a summit is in contact from approach 0 on, where it jumps to the radius
+        (2 pi dgamma R^2/E*)^(1/3) and is in tension.
     """
     law = JKR(material)
     return _sum_over_summits(lambda a, R: np.pi * a**2, law, reduced_separation, moments, pulled)
@@ -119,23 +121,25 @@ def fuller_tabor_pressure(reduced_separation, moments: SpectralMoments, material
 
 
 def separation_at(quantity: Callable, value, moments: SpectralMoments, *arguments):
-    """Where quantity(separation, moments, *arguments), which falls with the separation, has the values `value`.
+    """Find the separations at which quantity(separation, moments, *arguments) has the values `value`.
+
+    The quantity must decrease with the separation.
 
     Raises
     ------
     ValueError
-        If a value is not positive, or is not reached within 10 deviations of the mean summit.
+        If a value is not positive, or is not reached within 10 standard deviations of the mean summit.
     """
     summits = gaussian_summits(moments)
     middle, reach = summits.mean_height / moments.rms_height, _FARTHEST_PLANE * summits.deviation / moments.rms_height
     value = np.asarray(value, float)
     if np.any(value <= 0):
-        raise ValueError(f"{value.min():g} is not a value greater than 0")
+        raise ValueError(f"{value.min():g}; expected values greater than 0")
     low, high = middle - reach, middle + reach
     ends = [float(quantity(end, moments, *arguments)) for end in (low, high)]
     if value.size and not (value.max() <= ends[0] and value.min() >= ends[1]):
         raise ValueError(
-            f"{value.min():g} to {value.max():g} lies outside what summits reach, {ends[1]:g} to {ends[0]:g}"
+            f"{value.min():g} to {value.max():g} is out of reach of the summits; expected {ends[1]:g} to {ends[0]:g}"
         )
 
     def root(wanted):
@@ -145,19 +149,19 @@ def separation_at(quantity: Callable, value, moments: SpectralMoments, *argument
 
 
 def _height_above_summits(reduced_separation, moments, summits):
-    """The plane's height above the mean summit, in standard deviations."""
+    """Height of the plane above the mean summit, in standard deviations."""
     return (np.asarray(reduced_separation, float) * moments.rms_height - summits.mean_height) / summits.deviation
 
 
 def _mean_power_above(t, n):
-    """F_n(t): the mean of (s - t)^n, where it is positive, over standard normal s."""
+    """F_n(t): the mean of (s - t)^n over standard normal s, where s exceeds t."""
     return gamma(n + 1) / math.sqrt(2 * np.pi) * np.exp(-(t**2) / 4) * pbdv(-n - 1, t)[0]
 
 
 def _sum_over_summits(of_summit, law, reduced_separation, moments, pulled):
     """Sum of of_summit(contact radius, radius) over the summits in contact, per area.
 
-    A summit's contact radius tells its approach, and that its height above the plane.
+    The integral runs over the contact radius, which fixes the approach of a summit and so its height above the plane.
     """
     summits = gaussian_summits(moments)
     plane = np.asarray(reduced_separation, float)[..., None] * moments.rms_height

@@ -8,8 +8,8 @@ import numpy as np
 import xarray as xr
 
 from icha.asperity.material import Material
-from icha.datasets.attributes import THEORY, discovery
-from icha.datasets.variables.terms import term
+from icha.datasets.attributes import THEORY, file_attributes
+from icha.datasets.variables.terms import TERMS
 from icha.references import persson, summit_theories
 from icha.surfaces.moments import SpectralMoments
 from icha.surfaces.spectrum import SelfAffineSpectrum
@@ -21,8 +21,7 @@ SUMMIT_AREAS = np.geomspace(1e-5, summit_theories.SEPARATE_SUMMITS_AREA_LIMIT, 8
 def literature(name: str) -> dict:
     """Published numbers: one entry of `literature.json`, with title, description, citation, DOIs and units.
 
-    There are `gfmd_area`, `area_slope` and `contact_mechanics_challenge`. Lists of an entry belong together, point by
-    point.
+    Entries are `gfmd_area`, `area_slope` and `contact_mechanics_challenge`. The lists of an entry have the same points.
     """
     return json.loads(files("icha.references").joinpath("literature.json").read_text(encoding="utf-8"))[name]
 
@@ -39,23 +38,22 @@ def reference_dataset(
 
     Parameters
     ----------
-    spectrum : of the surface; without one (a measured surface) there is no Persson theory of its separation and
-        stiffness.
+    spectrum : of the surface; without one, as of a measured surface, Persson's theory gives the area only.
     moments : of the surface at any rms slope; without them there are no theories of separate summits.
-    adhesive : the materials with adhesion that lie against it, by rms slope and name: a curve of Fuller & Tabor each.
+    adhesive : materials with adhesion, by rms slope and name; each has a curve of Fuller & Tabor.
     reduced_pressures : p/(E* h'_rms), increasing and positive.
     attrs : further global attributes.
 
     Returns
     -------
-    Dataset with Persson's theory along `reduced_pressure`, that of Bush, Gibson & Thomas along `linear_point`, those
-    of Greenwood & Williamson and of Fuller & Tabor along `summit_point`, at the areas `summit_area_fraction`, and
-    published points, if they are of such a surface, along `gfmd_point`.
+    Dataset with Persson's theory along `reduced_pressure`; that of Bush, Gibson & Thomas along `linear_point`; those of
+    Greenwood & Williamson and of Fuller & Tabor along `summit_point`, at the areas `summit_area_fraction`; and, for a
+    surface of the same spectrum, published points along `gfmd_point`.
     """
-    variables = _persson(np.asarray(reduced_pressures, float), spectrum) | _published(spectrum)
+    variables = _mean_field_theories(np.asarray(reduced_pressures, float), spectrum) | _published_points(spectrum)
     if moments is not None:
-        variables |= _separate_summits(moments, adhesive)
-    described = discovery(
+        variables |= _summit_theories(moments, adhesive)
+    described = file_attributes(
         "Theories of rough contact, and published points",
         "Contact area, mean separation and contact stiffness against reduced pressure.",
         THEORY,
@@ -67,7 +65,7 @@ def reference_dataset(
 
 
 _PRESSURE, _AREA, _SEPARATION, _NAYAK = (
-    term(name).long_name
+    TERMS[name].long_name
     for name in ("reduced_pressure", "contact_area_fraction", "reduced_separation", "nayak_parameter")
 )
 
@@ -89,7 +87,7 @@ def _variable(dim, values, long_name, source=""):
     return xr.Variable(dim, values, described | ({"references": source} if source else {}))
 
 
-def _persson(pressure, spectrum):
+def _mean_field_theories(pressure, spectrum):
     dim = "reduced_pressure"
     variables = {
         dim: _variable(dim, pressure, _PRESSURE),
@@ -98,20 +96,20 @@ def _persson(pressure, spectrum):
     if spectrum is not None:
         separation = persson.persson_mean_separation(pressure, spectrum)
         stiffness = persson.persson_stiffness(pressure, spectrum)
-        named = "contact stiffness times rms height over contact modulus and rms slope, Yang and Persson"
+        long_name = "contact stiffness times rms height over contact modulus and rms slope, Yang and Persson"
         variables |= {
             "persson_reduced_separation": _variable(dim, separation, f"{_SEPARATION}, Yang and Persson", _YANG),
-            "persson_reduced_stiffness": _variable(dim, stiffness, named, _YANG),
+            "persson_reduced_stiffness": _variable(dim, stiffness, long_name, _YANG),
         }
     linear = pressure[summit_theories.bush_gibson_thomas_area(pressure) <= summit_theories.SEPARATE_SUMMITS_AREA_LIMIT]
-    area, named = summit_theories.bush_gibson_thomas_area(linear), f"{_AREA}, Bush, Gibson and Thomas"
+    area, long_name = summit_theories.bush_gibson_thomas_area(linear), f"{_AREA}, Bush, Gibson and Thomas"
     return variables | {
         "linear_pressure": _variable("linear_point", linear, _PRESSURE),
-        "bush_gibson_thomas_area_fraction": _variable("linear_point", area, named, _BUSH),
+        "bush_gibson_thomas_area_fraction": _variable("linear_point", area, long_name, _BUSH),
     }
 
 
-def _separate_summits(moments, adhesive):
+def _summit_theories(moments, adhesive):
     dim, by = "summit_point", "Greenwood and Williamson"
     separation = summit_theories.separation_at(summit_theories.greenwood_williamson_area, SUMMIT_AREAS, moments)
     pressure = summit_theories.greenwood_williamson_pressure(separation, moments)
@@ -125,9 +123,9 @@ def _separate_summits(moments, adhesive):
         return variables
     curves = []
     for (rms_slope, _), material in adhesive.items():
-        own = moments.scaled_to_rms_slope(rms_slope)
-        separation = summit_theories.separation_at(summit_theories.fuller_tabor_area, SUMMIT_AREAS, own, material)
-        curves.append((summit_theories.fuller_tabor_pressure(separation, own, material), separation))
+        scaled = moments.scaled_to_rms_slope(rms_slope)
+        separation = summit_theories.separation_at(summit_theories.fuller_tabor_area, SUMMIT_AREAS, scaled, material)
+        curves.append((summit_theories.fuller_tabor_pressure(separation, scaled, material), separation))
     pressures, separations = np.moveaxis(np.array(curves), 1, 0)
     slopes, names = zip(*adhesive, strict=True)
     curve, by = "fuller_tabor_curve", "Fuller and Tabor"
@@ -139,19 +137,16 @@ def _separate_summits(moments, adhesive):
     }
 
 
-def _published(spectrum):
-    """Points by Green's function molecular dynamics, where they are of surfaces of this spectrum."""
+def _published_points(spectrum):
+    """Points by Green's function molecular dynamics, if they are of surfaces of this spectrum."""
     gfmd = literature("gfmd_area")
-    if spectrum is None or not _without_rolloff(spectrum, gfmd["hurst"], gfmd["cutoff_ratio"]):
+    if spectrum is None:
+        return {}
+    ratios = (spectrum.rolloff_wavelength / spectrum.period, spectrum.period / spectrum.short_wavelength)
+    if not np.allclose((spectrum.hurst, *ratios), (gfmd["hurst"], 1.0, gfmd["cutoff_ratio"]), rtol=1e-3):
         return {}
     points = gfmd["citation"] + " " + gfmd["description"]
     return {
         f"gfmd_{name}": _variable("gfmd_point", np.array(gfmd[name]), f"{long_name}, GFMD", points)
         for name, long_name in (("reduced_pressure", _PRESSURE), ("area_fraction", _AREA))
     }
-
-
-def _without_rolloff(spectrum, hurst, cutoff_ratio):
-    """Whether a spectrum falls from the period on, with this Hurst exponent, down to this part of the period."""
-    found = (spectrum.hurst, spectrum.rolloff_wavelength / spectrum.period, spectrum.period / spectrum.short_wavelength)
-    return bool(np.allclose(found, (hurst, 1.0, cutoff_ratio), rtol=1e-3))

@@ -1,1 +1,1 @@
-"""The report of a campaign: one HTML page that needs nothing else."""
+"""The pages of a campaign: report, page for exploring, times of the jobs."""

@@ -1,7 +1,7 @@
-"""A page for moving along the paths of a campaign: one HTML file that needs neither network nor other files.
+"""The page for exploring a campaign: one HTML file that needs neither network nor other files.
 
-It holds the library that draws, plotly.js, and what its own short script (`templates/explorer.js`) shows of every
-contact. The same results and choices give the same bytes.
+It contains the library plotly.js, and a short script (`templates/explorer.js`) with the data of every contact. The same
+results and choices give the same bytes.
 """
 
 from __future__ import annotations
@@ -22,36 +22,39 @@ from icha.datasets import results
 from icha.datasets.attributes import why_no_result
 from icha.datasets.campaign import find_snapshot, reduced_gap, run_labels, select_run, spots_of
 from icha.datasets.files import read_campaign, read_dataset, readable
-from icha.datasets.labels import RunLabels, parts
+from icha.datasets.labels import RunLabels, path_fields
 from icha.figures.fig3_distributions import gap_densities, joined_pressure_densities, pressure_densities
 from icha.figures.fig8_patch_sizes import patch_areas, patch_density, patches_above
 from icha.figures.maps import block_means
 from icha.path.targets import BETWEEN
 from icha.report.template import template
 from icha.support.atomic_files import whole_file
-from icha.support.in_words import counted, printable_lines
+from icha.support.formatting import format_count, printable_lines
 
-# What one chooses a contact by, in this order.
+# Labels that identify a contact, in the order of the lists on the page.
 CHOICES = ("study", "surface", "rms_slope", "material", "seed")
-
-
-# Cells along an edge of a topography and of a map of contact, of which patches are finer than the topography.
+# Cells along an edge of a topography, and of a map of contact, whose patches are finer.
 MOST_HEIGHTS, MOST_CELLS = 256, 512
-# Bins of the pressure with less than this part of the highest density are not shown: JKR's tail has no end.
+# Smallest pressure density on the page, as a fraction of the highest one: the tail of JKR is infinite.
 LEAST_DENSITY = 1e-3
-_LEVELS = 255
-
-
-# Red, green and blue of contact, for spots and patches alike.
-CONTACT_COLOUR = (230, 0, 13)
+LEVELS = 255  # of a picture
+CONTACT_COLOUR = (230, 0, 13)  # red, green and blue, of spots and patches
 
 
 class NothingToExplore(ValueError):
-    """There is nothing in a folder that a page could show; the message says why and what is allowed."""
+    """Results from which no page can be made; the message gives the reason."""
 
 
 class Written(NamedTuple):
-    """What became of a page: bytes, contacts on it and those left out as it would be too large, or without a step."""
+    """Summary of a page.
+
+    Attributes
+    ----------
+    size : bytes.
+    shown : number of contacts on the page.
+    left_out : contacts omitted because the page would be too large.
+    without_steps : contacts omitted because their runs reached no stop.
+    """
 
     size: int
     shown: int
@@ -64,19 +67,19 @@ def write_explorer(
 ) -> Written:
     """Write the page of a campaign.
 
-    Contacts with the first seed of each kind come first, so that where not all find room, some of each kind do.
+    The first seed of each contact precedes the others, so that a small page contains all kinds of contacts.
 
     Parameters
     ----------
     folder : the campaign's results.
     page : the HTML file.
-    only : names of studies, surfaces and materials, and seeds, that are shown, by `CHOICES`; those left out are all.
-    largest : how large the page may be, MB.
+    only : names of studies, surfaces and materials, and seeds to include, by `CHOICES`; all if omitted.
+    largest : largest size of the page, MB.
 
     Raises
     ------
     NothingToExplore
-        If there is no campaign dataset, nothing of what is asked for, or room for not even one contact.
+        If there is no campaign dataset, nothing of `only`, or no contact fits.
     ValueError
         If a file cannot be read.
     """
@@ -85,7 +88,7 @@ def write_explorer(
     contacts = _contacts(run_labels(campaign), only)
     library = _library()
     room = largest * 1e6 - len(library.encode()) - len(_filled(campaign, {}, library="", largest=largest))
-    shown: list[dict] = []
+    included: list[dict] = []
     topographies: dict[str, dict] = {}
     without_steps = left_out = 0
     for number, runs in enumerate(contacts):
@@ -99,79 +102,75 @@ def write_explorer(
         if room < 0:
             left_out = len(contacts) - number
             break
-        shown.append(entry | {"topography": name})
+        included.append(entry | {"topography": name})
         topographies |= new
-    if not shown:
-        raise NothingToExplore(_why_nothing(left_out, largest))
-    data = {"contacts": shown, "topographies": topographies}
+    if left_out and not included:
+        raise NothingToExplore(f"not even one contact fits on a page of {largest:g} MB; use a larger page")
+    if not included:
+        raise NothingToExplore("no run reached a stop; there is nothing to show")
+    data = {"contacts": included, "topographies": topographies}
     text = _filled(campaign, data, library=library, largest=largest, left_out=left_out, without_steps=without_steps)
     with whole_file(page) as temporary:
         temporary.write_text(text, encoding="utf-8")
-    return Written(len(text.encode()), len(shown), left_out, without_steps)
+    return Written(len(text.encode()), len(included), left_out, without_steps)
 
 
 def _dataset(folder: Path) -> Path:
-    """The campaign dataset in a folder of results."""
-    found = sorted(folder.glob(results.DATASET.format(campaign="*")))
-    if len(found) != 1:
-        there = f"{len(found)} campaign datasets" if found else "no campaign dataset"
-        raise NothingToExplore(f"{folder}: has {there} in dataset/; allowed: the results of one campaign")
-    return found[0]
+    """Return the campaign dataset in a folder of results."""
+    files = sorted(folder.glob(results.DATASET.format(campaign="*")))
+    if len(files) != 1:
+        count = f"{len(files)} campaign datasets" if files else "no campaign dataset"
+        raise NothingToExplore(f"{folder}: has {count} in dataset/; expected the results of one campaign")
+    return files[0]
 
 
 def _contacts(labels: list[RunLabels], only: Mapping[str, Collection]) -> list[list[RunLabels]]:
-    """The runs of every contact, one for each model; contacts with the first seed of each kind come first."""
-    for name, wanted in only.items():
-        there = list(dict.fromkeys(getattr(each, name) for each in labels))
-        if unknown := [value for value in wanted if value not in there]:
-            raise NothingToExplore(f"{name} {unknown[0]}: there is none; allowed: {', '.join(map(str, there))}")
+    """Group runs by contact, in the order of models; the first seed of each contact precedes the others."""
+    for name, values in only.items():
+        known = list(dict.fromkeys(getattr(run, name) for run in labels))
+        if unknown := [value for value in values if value not in known]:
+            raise NothingToExplore(f"{name} {unknown[0]}: not in this campaign; expected {', '.join(map(str, known))}")
     contacts: dict[tuple, list[RunLabels]] = {}
-    for each in labels:
-        if all(getattr(each, name) in wanted for name, wanted in only.items()):
-            contacts.setdefault(each._replace(model=""), []).append(each)
-    rank: dict[tuple, int] = {}
-    ranked = []
-    for contact, runs in contacts.items():
-        kind = contact._replace(seed=0)
-        rank[kind] = rank.get(kind, -1) + 1
-        ranked.append((rank[kind], sorted(runs, key=lambda run: list(MODELS).index(run.model))))
-    return [runs for _, runs in sorted(ranked, key=lambda pair: pair[0])]
+    for run in labels:
+        if all(getattr(run, name) in values for name, values in only.items()):
+            contacts.setdefault(run._replace(model=""), []).append(run)
+    seeds: dict[tuple, int] = {}
+    ranks = {}
+    for contact in contacts:
+        ranks[contact] = seeds[contact._replace(seed=0)] = seeds.get(contact._replace(seed=0), -1) + 1
+    return [
+        sorted(contacts[contact], key=lambda run: list(MODELS).index(run.model))
+        for contact in sorted(contacts, key=ranks.get)
+    ]
 
 
 def _contact(campaign: xr.DataTree, folder: Path, labels: list[RunLabels]) -> dict | None:
-    """What the page shows of a contact by all models; None where no run came as far as to a first stop."""
-    runs = {each.model: select_run(campaign, each) for each in labels}
-    runs = {model: run for model, run in runs.items() if run.sizes["step"]}
-    if not runs:
-        return None
+    """Return the data of a contact with all models; None if no run reached a stop."""
+    runs = {run.model: select_run(campaign, run) for run in labels}
     entries = {
-        each.model: run_entry(runs[each.model], _maps(folder, each, runs[each.model]))
-        for each in labels
-        if each.model in runs
+        run.model: run_entry(runs[run.model], _maps(folder, run, runs[run.model]))
+        for run in labels
+        if runs[run.model].sizes["step"]
     }
-    first, *others = runs
+    if not entries:
+        return None
+    first, *others = entries
     for other in others:
         entries[other]["partners"] = partners(runs[first], runs[other])
     return {name: getattr(labels[0], name) for name in CHOICES} | {"runs": entries}
 
 
-def _maps(folder, labels, run):
-    """Pictures of the contact by boundary elements at every snapshot of a run; None without its file.
+def _maps(folder: Path, labels: RunLabels, run: xr.Dataset) -> list[str] | None:
+    """Return the picture of contact at every snapshot of a run with boundary elements; None without its file.
 
-    Maps are in the file of the run only, which may have its snapshots in another order than the campaign.
+    Only the file of the run contains maps; its snapshots may have another order than in the campaign.
     """
-    file = folder / results.RUN.format(**parts(labels))
+    file = folder / results.RUN.format(**path_fields(labels))
     if not MODELS[labels.model].by_cells or not file.is_file():
         return None
-    with readable(file), xr.open_dataset(file, engine="netcdf4") as own:
+    with readable(file), xr.open_dataset(file, engine="netcdf4") as data:
         states = zip(run["snapshot_kind"].values.astype(str), run["snapshot_target"].values, strict=True)
-        return [picture(own["contact_map"][find_snapshot(own, *state)].values) for state in states]
-
-
-def _why_nothing(left_out, largest):
-    if left_out:
-        return f"not even one contact finds room on a page of {largest:g} MB; allowed: a larger page"
-    return "no run came as far as to a first stop, so there is nothing to show"
+        return [picture(data["contact_map"][find_snapshot(data, *state)].values) for state in states]
 
 
 def _library() -> str:
@@ -181,7 +180,7 @@ def _library() -> str:
 
 
 def _printable(data):
-    """The same data; their texts are fit for a page, and so are the names by which others find them."""
+    """Replace control characters in all texts and keys."""
     if isinstance(data, dict):
         return {_printable(name): _printable(value) for name, value in data.items()}
     if isinstance(data, list):
@@ -190,7 +189,7 @@ def _printable(data):
 
 
 def _filled(campaign, data, *, library, largest, left_out=0, without_steps=0) -> str:
-    """The page as text."""
+    """Return the page as text."""
     return template("explorer.html").render(
         title=campaign.attrs.get("title", "Rough contact campaign"),
         campaign=campaign.attrs.get("campaign", ""),
@@ -202,44 +201,48 @@ def _filled(campaign, data, *, library, largest, left_out=0, without_steps=0) ->
         most_cells=MOST_CELLS,
         least_density=LEAST_DENSITY,
         largest=largest,
-        left_out=left_out and counted(left_out, "contact"),
-        without_steps=without_steps and counted(without_steps, "contact"),
+        left_out=left_out and format_count(left_out, "contact"),
+        without_steps=without_steps and format_count(without_steps, "contact"),
     )
 
 
-# --- what the page shows of a contact; arrays are the base64 text of their bytes ---
+# --- data of a contact ---
+
+
+def _base64(data: bytes) -> str:
+    return base64.b64encode(data).decode("ascii")
 
 
 def floats(values: np.ndarray) -> str:
-    """Numbers as the base64 text of their bytes, little-endian and in single precision."""
-    return base64.b64encode(np.asarray(values, "<f4").tobytes()).decode("ascii")
+    """Encode numbers in base64: little-endian, single precision."""
+    return _base64(np.asarray(values, "<f4").tobytes())
 
 
 def topography(surface: xr.Dataset) -> dict:
-    """Heights of a surface file in units of its rms height: means over blocks of nodes, in 256 levels."""
+    """Return the heights of a surface file over its rms height: means over blocks of nodes, in 256 levels."""
     heights = surface["height"].transpose("y", "x").values / float(surface["rms_height"])
-    shown = block_means(heights, MOST_HEIGHTS)
-    low, high = float(shown.min()), float(shown.max())
-    levels = np.rint((shown - low) / (high - low) * _LEVELS).astype(np.uint8)
+    means = block_means(heights, MOST_HEIGHTS)
+    low, high = float(means.min()), float(means.max())
+    levels = np.rint((means - low) / (high - low) * LEVELS).astype(np.uint8)
     return {
         "grid": len(heights),
-        "cells": len(shown),
+        "cells": len(means),
         "low": low,
         "high": high,
-        "levels": base64.b64encode(levels.tobytes()).decode("ascii"),
+        "levels": _base64(levels.tobytes()),
     }
 
 
 def run_entry(run: xr.Dataset, maps: Sequence[str] | None) -> dict:
-    """The curves of a run and its snapshots.
+    """Return the curves of a run and its snapshots.
 
     Parameters
     ----------
-    run : a run as in a campaign dataset, with at least one step.
-    maps : of boundary elements, the `picture` of every snapshot; None of asperities, whose spots are in the run, and
-        where the file with the maps is not there.
+    run : a run of a campaign dataset, with at least one step.
+    maps : `picture` of every snapshot of boundary elements; None for asperities, whose spots are in the run, and if the
+        file with the maps is missing.
     """
-    kinds, targets = run["step_kind"].values.astype(str), run["step_target"].values
+    stops = zip(run["step_kind"].values.astype(str), run["step_target"].values, strict=True)
     return {
         "failure": why_no_result(run.attrs),
         "period": float(run["period"]),
@@ -251,87 +254,82 @@ def run_entry(run: xr.Dataset, maps: Sequence[str] | None) -> dict:
         "gap": floats(reduced_gap(run)),
         "spots": run["spot_count"].values.tolist(),
         "leg": run["leg"].values.tolist(),
-        "stops": [
-            None if kind == BETWEEN else f"{kind} {target:.6g}" for kind, target in zip(kinds, targets, strict=True)
-        ],
+        "stops": [None if kind == BETWEEN else f"{kind} {target:.6g}" for kind, target in stops],
         "snapshots": [_snapshot(run, k, maps) for k in range(run.sizes["snapshot"])],
     }
 
 
-def _snapshot(run, at, maps):
-    """Spots or patches of a snapshot, and the distributions that figures 3 and 8 show."""
-    step = int(run["snapshot_step"].values[at])
+def _snapshot(run: xr.Dataset, snapshot: int, maps: Sequence[str] | None) -> dict:
+    """Return spots or patches of a snapshot, and the distributions of figures 3 and 8."""
+    by_cells = model_of(run.attrs).by_cells
     cell = float(run["period"]) ** 2
-    areas = [patch_areas(run, at)]
-    found = {
-        "step": step,
-        "gap": _points(gap_densities([(run, at)])),
-        "pressure": _pressures(run, at),
+    areas = [patch_areas(run, snapshot)]
+    densities = joined_pressure_densities if by_cells else pressure_densities
+    pressure, (density,) = densities([(run, snapshot)])
+    visible = density > LEAST_DENSITY * density.max(initial=0)
+    data = {
+        "step": int(run["snapshot_step"].values[snapshot]),
+        "gap": _points(gap_densities([(run, snapshot)])),
+        "pressure": [floats(pressure[visible]), floats(density[visible])],
         "sizes": _points(patch_density(areas, cell)),
         "larger": _points(patches_above(areas, cell)),
     }
     if maps is not None:
-        return found | {"map": maps[at]}
-    if model_of(run.attrs).by_cells:
-        return found
-    spots = spots_of(run, at)
-    return found | {"circles": [floats(spots[f"spot_{name}"]) for name in ("x", "y", "radius")]}
+        data["map"] = maps[snapshot]
+    elif not by_cells:
+        spots = spots_of(run, snapshot)
+        data["circles"] = [floats(spots[f"spot_{name}"]) for name in ("x", "y", "radius")]
+    return data
 
 
-def _points(curve):
-    """Points of the curve of a single run."""
+def _points(curve) -> list[str]:
+    """Return the points of a curve of a single run."""
     x, (y,) = curve
     return [floats(x), floats(y)]
 
 
-def _pressures(run, at):
-    """Points of the density of the pressure, without its thinnest tail; bins of few nodes are joined."""
-    densities = joined_pressure_densities if model_of(run.attrs).by_cells else pressure_densities
-    pressure, (density,) = densities([(run, at)])
-    shown = density > LEAST_DENSITY * density.max(initial=0)
-    return [floats(pressure[shown]), floats(density[shown])]
-
-
 def picture(contact: np.ndarray) -> str:
-    """A map of contact as a PNG in base64, its first row at the bottom: the part of a cell in contact as its opacity.
-
-    contact : (n, n), from 0 to 1, along y and x.
-    """
-    from PIL import Image
-
-    part = block_means(np.asarray(contact, float), MOST_CELLS)[::-1]
-    levels = np.rint(part * _LEVELS).astype(np.uint8)
-    image = Image.frombytes("P", levels.shape, levels.tobytes())
-    image.putpalette(CONTACT_COLOUR * (_LEVELS + 1))
-    file = io.BytesIO()
-    image.save(file, "PNG", transparency=bytes(range(_LEVELS + 1)))
-    return base64.b64encode(file.getvalue()).decode("ascii")
-
-
-def partners(one: Mapping, other: Mapping) -> list[int]:
-    """For every step of a run the step of another at the same state of the path, or -1 where it has none.
-
-    A stop is the one on the same leg that was asked for; an equilibrium between stops has for its partner the one on
-    the same leg at the nearest mean separation.
+    """Return a map of contact as a PNG in base64; opacity is the fraction of a cell in contact.
 
     Parameters
     ----------
-    one, other : runs, of which `step_kind`, `step_target`, `leg` and `mean_separation` are used.
+    contact : (n, n), from 0 to 1, along y and x; its first row is at the bottom of the picture.
     """
-    kinds, others = ([str(kind) for kind in run["step_kind"].values] for run in (one, other))
-    asked = zip(other["leg"].values.tolist(), others, other["step_target"].values.tolist(), strict=True)
-    stops = {stop: k for k, stop in enumerate(asked) if stop[1] != BETWEEN}
+    from PIL import Image
+
+    fraction = block_means(np.asarray(contact, float), MOST_CELLS)[::-1]
+    levels = np.rint(fraction * LEVELS).astype(np.uint8)
+    image = Image.frombytes("P", levels.shape, levels.tobytes())
+    image.putpalette(CONTACT_COLOUR * (LEVELS + 1))
+    file = io.BytesIO()
+    image.save(file, "PNG", transparency=bytes(range(LEVELS + 1)))
+    return _base64(file.getvalue())
+
+
+def partners(one: xr.Dataset, other: xr.Dataset) -> list[int]:
+    """Find, for every step of a run, the step of another run at the same state of the path; -1 if there is none.
+
+    The partner of a stop is the same stop on the same leg. The partner of another equilibrium is the step on the same
+    leg with the nearest mean separation.
+
+    Parameters
+    ----------
+    one, other : runs, with `step_kind`, `step_target`, `leg` and `mean_separation`.
+    """
+
+    def stops(run):
+        kinds = map(str, run["step_kind"].values)
+        return list(zip(run["leg"].values.tolist(), kinds, run["step_target"].values.tolist(), strict=True))
+
+    step_of_stop = {stop: k for k, stop in enumerate(stops(other)) if stop[1] != BETWEEN}
     legs, separations = other["leg"].values, other["mean_separation"].values
-    found = []
-    for k, (leg, kind, target) in enumerate(
-        zip(one["leg"].values.tolist(), kinds, one["step_target"].values.tolist(), strict=True)
-    ):
-        same = np.flatnonzero(legs == leg)
-        if kind != BETWEEN:
-            found.append(stops.get((leg, kind, target), -1))
-        elif len(same):
-            distance = np.abs(separations[same] - float(one["mean_separation"].values[k]))
-            found.append(int(same[np.argmin(distance)]))
+    steps = []
+    for stop, separation in zip(stops(one), one["mean_separation"].values, strict=True):
+        same_leg = np.flatnonzero(legs == stop[0])
+        if stop[1] != BETWEEN:
+            steps.append(step_of_stop.get(stop, -1))
+        elif len(same_leg):
+            steps.append(int(same_leg[np.argmin(np.abs(separations[same_leg] - separation))]))
         else:
-            found.append(-1)
-    return found
+            steps.append(-1)
+    return steps

@@ -1,8 +1,7 @@
-"""The report of a campaign: one HTML page that needs nothing else, neither network nor other files.
+"""The report of a campaign: one HTML page that needs neither network nor other files.
 
-All of it follows from the campaign's data, so the same data give the same bytes. Times and memory are measurements
-that differ from one execution to the next: they stand on a page of their own, which this one shows where it lies beside
-it. Long tables show their first rows; what is left out is in the data, to which the page links.
+The same data give the same bytes. Times and memory differ from one execution to the next, so they are on another page,
+which this one embeds. Long tables contain their first rows only; all rows are in the data, to which the page links.
 """
 
 from __future__ import annotations
@@ -23,20 +22,24 @@ from icha.contact.models import MODEL_PAPER
 from icha.datasets.results import EXPLORER
 from icha.figures.captions import count_runs
 from icha.figures.registry import figure_number
-from icha.report.sections import entry_section, provenance, sources, spectra, surface_row
+from icha.report.sections import error_section, provenance, sources, spectra, surface_row
 from icha.report.studies import study_section
-from icha.report.template import MOST_ROWS, template
-from icha.support.atomic_files import whole_file
+from icha.report.template import MOST_ROWS, write_page
 
 SOFTWARE = ("icha", "numpy", "scipy", "finufft", "xarray", "netCDF4", "matplotlib", "snakemake")
-
-# Tables with more rows are folded up.
-_FOLDED = 30
+FOLDED_ROWS = 30  # longer tables are folded
 
 
 @dataclass(frozen=True)
 class ReportFigure:
-    """A figure of the report: its name, caption, the files that hold it, and the studies whose runs it shows."""
+    """A figure of the report.
+
+    Attributes
+    ----------
+    name, caption : its name and caption.
+    png, pdf : its files.
+    studies : studies whose runs it shows.
+    """
 
     name: str
     caption: str
@@ -67,19 +70,19 @@ def write_report(
     Parameters
     ----------
     path : the HTML file; links to other files are relative to its folder.
-    campaign : the campaign dataset; its title, summary and licence head the page.
-    figures : in order; those of one study stand with it, the others before all studies.
-    checks : findings of `icha.analysis.checks.check_campaign`.
-    comparison : `icha.analysis.common_loads.compare_campaign` of the campaign, if there is one.
+    campaign : the campaign dataset, with title, summary and licence.
+    figures : in order; figures of one study are in its section, the others precede all studies.
+    checks : results of `icha.analysis.checks.check_campaign`.
+    comparison : `icha.analysis.common_loads.compare_campaign` of the campaign, if available.
     model_error : `icha.analysis.model_error.model_error` of the campaign, if it has boundary elements.
-    surfaces : surface files, with or without their heights, for their statistics and power spectra.
-    times_path : the page of what the jobs took (`write_times_page`), which is shown where it lies beside this one.
+    surfaces : surface files, with or without their heights, for statistics and power spectra.
+    times_path : the page of times (`write_times_page`), which is embedded.
     configuration : text of the configuration as used.
-    dataset_path : the campaign dataset's file, to be linked.
-    files : further files to be linked, by what they are called.
-    results : the folder of the campaign's results, to be linked; a page for exploring will be in it.
+    dataset_path : file of the campaign dataset, for a link.
+    files : further files to link, by their titles.
+    results : folder of the campaign's results, for links.
     citations : further sources to cite, such as those of measurements.
-    further_software : packages that the campaign needs besides those that every campaign needs.
+    further_software : packages that this campaign needs besides `SOFTWARE`.
     """
 
     def link(target):
@@ -87,38 +90,38 @@ def write_report(
 
     pictures = _pictures(figures, campaign, link)
     studies = [study_section(campaign, name, comparison) for name in campaign.children]
-    surfaces = list(surfaces)
+    surfaces, checks = list(surfaces), list(checks)
+    entries = list(model_error.children.values()) if model_error is not None else []
     linked = {name: link(target) for name, target in files.items()}
-    page = template("report.html").render(
-        **_of_campaign(campaign, studies),
-        **_of_checks(list(checks)),
-        **_of_surfaces(surfaces),
+    write_page(
+        path,
+        "report.html",
+        **_campaign_values(campaign, studies),
+        checks=worst(checks),
+        check_count=len(checks),
+        failed=[check for check in checks if not check.passed],
+        surfaces=[surface_row(surface) for surface in surfaces[:MOST_ROWS]],
+        surface_count=len(surfaces),
+        sources=sources(surfaces),
+        spectra=spectra(surfaces),
         figures=pictures,
         graph=provenance(studies, surfaces, pictures, model_error, linked, link(dataset_path)),
-        entries=[entry_section(node.to_dataset()) for node in _entries(model_error)],
-        **_links(link, dataset_path, times_path, results),
+        entries=[error_section(node.to_dataset()) for node in entries],
+        dataset=link(dataset_path),
+        dataset_name=Path(dataset_path).name if dataset_path is not None else None,
+        times=link(times_path),
+        results=link(results),
+        explorer=link(Path(results, EXPLORER)) if results is not None else None,
         files=linked,
         configuration=configuration,
         citations=citations,
-        references=_references(campaign, model_error),
+        references=_references([*campaign.children.values(), *entries]),
         software={name: _version(name) for name in (*SOFTWARE, *further_software)},
     )
-    with whole_file(path) as temporary:
-        temporary.write_text(page, encoding="utf-8")
 
 
-def _links(link, dataset, times, results):
-    return {
-        "dataset": link(dataset),
-        "dataset_name": Path(dataset).name if dataset is not None else None,
-        "times": link(times),
-        "results": link(results),
-        "explorer": link(Path(results, EXPLORER)) if results is not None else None,
-    }
-
-
-def _of_campaign(campaign, studies):
-    """What the page says of the campaign as a whole."""
+def _campaign_values(campaign: xr.DataTree, studies: list[dict]) -> dict:
+    """Return what the page prints about the campaign as a whole."""
     totals = {name: sum(study[name] for study in studies) for name in ("asked", "complete", "failed", "missing")}
     return {
         "title": campaign.attrs.get("title", "Rough contact campaign"),
@@ -128,61 +131,38 @@ def _of_campaign(campaign, studies):
         "totals": totals | {"not_applicable": sum(len(study["not_applicable"]) for study in studies)},
         "validity": of_dataset(campaign),
         "most_rows": MOST_ROWS,
-        "folded": _FOLDED,
+        "folded": FOLDED_ROWS,
         "paper": MODEL_PAPER.line,
     }
 
 
-def _of_checks(checks):
-    failed = [check for check in checks if not check.passed]
-    return {"checks": worst(checks), "check_count": len(checks), "failed": failed}
+def _pictures(figures: Sequence[ReportFigure], campaign: xr.DataTree, link) -> list[dict]:
+    """Return what the page shows of the figures: first those of no study or of several, then those of each study.
 
-
-def _of_surfaces(surfaces):
-    rows = [surface_row(surface) for surface in surfaces[:MOST_ROWS]]
-    return {
-        "surfaces": rows,
-        "surface_count": len(surfaces),
-        "sources": sources(surfaces),
-        "spectra": spectra(surfaces),
-    }
-
-
-def _pictures(figures, campaign, link):
-    """What the page shows of the figures: those of one study with it, after those of none or of several.
-
-    They have the numbers of their names, so that a figure has one number in the page, in its files and in the docs.
-    Captions count the runs that are missing or drawn pale.
+    A figure has the number of its name, on the page as in the documentation. Captions count missing and pale runs.
     """
     studies = list(campaign.children)
-    places = [None, *studies]
-    own = [each.studies[0] if len(each.studies) == 1 and each.studies[0] in studies else None for each in figures]
-    ordered = sorted(zip(own, figures, strict=True), key=lambda pair: places.index(pair[0]))
-    return [
+    pictures = [
         {
             "name": figure.name,
             "number": figure_number(figure.name),
             "caption": " ".join(filter(None, (figure.caption, count_runs(campaign, figure.studies)))),
             "data": base64.b64encode(Path(figure.png).read_bytes()).decode("ascii"),
             "pdf": link(figure.pdf),
-            "study": study,
+            "study": figure.studies[0] if len(figure.studies) == 1 and figure.studies[0] in studies else None,
         }
-        for study, figure in ordered
+        for figure in figures
     ]
+    return sorted(pictures, key=lambda picture: [None, *studies].index(picture["study"]))
 
 
-def _entries(model_error):
-    return model_error.children.values() if model_error is not None else ()
+def _references(nodes: Iterable[xr.DataTree]) -> list[str]:
+    """Return the sources that datasets name, each once."""
+    texts = ";".join(node.attrs.get("references", "") for node in nodes)
+    return list(dict.fromkeys(source.strip() for source in texts.split(";") if source.strip()))
 
 
-def _references(campaign, model_error):
-    """Sources that the studies' datasets and their boundary elements name, each once."""
-    nodes = [*campaign.children.values(), *_entries(model_error)]
-    found = (node.attrs.get("references", "") for node in nodes)
-    return list(dict.fromkeys(part.strip() for text in found for part in text.split(";") if part.strip()))
-
-
-def _version(name):
+def _version(name: str) -> str | None:
     try:
         return importlib.metadata.version(name)
     except importlib.metadata.PackageNotFoundError:

@@ -1,43 +1,43 @@
-"""Templates of the pages, and how numbers and symbols are set in them."""
+"""Templates of the pages, and how they print numbers and symbols."""
 
 from __future__ import annotations
 
+import os
 import re
 
 import jinja2
 import numpy as np
 from markupsafe import Markup, escape
 
-from icha.support import in_words
-from icha.support.in_words import printable_lines
+from icha.support import formatting
+from icha.support.atomic_files import whole_file
+from icha.support.formatting import printable_lines
 
-# A table has so many rows at most.
-MOST_ROWS = 300
-
-# Symbols as they stand in captions and attributes, and how a page sets them.
-_SYMBOLS = (
-    (re.compile(r"h(?:&#39;|')_?rms"), "<i>h</i>′<sub>rms</sub>"),
-    (re.compile(r"\bh_rms"), "<i>h</i><sub>rms</sub>"),
-    (re.compile(r"\bE\*"), "<i>E</i><sup>∗</sup>"),
-    (re.compile(r"\bA0\b"), "<i>A</i><sub>0</sub>"),
-)
+MOST_ROWS = 300  # of a table
+# Symbols in captions and attributes, and their form on a page.
+SYMBOLS = {
+    r"h(?:&#39;|')_?rms": "<i>h</i>′<sub>rms</sub>",
+    r"\bh_rms": "<i>h</i><sub>rms</sub>",
+    r"\bE\*": "<i>E</i><sup>∗</sup>",
+    r"\bA0\b": "<i>A</i><sub>0</sub>",
+}
 
 
 def _symbols(text: str) -> Markup:
-    """Set the symbols of plain text: E*, A0, h'rms."""
+    """Format the symbols of plain text: E*, A0, h'rms."""
     result = str(escape(printable_lines(text)))
-    for pattern, replacement in _SYMBOLS:
-        result = pattern.sub(replacement, result)
+    for pattern, replacement in SYMBOLS.items():
+        result = re.sub(pattern, replacement, result)
     return Markup(result)
 
 
 def scientific(value: float | None) -> Markup:
-    """A number with three digits, in powers of ten where it is small or large."""
+    """Format a number with three digits, with a power of ten if it is small or large."""
     if value is None:
         return Markup("–")
     if value == 0:
         return Markup("0")
-    # A hundredth less a rounding error is a hundredth.
+    # 0.01 may be stored as 0.00999….
     exponent = int(np.floor(np.log10(abs(value)) + 1e-9))
     if -3 <= exponent < 4:
         return Markup(escape(f"{value:.{max(0, 2 - exponent)}f}" if exponent < 3 else f"{value:.0f}"))
@@ -45,20 +45,20 @@ def scientific(value: float | None) -> Markup:
 
 
 def _per_cent(value: float, *, signed: bool = True) -> str:
-    """A part in per cent, to a tenth, with a true minus sign."""
+    """Format a fraction in per cent, to a tenth, with a typographic minus sign."""
     text = f"{100 * value:+.1f}" if signed else f"{100 * value:.1f}"
     return text.replace("+0.0", "0.0").replace("-0.0", "0.0").replace("-", "−")
 
 
 def template(name: str) -> jinja2.Template:
-    """A page to be filled in, with the filters above."""
+    """Return the template of a page, with the filters above."""
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("icha.report", "templates"),
         autoescape=True,
         trim_blocks=True,
         lstrip_blocks=True,
         undefined=jinja2.StrictUndefined,
-        # Titles, names and messages of failed runs: what a browser would turn round is written out.
+        # Titles, names and messages may contain characters that reverse the direction of text.
         finalize=lambda value: printable_lines(value) if type(value) is str else value,
     )
     environment.filters |= {
@@ -66,6 +66,12 @@ def template(name: str) -> jinja2.Template:
         "scientific": scientific,
         "per_cent": _per_cent,
         "number": "{:g}".format,
-        "duration": in_words.duration,
+        "duration": formatting.duration,
     }
     return environment.get_template(name)
+
+
+def write_page(path: str | os.PathLike, name: str, **values) -> None:
+    """Fill in a template and write the page."""
+    with whole_file(path) as temporary:
+        temporary.write_text(template(name).render(values), encoding="utf-8")

@@ -14,7 +14,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from icha.support import in_words
+from icha.support import formatting
 
 # Environment variable with the limit in MB, and the limit without it.
 VARIABLE = "ICHA_INPUT_MB"
@@ -44,7 +44,7 @@ class TooLarge(RefusedFile):
     def __init__(self, needed: str, most: int):
         """Say what is `needed`, that `most` bytes are allowed, and what allows more."""
         super().__init__(
-            f"needs {needed} of memory; allowed: {in_words.size(most)}, or what the environment variable {VARIABLE} "
+            f"needs {needed} of memory; allowed: {formatting.size(most)}, or what the environment variable {VARIABLE} "
             f"says, in MB"
         )
 
@@ -86,7 +86,7 @@ def require_room(needed: float, most: int | None = None) -> None:
     """Raise `TooLarge` if reading needs more bytes of memory than it may take: `most`, or those of any file."""
     most = most_memory() if most is None else most
     if needed > most:
-        raise TooLarge(f"about {in_words.size(needed)}", most)
+        raise TooLarge(f"about {formatting.size(needed)}", most)
 
 
 @contextmanager
@@ -109,7 +109,7 @@ def bounded_memory(most: int | None = None) -> Iterator[None]:
     try:
         yield
     except MemoryError:
-        raise TooLarge(f"more than {in_words.size(most)}", most) from None
+        raise TooLarge(f"more than {formatting.size(most)}", most) from None
     finally:
         resource.setrlimit(resource.RLIMIT_DATA, (soft, hard))
 

@@ -1,4 +1,4 @@
-"""Values of a configuration: quantities such as `25 MPa`, kept as floats in SI units, and types that refuse others."""
+"""Types of values in a configuration, such as `25 MPa`, which is kept as a float in SI units."""
 
 import math
 import re
@@ -12,21 +12,21 @@ from typing import Annotated, Any
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, WithJsonSchema
 
-from icha.support.rules import CONTACT_MODULUS, LENGTH, POSITIVE, SEED, SURFACE_ENERGY, Integer, Real
+from icha.support.rules import CONTACT_MODULUS, LENGTH, POSITIVE, SEED, SURFACE_ENERGY, FloatRange, IntegerRange
 
-# A number as people write it. PyYAML hands `1.0e6` and `1e-3` over as text, so text must be accepted.
+# A number as text: PyYAML reads `1.0e6` and `1e-3` as text, so text must be accepted.
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _QUANTITY = re.compile(rf"\s*({_NUMBER})\s*(.*?)\s*", re.DOTALL)
 _UNIT = re.compile(r"[A-Za-zµμÅ°%²³⁻·][\w\s*/^().µμÅ°%²³⁻·-]*")
 
-# Letters of a number or a unit; patterns and pint take their time for texts that are neither.
+# Most letters of a number or a unit: patterns and pint are slow on longer texts, which are neither.
 _LONGEST = 100
 
-# The quantities of a configuration, by the SI unit in which the model gets them.
+# Quantities of a configuration, by their SI unit.
 PHYSICAL_NAMES = {"m": "length", "Pa": "pressure", "J/m^2": "energy per area", "1": "ratio"}
 
-# What most configurations are written in, besides lengths: pint takes longer to get ready than all else takes to read
-# one. These are its own factors, which tests/support/test_units.py sees to.
+# The commonest units besides lengths. Loading pint takes longer than reading a configuration without it;
+# tests/support/test_units.py compares these factors with those of pint.
 USUAL = {
     ("Pa", "Pa"): "1",
     ("kPa", "Pa"): "1e3",
@@ -36,7 +36,7 @@ USUAL = {
     ("mJ/m^2", "J/m^2"): "1e-3",
 }
 
-# Lengths that people use for scans; pint knows others as well (px, pt, au, hand), which no file means by them.
+# Units of length of scans. Pint also accepts px, pt, au and hand, which mean something else in a file of heights.
 _PREFIXES = {"deci": "1e-1", "centi": "1e-2", "milli": "1e-3", "micro": "1e-6", "nano": "1e-9", "pico": "1e-12"}
 _SYMBOLS = {"km": "1e3", "m": "1", "dm": "1e-1", "cm": "1e-2", "mm": "1e-3", "um": "1e-6", "\u03bcm": "1e-6"}
 _SYMBOLS |= {"nm": "1e-9", "pm": "1e-12", "\u00c5": "1e-10", "in": "0.0254", "mil": "2.54e-5", "thou": "2.54e-5"}
@@ -48,7 +48,7 @@ _LONG_NAMES |= {
 }
 _LONG_NAMES |= {f"{name}s": factor for name, factor in _LONG_NAMES.items()} | {"inches": "0.0254"}
 
-# Units that are suggested for a slip of case or a missing ^.
+# Units to suggest for a wrong case or a missing ^.
 _SUGGESTED = {
     "Pa": ("Pa", "hPa", "kPa", "MPa", "GPa", "N/m^2", "kN/m^2", "MN/m^2", "N/mm^2"),
     "J/m^2": ("J/m^2", "mJ/m^2", "uJ/m^2", "N/m", "mN/m", "uN/m"),
@@ -56,29 +56,29 @@ _SUGGESTED = {
 }
 
 PATTERN = rf"^\s*{_NUMBER}\s*[A-Za-zµμÅ].*$"
-# Names are those of folders and files, too, which commands would take for options if they began with a hyphen.
+# Names become folders and files; commands would read one that begins with a hyphen as an option.
 NAME_PATTERN = r"^[a-z0-9_][a-z0-9_-]*$"
-# Letters of a name, and of one with the values that a study varies: a file's name with its ending has up to 255.
+# Most letters of a name, and of a name with the values that a study varies. A file name may have 255.
 _LONGEST_NAME, LONGEST_LABEL = 80, 200
-# Rounding of the quotient of two lengths must not decide whether a wave has its cells.
+# Relative tolerance of a quotient of two lengths, such as the number of cells per wave.
 ROUNDING = 1e-9
-# Names that messages list at most.
+# Most names that a message lists.
 _MOST_LISTED = 30
-# Location in a configuration, value, and what is wrong with it and allowed.
+# Location in a configuration, value, and what is wrong with it and what is expected.
 Problem = tuple[tuple, Any, str]
-# In the place of a value that is not there, in problems.
+# Value of a problem whose key is missing.
 NOTHING = object()
 Name = Annotated[str, Field(strict=True, pattern=NAME_PATTERN, max_length=_LONGEST_NAME)]
-# A name, or that of a variant made by a study's `vary`.
+# A name, or the name of a variant that `vary` of a study makes.
 Label = Annotated[str, Field(strict=True, pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.+-]*$", max_length=LONGEST_LABEL)]
 _RANGE = re.compile(r"\s*(\d{1,10})\s*\.\.\s*(\d{1,10})\s*")
-# More are a slip of the pen.
+# Most seeds of a range.
 _MOST_SEEDS = 10**5
 
 
 @cache
 def _registry():
-    # Decimals keep `100 um` exactly 1e-4 m, whatever way it is written.
+    # Decimals make `100 um` exactly 1e-4 m.
     import pint
 
     return pint.UnitRegistry(non_int_type=Decimal)
@@ -86,13 +86,7 @@ def _registry():
 
 @lru_cache(maxsize=1024)
 def conversion_factor(unit: str, si_unit: str) -> Decimal:
-    """Exact factor from `unit` to `si_unit`.
-
-    Raises
-    ------
-    ValueError
-        If `unit` is unknown or of another dimension; of a length, if it is none in which scans are measured.
-    """
+    """Exact factor from `unit` to `si_unit`; raise ValueError if `unit` is unknown or of another dimension."""
     if len(unit) > _LONGEST:
         raise ValueError(f"a text of {len(unit)} letters is not a unit")
     if unit == si_unit == "1":
@@ -102,17 +96,17 @@ def conversion_factor(unit: str, si_unit: str) -> Decimal:
     try:
         return _length(unit) if si_unit == "m" else _by_pint(unit, si_unit)
     except ValueError as error:
-        near = [known for known in _SUGGESTED.get(si_unit, ()) if _letters(known) == _letters(unit)]
-        raise ValueError(f"{error} (did you mean {near[0]!r}?)" if near else str(error)) from None
+        similar = [known for known in _SUGGESTED.get(si_unit, ()) if _letters(known) == _letters(unit)]
+        raise ValueError(f"{error} (did you mean {similar[0]!r}?)" if similar else str(error)) from None
 
 
 def _letters(unit):
-    """A unit without what slips: its case, blanks, and the signs of a power."""
+    """A unit in lower case, without blanks and signs of a power."""
     return re.sub(r"[\s^*]", "", unicodedata.normalize("NFKC", unit)).replace("\u03bc", "u").lower()
 
 
 def _length(unit):
-    """Exact factor from a unit of length to metres; both signs for micro and both for angstrom are known."""
+    """Exact factor from a unit of length to metres; accepts both signs for micro and both for angstrom."""
     name = unicodedata.normalize("NFKC", unit.strip())
     factor = _SYMBOLS.get(name) or _LONG_NAMES.get(name.lower())
     if factor is None:
@@ -133,7 +127,7 @@ def _by_pint(unit, si_unit):
         raise ValueError(f"{unit!r} is not a known unit") from None
     except pint.DimensionalityError:
         raise ValueError(f"{unit!r} is not a unit of {PHYSICAL_NAMES[si_unit]}") from None
-    except Exception:  # pint raises a dozen kinds of errors for text that is not a unit
+    except Exception:  # pint raises a dozen types of errors for text that is not a unit
         raise ValueError(f"{unit!r} is not a unit") from None
     if not 0 < float(factor) < math.inf:
         raise ValueError(f"{unit!r} is a unit too large or too small for a number")
@@ -141,13 +135,7 @@ def _by_pint(unit, si_unit):
 
 
 def to_si(value, si_unit: str) -> float:
-    """Read a quantity with its unit, such as `25 MPa`, as a float in `si_unit`.
-
-    Raises
-    ------
-    ValueError
-        If the unit is missing, unknown or of another dimension, or the value is not a finite number.
-    """
+    """Read a quantity with its unit, such as `25 MPa`, as a float in `si_unit`; raise ValueError if it is not one."""
     if isinstance(value, bool) or not isinstance(value, str | int | float):
         raise ValueError("is not a number with a unit")
     if not isinstance(value, str):
@@ -160,18 +148,12 @@ def to_si(value, si_unit: str) -> float:
         raise ValueError("the unit is missing")
     try:
         return finite(Decimal(magnitude) * conversion_factor(unit, si_unit))
-    except ArithmeticError:  # beyond what a Decimal can hold, 1e999999 MPa
+    except ArithmeticError:  # larger than a Decimal, such as 1e999999 MPa
         raise ValueError("is not finite") from None
 
 
 def to_number(value) -> float:
-    """Read a plain number; text such as `1e-3`, which YAML does not take for a number, is one.
-
-    Raises
-    ------
-    ValueError
-        If it is not a finite number, or has a unit.
-    """
+    """Read a finite number without a unit, also as text such as `1e-3`, which YAML does not read as a number."""
     if isinstance(value, str):
         if len(value) > _LONGEST:
             raise ValueError("is not a number")
@@ -195,50 +177,50 @@ def finite(value) -> float:
     return value
 
 
-def quantity(rule: Real, example: str):
-    """Type of a value that is written with its unit and kept as a float in that of `rule`."""
+def quantity(rule: FloatRange, example: str):
+    """Type of a value with its unit, kept as a float in the unit of `rule`."""
     bounds = f"in {rule.interval} {rule.unit}" if rule.most is not None else "0 or greater"
-    allowed = f"{PHYSICAL_NAMES[rule.unit]} with its unit, {bounds}, such as {example!r}"
+    expected = f"{PHYSICAL_NAMES[rule.unit]} with its unit, {bounds}, such as {example!r}"
     schema = {"type": "string", "pattern": PATTERN, "examples": [example]}
-    return _float(lambda value: to_si(value, rule.unit), rule, allowed, schema, Unit(rule.unit))
+    return _float(lambda value: to_si(value, rule.unit), rule, expected, schema, Unit(rule.unit))
 
 
 @dataclass(frozen=True)
 class Unit:
-    """Unit in which a quantity is kept, to be found in the metadata of its type."""
+    """Unit of a quantity, as metadata of its type."""
 
     si: str
 
 
-def number(rule: Real):
-    """Type of a pure number; `1e-3`, which YAML takes for text, is one."""
+def number(rule: FloatRange):
+    """Type of a number without a unit."""
     bounds = {"exclusiveMinimum": rule.above, "minimum": rule.least, "maximum": rule.most}
     schema = {"type": "number"} | {key: bound for key, bound in bounds.items() if bound is not None}
-    return _float(to_number, rule, rule.allowed, schema)
+    return _float(to_number, rule, rule.expected, schema)
 
 
-def _float(convert, rule, allowed, schema, *metadata):
-    """Type of a float that `convert` reads and that keeps to a rule; refused with what is allowed."""
+def _float(convert, rule, expected, schema, *metadata):
+    """Type of a float that `convert` reads and a rule checks; a message says what is expected."""
 
     def read(value: Any) -> float:
         try:
             result = convert(value)
         except ValueError as error:
-            raise ValueError(f"{error}; allowed: {allowed}") from None
-        if not rule.holds(result):
-            raise ValueError(f"is out of range; allowed: {allowed}")
+            raise ValueError(f"{error}; expected {expected}") from None
+        if not rule.contains(result):
+            raise ValueError(f"is out of range; expected {expected}")
         return result
 
     return Annotated[float, BeforeValidator(read), WithJsonSchema(schema), *metadata]
 
 
-def integer(rule: Integer):
+def integer(rule: IntegerRange):
     """Type of an integer."""
     least, most = rule.least, rule.most
 
     def read(value: Any) -> int:
-        if not rule.holds(value):
-            raise ValueError(f"is not an integer from {least} to {most}; allowed: {least}, {least + 1}, … {most}")
+        if not rule.contains(value):
+            raise ValueError(f"is not an integer from {least} to {most}; expected {least}, {least + 1}, … {most}")
         return value
 
     schema = {"type": "integer", "minimum": least, "maximum": most}
@@ -246,18 +228,18 @@ def integer(rule: Integer):
 
 
 def flag(value: Any) -> bool:
-    """True or false, and not one of the many words that YAML and Python take for them."""
+    """Return true or false; refuse the many words that YAML and Python read as them."""
     if not isinstance(value, bool):
-        raise ValueError("is neither true nor false; allowed: true, false")
+        raise ValueError("is neither true nor false; expected true or false")
     return value
 
 
 def distinct(values):
-    """Refuse a list in which an entry stands twice."""
+    """Refuse a list with an entry that is given twice."""
     seen = set()
     for value in values:
         if value in seen:
-            raise ValueError(f"{value!r} is given twice; allowed: every entry once")
+            raise ValueError(f"{value!r} is given twice; expected every entry once")
         seen.add(value)
     return values
 
@@ -266,7 +248,7 @@ def increasing(values):
     """Refuse a list of numbers that does not increase."""
     for before, after in pairwise(values):
         if not after > before:
-            raise ValueError(f"{after:g} comes after {before:g}; allowed: values in increasing order")
+            raise ValueError(f"{after:g} comes after {before:g}; expected values in increasing order")
     return values
 
 
@@ -274,37 +256,37 @@ def decreasing(values):
     """Refuse a list of lengths that does not decrease."""
     for before, after in pairwise(values):
         if not after < before:
-            raise ValueError(f"{after:g} m comes after {before:g} m; allowed: values in decreasing order")
+            raise ValueError(f"{after:g} m comes after {before:g} m; expected values in decreasing order")
     return values
 
 
 def exactly_one(section):
-    """Refuse a section with no key given, or more than one."""
+    """Refuse a section with no key or more than one."""
     given = sorted(name for name in section.model_fields_set if getattr(section, name) is not None)
     if len(given) != 1:
         names = ", ".join(type(section).model_fields)
-        raise ValueError(f"{' and '.join(given) or 'nothing'} is given; allowed: exactly one of {names}")
+        raise ValueError(f"{' and '.join(given) or 'nothing'} is given; expected exactly one of {names}")
     return section
 
 
 def listed(names: Iterable) -> str:
-    """Names as a message lists them: `a, b, c`, or the first ones and how many more there are."""
+    """List names for a message: `a, b, c`, or the first ones and the number of the others."""
     names = list(names)
     more = f", … ({len(names) - _MOST_LISTED} more)" if len(names) > _MOST_LISTED else ""
     return ", ".join(map(str, names[:_MOST_LISTED])) + more
 
 
 def unknown(location: tuple, name: str, names: Iterable[str]) -> Iterator[Problem]:
-    """The problem of a name that is none of some section's, if it is one."""
+    """Yield the problem of a name that is not one of `names`."""
     if name not in names:
-        yield location, name, f"is not defined; allowed: {listed(names) or 'none, for there is none'}"
+        yield location, name, f"is not defined; expected {listed(names) or 'no name, because none is defined'}"
 
 
 def _without_controls(value: str) -> str:
-    """Refuse what a YAML file cannot hold but as an escape: characters that act on a terminal, halves of characters."""
+    """Refuse characters that a YAML file can hold only as escapes: control characters and surrogates."""
     for char in value:
         if unicodedata.category(char) in ("Cc", "Cs") and char not in "\n\t":
-            raise ValueError(f"holds the control character {char!r}; allowed: text")
+            raise ValueError(f"holds the control character {char!r}; expected text without it")
     return value
 
 
@@ -312,13 +294,12 @@ Text = Annotated[str, Field(strict=True, min_length=1), AfterValidator(_without_
 
 
 def _file(value: str) -> str:
-    """Refuse paths that workflows take for patterns."""
+    """Refuse paths that Snakemake would read as patterns."""
     if re.search(r"[{}]", value):
-        raise ValueError("has braces; allowed: the path of a file without { and } in it")
+        raise ValueError("has braces; expected the path of a file without { and } in it")
     return value
 
 
-# The path of a file.
 File = Annotated[Text, AfterValidator(_file)]
 Length = quantity(LENGTH, "100 um")
 Modulus = quantity(CONTACT_MODULUS, "25 MPa")
@@ -329,24 +310,24 @@ Flag = Annotated[bool, BeforeValidator(flag)]
 
 
 def stops(kind, in_order):
-    """Type of a list of values, at least one, that `in_order` does not refuse."""
+    """Type of a list of at least one value that `in_order` accepts."""
     return Annotated[list[kind], Field(min_length=1), AfterValidator(in_order)]
 
 
 def list_of_names(description, kind=Name):
-    """Type of a list of names, at least one and each once."""
+    """Type of a list of at least one name, each given once."""
     return Annotated[list[kind], Field(min_length=1, description=description), AfterValidator(distinct)]
 
 
 class Section(BaseModel):
-    """A part of the configuration: immutable, and without room for keys that nobody reads."""
+    """A section of the configuration: immutable, without unknown keys."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
 def _seeds(value: Any) -> Any:
-    """Seeds with their ranges written out: `1..50`, or a list of integers and such ranges."""
-    allowed = "allowed: integers from 0 and ranges of them, such as 1..50 or [1..5, 9]"
+    """Expand seeds: a range such as `1..50`, or a list of integers and ranges."""
+    expected = "expected integers from 0 and ranges of them, such as 1..50 or [1..5, 9]"
     if isinstance(value, list) and not value:
         return value
     found = []
@@ -357,13 +338,13 @@ def _seeds(value: Any) -> Any:
         shown = f"{entry!r} " if isinstance(value, list) else ""
         match = _RANGE.fullmatch(entry)
         if not match:
-            raise ValueError(f"{shown}is no range of seeds; {allowed}")
+            raise ValueError(f"{shown}is not a range of seeds; {expected}")
         first, last = map(int, match.groups())
         if last < first or last - first >= _MOST_SEEDS:
-            raise ValueError(f"{shown}ends before it begins, or has more than {_MOST_SEEDS} seeds; {allowed}")
+            raise ValueError(f"{shown}ends before it begins, or has more than {_MOST_SEEDS} seeds; {expected}")
         found += range(first, last + 1)
         if len(found) > _MOST_SEEDS:
-            raise ValueError(f"{shown}makes more than {_MOST_SEEDS} seeds; {allowed}")
+            raise ValueError(f"{shown}makes more than {_MOST_SEEDS} seeds; {expected}")
     return found if isinstance(value, list | str) else value
 
 

@@ -1,1 +1,1 @@
-"""Rough surfaces: their spectra, moments and summits, made at random or measured."""
+"""Rough surfaces, random or measured: their spectra, moments and summits."""

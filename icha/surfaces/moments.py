@@ -1,7 +1,7 @@
-"""Spectral moments, by which statistical theories describe a rough surface, and its radial power spectrum.
+"""Spectral moments, with which statistical theories describe a rough surface, and its radial power spectrum.
 
-Surfaces are taken to be isotropic: the moments are those of a profile along any direction, as in P. R. Nayak, J.
-Lubr. Technol. 93 (1971) 398-407, doi:10.1115/1.3451608.
+Moments are those of a profile, averaged over its directions, as for the isotropic surfaces of P. R. Nayak, J. Lubr.
+Technol. 93 (1971) 398-407, doi:10.1115/1.3451608.
 """
 
 from __future__ import annotations
@@ -13,34 +13,35 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 if TYPE_CHECKING:
-    # SciPy, for which commands that need no more than moments do not wait.
+    # Imports SciPy, which commands that only need moments should not wait for.
     from icha.surfaces.surface import Surface
 
 
-# Cells of a wave in which its summits are resolved, and cells of a summit where the shortest waves have half of them:
-# isotropic surfaces have about 0.2 summits for every square of the shortest wave.
+# Cells of a wave in which its summits are resolved.
 RESOLVED_CELLS = 8
-# Below so many cells per shortest wave boundary elements do not stand for the surface.
-LEAST_CELLS_PER_WAVE = 1.5
+# Cells of a summit where the shortest waves have half of them, since isotropic surfaces have about 0.2 summits for
+# every square of the shortest wave.
 LEAST_CELLS_OF_SUMMIT = 80
-# A smaller mean square slope, over that across it, is rounding.
+# Fewest cells per shortest wave with which boundary elements represent the surface.
+LEAST_CELLS_PER_WAVE = 1.5
+# Ratio of the mean square slopes along two directions below which the smaller one is rounding.
 _NO_SLOPE = 1e-12
-# Waves shorter than this part of the period are so dense that sums over them are integrals.
+# Wave number, in 2 pi/L, above which waves are so dense that sums over them are integrals.
 _DENSE = 64
 
 
 def cells_per_short_wave(grid: int, summits: float) -> float:
-    """Nodes along the shortest waves of a surface of `grid` nodes a side, as the number of its summits tells it."""
+    """Estimate the nodes along the shortest waves of a surface, of `grid` nodes a side, from its number of summits."""
     return RESOLVED_CELLS / 2 * math.sqrt(grid**2 / max(summits, 1) / LEAST_CELLS_OF_SUMMIT)
 
 
 def error_of_cells(cells_per_short_wave: float) -> str:
-    """Error of the contact area of boundary elements at so many grid cells per shortest wave, in words; "" if small.
+    """Describe the error of the contact area of boundary elements at a number of cells per shortest wave; "" if small.
 
     Measured against grids four times as fine, on random surfaces at p* = 1e-3 and 1e-2: up to 93 % at 1.1 cells (white
     noise), 23 % at 2, 15 % at 3, 11 % at 5.
     """
-    if cells_per_short_wave >= 0.9 * RESOLVED_CELLS:  # the number of summits gives it to a tenth
+    if cells_per_short_wave >= 0.9 * RESOLVED_CELLS:  # the number of summits determines it to a tenth
         return ""
     if cells_per_short_wave >= 4:
         return "a few per cent"
@@ -48,7 +49,7 @@ def error_of_cells(cells_per_short_wave: float) -> str:
 
 
 def summit_density(m2: float, m4: float) -> float:
-    """Maxima of an isotropic Gaussian surface per area, m4/(6 sqrt(3) pi m2), of its moments; m^-2 (Nayak 1971)."""
+    """Maxima of an isotropic Gaussian surface per area, m4/(6 sqrt(3) pi m2), m^-2 (Nayak 1971)."""
     return m4 / (6 * math.sqrt(3) * math.pi * m2)
 
 
@@ -57,11 +58,11 @@ def self_affine_full_contact_energy(
 ) -> float:
     """Elastic energy of full contact per area over E* (m) of a self-affine surface of rms slope 1; lengths in m.
 
-    `icha.surfaces.surface.Surface.full_contact_energy` of the surfaces of a
-    `icha.surfaces.spectrum.SelfAffineSpectrum`, without its modes: long waves are summed, the others integrated.
+    It equals `Surface.full_contact_energy` of the realisations of a `SelfAffineSpectrum`, but needs no modes: long
+    waves are summed, the others integrated.
     """
     roll, last = period / rolloff_wavelength, period / short_wavelength
-    # Just below the cut-off, as in the spectrum, whatever the rounding of the quotient.
+    # The cut-off itself is not part of the spectrum, whatever the rounding of the quotient.
     dense = min(_DENSE, last * (1 - 1e-9))
     k = np.arange(-math.ceil(dense), math.ceil(dense) + 1)
     k = np.hypot(k[:, None], k).ravel()
@@ -72,7 +73,7 @@ def self_affine_full_contact_energy(
         return float(total) + 2 * math.pi * (integral(order + 1, last) - integral(order + 1, dense))
 
     def integral(order, end):
-        """Integral of k^order C/C0 from 0 to end, flat up to the roll-off, falling as k^(-2 - 2 H) beyond."""
+        """Integral of k^order C/C0 from 0 to end; C is flat up to the roll-off, then falls as k^(-2 - 2 H)."""
         flat = min(end, roll) ** (order + 1) / (order + 1)
         if end <= roll:
             return flat
@@ -111,31 +112,32 @@ class SpectralMoments(NamedTuple):
         return (8 / 3 * self.m4) ** 0.5
 
     def scaled_to_rms_slope(self, rms_slope: float) -> SpectralMoments:
-        """Those of the same topography with its heights multiplied so that the rms slope is `rms_slope`."""
+        """Return the moments of the same topography with its heights multiplied to the rms slope `rms_slope`."""
         factor = (rms_slope / self.rms_slope) ** 2
         return SpectralMoments(*(moment * factor for moment in self))
 
 
 def spectral_moments(surface: Surface) -> SpectralMoments:
-    """Moments of a profile of the surface, averaged over its directions."""
+    """Compute the moments of a profile of the surface, averaged over its directions."""
     height, slope, laplacian = surface.spectral_moments
     return SpectralMoments(height, slope / 2, 3 / 8 * laplacian)
 
 
 def height_statistics(surface: Surface) -> tuple[float, float]:
-    """Skewness and kurtosis of the heights; 0 and 3 for a Gaussian surface."""
+    """Compute skewness and kurtosis of the heights; 0 and 3 for a Gaussian surface."""
     z = surface.heights
     variance = np.mean(z**2)
     return float(np.mean(z**3) / variance**1.5), float(np.mean(z**4) / variance**2)
 
 
 def slope_anisotropy(surface: Surface) -> float:
-    """Largest over smallest rms slope of profiles along all directions: 1 if isotropic, infinite for straight grooves.
+    """Compute the ratio of the largest to the smallest rms slope of profiles over all directions.
 
-    They are along the principal axes of the slope tensor, of the mean slopes of the cells between four nodes.
+    It is 1 for isotropic surfaces and infinite for straight grooves. The two directions are the principal axes of the
+    slope tensor of the cells between four nodes.
     """
     z = surface.heights if surface.free else np.pad(surface.heights, ((0, 1), (0, 1)), mode="wrap")
-    # Between opposite corners, along axes turned by 45 degrees, which changes no principal value.
+    # Slopes between opposite corners are along axes turned by 45 degrees, which changes no principal value.
     one, other = z[1:, 1:] - z[:-1, :-1], z[1:, :-1] - z[:-1, 1:]
     tensor = [[np.mean(one**2), np.mean(one * other)], [np.mean(one * other), np.mean(other**2)]]
     least, most = np.linalg.eigvalsh(tensor)
@@ -143,17 +145,17 @@ def slope_anisotropy(surface: Surface) -> float:
 
 
 def radial_power_spectrum(surface: Surface) -> tuple[np.ndarray, np.ndarray]:
-    """Wave numbers (rad/m) and isotropic power spectrum C(q) (m^4): the mean over the wave vectors of a ring.
+    """Compute the isotropic power spectrum C(q) (m^4), the mean over the wave vectors of a ring, and q (rad/m).
 
     The integral of C over the plane of wave vectors is the mean square height. Rings are one wave number 2 pi/L wide,
-    from the tenth on a tenth of their wave number; they end where the grid does not hold all their directions. A free
-    square is multiplied by Hann's window first, and C divided by the mean square of that, so that the step from one
-    edge to the other does not show.
+    from the tenth on a tenth of their wave number; the last one is the largest circle in the grid of wave vectors. A
+    free square is multiplied by Hann's window first, and C divided by its mean square, because the step from one edge
+    to the other would add waves.
     """
-    edges, shown, scale = _ring_edges(surface), surface, 1.0
+    edges, periodic, scale = _ring_edges(surface), surface, 1.0
     if surface.free:
         hann = np.sin(np.pi * (np.arange(surface.grid) + 0.5) / surface.grid) ** 2
-        shown = replace(surface, heights=surface.heights * (hann[:, None] * hann), boundary="periodic")
+        periodic = replace(surface, heights=surface.heights * (hann[:, None] * hann), boundary="periodic")
         scale = 1 / np.mean(hann**2) ** 2
 
     def rings(k2, count, power):
@@ -163,13 +165,13 @@ def radial_power_spectrum(surface: Surface) -> tuple[np.ndarray, np.ndarray]:
         sums = (count, count * k, power)
         return [np.bincount(ring, weights=each.ravel(), minlength=len(edges) + 1) for each in sums]
 
-    count, wave_number, power = np.sum(shown.by_wave_vector(rings), axis=0)[:, 1:-1]
+    count, wave_number, power = np.sum(periodic.by_wave_vector(rings), axis=0)[:, 1:-1]
     unit = 2 * np.pi / surface.period
     return unit * wave_number / count, scale * power / count / unit**2
 
 
 def ring_edges(surface: Surface) -> np.ndarray:
-    """Wave numbers (rad/m) of the edges of the rings of `radial_power_spectrum`, one more than there are rings."""
+    """Return the wave numbers (rad/m) between the rings of `radial_power_spectrum`, one more than rings."""
     return 2 * np.pi / surface.period * _ring_edges(surface)
 
 

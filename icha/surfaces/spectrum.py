@@ -17,13 +17,12 @@ from icha.support.parallel import blocks, on_cores
 from icha.support.rules import GRID, HURST, LENGTH, SEED, SLOPE
 from icha.surfaces.surface import Surface
 
-# Wave numbers are compared in units of 2 pi / L; this keeps |k| = 64 out of a band that ends at L/lambda_s = 64
-# whatever the rounding of the quotient.
+# Relative rounding of wave numbers in units of 2 pi / L, so that a band that ends at L/lambda_s = 64 excludes |k| = 64.
 _ROUNDING = 1e-9
 
 AMPLITUDES = ("fixed", "gaussian")
 
-# Rows or columns that are transformed at a time.
+# Rows or columns to transform at a time.
 _LINES = 64
 
 
@@ -42,7 +41,7 @@ class SelfAffineSpectrum:
     Raises
     ------
     ValueError
-        Naming the parameter whose value is not allowed.
+        If a value is out of range; the message names the parameter.
     """
 
     period: float
@@ -54,9 +53,9 @@ class SelfAffineSpectrum:
     def __post_init__(self):
         """Check the values."""
         for name in ("period", "rolloff_wavelength", "short_wavelength"):
-            object.__setattr__(self, name, LENGTH.checked(name, getattr(self, name)))
-        object.__setattr__(self, "rms_slope", SLOPE.checked("rms_slope", self.rms_slope))
-        object.__setattr__(self, "hurst", HURST.checked("hurst", self.hurst))
+            object.__setattr__(self, name, LENGTH.validate(name, getattr(self, name)))
+        object.__setattr__(self, "rms_slope", SLOPE.validate("rms_slope", self.rms_slope))
+        object.__setattr__(self, "hurst", HURST.validate("hurst", self.hurst))
         if self.rolloff_wavelength > self.period * (1 + _ROUNDING):
             raise ValueError(
                 f"rolloff_wavelength: {self.rolloff_wavelength!r} m must not exceed the period {self.period!r} m"
@@ -87,8 +86,8 @@ class SelfAffineSpectrum:
     def _band(self):
         """Wave vectors (kx, ky) of one half of the band, and |k|, in units of 2 pi / L.
 
-        They are ordered by max(|kx|, |ky|), so that neither the grid nor a smaller short cut-off changes
-        which random number a mode receives: finer surfaces of one seed only add shorter waves.
+        They are ordered by max(|kx|, |ky|). So a mode receives the same random number on every grid and with every
+        short cut-off, and finer surfaces of one seed only add shorter waves.
         """
         m = math.ceil(self.period / self.short_wavelength)
         kx, ky = np.meshgrid(np.arange(m + 1), np.arange(-m, m + 1))
@@ -103,7 +102,7 @@ class SelfAffineSpectrum:
 
     @cached_property
     def plateau(self) -> float:
-        """C0 in m^4, such that the modes of the periodic cell have exactly the rms slope."""
+        """C0 in m^4, with which the modes of the periodic cell have exactly the rms slope."""
         _, _, k, _ = self._band
         q = 2 * np.pi / self.period
         slope2 = 2 * float(np.sum(self._shape(k) * k**2)) * q**4
@@ -136,10 +135,10 @@ class SelfAffineSpectrum:
         Raises
         ------
         ValueError
-            Naming the argument whose value is not allowed.
+            If a value is out of range; the message names the argument.
         """
-        grid = GRID.checked("grid", grid)
-        seed = SEED.checked("seed", seed)
+        grid = GRID.validate("grid", grid)
+        seed = SEED.validate("seed", seed)
         if amplitudes not in AMPLITUDES:
             raise ValueError(f"amplitudes: {amplitudes!r} must be one of {', '.join(AMPLITUDES)}")
         cells = self.cells_per_short_wave(grid)
@@ -150,7 +149,7 @@ class SelfAffineSpectrum:
             )
         if cells < 4 * (1 - _ROUNDING):
             warnings.warn(
-                f"grid: {grid} nodes give {cells:.3g} cells per shortest wavelength; recommended: 8, at least 4",
+                f"grid: {grid} nodes give {cells:.3g} cells per shortest wavelength; expected at least 4, better 8",
                 stacklevel=2,
             )
         kx, ky, k, inside = self._band

@@ -1,4 +1,4 @@
-"""Summits of a surface, found below the grid, and how well they stand for its highest places."""
+"""Summits of a surface, located between the nodes, and how well they represent its highest places."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from icha.support.parallel import blocks, on_cores
 from icha.surfaces.square import cell_of
 from icha.surfaces.surface import Surface
 
-# A quintic spline reproduces a parabola exactly, depends on far nodes only weakly (0.43 per cell), and at eight
+# A quintic spline reproduces a parabola exactly, depends on distant nodes only weakly (0.43 per cell), and at eight
 # cells per wavelength has the second derivatives of a sine to 4e-4.
 _DEGREE = 5
-# Value, slope and curvature of the quintic spline at a node, from the coefficients of the five nodes around.
+# Weights of the coefficients of five nodes in value, slope and curvature of the quintic spline at the middle one.
 _VALUE = np.array([1.0, 26.0, 66.0, 26.0, 1.0]) / 120
 _SLOPE = np.array([-1.0, -10.0, 0.0, 10.0, 1.0]) / 24
 _CURVATURE = np.array([1.0, 2.0, -6.0, 2.0, 1.0]) / 6
 
-# Quintic B-splines of the six nodes around a point, as polynomials of its way t from the third of them to the fourth
-# (rows: nodes; columns: powers of t), and their first and second derivatives.
+# Quintic B-splines of the six nodes around a point, as polynomials of its distance t from the third node (rows: nodes;
+# columns: powers of t), and their first and second derivatives.
 _BASIS = (
     np.array(
         [
@@ -41,7 +41,7 @@ _BASIS_SLOPE = _BASIS[:, 1:] * np.arange(1, 6)
 _BASIS_CURVATURE = _BASIS_SLOPE[:, 1:] * np.arange(1, 5)
 
 _MAX_NEWTON_STEPS = 30
-# In cells: the last step of a converged search, how far from its node it may end, and when two ends are the same.
+# In cells: last step of a converged search, largest distance of a summit from its node, and of two equal summits.
 _CONVERGED = 1e-9
 _FARTHEST = 1.5
 _SAME_SUMMIT = 1e-3
@@ -49,34 +49,36 @@ _SAME_SUMMIT = 1e-3
 # differences. Of summits of smooth random surfaces (H 0.8, six seeds of 128 x 128 nodes) 99.5 % stay below 0.91 with
 # 12 nodes per shortest wave, 1.09 with 8, 1.16 with 6 and 1.69 with 5, 98 % below 1.78 with 4.
 _MAX_RISE = 1.8
-# Smallest rise that is not rounding, in units of the range of heights.
+# Rounding of a rise, in units of the range of heights.
 _ROUNDING = 1e-9
-# Less curvature than this part of the surface's mean is rounding on a plateau.
+# Curvature, relative to the mean of the surface, below which it is rounding on a plateau.
 _FLAT = 1e-6
-# Nodes beyond the edges of a free square, after which the spline has forgotten what follows: 0.43^32 = 2e-12.
-_BEYOND = 32
-# Rows or columns of the grid, and points between them, that are worked on at a time, which bounds the memory.
+# Nodes added beyond the edges of a free square; the influence of those farther away is 0.43^32 = 2e-12.
+_MARGIN = 32
+# Rows or columns of the grid, and points between them, in memory at a time.
 _LINES = 16
 _POINTS = 4096
-# Largest share of the load, and of the summits, that may be without support before asperities do not stand for the
+# Largest shares of the load without a summit, and of summits without support, with which asperities represent the
 # surface. Smooth random surfaces with at least 5 nodes per shortest wave stay below 0.1 (`tests/surfaces`).
 MAX_SHARE = 0.1
-# Rows and columns between a node and the summit that stands for it: on a crest oblique to the grid there are two nodes
-# higher than their neighbours beside one summit.
-_NEAR = range(-2, 3)
+# Rows and columns between a node and its summit: on a crest oblique to the grid two nodes beside one summit are higher
+# than their neighbours.
+_NEIGHBOURHOOD = range(-2, 3)
 
 
 @dataclass(frozen=True, eq=False)
 class Asperities:
     """The summits of a surface.
 
+    Attributes
+    ----------
     position : (n, 2) array, (x, y) in [0, period), m.
     height : (n,) array, above the mean plane, m.
     radius_of_curvature : (n,) array, 1/sqrt(kappa1 kappa2), the geometric mean of the principal radii of curvature, m.
     period : side of the square, m.
-    free : whether it is single, on a free half-space, or repeats.
-    unsupported_height : (m,) array, heights of the maxima of the spline that the nodes around do not support, m. They
-        are no asperities.
+    free : whether the square is single, on a free half-space; else it repeats.
+    unsupported_height : (m,) array, heights of the maxima of the spline without support of the nodes around them, m.
+        They are no asperities.
     """
 
     position: np.ndarray
@@ -88,7 +90,7 @@ class Asperities:
 
     @property
     def cell(self) -> float:
-        """Period of positions, m: of a single square twice the side, where all ways are the shortest."""
+        """Period of positions, m: for a single square twice the side, so that differences are never wrapped."""
         return cell_of(self.period, self.free)
 
     def __len__(self) -> int:
@@ -109,8 +111,8 @@ def find_summits(surface: Surface) -> Asperities:
         return found
     if unsupported := len(found.unsupported_height):
         raise ValueError(
-            f"heights: none of the {unsupported} summits of the surface is supported by the nodes around it, as where "
-            "heights have steps; expected smooth summits. Use a cutoff, or the model boundary_elements"
+            f"heights: the nodes support none of the {unsupported} summits of the surface, as at steps of heights; "
+            "expected smooth summits. Use a cutoff, or the model boundary_elements"
         )
     raise ValueError("heights: the surface has no summit with negative-definite curvature")
 
@@ -119,13 +121,12 @@ def locate_summits(surface: Surface) -> Asperities:
     """Locate the summits of a surface: the maxima, with negative-definite curvature, of a quintic spline.
 
     Comparing every node with its neighbours misses and misplaces elongated summits: on a crest oblique to the grid
-    the highest node can lie cells away from the summit, or there is none, and the contact area then depends on the
-    grid by some per cent. Instead Newton's method starts from every node whose own parabola has its top in a cell
-    next to it, and only a start that converges nearby counts, since near-degenerate curvatures throw the others far
-    away.
+    the highest node can lie cells away from the summit, or no node is a maximum, and the contact area then depends on
+    the grid by some per cent. Instead Newton's method starts from every node whose parabola has its top within a cell.
+    Only starts that converge nearby count, because near-degenerate curvatures throw others far away.
 
-    The edges of a free square have no maxima: a crest that runs over an edge has its top outside. There the heights go
-    on by point reflection at the edge, and summits count that lie between the outermost nodes.
+    Edges of a free square have no maxima, because a crest that crosses an edge has its top outside. Heights continue
+    by point reflection at the edges, and summits between the outermost nodes count.
 
     Beside steps, pits, single pixels and plateaus the spline rises where the surface does not. A maximum is a summit
     only if the nodes around it support its height (`_is_supported`).
@@ -134,24 +135,24 @@ def locate_summits(surface: Surface) -> Asperities:
     -------
     Asperities, ordered as the nodes from which they were found; possibly none.
     """
-    spacing, beyond = surface.spacing, _BEYOND if surface.free else 0
+    spacing, margin = surface.spacing, _MARGIN if surface.free else 0
     heights = surface.heights
     if surface.free:
-        heights = np.pad(heights, beyond, mode="reflect", reflect_type="odd")
+        heights = np.pad(heights, margin, mode="reflect", reflect_type="odd")
     grid = len(heights)
     coefficients = _spline_coefficients(heights)
     node, flat = _nodes_near_summits(coefficients)
-    searches = on_cores(lambda some: _climb(coefficients, node[some], flat), blocks(len(node), _POINTS))
-    at = np.concatenate([np.empty((0, 2)), *searches])
-    # Several nodes lead to one summit: the first stands for it.
-    twice = np.sort(cKDTree(at, boxsize=grid).query_pairs(_SAME_SUMMIT, output_type="ndarray"), axis=1)
-    at = np.delete(at, twice[:, 1], axis=0)
+    climbs = on_cores(lambda block: _climb(coefficients, node[block], flat), blocks(len(node), _POINTS))
+    summit = np.concatenate([np.empty((0, 2)), *climbs])
+    # Several nodes may lead to one summit; keep the first.
+    pairs = np.sort(cKDTree(summit, boxsize=grid).query_pairs(_SAME_SUMMIT, output_type="ndarray"), axis=1)
+    summit = np.delete(summit, pairs[:, 1], axis=0)
     if surface.free:
-        at = at[np.all((at > beyond) & (at < beyond + surface.grid - 1), axis=1)]
-    there = on_cores(lambda some: _spline(coefficients, at[some]), blocks(len(at), _POINTS))
-    height, _, _, hyy, hyx, hxx = np.concatenate([np.empty((6, 0)), *there], axis=1)
-    supported = _is_supported(heights, at, height)
-    position = (at[supported, ::-1] - beyond) * spacing
+        summit = summit[np.all((summit > margin) & (summit < margin + surface.grid - 1), axis=1)]
+    values = on_cores(lambda block: _spline(coefficients, summit[block]), blocks(len(summit), _POINTS))
+    height, _, _, hyy, hyx, hxx = np.concatenate([np.empty((6, 0)), *values], axis=1)
+    supported = _is_supported(heights, summit, height)
+    position = (summit[supported, ::-1] - margin) * spacing
     position[position >= surface.period] = 0.0
     return Asperities(
         position=position,
@@ -163,16 +164,16 @@ def locate_summits(surface: Surface) -> Asperities:
     )
 
 
-def _is_supported(heights, at, height):
-    """Whether the nodes around the summits at points (k, 2), in cells, support their heights (k,).
+def _is_supported(heights, summit, height):
+    """Tell whether the nodes around the summits at points (k, 2), in cells, support their heights (k,).
 
     Along each axis a parabola through nodes of second difference -d rises at most d/8 above the higher of two
-    neighbours. Of the second differences at the two nodes on either side of the summit the smaller one counts: at the
-    edge of a plateau one of them is large, the other is not (the limiter `minmod` of A. Suresh and H. T. Huynh,
-    J. Comput. Phys. 136 (1997) 83-99, doi:10.1006/jcph.1997.5745).
+    neighbours. The smaller second difference at the two nodes on either side of the summit counts, because at the edge
+    of a plateau only one of them is large (the limiter `minmod` of A. Suresh and H. T. Huynh, J. Comput. Phys. 136
+    (1997) 83-99, doi:10.1006/jcph.1997.5745).
     """
     grid = len(heights)
-    (row, column), (y, x) = np.floor(at).astype(int).T, np.mod(np.rint(at).astype(int), grid).T
+    (row, column), (y, x) = np.floor(summit).astype(int).T, np.mod(np.rint(summit).astype(int), grid).T
     rows, columns = np.mod([row, row + 1], grid), np.mod([column, column + 1], grid)
 
     def bend(line, before, after):
@@ -185,13 +186,8 @@ def _is_supported(heights, at, height):
     return height - corners <= _MAX_RISE * rise + _ROUNDING * np.ptp(heights)
 
 
-def count_summits(surface: Surface) -> int:
-    """Number of summits of a surface; 0 if it has none."""
-    return len(locate_summits(surface))
-
-
 def _spline_coefficients(heights):
-    """Coefficients (n, n) of the periodic quintic spline through the heights."""
+    """Compute the coefficients (n, n) of the periodic quintic spline through the heights."""
     coefficients = np.empty_like(heights)
 
     def along_x(rows):
@@ -210,7 +206,7 @@ def _spline_filter(lines, output=np.float64):
 
 
 def _climb(coefficients, node, flat):
-    """The summits (k, 2), in cells, to which Newton's method leads from those of the nodes (m, 2) that have one."""
+    """Return the summits (k, 2), in cells, to which Newton's method converges from the nodes (m, 2)."""
     grid = len(coefficients)
     at, converged = node.copy(), np.zeros(len(node), dtype=bool)
     moving = np.arange(len(node))
@@ -218,10 +214,10 @@ def _climb(coefficients, node, flat):
         _, *derivatives = _spline(coefficients, np.mod(at[moving], grid))
         concave, _, step = _newton_step(*derivatives, flat)
         at[moving] += np.clip(step, -0.5, 0.5)
-        near = concave & (np.max(np.abs(at[moving] - node[moving]), axis=1) <= _FARTHEST)
+        inside = concave & (np.max(np.abs(at[moving] - node[moving]), axis=1) <= _FARTHEST)
         small = np.max(np.abs(step), axis=1) <= _CONVERGED
-        converged[moving] = near & small
-        moving = moving[near & ~small]
+        converged[moving] = inside & small
+        moving = moving[inside & ~small]
         if not len(moving):
             break
     at = np.mod(at[converged], grid)
@@ -230,7 +226,7 @@ def _climb(coefficients, node, flat):
 
 
 def _nodes_near_summits(coefficients):
-    """Nodes (k, 2) from which Newton's step to a maximum is at most a cell, and the curvature that counts as flat.
+    """Return the nodes (k, 2) whose Newton step to a maximum is at most a cell, and the curvature that counts as flat.
 
     Curvatures are in metres per squared cell.
     """
@@ -259,20 +255,20 @@ def _nodes_near_summits(coefficients):
 
 
 def _spline(coefficients, at):
-    """The spline's value and its derivatives y, x, yy, yx, xx at points (k, 2) in cells, each (k,)."""
+    """Return the spline's value and its derivatives y, x, yy, yx, xx at points (k, 2) in cells, each (k,)."""
     grid = len(coefficients)
     floor = np.floor(at).astype(int).T
     (ty, tx), nodes = at.T - floor, np.arange(-2, 4)[:, None]
     row, column = np.mod(floor[0] + nodes, grid), np.mod(floor[1] + nodes, grid)
     around = coefficients[row[:, None], column[None, :]]
-    # First along y, then along x: what is left are the six nodes of a row.
+    # Sum along y first, so that the six nodes of a row remain.
     by = [np.einsum("ik,ijk->jk", basis, around) for basis in _basis(ty)]
     bx = _basis(tx)
     return [np.einsum("jk,jk->k", by[i], bx[j]) for i, j in ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))]
 
 
 def _basis(t):
-    """Value, slope and curvature (6, k) of the six quintic B-splines around points at t in [0, 1), (k,)."""
+    """Return value, slope and curvature (6, k) of the six quintic B-splines around points at t in [0, 1), (k,)."""
     powers = np.cumprod(np.vstack([np.ones_like(t), np.broadcast_to(t, (_DEGREE, len(t)))]), axis=0)
     return [
         np.einsum("ij,jk->ik", polynomial, powers[: polynomial.shape[1]])
@@ -281,7 +277,7 @@ def _basis(t):
 
 
 def _newton_step(gy, gx, hyy, hyx, hxx, flat):
-    """Whether the Hessian is negative definite, its determinant, and Newton's step (..., 2), zero where it is not."""
+    """Return whether the Hessian is negative definite, its determinant, and Newton's step (..., 2), else zero."""
     determinant = hyy * hxx - hyx**2
     concave = (determinant > flat**2) & (hyy + hxx < 0)
     safe = np.where(concave, -determinant, 1.0)
@@ -290,22 +286,22 @@ def _newton_step(gy, gx, hyy, hyx, hxx, flat):
     return concave, determinant, step
 
 
-# Largest departure from paraboloids, weighted by the area of the spots, up to which asperities stand for a surface.
+# Largest departure from paraboloids, weighted by the area of the spots, with which asperities represent a surface.
 # Random surfaces of 5 to 12 nodes per shortest wave stay below 0.25 at p* = 1e-3 to 0.1, with areas within 25 % of
 # those of boundary elements; worn, conical and pyramidal tops, with areas up to 3 times too small, have 0.31 to 0.9.
 LARGEST_DEPARTURE = 0.3
-# Directions in which the surface around a summit is compared with its paraboloid.
+# Directions around a summit in which the surface is compared with its paraboloid.
 _DIRECTIONS = 16
-# Radius, in cells, below which a spot lies where the interpolated surface is the paraboloid itself.
+# Radius of a spot, in cells, below which the interpolated surface is the paraboloid itself.
 _SMALLEST_SPOT = 0.25
-# Smallest height of a summit above its surroundings, over that of its paraboloid, that is told from none.
+# Smallest height of a summit above its surroundings, over that of its paraboloid, that differs from none.
 _LEAST_DROP = 1e-2
 
 
 def paraboloid_departure(
     surface: Surface, position: np.ndarray, contact_radius: np.ndarray, radius_of_curvature: np.ndarray
 ) -> float:
-    """Return how far the surface departs from the paraboloids of its summits at the edges of their contact spots.
+    """Measure how far the surface departs from the paraboloids of its summits at the edges of their contact spots.
 
     Parameters
     ----------
@@ -338,8 +334,8 @@ def paraboloid_departure(
         around = [height(x + radius * np.cos(angle), y + radius * np.sin(angle)) for angle in angles]
         return top - np.array(around)
 
-    near = depth(_SMALLEST_SPOT)
-    mean, difference = near.mean(axis=0), 2 * np.abs(np.exp(2j * angles) @ near) / _DIRECTIONS
+    close = depth(_SMALLEST_SPOT)
+    mean, difference = close.mean(axis=0), 2 * np.abs(np.exp(2j * angles) @ close) / _DIRECTIONS
     elongation = 1 / np.sqrt(np.maximum(1 - (difference / mean) ** 2, _LEAST_DROP**2))
     paraboloid = contact_radius**2 / (2 * radius_of_curvature)
     ratio = np.maximum(depth(radius).mean(axis=0) / paraboloid, _LEAST_DROP)
@@ -348,13 +344,15 @@ def paraboloid_departure(
 
 @dataclass(frozen=True, eq=False)
 class SummitCoverage:
-    """The highest places of a surface, and whether summits stand for them.
+    """The highest places of a surface, and the summits that represent them.
 
-    peak_height : (k,) array, heights of the nodes that are not lower than any of their eight neighbours, m. Every node
-        of a plateau is one.
-    covered : (k,) array, whether a summit is found within two rows and columns of the node.
+    Attributes
+    ----------
+    peak_height : (k,) array, heights of the nodes not lower than any of their eight neighbours, m. Every node of a
+        plateau is one.
+    covered : (k,) array, whether a summit lies within two rows and columns of the node.
     summit_height : (n,) array, heights of the summits, m.
-    unsupported_height : (m,) array, heights of the maxima that are left out, as their nodes do not support them, m.
+    unsupported_height : (m,) array, heights of the maxima without support of the nodes around them, m.
     """
 
     peak_height: np.ndarray
@@ -369,21 +367,17 @@ class SummitCoverage:
         rows, columns = _peaks(surface)
         x, y = np.mod(np.rint(asperities.position / surface.spacing).astype(int), grid).T
         occupied = np.zeros((grid, grid), dtype=bool)
-        for down in _NEAR:
-            for across in _NEAR:
+        for down in _NEIGHBOURHOOD:
+            for across in _NEIGHBOURHOOD:
                 occupied[(y + down) % grid, (x + across) % grid] = True
-        return cls(
-            surface.heights[rows, columns],
-            occupied[rows, columns],
-            asperities.height,
-            asperities.unsupported_height,
-        )
+        peaks = surface.heights[rows, columns], occupied[rows, columns]
+        return cls(*peaks, asperities.height, asperities.unsupported_height)
 
     def uncovered_share(self, separation: float) -> float:
         """Share of the load, at a mean separation (m), on places without a summit.
 
-        The load of a place is estimated as its height above the plane of separation to the power 3/2 (Hertz). Where
-        no place is that high, it is the highest place that counts.
+        The load of a place is estimated as its height above the plane of separation to the power 3/2 (Hertz). If no
+        place is that high, the highest place counts.
         """
         load = np.maximum(self.peak_height - separation, 0.0) ** 1.5
         if not load.any():
@@ -396,23 +390,23 @@ class SummitCoverage:
         return unsupported / max(unsupported + int(np.count_nonzero(self.summit_height > separation)), 1)
 
     def reasons_against(self, separations: Iterable[float]) -> list[str]:
-        """Reasons why asperities do not stand for the surface at these mean separations (m); none if they do."""
-        separations, found = np.unique(list(separations)), []
+        """Return the reasons why asperities do not represent the surface at these mean separations (m)."""
+        separations, reasons = np.unique(list(separations)), []
         uncovered = max(map(self.uncovered_share, separations), default=0.0)
         if uncovered > MAX_SHARE:
-            found.append(
+            reasons.append(
                 f"no summit stands for {100 * uncovered:.0f} % of the highest places, by their share of the load"
             )
         unsupported = max(map(self.unsupported_share, separations), default=0.0)
         if unsupported > MAX_SHARE:
-            found.append(
+            reasons.append(
                 f"{100 * unsupported:.0f} % of the summits within reach are not supported by the nodes around them"
             )
-        return found
+        return reasons
 
 
 def _peaks(surface: Surface) -> tuple[np.ndarray, np.ndarray]:
-    """Rows and columns (k,) of the nodes not lower than their neighbours; those on edges of a free square are not."""
+    """Return rows and columns (k,) of the nodes not lower than their neighbours, without edges of a free square."""
     heights, grid = surface.heights, surface.grid
 
     def examine(rows):

@@ -16,30 +16,26 @@ import numpy as np
 import scipy.fft
 
 from icha.support.parallel import blocks, on_cores
-from icha.support.rules import LENGTH, SLOPE, Integer, Real
+from icha.support.rules import LENGTH, SLOPE, FloatRange, IntegerRange
 from icha.surfaces.square import problem_with_heights
 
-# What lies beyond the square: the same square again and again, or nothing but the half-space.
+# A square that repeats, or a single one on a half-space.
 PERIODIC, FREE = "periodic", "free"
 BOUNDARIES = (PERIODIC, FREE)
 
-# Heights from the lowest to the highest, over the period.
-_STEEPNESS = Real(least=1e-24, most=1e9)
+# Range of heights over the period.
+_STEEPNESS = FloatRange(least=1e-24, most=1e9)
 # Rows or columns that are transformed at a time.
 _LINES = 64
-
-
-# Lines of nodes whose steps are compared with the step from one cell to the next, spread over the surface.
+# Largest number of lines whose steps are compared with the step between cells.
 _COMPARED_LINES = 256
-# Least ratio of two differences that is a step between cells: a step less the mean of its two neighbours, rms along a
-# line, between two cells over the largest one inside. Measured on periodic surfaces: up to 1.3, and 2.4 on white noise
-# of 8 x 8 nodes; on halves of them with 4 nodes for the shortest wave: 3.2 and more.
+# Smallest misfit of a step between cells over the largest one inside a cell; the misfit is a step less the mean of its
+# two neighbours, rms along a line. Measured on periodic surfaces: up to 1.3, and 2.4 on white noise of 8 x 8 nodes; on
+# halves of them with 4 nodes for the shortest wave: 3.2 and more.
 _MISFIT = 3.0
-# Least ratio of the step between cells to the largest one between other nodes, rms along a line. Where the halves of a
+# Smallest ratio of the step between cells to the largest one inside a cell, rms along a line. Where the halves of a
 # symmetric dome meet it is 1.03: an edge, but no step.
 _STEP = 1.1
-
-
 MISFIT_OF_EDGES = (
     f"boundary: {PERIODIC!r}, but opposite edges differ by much more than neighbouring nodes, so there is a step at "
     f"the edges; use boundary={FREE!r}, or icha.read_scan for a measured surface"
@@ -47,7 +43,7 @@ MISFIT_OF_EDGES = (
 
 
 class EdgeWarning(UserWarning):
-    """Opposite edges of a surface that is taken to be periodic do not fit together."""
+    """Opposite edges of a periodic surface differ by a step."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +54,7 @@ class Surface:
     ----------
     heights : (n, n) array, metres. Its mean is removed; the array is copied and made read-only.
     period : side of the square in metres, in [1e-24, 1e9]; of a periodic surface its period.
-    boundary : "periodic" in both directions, or "free": one square on a half-space that goes on beyond it.
+    boundary : "periodic" in both directions, or "free": one square on a half-space that extends beyond it.
 
     Raises
     ------
@@ -84,15 +80,15 @@ class Surface:
             raise ValueError(f"heights: must be an array of real numbers in metres ({error})") from None
         if problem := problem_with_heights(heights):
             raise ValueError(f"heights: {problem}")
-        object.__setattr__(self, "period", LENGTH.checked("period", self.period))
+        object.__setattr__(self, "period", LENGTH.validate("period", self.period))
         with np.errstate(over="ignore"):
-            _STEEPNESS.checked("heights: their range over the period", np.ptp(heights) / self.period)
+            _STEEPNESS.validate("heights: their range over the period", np.ptp(heights) / self.period)
         heights -= heights.mean()
         heights.flags.writeable = False
         object.__setattr__(self, "heights", heights)
         if self.boundary not in BOUNDARIES:
             raise ValueError(f"boundary: {self.boundary!r} must be one of {', '.join(BOUNDARIES)}")
-        # Of its own surfaces this package reports it elsewhere (`icha describe`).
+        # `icha describe` reports it for surfaces that this package makes.
         caller = sys._getframe(2).f_globals.get("__name__", "")
         if not self.free and not caller.startswith(("icha.", "dataclasses")) and not edges_fit(heights):
             warnings.warn(MISFIT_OF_EDGES, EdgeWarning, stacklevel=3)
@@ -109,19 +105,19 @@ class Surface:
 
     @property
     def free(self) -> bool:
-        """Whether it is a single square."""
+        """Whether the surface is a single square."""
         return self.boundary == FREE
 
-    def require_periodic(self, what: str) -> None:
-        """Raise ValueError, naming what it is for, if the surface is a free square."""
+    def require_periodic(self, purpose: str) -> None:
+        """Raise ValueError, which names the purpose, if the surface is a free square."""
         if self.free:
-            raise ValueError(f"boundary: {FREE!r}; {what} needs a surface of boundary {PERIODIC!r}")
+            raise ValueError(f"boundary: {FREE!r}; {purpose} needs a surface of boundary {PERIODIC!r}")
 
     def by_wave_vector(self, function) -> list:
-        """Results of `function(k2, count, power)` for all wave vectors 2 pi/L (kx, ky) but zero, in blocks.
+        """Return results of `function(k2, count, power)` for blocks of all wave vectors 2 pi/L (kx, ky) but zero.
 
         k2 = kx^2 + ky^2; power: |h_q|^2, m^2, both (n, m); count (m,): 2 where the power is that of two opposite wave
-        vectors together, else 1. The heights are taken as one period, whatever the boundary.
+        vectors together, else 1. The heights are one period, also those of a free square.
         """
         n = self.grid
         half = np.empty((n, n // 2 + 1), dtype=complex)
@@ -149,8 +145,8 @@ class Surface:
     def spectral_moments(self) -> tuple[float, float, float]:
         """Sums of |h_q|^2, q^2 |h_q|^2 and q^4 |h_q|^2 over all wave vectors: m^2, 1, m^-2.
 
-        They are the variance of height, the squared rms slope |grad h| and the squared rms of the Laplacian. Those of a
-        free square, which has no spectrum of its own, are means over its nodes, of derivatives of a quintic spline.
+        They are the variance of height, the squared rms slope |grad h| and the squared rms of the Laplacian. A free
+        square has no spectrum; its moments are means over the nodes, of derivatives of a quintic spline.
         """
         if self.free:
             return _mean_squares(self.heights, self.spacing)
@@ -169,7 +165,7 @@ class Surface:
 
     @property
     def rms_slope(self) -> float:
-        """Root mean square of |grad h|, by the moments above (not by finite differences)."""
+        """Root mean square of |grad h|, by the spectral moments (not by finite differences)."""
         return self.spectral_moments[1] ** 0.5
 
     @property
@@ -184,8 +180,8 @@ class Surface:
     def full_contact_energy(self) -> float:
         """Elastic energy of full contact per nominal area over E*, U_full/E* = 1/4 sum q |h_q|^2, m.
 
-        In full contact a wave of amplitude h_q is pressed flat by the pressure q E* h_q/2. A free square is taken as
-        one quarter of the periodic surface that it makes with its mirror images, which has no steps at the edges.
+        In full contact the pressure q E* h_q/2 flattens a wave of amplitude h_q. A free square counts as a quarter of
+        the periodic surface that it forms with its mirror images, which has no steps at the edges.
         """
         if self.free:
             return _mirrored_energy(self.heights, self.period)
@@ -196,27 +192,23 @@ class Surface:
         return math.pi / (2 * self.period) * sum(self.by_wave_vector(sums))
 
     def scaled_to_rms_slope(self, rms_slope: float) -> Surface:
-        """The same topography with its heights multiplied so that the spectral rms slope is `rms_slope`."""
-        rms_slope = SLOPE.checked("rms_slope", rms_slope)
+        """Return the same topography with its heights multiplied to the spectral rms slope `rms_slope`."""
+        rms_slope = SLOPE.validate("rms_slope", rms_slope)
         factor = rms_slope / self.rms_slope
         scaled = replace(self, heights=self.heights * factor)
-        # Known already; `cached_property` keeps its values there.
+        # `cached_property` keeps its values in `vars`.
         vars(scaled)["spectral_moments"] = tuple(moment * factor**2 for moment in self.spectral_moments)
         return scaled
 
     def refined(self, factor: int) -> Surface:
-        """The same topography on a grid `factor` times as fine, by its trigonometric interpolant; old nodes keep their
-        heights.
+        """Return the trigonometric interpolant on a grid `factor` times as fine; old nodes keep their heights.
 
-        Raises
-        ------
-        ValueError
-            If the factor is not an integer of at least 1, or the surface is a free square.
+        Raises ValueError if the factor is not an integer of at least 1, or the surface is a free square.
         """
         self.require_periodic("a trigonometric interpolant")
-        if Integer(1).checked("factor", factor) == 1:
+        if IntegerRange(1).validate("factor", factor) == 1:
             return self
-        # Slow to import, and seldom needed.
+        # Slow to import, and rarely needed.
         from scipy.signal import resample
 
         heights = self.heights
@@ -226,22 +218,21 @@ class Surface:
 
 
 def edges_fit(heights: np.ndarray) -> bool:
-    """Tell whether heights (n, n) can be one cell of a periodic surface, without a step from one cell to the next."""
+    """Tell whether heights (n, n) can be one cell of a periodic surface, without a step between cells."""
     n = len(heights)
     compared = np.unique(np.linspace(1, n - 3, min(n, _COMPARED_LINES)).astype(int))
     for lines in (heights, heights.T):
         before, first, second, after = (lines[(np.append(compared, n - 1) + shift) % n] for shift in (-1, 0, 1, 2))
         misfit = np.sqrt(np.mean((1.5 * (second - first) - 0.5 * (after - before)) ** 2, axis=1))
         step = np.sqrt(np.mean((second - first) ** 2, axis=1))
-        # Where halves of a symmetric dome meet there is an edge, but no step.
         if step[-1] > _STEP * np.max(step[:-1]) and misfit[-1] > _MISFIT * np.max(misfit[:-1]) + 1e-9 * np.ptp(heights):
             return False
     return True
 
 
 def _mean_squares(heights, spacing):
-    """Mean squares over the nodes of height, slope and Laplacian, by quintic splines along both axes."""
-    # Slow to import, and seldom needed.
+    """Compute mean squares over the nodes of height, slope and Laplacian, by quintic splines along both axes."""
+    # Slow to import, and rarely needed.
     from scipy.interpolate import make_interp_spline
 
     n = len(heights)
@@ -263,7 +254,7 @@ def _mean_squares(heights, spacing):
 
 
 def _mirrored_energy(heights, period):
-    """`Surface.full_contact_energy` of a square and its mirror images, by a cosine series of period 2 L."""
+    """Compute `Surface.full_contact_energy` of a square and its mirror images, by a cosine series of period 2 L."""
     power = scipy.fft.dctn(heights, norm="ortho", workers=1) ** 2
     k2 = np.arange(len(heights)) ** 2.0
     # Parseval: with orthonormal coefficients the mean square height is their sum of squares over the nodes.

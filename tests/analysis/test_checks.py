@@ -15,7 +15,7 @@ from icha.analysis.checks import (
     write_checks,
 )
 from icha.checks.findings import Check, RunArrays
-from icha.checks.loops import _error_of_work, _met_one_way
+from icha.checks.loops import count_unshared_separations, work_error
 from icha.checks.run import check_run, reasons_of_failure
 from icha.datasets.campaign import campaign_tree, run_labels
 from icha.datasets.labels import RunLabels
@@ -217,10 +217,10 @@ def bare_run(separations, legs, stiffness=0.0, model="asperities"):
 
 
 def test_separations_that_only_the_way_back_meets_are_counted():
-    assert _met_one_way(bare_run([3.0, 2.0, 1.0, 2.0, 3.0], [0, 0, 0, 1, 1])) == 0
+    assert count_unshared_separations(bare_run([3.0, 2.0, 1.0, 2.0, 3.0], [0, 0, 0, 1, 1])) == 0
     # To ten times the error of an equilibrium two are the same; turning points have their own.
-    assert _met_one_way(bare_run([3.0, 2.0, 1.0, 2.0 + 5e-9, 2.5, 2.0, 3.0], [0, 0, 0, 1, 1, 2, 3])) == 1
-    assert _met_one_way(bare_run([3.0, 2.0, 1.0, 0.5, 1.5, 3.5], [0, 0, 0, 1, 1, 1])) == 3
+    assert count_unshared_separations(bare_run([3.0, 2.0, 1.0, 2.0 + 5e-9, 2.5, 2.0, 3.0], [0, 0, 0, 1, 1, 2, 3])) == 1
+    assert count_unshared_separations(bare_run([3.0, 2.0, 1.0, 0.5, 1.5, 3.5], [0, 0, 0, 1, 1, 1])) == 3
 
 
 def test_the_error_of_the_work_is_that_of_separations_and_stiffnesses():
@@ -228,7 +228,7 @@ def test_the_error_of_the_work_is_that_of_separations_and_stiffnesses():
     for model, part in (("asperities", 1e-6), ("boundary_elements", 1e-4)):
         run = bare_run([3.0, 1.0, 0.5], [0, 0, 0], stiffness=7.0, model=model)
         expected = 7.0 * 1e-9 * 2.5 + 2 * 7.0 * part * (2.0**2 + 0.5**2) / 12
-        assert _error_of_work(run) == pytest.approx(expected, rel=1e-12)
+        assert work_error(run) == pytest.approx(expected, rel=1e-12)
 
 
 def test_a_union_may_take_load_from_a_step_but_not_from_a_stop():

@@ -219,7 +219,7 @@ def test_what_cannot_be_compared_is_named():
         model_error(tree(), [(place, solution.assign(seed=2))])
     with pytest.raises(ValueError, match=STATE + r"the solution is one of reduced pressure 0\.01"):
         model_error(tree(), [(place, own_solution(runs()[labels], 1e-2))])
-    with pytest.raises(ValueError, match=r"reduced pressure 0\.02: no snapshot of reduced_pressure 0\.02; there are"):
+    with pytest.raises(ValueError, match=r"reduced pressure 0\.02: no snapshot of reduced_pressure 0\.02; the run has"):
         model_error(tree(), [(place._replace(reduced_pressure=0.02), solution)])
     with pytest.raises(ValueError, match=r"run one/rough/seed9/slope1/soft.*no seed 9"):
         model_error(tree(), [(place._replace(seed=9), solution)])

@@ -10,7 +10,7 @@ import icha
 from icha.asperity.full_contact import full_contact_energy_ratio
 from icha.datasets.campaign import campaign_tree, select_run
 from icha.datasets.files import read_run, write_dataset
-from icha.datasets.format import RUN, flaws
+from icha.datasets.format import RUN, problems_with_file
 from icha.simulation import asperity_applicability
 from icha.surfaces.moments import self_affine_full_contact_energy
 
@@ -66,7 +66,7 @@ def test_reasons_are_named_one_after_the_other():
     assert asperity_applicability(math.inf) == asperity_applicability(1.0, (), 0.25) == ""
     assert asperity_applicability(0.138, ["spikes", "pits"], 0.3) == (
         "asperity model not applicable: full contact has the lower energy (U_full/dgamma = 0.138, less than 1); "
-        "spikes; pits; contact area A/A0 = 0.3, beyond 0.25"
+        "spikes; pits; contact area A/A0 = 0.3, more than 0.25"
     )
 
 
@@ -96,7 +96,7 @@ def test_an_infinite_ratio_is_a_value_of_every_file(tmp_path):
     write_dataset(run, tmp_path / "run.nc")
     back = read_run(tmp_path / "run.nc")
     assert np.isposinf(back["full_contact_energy_ratio"]) and not [
-        flaw for flaw in flaws(RUN, back) if "finite" in flaw
+        flaw for flaw in problems_with_file(RUN, back) if "finite" in flaw
     ]
     labels = ("one", "asperities", "rough", -1, 1.0, "bare")
     for source in (run, tmp_path / "run.nc"):

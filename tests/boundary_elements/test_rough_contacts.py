@@ -18,7 +18,7 @@ from icha.boundary_elements.front_solver import LinearisedFront
 from icha.boundary_elements.half_space import HalfSpace
 from icha.checks.run import check_run
 from icha.contact.model import NotConverged
-from icha.contact.models import HELD_CELLS
+from icha.contact.models import AREA_TOLERANCE_CELLS
 from validation.rough_contacts import (
     HARD,
     SOFT,
@@ -151,7 +151,7 @@ def test_an_area_of_few_cells_is_met_to_two_of_them():
     areas = [0.005, 0.02, 0.05]
     run = icha.simulate(surface, HARD, icha.Path(area_fractions=areas), model="boundary_elements")
     cells = np.abs(run.contact_area_fraction - areas) * surface.grid**2
-    assert cells.max() <= HELD_CELLS
+    assert cells.max() <= AREA_TOLERANCE_CELLS
     assert not [check for check in check_run(run) if not check.passed]
     # Two cells are not a part of one.
     with pytest.raises(icha.ConvergenceError, match="lies inside a jump") as caught:

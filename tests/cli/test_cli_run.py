@@ -10,7 +10,7 @@ import time
 import pytest
 from conftest import REPOSITORY, copy_project, modules_of, snakemake
 
-from icha.cli.run import _last_words, _planned
+from icha.cli.run import _planned_jobs, _reason_in
 
 CAMPAIGN = """
 name: tiny
@@ -78,7 +78,7 @@ def test_a_job_that_crashes_is_named_with_its_log_and_stops_no_other(project):
     assert "1 job failed:\n  Sweep load: rough, seed 1, slope 1, bare" in done.stdout
     assert "RuntimeError('a bug in the program')" in done.stdout
     assert "log: results/tiny/logs/runs/load/rough/seed1/slope1/bare.log" in done.stdout
-    assert "not done, since they need what failed" in done.stdout and "Traceback" not in done.stdout
+    assert "not run, since they need results of failed jobs" in done.stdout and "Traceback" not in done.stdout
     assert (project / "results/tiny/runs/load/rough/seed1/slope1/sticky.nc").is_file()
     assert not (project / "results/tiny/dataset/tiny.nc").exists()
     # All that Snakemake said is kept, and it is told where.
@@ -115,7 +115,7 @@ def test_damaged_files_are_made_again(project):
     for path in paths[2:]:
         (results / path).write_bytes(before[path][:-1000])
     told = run(project, "--dry-run").stdout
-    assert all(f"damaged: {path}: to do again." in told for path in paths)
+    assert all(f"damaged: {path}: will be computed again" in told for path in paths)
     done = run(project, "dataset")
     for path in paths:
         aside = (results / path).with_name((results / path).name + ".damaged")
@@ -140,7 +140,7 @@ def test_it_goes_on_after_it_was_stopped(project):
     process.send_signal(signal.SIGINT)
     rest = process.communicate(timeout=200)[0]
     assert process.returncode == 1
-    assert "Stopped before the end. The same command goes on from here." in rest and "Traceback" not in rest
+    assert "Stopped before the end. Repeat the command to continue." in rest and "Traceback" not in rest
     assert "failed:" not in rest
     assert not left_running(project)
     done = run(project, "runs")
@@ -193,7 +193,7 @@ def test_a_dry_run_shows_the_plan_and_counts_the_jobs(project):
     told = subprocess.run(program, stderr=subprocess.STDOUT, **how)
     assert told.returncode == 0, told.stdout
     assert "study load" in told.stdout and "2 runs, 2 to do: about" in told.stdout
-    assert "1 job would run, those included that a changed program makes anew: 1 surface" in told.stdout
+    assert "1 job would run, including jobs for outdated results: 1 surface" in told.stdout
     for words in ("Job stats", "host:", "Building DAG", "reason:"):
         assert words not in told.stdout
     assert not (project / "results/planned").exists()
@@ -201,13 +201,13 @@ def test_a_dry_run_shows_the_plan_and_counts_the_jobs(project):
 
 def test_the_table_of_jobs_of_snakemake_is_read():
     table = "Job stats:\njob         count\n--------  -------\nall             1\nfigure          2\n"
-    assert _planned(f"{table}report_page     1\ntotal           4\n\nrun  7\n").endswith(
-        "anew: 2 figure, 1 report page"
+    assert _planned_jobs(f"{table}report_page     1\ntotal           4\n\nrun  7\n").endswith(
+        "outdated results: 2 figure, 1 report page"
     )
-    assert _planned("Building DAG\nNothing to be done\n").startswith("Nothing would run")
+    assert _planned_jobs("Building DAG\nNothing to be done\n").startswith("Nothing would run")
     again = "to be made again: results/tiny/b.nc (it was made with other settings)"
-    assert _planned(f"{again}\nBuilding DAG\nNothing to be done\n").splitlines()[0] == again
-    assert "Nothing would run" not in _planned(f"damaged, {again}\nNothing to be done\n")
+    assert _planned_jobs(f"{again}\nBuilding DAG\nNothing to be done\n").splitlines()[0] == again
+    assert "Nothing would run" not in _planned_jobs(f"damaged, {again}\nNothing to be done\n")
 
 
 @pytest.mark.parametrize(
@@ -223,7 +223,7 @@ def test_targets_that_there_are_not_are_mistakes(project, target, options):
     # That the campaign presses a sticky surface is confirmed, and said every time.
     warning, error = refused.stdout.splitlines()
     assert warning.startswith("Warning: ") and "full contact has the lower energy" in warning
-    assert error.startswith(f"Error: {target}: no target, and no file that campaign tiny makes; allowed: all,")
+    assert error.startswith(f"Error: {target}: not a target, and not a file of campaign tiny; expected all,")
 
 
 def contents(folder):
@@ -251,11 +251,11 @@ def test_a_copy_that_kept_its_name_is_refused_by_snakemake_too(project, tmp_path
 
 def test_the_last_words_of_snakemake_are_its_reason_without_traceback():
     said = "Host: here\nBuilding DAG of jobs...\nJob stats:\nall  1\ntotal  10\n\nReason 1\n"
-    assert _last_words(said) == ["Reason 1"]
+    assert _reason_in(said) == ["Reason 1"]
     trace = (
         'Traceback (most recent call last):\n\n  File "a.py", line 3, in f\n    open(x)\n\nPermissionError: results\n'
     )
-    assert _last_words(said + trace) == ["Reason 1", "PermissionError: results"]
+    assert _reason_in(said + trace) == ["Reason 1", "PermissionError: results"]
 
 
 @pytest.mark.slow

@@ -10,7 +10,7 @@ from icha.figures.fig4_contact_map import finest_solution
 def test_figures_of_snapshots_need_one(load):
     figures = {"fig3_distributions": {"study": "one"}}
     load({"figures": figures})
-    with pytest.raises(ConfigurationError, match=r"fig3_distributions\.study: 'one' keeps no snapshot to draw"):
+    with pytest.raises(ConfigurationError, match=r"fig3_distributions\.study: 'one' keeps no snapshot"):
         load({"figures": figures, "studies.one.snapshots": []})
 
 

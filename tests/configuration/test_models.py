@@ -5,8 +5,8 @@ import pytest
 from icha.configuration.cases import run_cases, run_settings, run_sha256
 from icha.configuration.errors import ConfigurationError
 from icha.planning.costs import RUN_SIZES
-from icha.planning.needs import run_memory, run_minutes, surface_threads
 from icha.planning.plan import plan
+from icha.planning.requirements import run_memory, run_minutes, surface_threads
 from icha.planning.results import campaign_files
 
 BOTH = {"studies.one.models": ["asperities", "boundary_elements"]}

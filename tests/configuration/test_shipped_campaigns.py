@@ -7,7 +7,7 @@ from demo_configuration import REPOSITORY
 from icha.configuration.cases import run_cases, run_settings, surface_cases
 from icha.configuration.load import load_configuration
 from icha.contact.models import DEFAULT_MODEL, REFERENCE_MODEL
-from icha.planning.needs import further_software
+from icha.planning.requirements import further_software
 from icha.planning.results import campaign_files
 from icha.references.theories import literature
 

@@ -63,7 +63,7 @@ def test_what_only_looks_like_a_number_is_text_until_it_is_checked(number, tmp_p
     (tmp_path / "one.yaml").write_text(f"a: {number}")
     assert read_yaml(tmp_path / "one.yaml") == {"a": number}
     (tmp_path / "two.yaml").write_text(GOOD.replace("grid: 80", f"grid: {number}"))
-    with pytest.raises(ConfigurationError, match=r"rough\.grid: .* is not an integer from 8 to 32768; allowed: "):
+    with pytest.raises(ConfigurationError, match=r"rough\.grid: .* is not an integer from 8 to 32768; expected "):
         load_configuration(tmp_path / "two.yaml")
 
 
@@ -90,22 +90,22 @@ def test_what_is_wrong_is_told_without_what_acts_on_a_terminal(load):
 def test_pipes_and_devices_are_not_opened(tmp_path, refused):
     pipe = tmp_path / "pipe"
     os.mkfifo(pipe)
-    with pytest.raises(ConfigurationError, match="pipe: is a pipe; allowed: a YAML file"):
+    with pytest.raises(ConfigurationError, match=r"pipe: is a pipe; .*a YAML file"):
         load_configuration(pipe)
     with pytest.raises(ConfigurationError, match="is a device; allowed"):
         load_configuration(Path("/dev/zero"))
     for path, kind in ((str(pipe), "pipe"), ("/dev/zero", "device")):
         for surface in (measured_surface(path=path), {"kind": "file", "height_unit": "um", "period": "1 mm"}):
-            refused("surfaces.rough", surface | {"path": path}, f"surfaces.rough.path: '{path}' is a {kind}; allowed: ")
+            refused("surfaces.rough", surface | {"path": path}, f"surfaces.rough.path: '{path}' is a {kind}; expected ")
         columns = {"load": {"column": "a", "unit": "1"}, "area": {"column": "b", "unit": "1"}}
         entry = {"path": path, "label": "a", "citation": "b", "study": "one"} | columns
         refused("measurements", {"m": entry}, f"measurements.m.path: '{path}' is a {kind}; allowed: a CSV file")
 
 
 WRONG = {
-    "unit of 100 kB": ("surfaces.rough.period", "1 " + "m" * 100_000, "is not a number with a unit; allowed: "),
-    "spaces": ("surfaces.rough.period", "1" + " " * 100_000 + "um", "is not a number with a unit; allowed: "),
-    "far beyond decimals": ("materials.soft.contact_modulus", f"1e{'9' * 50} MPa", "is not finite; allowed: "),
+    "unit of 100 kB": ("surfaces.rough.period", "1 " + "m" * 100_000, "is not a number with a unit; expected "),
+    "spaces": ("surfaces.rough.period", "1" + " " * 100_000 + "um", "is not a number with a unit; expected "),
+    "far beyond decimals": ("materials.soft.contact_modulus", f"1e{'9' * 50} MPa", "is not finite; expected "),
     "cases times seeds": (
         {
             "studies.one.cases": [{"surface": "rough", "material": "soft"}] * 100,

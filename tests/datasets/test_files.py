@@ -408,7 +408,7 @@ def test_runs_that_do_not_fit_are_refused_by_name():
     (labels, run), *_ = slopes
     asked = [labels._replace(study="single")]
     for runs, design, message in (
-        ([(labels, run)], [labels, *asked], "study single: there is no run of it"),
+        ([(labels, run)], [labels, *asked], "study single: it has no run"),
         ([(labels, run)], asked, r"slopes/.*/soft: this run is not in the design"),
         ([(labels, run)], [labels._replace(material="hertz")], r"slopes/.*/soft: this run is not in the design"),
         ([(labels._replace(rms_slope=0.7), run)], None, "rms_slope is 1"),

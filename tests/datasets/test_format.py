@@ -6,7 +6,7 @@ import small_campaign as small
 import xarray as xr
 
 from icha.datasets.files import write_dataset
-from icha.datasets.format import CAMPAIGN, PROMISED, RUN, SURFACE, UnknownFile, flaws, kind_of
+from icha.datasets.format import CAMPAIGN, PROMISED, RUN, SURFACE, UnknownFile, identify_file, problems_with_file
 from icha.datasets.surface_file import write_surface
 from icha.datasets.variables import run as of_run
 from icha.datasets.variables import surface as of_surface
@@ -23,14 +23,14 @@ def files(tmp_path_factory):
 
 def test_what_is_written_keeps_to_the_format(files):
     for name, kind in (("run", RUN), ("surface", SURFACE)):
-        found, data = kind_of(files / f"{name}.nc")
-        assert found == kind and flaws(kind, data) == []
+        found, data = identify_file(files / f"{name}.nc")
+        assert found == kind and problems_with_file(kind, data) == []
 
 
 def test_a_campaign_lacks_only_what_the_workflow_adds(files):
-    kind, tree = kind_of(files / "campaign.nc")
+    kind, tree = identify_file(files / "campaign.nc")
     assert kind == CAMPAIGN
-    assert {flaw.split(": ")[-1] for flaw in flaws(kind, tree)} <= {
+    assert {problem.split(": ")[-1] for problem in problems_with_file(kind, tree)} <= {
         f"attribute {name} is missing" for name in ("config_sha256", "license")
     }
 
@@ -51,7 +51,7 @@ def changed(run, name, **attrs):
 
 
 @pytest.mark.parametrize(
-    ("spoil", "flaw"),
+    ("spoil", "problem"),
     [
         (lambda run: run.drop_vars("residual"), "residual is missing"),
         (lambda run: run.drop_vars("spot_force"), "spot_force is missing in a file with snapshots"),
@@ -65,47 +65,55 @@ def changed(run, name, **attrs):
         (lambda run: run.assign(extra=xr.Variable((), 1.0)), "extra: has no attribute units"),
         (lambda run: run.assign(rms_height=run["rms_height"] * np.nan), "rms_height: 1 of 1 values are not finite"),
         (lambda run: run.assign_attrs(history="Thu May 2 10:11:12 2024: ncks"), "attribute history: 'Thu May"),
-        (lambda run: run.assign_attrs(creator_name="A. Maker"), "attribute creator_name is there"),
+        (lambda run: run.assign_attrs(creator_name="A. Maker"), "attribute creator_name is present"),
         (lambda run: run.assign_attrs(config_sha256="abc"), "attribute config_sha256: 'abc'"),
         (lambda run: run.assign_attrs(campaign="x", study=""), "attribute study is missing"),
         (
             lambda run: run.assign_coords(branch=run["branch"].copy(data=["up"] * run.sizes["step"])),
-            "branch: 'up'; allowed: loading",
+            "branch: 'up'; expected loading",
         ),
     ],
 )
-def test_what_is_spoilt_is_found(spoil, flaw):
+def test_what_is_spoilt_is_found(spoil, problem):
     with xr.set_options(keep_attrs=True):
-        found = flaws(RUN, spoil(small.run()))
-    assert any(flaw in line for line in found), found
+        found = problems_with_file(RUN, spoil(small.run()))
+    assert any(problem in line for line in found), found
 
 
 def test_spoilt_surfaces_and_campaigns_are_found(files):
-    _, surface = kind_of(files / "surface.nc")
-    assert any("height: is (31, 32)" in flaw for flaw in flaws(SURFACE, surface.isel(y=slice(1, None))))
-    assert any("boundary: 'round'" in flaw for flaw in flaws(SURFACE, surface.assign_attrs(boundary="round")))
-    _, tree = kind_of(files / "campaign.nc")
+    _, surface = identify_file(files / "surface.nc")
+    assert any(
+        "height: has the shape (31, 32)" in problem
+        for problem in problems_with_file(SURFACE, surface.isel(y=slice(1, None)))
+    )
+    assert any(
+        "boundary: 'round'" in problem
+        for problem in problems_with_file(SURFACE, surface.assign_attrs(boundary="round"))
+    )
+    _, tree = identify_file(files / "campaign.nc")
     tree.attrs |= {"creator_name": "A. Maker", "date_created": "today"}
-    refused = [flaw for flaw in flaws(CAMPAIGN, tree) if "nothing that tells who made" in flaw]
-    assert len(refused) == 1 and refused[0].startswith("attribute date_created is there")
+    refused = [problem for problem in problems_with_file(CAMPAIGN, tree) if "nothing about who made" in problem]
+    assert len(refused) == 1 and refused[0].startswith("attribute date_created is present")
     study = tree["slopes"].to_dataset()
     spoilt = study["nominal_pressure"].copy()
     spoilt[0, 0, 0, 0, 0, 0] = np.nan
     broken = xr.DataTree.from_dict({"/": tree.to_dataset(), "/slopes": study.assign(nominal_pressure=spoilt)})
-    assert any("nominal_pressure: 1 values of complete runs" in flaw for flaw in flaws(CAMPAIGN, broken))
+    assert any(
+        "nominal_pressure: 1 values of complete runs" in problem for problem in problems_with_file(CAMPAIGN, broken)
+    )
 
 
 def test_other_files_are_refused(tmp_path):
     (tmp_path / "text.nc").write_text("no netCDF")
     with pytest.raises(UnknownFile, match="not a readable netCDF file"):
-        kind_of(tmp_path / "text.nc")
+        identify_file(tmp_path / "text.nc")
     with pytest.raises(UnknownFile, match="is a folder"):
-        kind_of(tmp_path)
+        identify_file(tmp_path)
     (tmp_path / "empty.nc").touch()
     with pytest.raises(UnknownFile, match="the file is empty"):
-        kind_of(tmp_path / "empty.nc")
+        identify_file(tmp_path / "empty.nc")
     with pytest.raises(UnknownFile, match="no such file"):
-        kind_of(tmp_path / "none.nc")
+        identify_file(tmp_path / "none.nc")
     xr.Dataset({"a": 1}).to_netcdf(tmp_path / "other.nc")
-    with pytest.raises(UnknownFile, match="neither a run dataset"):
-        kind_of(tmp_path / "other.nc")
+    with pytest.raises(UnknownFile, match="not a file that ICHA writes"):
+        identify_file(tmp_path / "other.nc")

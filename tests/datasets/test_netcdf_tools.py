@@ -11,7 +11,7 @@ import pint
 import pytest
 from outside_validators import REPOSITORY, python_of_validators
 
-from icha.datasets.format import CAMPAIGN, RUN, SOLUTION, SURFACE, kind_of
+from icha.datasets.format import CAMPAIGN, RUN, SOLUTION, SURFACE, identify_file
 from icha.datasets.labels import LABELS
 
 GROUPS = {"run.nc": "/", "campaign.nc": "/slopes"}
@@ -215,7 +215,7 @@ sys.exit(not validate.validate(pathlib.Path(sys.argv[2]), ["compliance-checker",
 
 
 def test_every_kind_of_file_is_known(folder):
-    found = {path.stem: kind_of(path)[0] for path in sorted(folder.glob("*.nc"))}
+    found = {path.stem: identify_file(path)[0] for path in sorted(folder.glob("*.nc"))}
     assert {name for name, kind in found.items() if kind == RUN} == {"run", "run_without_snapshots", "cycle"}
     assert {name for name, kind in found.items() if kind == SOLUTION} == {
         "boundary_elements",

@@ -84,12 +84,12 @@ def test_surfaces_may_have_different_numbers_of_slopes(tmp_path):
 
 def test_what_is_not_there_is_named():
     tree = crops.tree()
-    with pytest.raises(ValueError, match=f"there are {crops.STUDY}"):
+    with pytest.raises(ValueError, match=f"expected one of {crops.STUDY}"):
         select_run(tree, ("other", "asperities", "crop1", 1, 0.5, "soft"))
     labels = RunLabels(crops.STUDY, "asperities", "crop1", 1, 0.21, "soft")
-    with pytest.raises(ValueError, match=r"no rms_slope 0\.21; there are 0\.5"):
+    with pytest.raises(ValueError, match=r"no rms_slope 0\.21; expected one of 0\.5"):
         select_run(tree, labels)
-    with pytest.raises(ValueError, match="no surface 'other'; there are crop1, crop2, crop3"):
+    with pytest.raises(ValueError, match="no surface 'other'; expected one of crop1, crop2, crop3"):
         select_run(tree, labels._replace(surface="other"))
 
 
@@ -163,7 +163,7 @@ def test_report_checks_and_validity_of_either_form_are_the_same():
     assert section(tree) == section(other)
     assert check_campaign(tree) == check_campaign(other)
     assert of_dataset(tree) == of_dataset(other)
-    rows = [error_section.entry_section(crops.errors(each)[crops.STUDY].to_dataset()) for each in (tree, other)]
+    rows = [error_section.error_section(crops.errors(each)[crops.STUDY].to_dataset()) for each in (tree, other)]
     assert repr(rows[0]) == repr(rows[1]) and len(rows[0]["rows"]) == 3 * 2 * 2
 
 

@@ -27,9 +27,7 @@ def repository(tmp_path):
         "Snakefile": "rule all:\n",
         "uv.lock": "version = 1\n",
         ".gitignore": "__pycache__/\nresults/\n",
-        ".gitattributes": "icha/data.txt export-ignore\n*.txt text eol=crlf\nicha/id.py export-subst\n",
         "icha/physics.py": "ONE = 1\n",
-        "icha/id.py": "COMMIT = '$Format:%H$'\n",
         "icha/data.txt": "1\n2\n",
         "icha/mit Umlaut ä.txt": "ä\n",
         "workflow/rules/runs.smk": "rule run:\n",
@@ -59,7 +57,7 @@ def test_source_is_what_was_committed_byte_by_byte(repository, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("spoil", "said"),
+    ("spoil", "message"),
     [
         (lambda r: (r / "icha/physics.py").write_text("ONE = 2\n"), "changed: icha/physics.py"),
         (lambda r: (r / "docs/page.md").write_text("# Pages\n"), "changed: docs/page.md"),
@@ -69,30 +67,19 @@ def test_source_is_what_was_committed_byte_by_byte(repository, tmp_path):
         (lambda r: (r / "workflow/rules/ä b.smk").write_text(""), "not committed: workflow/rules/ä b.smk"),
     ],
 )
-def test_changes_that_are_not_committed_are_refused(repository, spoil, said):
+def test_changes_that_are_not_committed_are_refused(repository, spoil, message):
     spoil(repository)
-    with pytest.raises(ValueError, match=f"git commit(.|\n)*{re.escape(said)}"):
+    with pytest.raises(ValueError, match=f"git commit(.|\n)*{re.escape(message)}"):
         program_source(repository)
 
 
-def test_changes_cannot_be_hidden(repository, monkeypatch, tmp_path):
+def test_changes_that_git_status_does_not_show_are_refused(repository):
     (repository / "icha/more.py").write_text("TWO = 2\n")
-    git(repository, "add", "icha/more.py")
-    with pytest.raises(ValueError, match=r"not committed: icha/more\.py"):
-        program_source(repository)
-    git(repository, "reset", "--quiet")
     (repository / ".git/info/exclude").write_text("more.py\n")
-    (tmp_path / "ignore").write_text("more.py\n")
-    (tmp_path / "gitconfig").write_text(f"[core]\nexcludesFile = {tmp_path / 'ignore'}\n")
-    monkeypatch.setenv("GIT_CONFIG_GLOBAL", str(tmp_path / "gitconfig"))
-    assert git(repository, "status", "--porcelain") == ""
-    with pytest.raises(ValueError, match=r"not committed: icha/more\.py"):
-        program_source(repository)
-    (repository / "icha/more.py").unlink()
     git(repository, "update-index", "--assume-unchanged", "icha/physics.py")
     (repository / "icha/physics.py").write_text("ONE = 2\n")
     assert git(repository, "status", "--porcelain") == ""
-    with pytest.raises(ValueError, match=r"changed: icha/physics\.py"):
+    with pytest.raises(ValueError, match=r"changed: icha/physics\.py\n  not committed: icha/more\.py"):
         program_source(repository)
 
 
@@ -137,7 +124,7 @@ def test_folders_without_a_commit_and_links_are_refused(repository, tmp_path, mo
     (repository / "link").symlink_to("Snakefile")
     git(repository, "add", "link")
     git(repository, "commit", "--quiet", "--message", "Link")
-    with pytest.raises(ValueError, match="changed: link"):
+    with pytest.raises(ValueError, match="a link: link"):
         program_source(repository)
     monkeypatch.setenv("PATH", str(tmp_path))
     with pytest.raises(ValueError, match="git: no such program"):
@@ -183,7 +170,7 @@ def test_source_is_what_was_installed_in_its_places_in_the_repository(place, tmp
 
 
 @pytest.mark.parametrize(
-    ("spoil", "said"),
+    ("spoil", "message"),
     [
         (lambda p: (p / "icha/physics.py").write_text("ONE = 2\n"), "changed: icha/physics.py"),
         (lambda p: (p / "icha_workflow/Snakefile").unlink(), "changed: icha_workflow/Snakefile"),
@@ -191,9 +178,9 @@ def test_source_is_what_was_installed_in_its_places_in_the_repository(place, tmp
         (lambda p: (p / "icha-7.1.dist-info").rename(p / "other"), "no distribution `icha` is installed here"),
     ],
 )
-def test_another_program_than_what_was_installed_is_refused(place, spoil, said):
+def test_another_program_than_what_was_installed_is_refused(place, spoil, message):
     spoil(place)
-    with pytest.raises(ValueError, match=re.escape(said)):
+    with pytest.raises(ValueError, match=re.escape(message)):
         program_source(place / "icha_workflow")
 
 
@@ -227,7 +214,7 @@ def test_results_that_were_made_with_other_versions_are_refused(tmp_path, monkey
     note_versions(results)
     noted = (results / MADE_WITH).read_text().splitlines()
     assert "numpy==0.1" in noted and len([line for line in noted if line.startswith("numpy==")]) == 2
-    with pytest.raises(ValueError, match=r"made with versions that are not those of uv\.lock(.|\n)*  numpy 0\.1"):
+    with pytest.raises(ValueError, match=r"made with other versions than those of uv\.lock(.|\n)*  numpy 0\.1"):
         refuse_other_environment(tmp_path, results)
     written = (results / MADE_WITH).stat().st_mtime_ns
     note_versions(results)

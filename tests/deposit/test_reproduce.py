@@ -127,8 +127,8 @@ def test_what_is_the_same_is_identical_and_leaves_nothing_behind(ending, deposit
     before = {path: path.stat().st_mtime_ns for path in folder.rglob("*")}
     status, said = reproduce(folder.with_name(folder.name + ending), "--cores", "3", "--anyway")
     assert status == 0 and "identical: 4 files, every value" in said, said
-    assert "it says of itself, and nobody has checked it:\n  title:    A \\x1b[2J title\n  authors:  Carb" in said
-    assert f"is run:     the ICHA that is installed, {version('icha')}; nothing in the deposit is executed" in said
+    assert "its metadata, which ICHA cannot verify:\n  title:    A \\x1b[2J title\n  authors:  Carb" in said
+    assert f"program:    the installed ICHA {version('icha')}; nothing in the deposit is executed" in said
     ((_, targets, cores, anyway),) = computed
     assert (targets, cores, anyway) == (["all"], "3", True)
     assert list((tmp_path / "temporary").iterdir()) == []
@@ -155,7 +155,7 @@ def test_single_runs(deposit, reproduce, computed, tmp_path):
         assert status == 0 and f"identical: {len(runs) + 1} files" in said, said  # and the surface of both
         assert computed[-1][1] == [f"results/tiny/runs/{run}.nc" for run in runs]
     status, said = reproduce(own, "--only", "load/plate/seed3/slope1/soft")
-    assert status == 2 and "has no such run; allowed: smallest, or one of its 2 runs" in said and HARD in said
+    assert status == 2 and "has no such run; expected smallest, or one of its 2 runs" in said and HARD in said
 
 
 def test_the_smallest_run_is_the_smallest_that_is_complete(deposit, reproduce, computed, tmp_path):

@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 from icha.cli import app
 from icha.deposit import verify
 from icha.deposit.verify import Damaged, files_of, problem_with_name, read_text, verify_deposit, whole_deposit
-from icha.support.in_words import is_printable
+from icha.support.formatting import is_printable
 
 FILES = {"README.md": "# Tiny\n", "runs/load/soft.nc": bytes(range(256)) * 20, "inputs/Höhen (2).txt": "1 2\n"}
 
@@ -44,7 +44,7 @@ def test_a_whole_deposit_is_whole(ending, folder):
         assert files_of(found) == sorted([*FILES, "SHA256SUMS"])
     assert found == path or not found.exists()
     done = CliRunner().invoke(app, ["verify", str(path)])
-    assert done.exit_code == 0 and "whole: 4 files" in done.output
+    assert done.exit_code == 0 and "intact: 4 files" in done.output
     assert CliRunner().invoke(app, ["verify", f"{path}.none"]).exit_code == 2
 
 
@@ -127,7 +127,7 @@ def test_what_unpacks_to_far_more_is_not_unpacked_unless_asked(pack, monkeypatch
     folder = pack({"zeros": bytes(10_000_000)})
     monkeypatch.setattr(verify, "ALLOWANCE", 1000)
     (problem,) = verify_deposit(folder.with_name("tiny.zip"))
-    assert "to 10 MB; allowed: 50 times its size" in problem
+    assert "to 10 MB; expected at most 50 times its size" in problem
     assert verify_deposit(folder.with_name("tiny.zip"), large=True) == []
 
 
@@ -135,7 +135,7 @@ def test_what_unpacks_to_far_more_is_not_unpacked_unless_asked(pack, monkeypatch
 def test_the_number_of_files_is_bounded(ending, folder, monkeypatch):
     monkeypatch.setattr(verify, "MOST_FILES", 2)
     (problem,) = verify_deposit(folder.with_name(folder.name + ending))
-    assert "files or more; allowed: 2, or more with --large" in problem
+    assert "files or more; expected at most 2. Use --large" in problem
 
 
 @pytest.mark.parametrize("declared", [3, 5, 10_000_000])
@@ -167,7 +167,7 @@ def test_unpacking_needs_room(folder, monkeypatch):
 
 def test_a_large_text_is_not_read_as_a_whole(folder, monkeypatch):
     monkeypatch.setattr(verify, "LARGEST_TEXT", 3)
-    with pytest.raises(ValueError, match="allowed: 3 B"):
+    with pytest.raises(ValueError, match="expected at most 3 B"):
         read_text(folder, "README.md")
 
 
@@ -175,7 +175,7 @@ def test_no_more_than_a_hundred_problems_are_printed(folder):
     for k in range(150):
         (folder / f"added{k}").touch()
     done = CliRunner().invoke(app, ["verify", str(folder)])
-    assert done.exit_code == 1 and "… and 50 more" in done.output and "not whole: 150 problems" in done.output
+    assert done.exit_code == 1 and "… and 50 more" in done.output and "damaged: 150 problems" in done.output
 
 
 def test_names_are_too_long_where_file_systems_say_so():

@@ -170,7 +170,7 @@ def write_results(folder, campaign):
 def with_results(folder):
     """The folder with the datasets that the pages read: of the tutorial with seeds, pulling as well, and of others."""
     tutorial = yaml.safe_load(tutorial_campaign())
-    ((_, pulling), *_) = campaigns(DOCS / "howto/way_back.md")
+    ((_, pulling), *_) = campaigns(DOCS / "howto/unloading.md")
     study = tutorial["studies"]["load"] | {"seeds": [1, 2]}
     pull = pulling["studies"]["pull"] | {"max_step": 0.5, "turning_points": [], "materials": ["weak"]}
     pull["targets"] = {"reduced_pressures": pull["targets"]["reduced_pressures"][:1]}

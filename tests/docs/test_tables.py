@@ -20,7 +20,7 @@ def test_every_table_is_shown_by_one_page():
     [
         lambda: benchmarks.tables(benchmarks.read_results()),
         lambda: short_range.tables(short_range.kept()),
-        lambda: faults.tables(faults.kept()),
+        lambda: faults.tables(faults.read_counts()),
     ],
     ids=["benchmarks", "short_range", "faults"],
 )

@@ -148,7 +148,7 @@ def test_a_union_keeps_the_area_at_this_separation(energy):
     volume = two.contact_radius**4 / two.radius_of_curvature
     np.testing.assert_allclose(one.position[0], volume @ two.position / np.sum(volume), rtol=1e-7)
     assert one.members.tolist() == [2]
-    np.testing.assert_array_equal(after.owner, [0, 0])
+    np.testing.assert_array_equal(after.spot_of_asperity, [0, 0])
     # From here on it is a spot of that height: h - u = delta + w of its own images.
     law, E = contact.law, 2.0
     w = -3.900265 * law.force(one.contact_radius, one.radius_of_curvature) / (np.pi * E * PERIOD)
@@ -173,7 +173,7 @@ def test_the_order_of_the_input_does_not_matter(energy):
         rank = np.argsort(spots.position[:, 0])
         results.append([spots.position[rank, 0], spots.height[rank], spots.contact_radius[rank], spots.members[rank]])
         # Every asperity belongs to the spot into which those near it were united.
-        members = np.bincount(state.owner[state.owner >= 0], minlength=len(spots))
+        members = np.bincount(state.spot_of_asperity[state.spot_of_asperity >= 0], minlength=len(spots))
         assert np.all(members >= spots.members)
     for other in results[1:]:
         for value, reference in zip(other, results[0], strict=True):

@@ -7,7 +7,7 @@ from half_space import all_pairs, jkr_approach, jkr_force, periodic_displacement
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-import icha.equilibrium.equilibrium
+import icha.equilibrium.solver
 from icha import Material, SelfAffineSpectrum, Surface
 from icha.asperity.jkr import JKR
 from icha.contact.model import Control, NotConverged
@@ -104,7 +104,7 @@ def test_jump_off_of_a_bump_happens_at_the_jkr_limit():
     detached = contact.equilibrium(state, expected - 1e-8 * limit)
     assert len(detached.spots) == 0
     assert detached.jump_offs == 1
-    np.testing.assert_array_equal(detached.owner, [-1])
+    np.testing.assert_array_equal(detached.spot_of_asperity, [-1])
 
 
 def test_strongest_pull_of_a_bump_is_that_of_jkr():
@@ -166,7 +166,7 @@ def test_interacting_spots_against_an_independent_solution(count, energy):
     state = contact.equilibrium(contact.untouched(), 0.85e-6)
     assert len(state.spots) == count
     spots = state.spots
-    np.testing.assert_array_equal(np.sort(state.owner), np.arange(count))
+    np.testing.assert_array_equal(np.sort(state.spot_of_asperity), np.arange(count))
     order = [int(np.argmin(np.hypot(*(spots.position - p).T))) for p in contact.asperities.position]
     alone = contact.law.contact_radius(contact.asperities.height - 0.85e-6, contact.asperities.radius_of_curvature)
     expected = independent_solution(contact, 0.85e-6, energy, alone)
@@ -240,7 +240,7 @@ def test_stiffness_against_differences(energy):
         state = contact.equilibrium(state, level * contact.rms_height)
     step = 1e-6 * contact.rms_height
     ahead, behind = (contact.equilibrium(state, state.separation + s) for s in (-step, step))
-    np.testing.assert_array_equal(ahead.owner, behind.owner)
+    np.testing.assert_array_equal(ahead.spot_of_asperity, behind.spot_of_asperity)
     difference = (contact.pressure(ahead) - contact.pressure(behind)) / (2 * step)
     assert contact.stiffness(state) == pytest.approx(difference, rel=1e-5)
 
@@ -305,10 +305,12 @@ def assert_consistent(contact, state):
     assert np.max(np.abs(error), initial=0) <= 2e-7 * contact.rms_height
     first, second, r = all_pairs(spots.position, period)
     assert np.all(r >= spots.contact_radius[first] + spots.contact_radius[second])
-    assert np.all(np.isin(state.holder[state.holder >= 0], np.flatnonzero(state.contact_radius > 0)))
+    assert np.all(
+        np.isin(state.site_of_asperity[state.site_of_asperity >= 0], np.flatnonzero(state.contact_radius > 0))
+    )
     # Every spot has an owner, and no free asperity is left beyond its jump-in but the pending ones.
-    assert set(state.owner[state.owner >= 0]) == set(range(len(spots)))
-    free = state.owner < 0
+    assert set(state.spot_of_asperity[state.spot_of_asperity >= 0]) == set(range(len(spots)))
+    free = state.spot_of_asperity < 0
     there = contact.asperities.position[free]
     w = displacement_at(law, period, there, spots.position, a, R)
     approach = contact.asperities.height[free] - state.separation - w
@@ -324,7 +326,7 @@ def assert_consistent(contact, state):
 def counting(monkeypatch, most):
     """Count the rounds of events, and stop at more than `most`."""
     calls = []
-    original = icha.equilibrium.equilibrium.happen
+    original = icha.equilibrium.solver.apply_events
 
     def events(*arguments):
         search, changed = original(*arguments)
@@ -332,7 +334,7 @@ def counting(monkeypatch, most):
         assert sum(calls) <= most, "the rounds do not end"
         return search, changed
 
-    monkeypatch.setattr(icha.equilibrium.equilibrium, "happen", events)
+    monkeypatch.setattr(icha.equilibrium.solver, "apply_events", events)
     return calls
 
 
@@ -397,7 +399,7 @@ def test_states_along_a_path_are_consistent(energy):
 
 def test_too_few_newton_steps_are_reported_not_passed_off(monkeypatch):
     contact = rough(ENERGY)
-    monkeypatch.setattr(icha.equilibrium.equilibrium, "_MAX_NEWTON_STEPS", 1)
+    monkeypatch.setattr(icha.equilibrium.solver, "_MAX_NEWTON_STEPS", 1)
     with pytest.raises(NotConverged, match="equilibrium error"):
         contact.equilibrium(contact.untouched(), 1.5 * contact.rms_height)
 
@@ -411,7 +413,7 @@ def test_events_that_lead_back_to_the_same_spots_end_soon(monkeypatch):
         rounds += 1
         return search, True
 
-    monkeypatch.setattr(icha.equilibrium.equilibrium, "happen", always)
+    monkeypatch.setattr(icha.equilibrium.solver, "apply_events", always)
     contact, top = bump(ENERGY)
     with pytest.raises(NotConverged, match="no equilibrium after 11 rounds of jumps and unions"):
         contact.equilibrium(contact.untouched(), top)

@@ -1,13 +1,10 @@
-"""The two interfaces: equilibria need no more of a law, and paths no more of a model, than these say."""
+"""The interface of contact models: a path needs no more of a model."""
 
-import numpy as np
 import pytest
 
 from icha import Material, Path, SelfAffineSpectrum
 from icha.asperity.jkr import JKR
-from icha.asperity.law import SpotLaw
 from icha.contact.model import ContactModel
-from icha.equilibrium.distributions import gap_distribution, pressure_distribution
 from icha.equilibrium.interacting_asperities import InteractingAsperities
 from icha.path.follow import follow
 from icha.surfaces.summits import find_summits
@@ -34,16 +31,6 @@ def model(law):
 
 def last(contact, loads, **path):
     return list(follow(contact, Path(reduced_pressures=loads, **path)))[-1].state
-
-
-@pytest.mark.parametrize("energy", [0.0, 0.05])
-def test_an_equilibrium_asks_a_law_for_no_more_than_its_interface(energy):
-    law = JKR(Material(MODULUS, energy, 2.071e-9))
-    expected, found = (last(model(each), [1e-3, 6e-2]) for each in (law, Only(law, SpotLaw)))
-    assert len(found.spots) > 3 and np.any(found.spots.members > 1)
-    np.testing.assert_array_equal(found.spots.contact_radius, expected.spots.contact_radius)
-    gap_distribution(Only(law, SpotLaw), SURFACE, found)
-    pressure_distribution(Only(law, SpotLaw), SURFACE, found.spots)
 
 
 @pytest.mark.parametrize("path", [{}, {"unload": True, "control": "load"}], ids=str)

@@ -5,26 +5,20 @@ import pytest
 import separate_asperities as separate
 import small_campaign as small
 import xarray as xr
+from drawn import legend
 from matplotlib.colors import to_hex
 
 from icha.datasets.campaign import campaign_tree
-from icha.datasets.files import read_dataset
 from icha.datasets.labels import RunLabels
-from icha.datasets.surface_file import write_surface
 from icha.figures import fig13_loops, fig14_pull_off, fig15_loss, fig16_snap_map
+from icha.figures.ensembles import Points
 from icha.figures.fig15_loss import PARTS, linear_fit, shares
-from icha.figures.hysteresis import averages, unloaded_runs
+from icha.figures.hysteresis import unloaded_runs
+from icha.figures.select import ContactRuns
 
 MODULES = (fig13_loops, fig14_pull_off, fig15_loss, fig16_snap_map)
 NAMES = (("reduced_separation", "reduced_pressure"), ("reduced_pressure", "contact_area_fraction"))
 DEPTHS = {"gentle": -0.6, "middle": -0.1, "hard": 0.5}
-
-
-@pytest.fixture(scope="module")
-def surface(tmp_path_factory):
-    path = tmp_path_factory.mktemp("surface") / "s.nc"
-    write_surface(path, small.surface(), name="rough", seed=1)
-    return read_dataset(path)
 
 
 @pytest.fixture(scope="module")
@@ -42,10 +36,6 @@ def one(material="sticky", **changed):
 def draw(module, tree, surface, study):
     options = {"studies": [study]} if module is fig15_loss else {"study": study}
     return module.figure(tree, **({"surface": surface} if module is fig16_snap_map else {}), **options)
-
-
-def legend(figure):
-    return [text.get_text() for text in figure.legends[0].get_texts()]
 
 
 def curves(axes):
@@ -293,11 +283,6 @@ def test_fig14_tells_slopes_of_the_loads_apart(tree):
     assert len(legend(figure)) == 2 + 2 + 1
 
 
-def test_fig14_names_what_there_is(tree):
-    with pytest.raises(ValueError, match=r"no study 'harder'.*there are slopes, gentle, middle, hard"):
-        fig14_pull_off.figure(tree, study="slopes", load_studies=["hard", "harder"])
-
-
 # --- figure 15 --------------------------------------------------------------------------------------------------
 
 
@@ -355,17 +340,21 @@ def test_fig15_fits_nothing_through_two_loads_or_other_seeds(tree):
     assert len(figure.axes[0].containers[0][0].get_xdata()) == 3
 
 
+def points(*runs):
+    """A line of points, from x and y of every seed."""
+    return Points(
+        [ContactRuns(None, {seed: {"x": x, "y": y} for seed, (x, y) in own.items()}, len(own), True) for own in runs],
+        "x",
+        "y",
+    )
+
+
 def test_points_of_a_line_are_means_over_the_seeds_that_all_have():
-    line = averages([{1: (2.0, 10.0), 2: (4.0, 30.0), 3: (9.0, 99.0)}, {2: (1.0, 6.0), 1: (1.0, 2.0)}])
-    assert line.same_seeds
-    assert line.x.tolist() == [1, 3] and line.y.tolist() == [4, 20]
-    # Two seeds: 12.706 standard errors, half the difference of both; of the logarithm, for losses are positive.
-    low, high = line.over.band(positive=True)
-    np.testing.assert_allclose(np.log(high[:, 1] / line.y), 12.7062047 * np.array([2 / 4, 10 / 20]), rtol=1e-7)
-    assert np.all(low > 0)
-    assert line.over.count[:, 0].tolist() == [2, 2]
-    apart = averages([{1: (2.0, 10.0)}, {2: (3.0, 8.0)}])
-    assert not apart.same_seeds and apart.y.tolist() == [10, 8] and np.isnan(apart.over.band(positive=True)).all()
+    line = points({1: (2.0, 10.0), 2: (4.0, 30.0), 3: (9.0, 99.0)}, {2: (1.0, 6.0), 1: (1.0, 2.0)})
+    assert line.same_seeds and line.counts == [2, 2]
+    assert line.means.tolist() == [[1, 3], [4, 20]]
+    apart = points({1: (2.0, 10.0)}, {2: (3.0, 8.0)})
+    assert not apart.same_seeds and apart.means[1].tolist() == [10, 8]
 
 
 def test_fig15_in_joule_shows_runs_without_adhesion_too(tree):
@@ -388,9 +377,8 @@ def test_fig15_in_joule_shows_runs_without_adhesion_too(tree):
 def test_fig15_parts_are_of_either_sign_and_make_up_the_whole(tree):
     run = separate.run("sticky", 0.5)
     parts = {"loss_by_jump_in": 3.0, "loss_by_jump_off": 1.0, "loss_by_coalescence": -1.0, "loss_unattributed": 0.0}
-    found = shares(
-        {"hard": {1: run.assign(parts), 2: run.assign(parts)}, "soft": {1: run.assign(largest_reduced_pressure=0.0)}}
-    )
+    line = [{1: run.assign(parts), 2: run.assign(parts)}, {1: run.assign(largest_reduced_pressure=0.0)}]
+    found = shares([ContactRuns(None, runs, 2, True) for runs in line])
     assert list(found.values()) == pytest.approx([0.6, 0.2, -0.2, 0, 0])
     figure = fig15_loss.figure(one(**parts), studies=["one"])
     heights = sorted((bar.get_y(), bar.get_y() + bar.get_height()) for bar in figure.axes[1].patches)

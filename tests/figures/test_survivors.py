@@ -6,11 +6,10 @@ import cyclic_campaign as cyclic
 import numpy as np
 import pytest
 import small_campaign as small
+from drawn import legend, lines_of
 
 from icha.datasets.campaign import campaign_tree
-from icha.datasets.files import read_dataset
 from icha.datasets.labels import RunLabels
-from icha.datasets.surface_file import write_surface
 from icha.figures import (
     fig2_area_and_gap,
     fig4_contact_map,
@@ -21,7 +20,8 @@ from icha.figures import (
 )
 from icha.figures.captions import count_runs
 from icha.figures.ensembles import draw_members, draw_points
-from icha.figures.looks import FEWER_SEEDS, NOT_APPLICABLE, NOT_APPLICABLE_ALONE
+from icha.figures.legends import FEWER_SEEDS
+from icha.figures.looks import NOT_APPLICABLE, NOT_APPLICABLE_ALONE
 from icha.figures.style import new_figure
 
 SEEDS = range(1, 6)
@@ -62,28 +62,25 @@ def numbers(axes):
     return [text.get_text() for text in axes.texts if text.get_text().startswith("n=")]
 
 
-def legend(figure):
-    return [text.get_text() for text in figure.legends[0].get_texts()]
+def test_means_over_all_seeds_are_not_marked():
+    whole = draw(fig2_area_and_gap, campaign())
+    assert not any(crossed(axes) or numbers(axes) for axes in whole.axes)
+    assert FEWER_SEEDS not in legend(whole)
 
 
 @pytest.mark.parametrize("module", [*LOADING, *LOOPS])
-def test_means_over_the_survivors_are_crossed_with_their_number(module):
-    run = cyclic.run if module in LOOPS else small.run
-    whole = draw(module, campaign(run=run))
-    assert not any(crossed(axes) or numbers(axes) for axes in whole.axes)
-    assert FEWER_SEEDS not in legend(whole)
-    figure = draw(module, campaign(lacking=(2,), checks=(4,), run=run))
+def test_means_over_fewer_seeds_are_crossed_and_runs_not_applicable_are_pale(module):
+    figure = draw(
+        module, campaign(lacking=(2,), checks=(4,), pale=(5,), run=cyclic.run if module in LOOPS else small.run)
+    )
     axes = figure.axes[0]
-    assert numbers(axes) and set(numbers(axes)) == {"n=3"}
+    assert sorted(set(numbers(axes))) == ["n=1", "n=2"]
     for cross in crossed(axes):
         x, y = cross.get_data()
-        hollow = [
-            line
-            for line in axes.get_lines()
-            if line.get_marker() not in ("x", ".") and line.get_markerfacecolor() == "white"
-        ]
+        hollow = [line for line in lines_of(axes) if line.get_marker() not in ("x", ".")]
+        hollow = [line for line in hollow if line.get_markerfacecolor() == "white"]
         assert any(np.array_equal(line.get_data(), (x, y)) for line in hollow)
-    assert legend(figure).count(FEWER_SEEDS) == 1
+    assert legend(figure).count(FEWER_SEEDS) == legend(figure).count(NOT_APPLICABLE) == 1
     figure.draw_without_rendering()
     for axes in figure.axes:
         boxes = [text.get_window_extent() for text in axes.texts if text.get_text().startswith("n=")]
@@ -120,19 +117,9 @@ def test_no_line_joins_means_over_different_seeds(few):
     assert cross.get_xdata().tolist() == [1, 2, 3]
 
 
-@pytest.mark.parametrize("module", [*LOADING, *LOOPS])
-def test_runs_that_the_model_is_not_applicable_to_are_pale_and_apart(module):
-    run = cyclic.run if module in LOOPS else small.run
-    figure = draw(module, campaign(pale=(1, 5), run=run))
-    axes = figure.axes[0]
-    assert sorted(set(numbers(axes))) == ["n=2", "n=3"]
-    assert legend(figure).count(NOT_APPLICABLE) == 1
-
-
-def test_figures_of_one_run_say_that_the_model_is_not_applicable(tmp_path):
-    write_surface(tmp_path / "s.nc", small.surface(), name="rough", seed=1)
+def test_figures_of_one_run_say_that_the_model_is_not_applicable(surface):
     tree = campaign(pale=(1,))
-    figure = fig4_contact_map.figure(tree, read_dataset(tmp_path / "s.nc"), study="five")
+    figure = fig4_contact_map.figure(tree, surface, study="five")
     assert NOT_APPLICABLE_ALONE in figure.get_suptitle()
     assert NOT_APPLICABLE_ALONE in legend(fig6_spots_by_slope.figure(tree, study="five"))[0]
 

@@ -87,7 +87,7 @@ def test_tangent_is_the_derivative(energy):
     tangent = interaction.tangent(a)
     largest = np.max(np.abs(difference))
     np.testing.assert_allclose(tangent(change), difference, atol=1e-5 * largest, rtol=0)
-    np.testing.assert_allclose(tangent.nearly(change), difference, atol=3e-3 * largest, rtol=0)
+    np.testing.assert_allclose(tangent.approximate(change), difference, atol=3e-3 * largest, rtol=0)
 
 
 @pytest.mark.parametrize("energy", ENERGIES)
@@ -171,7 +171,7 @@ def test_unlike_spots_in_equilibrium(energy):
 
     found = scipy.optimize.root(error, np.sqrt(R * (height - u)) * 0.9, tol=1e-13)
     assert found.success
-    np.testing.assert_allclose(state.spots.contact_radius[state.owner], found.x, rtol=1e-7)
+    np.testing.assert_allclose(state.spots.contact_radius[state.spot_of_asperity], found.x, rtol=1e-7)
 
 
 @pytest.mark.parametrize("energy", WEAK)

@@ -128,7 +128,7 @@ def test_tangent_against_differences_for_many_spots():
     good = np.abs(value - difference) < 1e-5 * np.max(np.abs(difference))
     assert np.mean(good) > 0.97
     # The operator of the linear solves only has to be close.
-    assert np.max(np.abs(tangent.nearly(direction) - value)) < 5e-3 * np.max(np.abs(value))
+    assert np.max(np.abs(tangent.approximate(direction) - value)) < 5e-3 * np.max(np.abs(value))
 
 
 @pytest.mark.parametrize("energy", ENERGIES)

@@ -17,7 +17,7 @@ from icha.contact.models import DEFAULT_MODEL, MODELS, REFERENCE_MODEL
 from icha.datasets.campaign import campaign_tree, run_labels, select_run
 from icha.datasets.campaign_file import write_campaign
 from icha.datasets.files import read_campaign, read_run, write_dataset
-from icha.datasets.format import CAMPAIGN, RUN, flaws, kind_of
+from icha.datasets.format import CAMPAIGN, RUN, identify_file, problems_with_file
 from icha.datasets.labels import LABELS, RunLabels
 from icha.datasets.variables.run import FURTHER, OF_MODELS
 from icha.figures.looks import MODEL_MARKERS
@@ -64,17 +64,19 @@ def test_a_run_says_by_which_model_it_is(runs, tmp_path):
         assert asperities.attrs[name] != patched.attrs[name]
     assert "boundary elements" in patched.attrs["title"] and "Griffith" in patched.attrs["references"]
     write_dataset(patched, tmp_path / "run.nc")
-    kind, back = kind_of(tmp_path / "run.nc")
-    assert kind == RUN and flaws(RUN, back) == []
+    kind, back = identify_file(tmp_path / "run.nc")
+    assert kind == RUN and problems_with_file(RUN, back) == []
     with netCDF4.Dataset(tmp_path / "run.nc") as file:
         storage = file["contact_map"]
         assert storage.chunking() == [1, 32, 32] and storage.filters()["zlib"]
     lacking = back.drop_vars(["contact_map", "front_residual"])
-    assert flaws(RUN, lacking) == [
+    assert problems_with_file(RUN, lacking) == [
         "front_residual is missing in a file with boundary elements",
         "contact_map is missing in a file with snapshots of boundary elements",
     ]
-    assert any("contact_model: 'guess'" in flaw for flaw in flaws(RUN, back.assign_attrs(contact_model="guess")))
+    assert any(
+        "contact_model: 'guess'" in flaw for flaw in problems_with_file(RUN, back.assign_attrs(contact_model="guess"))
+    )
 
 
 def test_areas_of_spots_are_those_of_their_circles(runs):
@@ -101,7 +103,7 @@ def test_model_is_the_first_dimension_of_every_study(runs, tmp_path):
     assert np.isnan(front.sel(model=DEFAULT_MODEL)).all() and front.attrs["missing"] == "of runs by asperities"
     assert (front.sel(model=REFERENCE_MODEL, material="soft") == 1e-9).all()
     assert set(np.unique(study["spot_model"])) == {0, 1}
-    assert [flaw for flaw in flaws(CAMPAIGN, tree) if "attribute" not in flaw] == []
+    assert [flaw for flaw in problems_with_file(CAMPAIGN, tree) if "attribute" not in flaw] == []
     assert run_labels(tree) == [labels(DEFAULT_MODEL), labels(DEFAULT_MODEL, "hertz"), labels(REFERENCE_MODEL)]
     assert "Griffith" in tree.attrs["references"] and "Violano" in tree.attrs["references"]
 
@@ -115,7 +117,7 @@ def test_every_run_of_both_models_is_taken_out_unchanged(runs):
         assert set(taken.variables) - {"model", "surface", "material"} == kept
         for name in kept:
             np.testing.assert_array_equal(taken[name].values, original[name].values, err_msg=f"{each} {name}")
-    with pytest.raises(ValueError, match=r"no model 'other'; there are asperities, boundary_elements"):
+    with pytest.raises(ValueError, match=r"no model 'other'; expected one of asperities, boundary_elements"):
         select_run(tree, labels("other"))
 
 

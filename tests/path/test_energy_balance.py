@@ -49,8 +49,8 @@ def lost(contact, waypoints):
     """Work lost by the end of a path, and its parts, as energies."""
     balance = waypoints[-1].balance
     parts = (balance.jump_in, balance.jump_off, balance.coalescence, balance.load_jump, balance.unattributed)
-    assert balance.lost == pytest.approx(sum(parts), rel=1e-12)
-    return balance.lost * contact.area, *(part * contact.area for part in parts)
+    assert balance.loss == pytest.approx(sum(parts), rel=1e-12)
+    return balance.loss * contact.area, *(part * contact.area for part in parts)
 
 
 # --- closed forms -------------------------------------------------------------------------------------------
@@ -262,7 +262,7 @@ def test_the_step_does_not_matter(monkeypatch):
     """Half the longest step, and half of all that is left unresolved, change pull-off and loss by less than 1 %."""
     coarse = united_run()
     assert int(coarse.coalescence_count[-1]) > 0
-    for name in ("UNRESOLVED_LOSS", "UNRESOLVED_WORK", "UNITING_STEP"):
+    for name in ("UNRESOLVED_LOSS", "UNRESOLVED_WORK", "UNION_STEP"):
         monkeypatch.setattr(cycle, name, 0.5 * getattr(cycle, name))
     fine = icha.simulate(*small(), Path([5e-2], unload=True, max_step=0.5 * DEFAULT_STEP))
     assert fine.sizes["step"] > coarse.sizes["step"]
@@ -296,7 +296,7 @@ def test_steps_of_a_lone_asperity_do_not_matter():
 def test_jumps_that_nearly_cancel_lose_no_more_than_each_alone(gained_and_lost):
     """Where the range is long a jump into contact may be uphill; the two are not a share of what the step loses."""
     events = Events(np.array([JUMP_IN, JUMP_OFF]), np.zeros((2, 2)), np.ones(2, int), np.array(gained_and_lost))
-    step = Step(0.1, work=0.6, gained=0.1, pressure_jump=0.0, integration_error=0.0, sudden=True, events=events)
-    balance = EnergyBalance().after(contact_of([HEIGHT], period=1.0), step)
+    step = Step(0.1, work=0.6, stored=0.1, pressure_jump=0.0, integration_error=0.0, has_jump=True, events=events)
+    balance = EnergyBalance().add_step(contact_of([HEIGHT], period=1.0), step)
     assert (balance.jump_in, balance.jump_off) == pytest.approx(gained_and_lost)
-    assert balance.lost == pytest.approx(0.5)
+    assert balance.loss == pytest.approx(0.5)

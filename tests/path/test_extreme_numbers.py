@@ -9,8 +9,8 @@ from icha.checks.run import check_run
 from icha.contact.model import NotConverged
 from icha.path import loading
 from icha.path.follow import follow
-from icha.path.loading import Course
-from icha.path.stops import Stop
+from icha.path.loading import PathProgress
+from icha.path.stops import TargetFunction
 
 WAVES = np.add.outer(*[np.cos(np.linspace(0, 2 * np.pi, 16, endpoint=False))] * 2)
 
@@ -18,19 +18,22 @@ WAVES = np.add.outer(*[np.cos(np.linspace(0, 2 * np.pi, 16, endpoint=False))] * 
 @pytest.mark.parametrize(
     ("make", "named"),
     [
-        (lambda: Path([1e-80]), r"^reduced_pressures\[0\]: 1e-80 must lie in \[1e-12, 0.15\]"),
-        (lambda: Path(area_fractions=[5e-324]), r"^area_fractions\[0\]: 5e-324 must lie in \[1e-9, 0.25\]"),
-        (lambda: Path(mean_separations=[1e100]), r"^mean_separations\[0\]: 1e\+100 must lie in \[1e-24, 1e9\]"),
-        (lambda: Path([1e-2], max_step=5e-324), r"^max_step: 5e-324 must lie in \[1e-4, 0.5\]"),
+        (lambda: Path([1e-80]), r"^reduced_pressures\[0\]: 1e-80 must be a number in \[1e-12, 0.15\]"),
+        (lambda: Path(area_fractions=[5e-324]), r"^area_fractions\[0\]: 5e-324 must be a number in \[1e-9, 0.25\]"),
+        (lambda: Path(mean_separations=[1e100]), r"^mean_separations\[0\]: 1e\+100 must be a number in \[1e-24, 1e9\]"),
+        (lambda: Path([1e-2], max_step=5e-324), r"^max_step: 5e-324 must be a number in \[1e-4, 0.5\]"),
         (lambda: Path([1e-2], turning_points=[("reduced_pressure", -1e-80)]), r"^turning_points\[0\]: -1e-80"),
-        (lambda: Surface(1e-6 * WAVES, 1e100), r"^period: 1e\+100 must lie in \[1e-24, 1e9\]"),
+        (lambda: Surface(1e-6 * WAVES, 1e100), r"^period: 1e\+100 must be a number in \[1e-24, 1e9\]"),
         (lambda: Surface(1e100 * WAVES, 1e-4), r"^heights: their range over the period: .*\[1e-24, 1e9\]"),
         (lambda: Surface(1e-100 * WAVES, 1e-4), r"^heights: their range over the period: .*\[1e-24, 1e9\]"),
         (lambda: Surface(8e307 * WAVES, 1e-4), r"^heights: their range over the period: "),
-        (lambda: SelfAffineSpectrum(1e-4, 2e-5, 1e-5, 0.8, rms_slope=1e-100), r"^rms_slope: 1e-100 must lie in"),
-        (lambda: Material(1e100, 0.0, 1e-9), r"^contact_modulus: 1e\+100 must lie in \[1e-9, 1e15\]"),
-        (lambda: Material(1e6, 1e-300, 1e-9), r"^surface_energy over contact_modulus: 1e-306 must lie in"),
-        (lambda: Material(1e6, 0.1, 1e-100), r"^interaction_range: 1e-100 must lie in"),
+        (
+            lambda: SelfAffineSpectrum(1e-4, 2e-5, 1e-5, 0.8, rms_slope=1e-100),
+            r"^rms_slope: 1e-100 must be a number in",
+        ),
+        (lambda: Material(1e100, 0.0, 1e-9), r"^contact_modulus: 1e\+100 must be a number in \[1e-9, 1e15\]"),
+        (lambda: Material(1e6, 1e-300, 1e-9), r"^surface_energy over contact_modulus: 1e-306 must be a number in"),
+        (lambda: Material(1e6, 0.1, 1e-100), r"^interaction_range: 1e-100 must be a number in"),
     ],
 )
 def test_numbers_out_of_range_are_refused_by_name_and_range(make, named):
@@ -42,7 +45,7 @@ def test_next_to_no_load_is_refused_in_units_of_the_slope():
     surface = Surface(1e-6 * WAVES, 1e-4)
     path = Path([1e-3], snapshots=[("relative_load", 1e-80)])
     with pytest.raises(
-        ValueError, match=r"^path: relative_load = 1e-80 .* allowed: a reduced pressure of at least 1e-12"
+        ValueError, match=r"^path: relative_load = 1e-80 .* expected a reduced pressure of at least 1e-12"
     ):
         simulate(surface, Material(1e6, 0.0, 1e-9), path)
 
@@ -86,20 +89,22 @@ def test_at_the_ends_of_the_ranges_runs_are_finite_and_pass_their_checks(height,
 def test_a_path_that_does_not_get_on_ends_and_says_so(monkeypatch):
     monkeypatch.setattr(loading, "_MOST_EQUILIBRIA", 10)
     contact = contact_of([HEIGHT])
-    state, here = contact.untouched(), Course(contact, 1, longest=1.0)
+    state, progress = contact.untouched(), PathProgress(contact, 1, longest=1.0)
     for _ in range(11):
-        here = here.after(state, loading=True)
+        progress.record_equilibrium(state, loading=True)
     with pytest.raises(NotConverged, match=r"no progress: 10 equilibria within 0\.1 h_rms"):
-        here.after(state, loading=True)
-    # A stop is progress, and so is a longest step.
-    assert here.met(Path([1e-2]).targets[0], state).after(state, True).idle == 1
+        progress.record_equilibrium(state, loading=True)
+    # A target is progress, and so is a longest step.
+    progress.record_target(Path([1e-2]).targets[0], state)
+    progress.record_equilibrium(state, loading=True)
+    assert progress.idle == 1
 
 
 @pytest.mark.parametrize("unload", [False, True])
 def test_the_work_for_each_of_many_stops_does_not_grow_with_their_number(monkeypatch, unload):
     contact, calls = contact_of([HEIGHT]), []
-    excess = Stop.excess
-    monkeypatch.setattr(Stop, "excess", lambda stop, state: calls.append(stop) or excess(stop, state))
+    excess = TargetFunction.excess
+    monkeypatch.setattr(TargetFunction, "excess", lambda stop, state: calls.append(stop) or excess(stop, state))
     per_stop = []
     for count in (20, 100):
         calls.clear()

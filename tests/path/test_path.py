@@ -203,14 +203,13 @@ def test_progress_tells_every_stop(surface):
         ({"reduced_pressures": ["0.1"]}, r"reduced_pressures\[0\]"),
         ({"reduced_pressures": [MAX_REDUCED_PRESSURE * 1.001]}, r"reduced_pressures\[0\].*beyond"),
         ({"area_fractions": [0.1, MAX_AREA_FRACTION * 1.001]}, r"area_fractions\[1\].*beyond"),
-        ({"reduced_pressures": [0.1], "unload": 1}, "unload: 1 is neither True nor False"),
-        ({"reduced_pressures": [0.1], "unload": "yes"}, "unload: 'yes' is neither"),
+        ({"reduced_pressures": [0.1], "unload": 1}, "unload: expected True or False, got 1"),
         ({"reduced_pressures": [0.1], "max_step": 0.0}, "max_step"),
         ({"reduced_pressures": [0.1], "max_step": 0.51}, "max_step"),
         ({"reduced_pressures": [0.1], "max_step": None}, "max_step"),
         ({"reduced_pressures": [0.1], "snapshots": [("pressure", 0.1)]}, r"snapshots\[0\].*kind"),
-        ({"reduced_pressures": [0.1], "snapshots": 0.1}, "snapshots: 0.1 is not a list"),
-        ({"mean_separations": b"1"}, "mean_separations: b'1' is not a list of numbers"),
+        ({"reduced_pressures": [0.1], "snapshots": 0.1}, "snapshots: expected a list of pairs"),
+        ({"mean_separations": b"1"}, "mean_separations: expected a list of numbers, got b'1'"),
         ({"reduced_pressures": [0.1], "snapshots": [0.1]}, r"snapshots\[0\]"),
         ({"reduced_pressures": [0.1], "snapshots": [("area_fraction", -0.1)]}, r"snapshots\[0\]"),
         ({"reduced_pressures": [0.1], "snapshots": [("area_fraction", 0.9)]}, r"snapshots\[0\].*beyond"),
@@ -265,9 +264,7 @@ def test_stops_inside_a_jump_are_left_out_and_the_others_kept():
 
 
 def test_no_stop_beyond_the_covered_area_is_handed_out(surface):
-    with pytest.raises(
-        ConvergenceError, match=r"runs to 0\.\d\d of the nominal one, beyond what the model covers"
-    ) as caught:
+    with pytest.raises(ConvergenceError, match=r"grows to 0\.\d\d of the nominal area, outside the range") as caught:
         simulate(surface, Material(MODULUS, 0.3, 2.071e-9), Path(mean_separations=[surface.rms_height, 1e-12]))
     assert caught.value.dataset.sizes["step"] == 1
 

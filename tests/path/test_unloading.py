@@ -42,8 +42,9 @@ import icha
 from icha import Material, Path
 from icha.contact.model import COALESCENCE, JUMP_IN, JUMP_OFF, SPLIT, NotConverged
 from icha.equilibrium.interacting_asperities import InteractingAsperities
-from icha.path.cycle import Account, Stride, resolved
+from icha.path.cycle import _Cycle
 from icha.path.follow import follow
+from icha.path.loading import PathProgress
 from icha.path.targets import LOAD_CONTROL, MAX_REDUCED_PRESSURE
 from icha.surfaces.summits import find_summits
 from validation.surfaces import paraboloid
@@ -343,8 +344,8 @@ def test_a_turning_point_beyond_the_model_is_refused_before_anything_runs():
         ({"control": "force", "unload": True}, "^control: 'force' must be one of separation, load"),
         ({"control": None}, "^control: None"),
         ({"control": "load"}, "^control: 'load'"),
-        ({"turning_points": 0.1}, "^turning_points: 0.1 is not a list"),
-        ({"turning_points": [0.1]}, r"^turning_points\[0\]: 0.1 is not a pair"),
+        ({"turning_points": 0.1}, "^turning_points: expected a list of pairs"),
+        ({"turning_points": [0.1]}, r"^turning_points\[0\]: expected a pair"),
         ({"turning_points": [("pressure", 0.01)]}, r"^turning_points\[0\]: kind 'pressure' must be one of"),
         ({"turning_points": [("reduced_pressure", 0.11)]}, r"^turning_points\[0\]: 0.11 .*0\.1"),
         ({"turning_points": [("reduced_pressure", 0.1)]}, r"^turning_points\[0\]: 0.1 .*0\.1"),
@@ -420,8 +421,10 @@ def touchy(lengths, farthest=np.inf):
 def test_a_step_that_fails_is_halved_whatever_the_one_before(stride):
     contact = touchy((0.6, np.inf))
     start = contact.equilibrium(contact.untouched(), HEIGHT - 3.0)
-    beyond, step, _ = resolved(contact, start, 1, 1.0, Stride(stride), Account(), 1.5)
-    assert step.width == pytest.approx(0.5) and beyond.separation == start.separation + step.width
+    cycle = _Cycle(contact, 1.5, PathProgress(contact, 1, 1.5), start, leg=1)
+    cycle.step_length = stride
+    state, step = cycle.find_next(1.0)
+    assert step.width == pytest.approx(0.5) and state.separation == start.separation + step.width
 
 
 def test_a_load_that_is_not_met_before_a_station_is_met_in_shorter_steps():

@@ -8,7 +8,7 @@ from conftest import smoke_at_finite_ranges
 
 from icha.configuration.load import load_configuration
 from icha.datasets import results
-from icha.datasets.labels import parts
+from icha.datasets.labels import path_fields
 from icha.planning.results import campaign_files
 
 ROOT = Path(__file__).parents[2]
@@ -33,7 +33,7 @@ def test_every_path_is_its_pattern_with_the_parts_of_its_labels(campaign, kind, 
     files = getattr(campaign_files(campaign), kind)
     assert files
     for path, labels in files.items():
-        assert path == pattern.format(**parts(labels))
+        assert path == pattern.format(**path_fields(labels))
         assert path.endswith(f"/{labels.path}.nc")
 
 

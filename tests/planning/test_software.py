@@ -10,7 +10,7 @@ import yaml
 from conftest import REPOSITORY, snakemake_command
 
 from icha.configuration.load import load_configuration
-from icha.planning.needs import BY_TAMAAS, further_software, missing_software
+from icha.planning.requirements import BY_TAMAAS, further_software, missing_software
 
 # Nothing of this name can be imported.
 WITHOUT = "import sys\n\nsys.modules['tamaas'] = None\n"

@@ -15,9 +15,9 @@ from icha.references.finite_range import (
     NotSolved,
     contact_state,
     finite_range_solution,
-    states_at_mean_separations,
 )
 from icha.surfaces.surface import Surface
+from validation.mean_gaps import states_at_mean_separations
 from validation.surfaces import paraboloid
 
 HERTZ = MATERIALS["hertz"]
@@ -161,14 +161,10 @@ def test_range_that_the_grid_does_not_resolve_is_refused_with_the_numbers():
     lines = []
     with pytest.raises(ValueError, match=r"^interaction_range: a range of 2\.071e-09 m is not resolved") as refused:
         finite_range_solution(surface, short, PRESSURE, progress=lines.append)
-    numbers = (
-        f"{longest_spacing(short):.3g}",
-        f"{strength_number(short, surface.spacing):.3g}",
-        f"{surface.spacing:.4g}",
-    )
+    strength = f"{strength_number(short, surface.spacing):.3g}"
+    numbers = (f"{longest_spacing(short):.3g}", strength, f"{surface.spacing:.4g}")
     assert all(number in str(refused.value) for number in numbers)
-    assert len(lines) == 1  # printed before anything is solved
-    assert f"{strength_number(short, surface.spacing):.3g}" in lines[0]
+    assert len(lines) == 1 and strength in lines[0]  # printed before anything is solved
 
 
 @pytest.mark.parametrize(
@@ -195,16 +191,17 @@ def test_mean_separations_need_adhesion_and_are_positive():
         states_at_mean_separations(surface, MATERIALS["adhesive"], [1e-6, 0.0])
 
 
-def test_solver_that_does_not_converge_is_an_error(monkeypatch):
-    monkeypatch.setattr("icha.references.finite_range._MAX_ITERATIONS", 3)
-    with pytest.raises(NotSolved, match=r"did not converge: error .*, tolerance 1e-08"):
-        finite_range_solution(small_rough_solution.surface(), MATERIALS["hertz"], PRESSURE)
-
-
-def test_load_that_no_mean_gap_carries_is_an_error(monkeypatch):
-    monkeypatch.setattr("icha.references.finite_range._MAX_SOLVES", 1)
-    with pytest.raises(NotSolved, match=r"no mean gap was found that carries the load: 1 tries"):
-        finite_range_solution(small_rough_solution.surface(), MATERIALS["adhesive"], PRESSURE)
+@pytest.mark.parametrize(
+    ("limit", "most", "material", "message"),
+    [
+        ("_MAX_ITERATIONS", 3, "hertz", r"did not converge: error .*, tolerance 1e-08"),
+        ("_MAX_SOLVES", 1, "adhesive", "no mean gap was found that carries the load: after 1 tries"),
+    ],
+)
+def test_states_that_are_not_found_are_errors(limit, most, material, message, monkeypatch):
+    monkeypatch.setattr(f"icha.references.finite_range.{limit}", most)
+    with pytest.raises(NotSolved, match=message):
+        finite_range_solution(small_rough_solution.surface(), MATERIALS[material], PRESSURE)
 
 
 def test_same_bytes_in_another_process_with_more_threads():

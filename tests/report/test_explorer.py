@@ -220,8 +220,8 @@ def test_the_command_writes_the_page_and_refuses_what_it_cannot_show(folder, tmp
         ([tmp_path / "empty"], "empty: has no campaign dataset"),
         ([tmp_path / "deposit"], "deposit: is a deposit"),
         ([folder, "-o", tmp_path / "empty"], "empty: is a folder"),
-        ([folder, "--study", "other"], "study other: there is none; allowed: slopes, single, one, loops"),
-        ([folder, "--size", 1], "not even one contact finds room on a page of 1 MB"),
+        ([folder, "--study", "other"], "study other: not in this campaign; expected slopes, single, one, loops"),
+        ([folder, "--size", 1], "not even one contact fits on a page of 1 MB"),
         ([tmp_path / "missing"], "surfaces/rough/seed1.nc: no such file"),
     ):
         refused = icha(*arguments)

@@ -370,7 +370,7 @@ def test_spectra_are_means_over_the_seeds_and_many_have_a_scale(tmp_path, parts)
 
 
 def test_long_tables_are_folded_and_cut_and_say_so(write, tmp_path, monkeypatch):
-    monkeypatch.setattr(report, "_FOLDED", 2)
+    monkeypatch.setattr(report, "FOLDED_ROWS", 2)
     for module in (report, studies):
         monkeypatch.setattr(module, "MOST_ROWS", 3)
     runs = [

@@ -11,13 +11,13 @@ from typer.testing import CliRunner
 
 import icha
 from icha.cli import app
-from icha.cli.live import Job, last_line, reason_of
+from icha.cli.live import Job, error_of, last_line
 from icha.cli.project import UserError, echo, markup, reports_errors
 from icha.datasets.files import write_dataset
 from icha.datasets.surface_file import write_surface
 from icha.report.explorer import _filled
 from icha.report.template import template
-from icha.support.in_words import is_printable, printable, printable_lines
+from icha.support.formatting import is_printable, printable, printable_lines
 
 EVIL = "a\x1b[2J\x9b1m\r\b\x07\x7f\u202eb\u2028c\u200b"
 
@@ -53,8 +53,8 @@ def test_commands_say_nothing_else(capsys):
 def test_messages_of_jobs_are_printable(tmp_path):
     (tmp_path / "log").write_text(f"working\nError: {EVIL}\nmore \x1b[1A\n", encoding="utf-8")
     job = Job("run", "title", ("out",), ("log",), 0.0)
-    assert all(map(is_printable, [*reason_of(job, tmp_path), last_line(job, tmp_path)]))
-    assert any(r"\x1b[2J" in line for line in reason_of(job, tmp_path))
+    assert all(map(is_printable, [*error_of(job, tmp_path), last_line(job, tmp_path)]))
+    assert any(r"\x1b[2J" in line for line in error_of(job, tmp_path))
 
 
 def test_attributes_of_a_file_are_shown_in_their_lines(tmp_path):
@@ -87,7 +87,7 @@ def test_no_text_of_a_file_begins_a_line_of_its_own(tmp_path):
         said = told[command, name] = CliRunner().invoke(app, [command, str(tmp_path / f"{name}.nc")]).output
         assert "all is well" in said, said
         assert "\nrun.nc" not in said and not set("\x1b\x9b\r\b\x07\x7f\u202e") & set(said)
-    assert "flaw" in told["check", "surface"]
+    assert "problem" in told["check", "surface"]
 
 
 def test_pages_hold_no_overrides_and_no_control_characters():

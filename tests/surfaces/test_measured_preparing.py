@@ -10,10 +10,11 @@ import pytest
 from scans import NM, SIZE, UM, centred, preparation, refused, scan, write_xyz
 
 from icha.configuration.surfaces import MeasuredSurface
+from icha.configuration.topographies import inspect_scan
 from icha.datasets.files import read_dataset
 from icha.datasets.surface_file import read_surface, write_surface
 from icha.surfaces.measured.settings import UnfitTopography
-from icha.surfaces.measured.topography import prepared_topography, topography_facts
+from icha.surfaces.measured.topography import prepared_topography
 from icha.surfaces.spectrum import SelfAffineSpectrum
 
 TOPOGRAPHIES = Path(__file__).parents[2] / "config" / "topographies"
@@ -71,7 +72,7 @@ def test_missing_points_are_refused_or_filled_harmonically(prepared):
     harmonic = x**2 - y**2 + 2 * x * y  # of the five-point Laplacian, too
     holey = harmonic.copy()
     holey[4:7, 3:6] = np.nan
-    with refused("missing", r"9 among 100; allowed: fill"):
+    with refused("missing", r"9 of 100 points without a height; expected fill"):
         prepared(holey, boundary="free")
     result = prepared(holey, boundary="free", missing="fill")
     np.testing.assert_allclose(result.surface.heights, centred(harmonic), atol=1e-11)
@@ -79,7 +80,7 @@ def test_missing_points_are_refused_or_filled_harmonically(prepared):
     # Those outside of the square that is used matter to nobody.
     assert prepared(np.pad(harmonic, ((0, 0), (2, 2)), constant_values=np.nan), boundary="free")
     holey[:, 2:9] = np.nan
-    with pytest.raises(UnfitTopography, match="up to half"):
+    with pytest.raises(UnfitTopography, match="at most half"):
         prepared(holey, boundary="free", missing="fill")
 
 
@@ -208,7 +209,7 @@ def test_weights_of_the_cutoff_are_those_of_the_standard(prepared):
 @pytest.mark.parametrize("cutoff", [3.9, 65.1])
 def test_a_cutoff_that_the_scan_does_not_hold_is_refused(prepared, cutoff):
     heights = np.random.default_rng(1).normal(size=(65, 65))
-    with refused("cutoff", "allowed: from 4 pixels, 4 m, to the side of the square, 65 m"):
+    with refused("cutoff", "expected from 4 pixels, 4 m, to the side of the square, 65 m"):
         prepared(heights, boundary="window", taper=0.1, size=(65.0, 65.0), cutoff=cutoff)
 
 
@@ -235,28 +236,28 @@ def test_fine_roughness_on_a_high_step_is_none_of_rounding(prepared):
         (np.empty((0, 12)), "path", "of shape"),
         (np.empty((12, 0)), "path", "of shape"),
         (np.ones((1, 1)), "path", "leaves 1 x 1 points"),
-        (np.arange(12.0)[None], "path", "is a line scan, one profile of 12 points; allowed: a topography"),
+        (np.arange(12.0)[None], "path", "is a line scan, one profile of 12 points"),
         (np.arange(12.0)[:, None], "path", "is a line scan"),
         (np.arange(24.0).reshape(12, 2), "path", "is a line scan"),
-        (np.full((12, 12), np.nan), "path", "no height at all"),
-        (np.where(np.eye(12) > 0, np.arange(12.0), np.nan), "missing", "would make up 132 of 144"),
-        (np.where(np.eye(12) > 0, np.inf, np.arange(12.0)), "missing", "12 among 144"),
+        (np.full((12, 12), np.nan), "path", "no height"),
+        (np.where(np.eye(12) > 0, np.arange(12.0), np.nan), "missing", "cannot fill 132 of 144"),
+        (np.where(np.eye(12) > 0, np.inf, np.arange(12.0)), "missing", "12 of 144"),
     ],
 )
 @pytest.mark.parametrize("detrend", ["none", "tilt"])
 def test_too_little_for_a_surface(prepared, heights, key, words, detrend):
-    missing = "fill" if "make up" in words else "refuse"
+    missing = "fill" if "cannot fill" in words else "refuse"
     with refused(key, words):
         prepared(heights, boundary="free", detrend=detrend, missing=missing, size=(6.0, 6.0))
 
 
 def test_messages_are_short_and_in_units_of_people(tmp_path, prepared):
     (tmp_path / "words.txt").write_text("no heights in here\n")
-    with pytest.raises(UnfitTopography, match="none of the formats of instruments") as raised:
+    with pytest.raises(UnfitTopography, match="cannot be read as instrument") as raised:
         scan(tmp_path / "words.txt", height_unit=NM, size=SIZE)
     assert len(str(raised.value)) < 200
     crop = {"x": 7 * UM, "y": 0.0, "side": 2.5 * UM}
-    with pytest.raises(UnfitTopography, match=r"ends at x = 9.5 um, y = 2.5 um, .* up to x = 4 um, y = 3 um"):
+    with pytest.raises(UnfitTopography, match=r"ends at x = 9.5 um, y = 2.5 um, .* at most x = 4 um, y = 3 um"):
         prepared(np.eye(12, 16), size=(4e-6, 3e-6), crop=crop)
     with pytest.raises(UnfitTopography, match=r"needs a square, and the scan is 4 um x 3 um"):
         prepared(np.eye(12, 16), size=(4e-6, 3e-6), boundary="periodic")
@@ -283,13 +284,14 @@ def test_provenance_and_facts(prepared, tmp_path):
     assert result.source_file == "scan.npy"
     assert result.source_sha256 == hashlib.sha256((tmp_path / "scan.npy").read_bytes()).hexdigest()
     assert str(tmp_path) not in result.description
-    how = preparation(height_unit=1.0, size=(5.0, 5.0), boundary="free", detrend="tilt")
-    facts = topography_facts(tmp_path / "scan.npy", how)
-    assert (facts.grid, facts.period, facts.boundary) == (10, 5.0, "free")
-    assert (facts.rms_slope, facts.source_sha256) == (result.rms_slope, result.source_sha256)
+    keys = {"kind": "measured", "path": str(tmp_path / "scan.npy"), "height_unit": "m", "size": "5 m"}
+    section = MeasuredSurface.model_validate(keys | {"boundary": "free", "detrend": "tilt"})
+    facts = inspect_scan(section)
+    assert (facts.grid, facts.period, facts.sha256) == (10, 5.0, result.source_sha256)
+    assert facts.rms_slope == pytest.approx(result.rms_slope, rel=1e-5)
     # A file that changes is read again.
     np.save(tmp_path / "scan.npy", np.pad(heights, 1))
-    assert topography_facts(tmp_path / "scan.npy", how).grid == 12
+    assert inspect_scan(section).grid == 12
 
 
 def test_synthetic_scan_is_what_its_script_makes(tmp_path):

@@ -213,9 +213,9 @@ def test_of_several_images_in_a_text_one_is_read(tmp_path):
         assert prepared.data == "Topography" and "data Topography of several" in prepared.reading
     other = read(path, data="Phase", **own)
     assert other.surface.grid == GRID - 1 and other.data == "Phase"
-    with refused("data", "allowed: Topography, Phase"):
+    with refused("data", "expected one of: Topography, Phase"):
         read(path, data="Nonsense", **own)
-    with refused("data", "allowed: Topography$"):
+    with refused("data", "expected one of: Topography$"):
         read(written(tmp_path, images(("Topography", "nm")), "scan.txt"), data="Nonsense", **own)
 
 

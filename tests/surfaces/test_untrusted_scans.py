@@ -1,6 +1,7 @@
 """Data files of strangers: what they declare, unpack to or point to is bounded, and refused with what is allowed."""
 
 import os
+import re
 import socket
 import subprocess
 import sys
@@ -14,7 +15,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scans import COLUMNS, HEIGHTS, NM, ROWS, SIZE, refused, scan, write_xyz
 
-from icha.datasets.format import SURFACE, UnknownFile, kind_of
+from icha.datasets.format import SURFACE, UnknownFile, identify_file
 from icha.surfaces.measured.array_files import read_height_map
 from icha.surfaces.measured.settings import UnfitTopography
 from icha.surfaces.measured.topography import prepared_topography
@@ -156,9 +157,9 @@ def test_files_that_are_large_themselves_are_read_and_small_ones_that_say_so_are
                 file.createDimension(axis, nodes)
             file.createVariable("period", "f8")[...] = 1.0
             file.createVariable("height", "f8", ("y", "x"), compression=compression)[:] = np.zeros((nodes, nodes))
-    assert kind_of(tmp_path / "own.nc")[0] == SURFACE
+    assert identify_file(tmp_path / "own.nc")[0] == SURFACE
     with pytest.raises(UnknownFile, match=r"packed\.nc: "):
-        kind_of(tmp_path / "packed.nc")
+        identify_file(tmp_path / "packed.nc")
 
 
 def test_what_is_left_in_a_campaign_dataset_until_it_is_used_is_bounded_as_well(tmp_path):
@@ -169,7 +170,7 @@ def test_what_is_left_in_a_campaign_dataset_until_it_is_used_is_bounded_as_well(
         study.createVariable("status", "i4", ())[...] = 0
         study.createVariable("residual", "f8", ("run", "step"), chunksizes=(100, 100), compression="zlib")
     with pytest.raises(UnknownFile, match="needs about 320 GB of memory; allowed: 2 GB, or what"):
-        kind_of(tmp_path / "campaign.nc")
+        identify_file(tmp_path / "campaign.nc")
 
 
 def write_external_storage(path, secret):
@@ -202,7 +203,7 @@ def test_data_that_lie_in_other_files_are_refused(write, name, tmp_path):
     with pytest.raises(UnfitTopography, match=r"'height' (is a link to another file|has its data elsewhere)"):
         scan(path, **LINES)
     with pytest.raises(UnknownFile, match=r"'height' (is a link to another file|has its data elsewhere)"):
-        kind_of(path)
+        identify_file(path)
     if name == "scan.nc":
         with pytest.raises(ValueError, match=r"'height' (is a link to another file|has its data elsewhere)"):
             read_height_map(path, 1.0)
@@ -235,7 +236,7 @@ def test_groups_with_two_names_are_refused(circle, name, tmp_path):
     with pytest.raises(UnfitTopography, match="is a group that has another name, too; allowed: one name for each"):
         scan(tmp_path / name, **LINES)
     with pytest.raises(UnknownFile, match="is a group that has another name, too"):
-        kind_of(tmp_path / name)
+        identify_file(tmp_path / name)
 
 
 def test_groups_that_lie_deep_in_one_another_are_refused_at_once(tmp_path):
@@ -256,7 +257,7 @@ def test_soft_links_are_no_datasets(tmp_path):
         file["nowhere"] = h5py.SoftLink("/none")
         file["itself"] = h5py.SoftLink("/itself")
     assert scan(path, **LINES).heights.shape == HEIGHTS.shape
-    with pytest.raises(UnfitTopography, match="is no dataset of the file; allowed: heights"):
+    with pytest.raises(UnfitTopography, match="is no dataset of the file; expected one of: heights"):
         scan(path, **LINES, data="other")
 
 
@@ -275,7 +276,7 @@ def test_paths_that_are_no_files_are_not_opened(tmp_path, monkeypatch):
             ("a\0b", "no such file"),
             ("x" * 5000, "cannot be read"),
         ):
-            with refused("path", f"{flaw}.*; allowed: a file of heights"):
+            with refused("path", f"{flaw}.*; expected a file of heights"):
                 prepared_topography(path, how)
 
 
@@ -365,6 +366,6 @@ def test_damaged_and_changed_files_are_read_or_refused(whole, name, data):
     try:
         surface = prepared_topography(path, how).surface
     except UnfitTopography as error:
-        assert "allowed: " in str(error)
+        assert re.search("expected|allowed: |leave it out", str(error))
     else:
         assert np.all(np.isfinite(surface.heights))

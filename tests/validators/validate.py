@@ -324,7 +324,7 @@ VALIDATORS: dict[str, Callable[[Path], Outcome]] = {
 
 def validate(folder: Path, names: list[str], most: int) -> bool:
     """Run validators and print what they say; whether all are content."""
-    from icha.support.in_words import printable
+    from icha.support.formatting import printable
 
     good = True
     for name in names:
@@ -349,7 +349,7 @@ def validate(folder: Path, names: list[str], most: int) -> bool:
 def main() -> int:
     """Validate what the command line names."""
     from icha.deposit.verify import LARGE, Damaged, whole_deposit
-    from icha.support.in_words import printable
+    from icha.support.formatting import printable
     from icha.support.input_files import refuse_traps
 
     parser = argparse.ArgumentParser(description="Put a deposit to the validators of others, without any network.")

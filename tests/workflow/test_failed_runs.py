@@ -10,7 +10,7 @@ import small_campaign as small
 from icha.analysis.checks import check_campaign, read_checks
 from icha.datasets.campaign import campaign_tree, select_run
 from icha.datasets.files import read_campaign, read_dataset, read_run, write_dataset
-from icha.datasets.format import RUN, flaws
+from icha.datasets.format import RUN, problems_with_file
 from icha.datasets.labels import RunLabels
 from icha.datasets.surface_file import write_surface
 from icha.figures.fig2_area_and_gap import figure
@@ -157,7 +157,7 @@ def test_a_surface_that_a_model_cannot_compute_costs_no_other_run(sweep, dataset
     )
     assert said == [f"Failed: {run.attrs['incomplete']}"]
     assert run.sizes["step"] == 0 and int(run["asperity_count"]) == 0
-    assert not flaws(RUN, run.assign_attrs(config_sha256=64 * "0"))
+    assert not problems_with_file(RUN, run.assign_attrs(config_sha256=64 * "0"))
     again, _ = sweep("again", BARE, path, ridges(), model)
     assert again.read_bytes() == odd.read_bytes()
     file, labels = dataset({"ridges/bare": odd, "pitted/bare": pit}, model)

@@ -30,13 +30,13 @@ def reference(tmp_path_factory):
 
 
 @pytest.mark.slow
-def test_killed_calls_leave_nothing_behind_and_the_next_goes_on(reference):
+def test_killed_calls_leave_no_process_and_the_next_call_resumes(reference):
     place, chance = reference.empty(), random.Random(1)
     for victim in (faults.VICTIMS[1], faults.VICTIMS[0]):
         assert not faults.kill(place, reference, victim, 0.5 * reference.seconds, chance)
     before = place.times()
-    assert reference.goes_on(place) == []
-    assert faults.computed_again(before, place) == []
+    assert reference.resume(place) == []
+    assert faults.recomputed(before, place) == []
 
 
 @pytest.mark.slow
@@ -47,56 +47,56 @@ def test_flipped_bits_are_found_by_the_one_of_two_calls_that_may_run(reference):
         file = place.results / faults.KINDS[kind]
         faults.flip(file, where)
         spoilt[file.with_name(f"{file.name}.damaged")] = file.read_bytes()
-    assert len(reference.half_written(place)) == len(spoilt)
+    assert len(reference.foreign_results(place)) == len(spoilt)
     ends = [place.end(call) for call in [place.start(), place.start()]]
     assert sorted(bool(status) for status, _ in ends) == [False, True], ends
-    refusal = next(said for status, said in ends if status)
+    refusal = next(output for status, output in ends if status)
     assert "is running this campaign in this directory" in refusal and "Traceback" not in refusal
-    assert reference.unequal(place) == []
+    assert reference.differences(place) == []
     assert {file: file.read_bytes() for file in spoilt} == spoilt
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("way", faults.WAYS)
-def test_folders_may_have_any_name_but_for_a_backslash_and_hold_any_file(reference, way):
-    place = reference.empty(reference.scratch / f"both' of \"them & ($HOME*; {way}")
+@pytest.mark.parametrize("call", faults.CALLS)
+def test_folders_may_have_any_name_but_for_a_backslash_and_hold_any_file(reference, call):
+    place = reference.empty(reference.scratch / f"both' of \"them & ($HOME*; {call}")
     for name in ("icha", "json", "numpy", "socket", "snakemake"):
         (place.folder / f"{name}.py").write_text("raise SystemExit('imported from the working folder')\n")
     # Its path is too long for a socket.
     temporary = reference.scratch / ("temporary" * 12)
     temporary.mkdir(exist_ok=True)
-    assert place.run(way, TMPDIR=str(temporary))[0] == 0
-    assert reference.unequal(place) == []
-    refused = reference.empty(reference.scratch / f"back\\slash{way}")
-    status, said = refused.run(way)
-    assert status and "has a backslash" in said and "Traceback" not in said
+    assert place.run(call, TMPDIR=str(temporary))[0] == 0
+    assert reference.differences(place) == []
+    refused = reference.empty(reference.scratch / f"back\\slash{call}")
+    status, output = refused.run(call)
+    assert status and "has a backslash" in output and "Traceback" not in output
     assert not list(refused.results.rglob("*.nc"))
 
 
 @pytest.mark.slow
-def test_an_orphan_leaves_nothing_of_its_own_settings(reference):
+def test_orphan_leaves_no_result_of_its_settings(reference):
     place = reference.empty()
     process = place.start("snakemake", "--config", OTHER)
     time.sleep(0.4 * reference.seconds)
     faults.kill_process(process.pid)
-    assert reference.goes_on(place) == []
+    assert reference.resume(place) == []
     place.end(process)
-    assert [*place.left_behind(), *reference.unequal(place)] == []
+    assert [*place.end_remaining(), *reference.differences(place)] == []
 
 
 @pytest.mark.slow
 @AS_ROOT
-def test_a_full_disk_is_told_and_leaves_nothing_half_written(reference):
-    trial = faults.full_disks(reference, reference.empty(), 2, random.Random(1))
-    assert trial.violations == [] and trial.ended == faults.REFUSED
+def test_full_disk_ends_with_a_message_and_leaves_no_incomplete_result(reference):
+    trial = faults.disturb_by_full_disk(reference, reference.empty(), 2, random.Random(1))
+    assert trial.violations == [] and trial.outcome == faults.REFUSED
 
 
 @AS_ROOT
-def test_what_is_complete_is_still_there_after_a_power_cut(tmp_path):
+def test_complete_files_survive_a_power_cut(tmp_path):
     contents = {f"runs/{number}.nc": random.Random(number).randbytes(100_000) for number in range(5)}
     disk = tmp_path / "disk"
     try:
-        with faults.power(disk, tmp_path / "image") as (cut, mount):
+        with faults.disk_with_power(disk, tmp_path / "image") as (cut, mount):
             for path, content in contents.items():
                 with whole_file(disk / path) as temporary:
                     temporary.write_bytes(content)

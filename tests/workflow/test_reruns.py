@@ -168,7 +168,7 @@ def test_scripts_whose_fingerprint_a_module_is_part_of(fingerprint):
     }
     for module, scripts in {
         "boundary_elements/contact": {"run_sweep"},
-        "equilibrium/equilibrium": {"run_sweep"},
+        "equilibrium/solver": {"run_sweep"},
         "asperity/jkr": {"run_sweep", "make_references"},
         "simulation": {"run_sweep"},
         # Boundary elements know nothing of the model: they are not solved again.

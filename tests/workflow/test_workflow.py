@@ -18,7 +18,7 @@ from traces import traces
 
 from icha.configuration.cases import campaign_sha256
 from icha.configuration.load import load_configuration
-from icha.planning.needs import missing_software
+from icha.planning.requirements import missing_software
 from icha.planning.results import campaign_files
 
 CAMPAIGNS = ["config/config.yaml", *(f"config/campaigns/{p.name}" for p in (REPOSITORY / "config/campaigns").iterdir())]

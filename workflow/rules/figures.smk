@@ -3,7 +3,7 @@
 
 from icha.datasets.results import ResultFiles
 from icha.figures.registry import DECLARATIONS
-from icha.planning.needs import figure_memory
+from icha.planning.requirements import figure_memory
 from icha.support.checksums import sha256_of
 
 RESULT_FILES = ResultFiles(CAMPAIGN.name, RESULTS)

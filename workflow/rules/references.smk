@@ -2,7 +2,7 @@
 # of a run, one load each or both ways.
 
 from icha.configuration.cases import adhesive_contacts, loop_settings, solution_settings
-from icha.planning.needs import solver_memory
+from icha.planning.requirements import solver_memory
 
 
 rule reference:

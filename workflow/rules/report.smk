@@ -1,7 +1,7 @@
 # report.html: figures, tables, parameters and checks on one page. Times differ from one execution to the next, so
 # they stand in a table of their own, run_times.tsv, and the page has the same bytes for the same data.
 
-from icha.planning.needs import further_software
+from icha.planning.requirements import further_software
 
 
 rule report_page:

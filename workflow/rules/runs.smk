@@ -3,7 +3,7 @@
 from icha.configuration.cases import run_settings
 from icha.contact.models import MODELS
 from icha.datasets.labels import model_folder
-from icha.planning.needs import run_memory, run_minutes, surface_threads
+from icha.planning.requirements import run_memory, run_minutes, surface_threads
 
 
 wildcard_constraints:

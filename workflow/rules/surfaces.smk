@@ -1,7 +1,7 @@
 # Topographies at rms slope 1, shared by all slopes and materials.
 
 from icha.configuration.cases import surface_settings
-from icha.planning.needs import surface_memory, surface_threads
+from icha.planning.requirements import surface_memory, surface_threads
 
 
 rule surface:

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from icha.support import checksums
 from icha.support.atomic_files import move_only_while_owned
-from icha.support.in_words import printable_lines
+from icha.support.formatting import printable_lines
 from icha.support.program import beginning_of, end_with_parent
 
 # Set by the Snakefile: number and beginning of the process that wants the job.

@@ -9,12 +9,12 @@ import scipy
 from job import attributes, guarded
 
 from icha.asperity.material import Material
-from icha.contact.kept import prepared
+from icha.contact.checkpoints import prepare_checkpoints
 from icha.contact.models import DEFAULT_MODEL
 from icha.datasets.files import write_dataset
 from icha.datasets.surface_file import read_surface
 from icha.path.targets import Path
-from icha.simulation import ConvergenceError, simulate, unfollowed
+from icha.simulation import ConvergenceError, simulate, empty_run
 
 # What this machine lacks says nothing of the run: its job fails, and the next call tries again.
 OF_THE_MACHINE = (OSError, MemoryError, ImportError)
@@ -43,7 +43,7 @@ def run_sweep(
         if not isinstance(error, ValueError):
             reason = f"{type(error).__name__}, which was not expected: {error}"
             progress(traceback.format_exc())
-        dataset = unfollowed(*pressed, reason, model=model, seed=seed)
+        dataset = empty_run(*pressed, reason, model=model, seed=seed)
     if "incomplete" in dataset.attrs:
         progress(f"Failed: {dataset.attrs['incomplete']}")
     write_dataset(dataset.assign_attrs(attributes), output)
@@ -51,7 +51,9 @@ def run_sweep(
 
 def _kept(output, asked, inputs):
     """The folder in which equilibria are kept, with nothing in it from another surface, path or code."""
-    return prepared(pathlib.Path(output).with_suffix(".kept"), f"{asked} {inputs} {np.__version__} {scipy.__version__}")
+    return prepare_checkpoints(
+        pathlib.Path(output).with_suffix(".kept"), f"{asked} {inputs} {np.__version__} {scipy.__version__}"
+    )
 
 
 if "snakemake" in globals():

@@ -1,67 +1,41 @@
-"""Variables that the campaign dataset has besides those of its runs, and what those depend on there."""
+"""Variables that the campaign dataset has besides those of its runs, and the labels with which those vary."""
 
 import numpy as np
 
-from icha.datasets.build import bin_table
-from icha.datasets.labels import LABELS
-from icha.datasets.variables.terms import Variable
+from icha.datasets.variables.terms import Variable, bin_table, read_tables
 
-# Runs of the first kind alone are results. A run with failed checks has all of its values, which are not to be used.
+# Only complete runs are results. A run with failed checks has all of its values, which are not to be used.
 COMPLETE, INCOMPLETE, MISSING, NOT_IN_DESIGN, FAILED_CHECKS = range(5)
 STATUS_MEANINGS = ("complete", "incomplete", "missing", "not_in_design", "failed_checks")
-# Status of runs that have a file, whatever it is worth.
+# Status of runs that have a file.
 COMPUTED_RUNS = (COMPLETE, INCOMPLETE, FAILED_CHECKS)
 
-STATUS = Variable(
-    LABELS,
-    "1",
-    "status of the run",
-    np.int8,
-    {
+_ATTRIBUTES = {
+    "status": {
         "flag_values": np.arange(len(STATUS_MEANINGS), dtype=np.int8),
         "flag_meanings": " ".join(STATUS_MEANINGS),
         "comment": "values that a run, or all runs of its model, do not have are filled with _FillValue",
     },
-)
-STEP_COUNT = Variable(
-    LABELS,
-    "1",
-    "number of steps of the run",
-    np.int32,
-    {"comment": "from this position on along step, numbers are filled with _FillValue and texts are empty"},
-)
-FAILURE = Variable(
-    LABELS, "1", "why the run is incomplete or which of its checks failed; empty where it is complete", str
-)
-APPLICABILITY = Variable(
-    LABELS, "1", "why the model is not applicable to the surface and material of the run; empty where it is", str
-)
-CAMPAIGN = {
-    "status": STATUS,
-    "step_count": STEP_COUNT,
-    "seed": Variable(("seed",), "1", "seed of the surface", np.int32, coordinate=True),
-    "rms_slope": Variable(("rms_slope",), "1", "root mean square slope of the surface", coordinate=True),
-    "model": Variable(("model",), "1", "model of contact: asperities or boundary_elements", str, coordinate=True),
-    "surface": Variable(("surface",), "1", "name of the surface", str, coordinate=True),
-    "material": Variable(("material",), "1", "name of the material", str, coordinate=True),
-    "failure": FAILURE,
-    "applicability": APPLICABILITY,
+    "step_count": {
+        "comment": "from this position on along step, numbers are filled with _FillValue and texts are empty"
+    },
 }
+CAMPAIGN = read_tables("campaign.txt", attributes=_ATTRIBUTES)[""]
+STATUS = CAMPAIGN["status"]
 
-# Of these every run has as many as it has: in the campaign they stand one after the other.
+# Dimensions whose length differs from run to run: in the campaign the runs' values stand one after the other.
 RAGGED = ("spot", "event")
 
 
-def place_of(dim: str, label: str) -> Variable:
-    """Description of `<dim>_<label>`, which says of what is ragged to which run it belongs."""
-    return Variable(
-        (dim,), "1", f"position of the {dim}'s run along {label}, from 0", np.int32, {"instance_dimension": label}
-    )
+def index_variable(dim: str, label: str) -> Variable:
+    """Describe `<dim>_<label>`, the position along a label of the run to which a value along `dim` belongs."""
+    long_name = f"position of the {dim}'s run along {label}, from 0"
+    return Variable((dim,), "1", long_name, np.int32, {"instance_dimension": label})
 
 
 _TOPOGRAPHY = ("surface", "seed", "rms_slope")
-# What a quantity of a run can depend on; everything else depends on all five labels. The snapshots' targets are those
-# of the study's path, the bins are fixed in units of h_rms and of E* h'_rms.
+# The labels with which a variable of the runs varies; all five where it is not listed. The snapshots' targets are those
+# of the study's path; the bins are fixed in units of h_rms and of E* h'_rms.
 VARIES_WITH = {
     **dict.fromkeys(("contact_modulus", "surface_energy", "interaction_range"), ("material",)),
     **dict.fromkeys(("rms_height", "rms_curvature", "nayak_parameter"), _TOPOGRAPHY),

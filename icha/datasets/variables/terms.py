@@ -1,14 +1,24 @@
-"""Descriptions of variables, and the terms that several kinds of files have in common."""
+"""Descriptions of variables, read from text tables, and the terms that several kinds of files have in common."""
 
+import re
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any, NamedTuple
+
+import numpy as np
 
 
 class Variable(NamedTuple):
     """Description of a variable.
 
-    dims : names of its dimensions. units : as CF has them, "1" where there are none. dtype : of numpy; `str` of texts.
-    further : attributes besides units and long name. coordinate : whether it is one of CF's coordinates.
+    Attributes
+    ----------
+    dims : names of its dimensions.
+    units : as CF has them, "1" for numbers without a unit.
+    long_name : its meaning.
+    dtype : of numpy; `str` for texts.
+    further : attributes besides units and long name.
+    coordinate : True for a coordinate of CF.
     """
 
     dims: tuple[str, ...]
@@ -24,44 +34,74 @@ class Variable(NamedTuple):
         return {"units": self.units, "long_name": self.long_name, **self.further}
 
 
-# Attribute of a variable that may be infinite (inf, a value as any other); it says where.
+# Attribute of a variable that may be infinite (inf is a value like any other); its text is the condition.
 INFINITE = "infinite"
-
-Table = dict[str, Variable]
-
-# What has the same meaning in several kinds of files, whatever its dimensions there.
-_TERMS = {
-    "reduced_pressure": Variable((), "1", "nominal pressure over contact modulus and rms slope, p/(E* h'rms)"),
-    "relative_load": Variable((), "1", "nominal pressure over contact modulus, F/(E* A0)"),
-    "reduced_separation": Variable((), "1", "mean separation over rms height"),
-    "contact_area_fraction": Variable((), "1", "real over nominal contact area, A/A0"),
-    "pressure_bin_mean": Variable((), "Pa", "mean pressure of the area in the bin, 0 where empty"),
-    "contact_modulus": Variable((), "Pa", "composite contact modulus E*"),
-    "surface_energy": Variable((), "J m^-2", "energy of adhesion per area"),
-    "interaction_range": Variable((), "m", "range of the attractive forces"),
-    "rms_slope": Variable((), "1", "root mean square slope |grad h| from the spectrum"),
-    "rms_height": Variable((), "m", "root mean square height"),
-    "rms_curvature": Variable((), "m^-1", "root mean square curvature of a profile, from the spectrum"),
-    "nayak_parameter": Variable((), "1", "Nayak's parameter m0 m4/m2^2: breadth of the spectrum"),
-    "tabor_parameter": Variable((), "1", "Tabor parameter with the radius 1/rms_curvature"),
-    "period": Variable((), "m", "side of the periodic cell"),
-    "seed": Variable((), "1", "seed of the surface; -1 where it has none", int),
-    "grid": Variable((), "1", "nodes along a side", int),
-    "spacing": Variable((), "m", "distance between nodes"),
-    "strength_number": Variable((), "1", "sqrt(dgamma dx/E*)/range; 0 without adhesion"),
-    "longest_spacing": Variable((), "m", "widest spacing that resolves the cohesive zone; 0 without adhesion"),
-    "x": Variable(("x",), "m", "x of the nodes", coordinate=True),
-    "y": Variable(("y",), "m", "y of the nodes", coordinate=True),
-}
 MATERIAL = ("contact_modulus", "surface_energy", "interaction_range")
 ROUGHNESS = ("rms_slope", "rms_height", "rms_curvature")
 
-
-def term(name: str) -> Variable:
-    """Description of a term that several kinds of files have in common."""
-    return _TERMS[name]
+Table = dict[str, Variable]
+_TYPES = {"int": int, "int8": np.int8, "int32": np.int32, "text": str}
 
 
-def terms(*names: str, along: tuple[str, ...] | None = None) -> Table:
-    """Such terms as part of a table, along given dimensions."""
-    return {name: _TERMS[name] if along is None else _TERMS[name]._replace(dims=along) for name in names}
+def read_tables(
+    name: str, known: Mapping[str, Variable] = {}, attributes: Mapping[str, Mapping[str, Any]] = {}, **texts: str
+) -> dict[str, Table]:
+    """Read the tables of a text file of this folder, by their headings; `terms.txt` describes the format.
+
+    Parameters
+    ----------
+    name : the file.
+    known : descriptions to which lines without a long name refer; later tables also refer to earlier ones.
+    attributes : further attributes of variables, by name.
+    texts : replacements for names in braces in long names.
+    """
+    tables: dict[str, Table] = {}
+    table: Table = {}
+    for line in Path(__file__).with_name(name).read_text(encoding="utf-8").splitlines():
+        if line.startswith("["):
+            known = {**known, **table}
+            table = tables[line.strip("[]")] = {}
+        elif bins := re.fullmatch(r"(\w+) bins (\S+)", line):
+            table |= bin_table(*bins.groups())
+        elif line and not line.startswith("#"):
+            facts, _, long_name = line.partition(": ")
+            key, dims, rest = re.fullmatch(r"(\w+)\((.*?)\) ?(.*)", facts).groups()
+            dims = tuple(filter(None, dims.split(", ")))
+            words = rest.split()
+            coordinate = words[-1:] == ["coordinate"]
+            if coordinate:
+                words.pop()
+            if not long_name:
+                table[key] = known[key]._replace(dims=dims, coordinate=coordinate)
+                continue
+            dtype = _TYPES[words.pop()] if words[-1] in _TYPES else float
+            further = attributes.get(key, {})
+            table[key] = Variable(dims, " ".join(words), long_name.format(**texts), dtype, further, coordinate)
+    return tables or {"": table}
+
+
+def bin_table(quantity: str, units: str, over: str = "") -> Table:
+    """Describe the variables of the bins of a quantity.
+
+    `<quantity>_bin_edges` are the edges; `<quantity>_bin_centre`, a coordinate, has `<quantity>_bin_bounds` as its
+    bounds (CF 1.11, section 7.1), with its units and its long name. In Pa it must not be a coordinate variable, along a
+    dimension of its own name, which CF would take for a height.
+
+    Parameters
+    ----------
+    quantity : the binned quantity.
+    units : of the edges.
+    over : the unit of reference of the quantity, if it is divided by one.
+    """
+    over = f" over {over}" if over else ""
+    bins, inside = f"{quantity}_bin", f"{quantity} in the bin{over}"
+    middle = {"bounds": f"{bins}_bounds", "comment": "middle of the bin"}
+    return {
+        f"{bins}_edges": Variable((f"{quantity}_edge",), units, f"edges of the {quantity} bins{over}"),
+        f"{bins}_centre": Variable((bins,), units, inside, further=middle, coordinate=True),
+        # Lower and upper edge of a bin, as CF has bounds.
+        f"{bins}_bounds": Variable((bins, "bound"), units, inside),
+    }
+
+
+TERMS = read_tables("terms.txt")[""]

@@ -1,4 +1,4 @@
-"""Readers of arrays: npy, netCDF, HDF5, and whatever formats of instruments SurfaceTopography reads."""
+"""Readers of arrays: npy, netCDF, HDF5, and the formats of instruments that SurfaceTopography reads."""
 
 import math
 from collections.abc import Mapping
@@ -21,32 +21,31 @@ from icha.surfaces.measured.settings import (
 )
 from icha.surfaces.square import problem_with_heights
 
-# Copies of an array, as floats, that are held while it is read.
+# Copies of an array, as floats, in memory while it is read.
 _COPIES = 3
-# Formats in which any bytes of the right number are heights: there it is the ending of the name that tells.
+# Formats in which any bytes of the right number are heights; only the ending of the name identifies them.
 _WITHOUT_SIGNATURE = ("hgt", "nms")
-# Formats that are no evidence of an instrument: of any text with numbers, of which other fields are dropped, and
-# of any file of a certain length.
+# Formats that are no evidence of an instrument: SurfaceTopography finds them in any text with numbers, of which it
+# drops other fields, and in any file of a certain length.
 _OF_ANY_TEXT = ("asc", *_WITHOUT_SIGNATURE)
-# Attributes of packed numbers, and what they are if they are left out.
+# Attributes of packed numbers, and their values if they are left out.
 _PACKING = {"scale_factor": 1.0, "add_offset": 0.0}
-# Formats of arrays that say nothing about themselves.
+# Formats of arrays without a default one.
 _ARRAYS = ("mat", "npz")
 _UNKNOWN = (
-    "cannot be read as instrument: the file is of none of the formats of instruments that are known here, or damaged; "
-    "allowed: another `format`, or an export of the heights as text"
+    "cannot be read as instrument: the file is damaged, or its format is not known here; expected another `format`, or "
+    "an export of the heights as text"
 )
-_ALLOWED = "allowed: a square array of at least 8 x 8 finite heights (.npy, or .nc with a variable `height`)"
+_EXPECTED = "expected a square array of at least 8 x 8 finite heights (.npy, or .nc with a variable `height`)"
 
 
 def read_npy(file, how: Preparation) -> Found:
-    """An array of NumPy's, without names or units."""
+    """Read a NumPy array, which has no names or units."""
     return Found(with_y_first(_whole_npy(file.path), how), data_known=False)
 
 
 def _whole_npy(path: Path) -> np.ndarray:
-    """The array of a file of NumPy's."""
-    # Mapped, no more is declared than is there; of what overflows NumPy warns before it refuses it.
+    # A mapped array cannot declare more than the file holds. NumPy warns of an overflow before it refuses it.
     with np.errstate(over="ignore"):
         array = np.lib.format.open_memmap(path, mode="r")
     _require_room(array)
@@ -54,18 +53,18 @@ def _whole_npy(path: Path) -> np.ndarray:
 
 
 def _whole_variable(variable) -> np.ndarray:
-    """The numbers of a netCDF variable as floats, nan where they are missing."""
+    """Read a netCDF variable as floats, nan where numbers are missing."""
     _require_room(variable)
     return np.ma.filled(variable[...].astype(float), np.nan)
 
 
 def _require_room(declared):
-    """Refuse an array by what is declared of it, before it is read; on the way to heights it is copied."""
+    """Refuse an array by its declared shape, before it is read."""
     require_room(_COPIES * 8 * math.prod(declared.shape))
 
 
 def read_netcdf(source, how: Preparation) -> Found:
-    """The variable `data`, `height`, `heights`, `z` or the only one of two dimensions, with its units and axes."""
+    """Read the variable `data`, `height`, `heights`, `z` or the only one of two dimensions, with its units and axes."""
     import netCDF4
 
     with netCDF4.Dataset(source.path) as file:
@@ -75,7 +74,7 @@ def read_netcdf(source, how: Preparation) -> Found:
         chosen = file[asked]
         if not _is_map(chosen.shape):
             raise UnfitTopography(
-                "data", f"has {chosen.ndim} dimensions; allowed: {', '.join(plane) or 'none is there'}"
+                "data", f"has {chosen.ndim} dimensions; expected two, as {', '.join(plane) or 'no variable has'}"
             )
         heights = _whole_variable(chosen)
         heights = heights.reshape(heights.shape[-2:])
@@ -95,23 +94,24 @@ def read_netcdf(source, how: Preparation) -> Found:
 
 
 def _side(coordinate, count):
-    """Length of a side in m, None if the file does not say it, and whether its coordinate falls."""
+    """Return the length of a side in m, None if the file does not give it, and whether its coordinate falls."""
     if coordinate is None or coordinate.ndim != 1:
         return None, False
-    about, unit = coordinate.__dict__, _unit_of(coordinate.__dict__)
+    attributes = coordinate.__dict__
+    unit = _unit_of(attributes)
     values = _whole_variable(coordinate)
-    if unit is not None and "length" in about:
-        return float(about["length"]) * unit, False
+    if unit is not None and "length" in attributes:
+        return float(attributes["length"]) * unit, False
     if count < 2:
         return None, False
     _, ticks, step = regular_ticks(values, coordinate.name)
     if ticks != count:
-        raise UnfitTopography("path", f"has {coordinate.name} on no regular grid; allowed: equal distances")
+        raise UnfitTopography("path", f"has {coordinate.name} on no regular grid; expected equal distances")
     return (count * step * unit if unit is not None else None), values[0] > values[-1]
 
 
 def read_hdf5(source, how: Preparation) -> Found:
-    """The dataset `data`, or the only one of two dimensions, with its attributes, which mean what they do in netCDF.
+    """Read the dataset `data`, or the only one of two dimensions; attributes have the same meaning as in netCDF.
 
     MATLAB (from version 7.3) stores columns, so that HDF5 has the transpose of what MATLAB shows.
     """
@@ -120,16 +120,12 @@ def read_hdf5(source, how: Preparation) -> Found:
     with h5py.File(source.path) as file:
         shapes = {}
 
-        def note(name, node):
-            if (
-                isinstance(node, h5py.Dataset)
-                and node.dtype.kind in "iuf"
-                and _is_map(node.shape)
-                and node.attrs.get("MATLAB_class") != b"char"
-            ):
+        def add(name, node):
+            is_array = isinstance(node, h5py.Dataset) and node.dtype.kind in "iuf" and _is_map(node.shape)
+            if is_array and node.attrs.get("MATLAB_class") != b"char":
                 shapes[name] = node.shape
 
-        file.visititems(note)
+        file.visititems(add)
         plane = sorted(maps_among(shapes))
         asked = how.data.strip("/") if how.data else None
         name = str(asked) if asked in shapes else chosen_name(asked, plane, (), "dataset")
@@ -143,12 +139,12 @@ def read_hdf5(source, how: Preparation) -> Found:
 
 
 def _unpacked(dataset):
-    """The numbers of a dataset, nan where they are missing, by the attributes with which netCDF packs numbers."""
-    stored, about = dataset[...], dataset.attrs
-    fills = [value for name in ("_FillValue", "missing_value") if name in about for value in np.ravel(about[name])]
-    # Zero is what HDF5 fills with if nobody says otherwise.
+    """Read a dataset, nan where numbers are missing, by the attributes with which netCDF packs numbers."""
+    stored, attributes = dataset[...], dataset.attrs
+    fills = [each for name in ("_FillValue", "missing_value") for each in np.ravel(attributes.get(name, []))]
+    # HDF5 fills with zero by default.
     fills += [dataset.fillvalue] if dataset.fillvalue else []
-    scale, offset = (float(np.ravel(about.get(name, usual))[0]) for name, usual in _PACKING.items())
+    scale, offset = (float(np.ravel(attributes.get(name, usual))[0]) for name, usual in _PACKING.items())
     if not fills and (scale, offset) == (1.0, 0.0):
         return stored
     missing = np.isin(stored, np.array(fills, dtype=float).astype(stored.dtype))
@@ -156,7 +152,7 @@ def _unpacked(dataset):
 
 
 def format_of_hdf5(path: Path) -> str | None:
-    """The format of an HDF5 file whose name does not tell it, None of others; netCDF-4 and Zygo's files are HDF5."""
+    """Return the format of an HDF5 file, which netCDF-4 and Zygo's files are, too; None for other files."""
     import h5py
 
     if not h5py.is_hdf5(path):
@@ -168,21 +164,21 @@ def format_of_hdf5(path: Path) -> str | None:
 
 
 def _is_map(shape):
-    """Whether an array has two dimensions, besides leading ones of length 1."""
+    """Tell whether an array has two dimensions, besides leading ones of length 1."""
     return len(shape) >= 2 and all(count == 1 for count in shape[:-2])
 
 
 def maps_among(shapes: Mapping[Any, tuple[int, ...]]) -> list:
-    """Names of the arrays that can be maps of heights; lines and single numbers of two dimensions only if no other is.
+    """Return the names of the arrays that can be maps of heights.
 
-    MATLAB keeps every number and every line as an array of two dimensions.
+    Lines and single numbers of two dimensions, as which MATLAB stores them, count only if there is no other array.
     """
     maps = [name for name, shape in shapes.items() if _is_map(shape)]
     return [name for name in maps if min(shapes[name][-2:]) > 2] or maps
 
 
 def _unit_of(attributes):
-    """Metres of the unit that a variable's attributes name; None if they do not, or not of a length."""
+    """Return the metres of the unit in a variable's attributes; None if there is none, or none of length."""
     text = attributes.get("units", attributes.get("unit"))
     if isinstance(text, bytes):
         text = text.decode("utf-8", "replace")
@@ -190,26 +186,26 @@ def _unit_of(attributes):
 
 
 def open_instrument(path: Path):
-    """Open a file with SurfaceTopography; None if it is of no format that it knows."""
+    """Open a file with SurfaceTopography; None if it does not know the format."""
     from SurfaceTopography import open_topography
     from SurfaceTopography.Exceptions import CannotDetectFileFormat
 
     try:
         return open_topography(str(path))
-    except CannotDetectFileFormat:  # its message lists what every reader says
+    except CannotDetectFileFormat:  # its message lists those of all readers
         return None
 
 
 def is_instrument_text(file) -> bool:
-    """Whether SurfaceTopography knows the format of a text file, as one of a certain instrument."""
+    """Tell whether SurfaceTopography knows a text file as one of a certain instrument."""
     try:
         return file.instrument is not None and file.instrument.format() not in _OF_ANY_TEXT
-    except Exception:  # a damaged file of a format that it knows; reading it gives the message
+    except Exception:  # a damaged file of a known format; reading it gives the message
         return True
 
 
 def read_instrument(file, how: Preparation) -> Found:
-    """Whatever SurfaceTopography reads. Its arrays have x as first axis."""
+    """Read a file with SurfaceTopography, whose arrays have x as first axis."""
     opened = file.instrument
     endings = opened.file_extensions() if opened is not None else ()
     if opened is None or (
@@ -217,28 +213,26 @@ def read_instrument(file, how: Preparation) -> Found:
     ):
         raise UnfitTopography("path", _UNKNOWN)
     channel, data = _channel(opened, how)
-    said = channel.physical_sizes
-    topography = channel.topography(**({"physical_sizes": (1.0, 1.0)} if said is None else {}))
+    sized = channel.physical_sizes is not None
+    topography = channel.topography(**({} if sized else {"physical_sizes": (1.0, 1.0)}))
     heights = np.ma.filled(np.ma.asarray(topography.heights()).astype(float), np.nan).T
     unit = None if topography.unit is None else metres_of(topography.unit)
-    size: Any = None if said is None else tuple(float(side) for side in topography.physical_sizes)
-    coordinates = size
+    sides: Any = tuple(float(side) for side in topography.physical_sizes) if sized else None
     lateral = how.lateral_unit or unit
-    if size is not None:
-        size = None if lateral is None else tuple(side * lateral for side in size)
-    coordinates = coordinates if size is None else None
-    return Found(heights, unit, size, coordinates, format=opened.name(), data=data)
+    if sized and lateral is not None:
+        return Found(heights, unit, tuple(side * lateral for side in sides), format=opened.name(), data=data)
+    return Found(heights, unit, coordinates=sides, format=opened.name(), data=data)
 
 
 def _channel(opened, how):
-    """The channel that is asked for, or the default one; its name, empty if it is the only map."""
+    """Return the channel that is asked for, or the default one, and its name, empty if it is the only map."""
     channels = opened.channels
     names = [channel.name for channel in channels]
     maps = [channels[k] for k in maps_among({k: tuple(channel.nb_grid_pts) for k, channel in enumerate(channels)})]
     if how.data is not None:
         channel = channels[names.index(chosen_name(how.data, names, (), "channel"))]
     elif opened.format() in _ARRAYS and maps:
-        # Arrays of a workspace have no default: whichever came first would be pressed.
+        # Arrays of a workspace have no default; the first one could be anything.
         channel = channels[names.index(chosen_name(None, [each.name for each in maps], (), "array"))]
     else:
         channel = opened.default_channel
@@ -246,12 +240,12 @@ def _channel(opened, how):
         areal = [each.name for each in channels if each.dim == 2]
         if not areal:
             raise UnfitTopography("path", LINE_SCAN.format(max(channel.nb_grid_pts)))
-        raise UnfitTopography("data", f"is a line scan; allowed: a topography, of {', '.join(areal)}")
+        raise UnfitTopography("data", f"is a line scan; expected a topography: {', '.join(areal)}")
     return channel, channel.name if len(maps) > 1 else ""
 
 
 def read_height_map(path: str | Path, metres_per_unit: float) -> np.ndarray:
-    """Read the heights of a file, (n, n) in m, first axis y.
+    """Read the heights of a surface of kind `file`, (n, n) in m, first axis y.
 
     Parameters
     ----------
@@ -265,24 +259,24 @@ def read_height_map(path: str | Path, metres_per_unit: float) -> np.ndarray:
     """
     path = Path(path)
     if problem := problem_with_path(path):
-        raise ValueError(f"{problem}; {_ALLOWED}")
+        raise ValueError(f"{problem}; {_EXPECTED}")
     try:
         with bounded_memory():
             refuse_traps(path)
-            heights = _heights(path)
-    except Exception as error:  # whatever the libraries raise for files that are damaged or of another kind
-        raise ValueError(f"cannot be read ({error}); {_ALLOWED}") from None
+            heights = _whole_array(path)
+    except Exception as error:  # libraries raise all kinds for files that are damaged or of another format
+        raise ValueError(f"cannot be read ({error}); {_EXPECTED}") from None
     if heights.dtype.kind not in "iuf":
-        raise ValueError(f"holds {heights.dtype}, not real numbers; {_ALLOWED}")
+        raise ValueError(f"holds {heights.dtype}, not real numbers; {_EXPECTED}")
     if problem := problem_with_heights(heights):
-        raise ValueError(f"holds {problem}; {_ALLOWED}")
+        raise ValueError(f"holds {problem}; {_EXPECTED}")
     heights = heights.astype(float) * metres_per_unit
-    if not LENGTH.holds(float(np.ptp(heights))):
-        raise ValueError(f"holds heights that span {np.ptp(heights):g} m; {_ALLOWED}, and another unit")
+    if not LENGTH.contains(float(np.ptp(heights))):
+        raise ValueError(f"holds heights that span {np.ptp(heights):g} m; {_EXPECTED}, and another unit")
     return heights
 
 
-def _heights(path: Path) -> np.ndarray:
+def _whole_array(path: Path) -> np.ndarray:
     if path.suffix == ".npy":
         return _whole_npy(path)
     if path.suffix == ".nc":

@@ -1,4 +1,4 @@
-"""How well a scan resolves its surface: its summits, its spectrum with the noise of the instrument, and what to do."""
+"""Resolution of a scan: its summits, its spectrum with the noise of the instrument, and advice."""
 
 import math
 import os
@@ -10,7 +10,7 @@ import numpy as np
 import scipy.fft
 
 from icha.surfaces.measured.steps import LEAST_PIXELS
-from icha.surfaces.measured.topography import prepared_topography
+from icha.surfaces.measured.topography import PreparedTopography, prepared_topography
 from icha.surfaces.moments import (
     LEAST_CELLS_OF_SUMMIT,
     RESOLVED_CELLS,
@@ -21,21 +21,25 @@ from icha.surfaces.moments import (
 from icha.surfaces.summits import Asperities, SummitCoverage, locate_summits
 from icha.surfaces.surface import FREE, PERIODIC, Surface, edges_fit
 
-# The spectrum of a self-affine surface falls at least as q^-2 (its Hurst exponent is not negative), that of
-# uncorrelated noise does not fall. A floor falls less than halfway between the two, over this factor of wave numbers.
+# Largest power of q with which a noise floor falls, and smallest ratio of its wave numbers. The spectrum of a
+# self-affine surface falls at least as q^-2 (its Hurst exponent is not negative); that of uncorrelated noise is flat.
 _FLOOR_FALLS, _FLOOR_SPANS = -1.0, 1.3
-# A floor so far below the largest power is rounding.
+# Power of a floor, relative to the largest power, below which it is rounding.
 _ROUNDING = 1e-20
-# A grid is worth changing if it loses this part of its nodes along a side.
+# Largest ratio of a new grid to the old one that is worth a change.
 _WORTH = 0.75
 
 
 @dataclass(frozen=True)
 class NoiseFloor:
-    """Where the spectrum of a scan ends in noise.
+    """The noise in which the spectrum of a scan ends.
 
-    power : of the noise, m^4. wavelength : m, of the wave that has as much power as the noise; shorter ones are mostly
-    noise. rms : of the noise's heights, m. slope_share : part of the mean square slope that these shorter waves have.
+    Attributes
+    ----------
+    power : power of the noise, m^4.
+    wavelength : wavelength that has as much power as the noise, m; shorter waves are mostly noise.
+    rms : rms height of the noise, m.
+    slope_share : share of the shorter waves in the mean square slope.
     """
 
     power: float
@@ -45,32 +49,31 @@ class NoiseFloor:
 
 
 @dataclass(frozen=True, eq=False)
-class ScanResolution:
-    """A scan before its short waves are cut off, and the surface that is made of it.
+class ScanResolution(PreparedTopography):
+    """A prepared scan beside the scan before its short waves were filtered.
 
-    measured : the scan as a square, without filter, edges and changes of its grid. used : the prepared surface.
-    cutoff : nesting index of its filter, m; None: it has none. format : as which the file was read. data : the array or
-    channel that was taken, empty if the file has only one. reading : how the file was read, in words. filled : number
-    of points that had no height. points : number of points that were used.
+    Attributes
+    ----------
+    measured : the scan as a square, without filter, edges and changes of its grid.
+    cutoff : nesting index of the filter, m; None without one.
     """
 
     measured: Surface
-    used: Surface
     cutoff: float | None
-    format: str = ""
-    data: str = ""
-    reading: str = ""
-    filled: int = 0
-    points: int = 1
+
+    @property
+    def used(self) -> Surface:
+        """The prepared surface."""
+        return self.surface
 
     @property
     def edges_fit(self) -> bool:
-        """Whether the prepared surface is free, or periodic without a step from one cell to the next."""
+        """Whether the prepared surface is free, or periodic without a step between cells."""
         return self.used.free or edges_fit(self.used.heights)
 
     @cached_property
     def asperities(self) -> Asperities:
-        """Summits of the prepared surface, and those that its nodes do not support."""
+        """Summits of the prepared surface, supported and unsupported."""
         return locate_summits(self.used)
 
     @property
@@ -80,28 +83,28 @@ class ScanResolution:
 
     @property
     def reasons_against_asperities(self) -> list[str]:
-        """Reasons why asperities do not stand for the surface 3 to 1 rms heights above its mean, where it touches."""
+        """Reasons why asperities do not represent the surface 3 to 1 rms heights above its mean, where it touches."""
         heights = np.linspace(3, 1, 5) * self.used.rms_height
         return SummitCoverage.of(self.used, self.asperities).reasons_against(heights)
 
     @property
     def cells_per_summit(self) -> float:
-        """Nodes of the prepared surface for every summit."""
+        """Nodes of the prepared surface per summit."""
         return self.used.grid**2 / max(self.summits, 1)
 
     @property
     def cells_per_short_wave(self) -> float:
-        """Nodes of the prepared surface along its shortest waves, as the number of its summits tells it."""
+        """Nodes of the prepared surface along its shortest waves, estimated from the number of its summits."""
         return cells_per_short_wave(self.used.grid, self.summits)
 
     @cached_property
     def noise(self) -> NoiseFloor | None:
-        """Floor of the scan's spectrum, None if it falls to its end."""
+        """Noise floor of the spectrum of the scan; None if it has none."""
         return noise_floor(self.measured)
 
     @property
     def advice(self) -> dict[str, float | int]:
-        """Keys of the configuration that would resolve the surface, in SI units; none if it is resolved."""
+        """Keys of the configuration that would resolve the surface, in SI units; empty if it is resolved."""
         found = {}
         cutoff, pixel = self.cutoff or 0.0, self.measured.spacing
         if self.noise is not None and cutoff < self.noise.wavelength * (1 - 1e-9):
@@ -117,7 +120,7 @@ class ScanResolution:
 
 
 def slope_left(surface: Surface, cutoff: float) -> float:
-    """Part of a surface's rms slope that the Gaussian filter of a nesting index (m) leaves, by the radial spectrum."""
+    """Estimate the fraction of the rms slope that the Gaussian filter of a nesting index (m) leaves."""
     q, power = radial_power_spectrum(surface)
     slopes = _squared_slopes(surface, q, power)
     transmission = 2.0 ** -((cutoff * q / (2 * np.pi)) ** 2)
@@ -125,29 +128,21 @@ def slope_left(surface: Surface, cutoff: float) -> float:
 
 
 def scan_resolution(path: str | os.PathLike, preparation: Mapping) -> ScanResolution:
-    """Look at a scan; arguments and errors as `icha.surfaces.measured.topography.prepared_topography`."""
+    """Examine a scan; arguments and errors as `icha.surfaces.measured.topography.prepared_topography`."""
     raw = {key: preparation[key] for key in preparation if key not in ("cutoff", "taper")}
     if preparation["boundary"] != PERIODIC:
         raw |= {"boundary": FREE, "grid": None}
     measured = prepared_topography(path, raw).surface
-    used = prepared_topography(path, preparation)
     return ScanResolution(
-        measured=measured,
-        used=used.surface,
-        cutoff=preparation.get("cutoff"),
-        format=used.format,
-        data=used.data,
-        reading=used.reading,
-        filled=used.filled,
-        points=used.points,
+        **vars(prepared_topography(path, preparation)), measured=measured, cutoff=preparation.get("cutoff")
     )
 
 
 def noise_floor(surface: Surface) -> NoiseFloor | None:
-    """The floor in which the radial power spectrum of a surface ends; None if it falls to its end.
+    """Find the noise floor in which the radial power spectrum of a surface ends; None if it falls to its end.
 
-    It is the longest tail of the spectrum through which the best power law falls less steeply than 1/q. Its power is
-    the geometric mean of the shorter half of its waves.
+    The floor is the longest tail of the spectrum through which the best power law falls less steeply than 1/q. Its
+    power is the geometric mean of the shorter half of its waves.
     """
     q, power = radial_power_spectrum(surface)
     log_q, log_power = np.log(q), np.log(np.maximum(power, np.finfo(float).tiny))
@@ -159,27 +154,27 @@ def noise_floor(surface: Surface) -> NoiseFloor | None:
     if floor < _ROUNDING * power.max():
         return None
     above = np.flatnonzero(power > 2 * floor)
-    # Between this ring and the next, on a line of logarithms; the longest wave where noise is all there is.
+    # Interpolate the logarithms between this ring and the next; take the longest wave if there is only noise.
     k = above[-1] if len(above) else 0
-    there = q[k]
+    limit = q[k]
     if len(above) and k + 1 < len(q):
-        way = np.log(power[k] / (2 * floor)) / np.log(power[k] / power[k + 1])
-        there = q[k] * (q[k + 1] / q[k]) ** min(max(way, 0.0), 1.0)
+        fraction = np.log(power[k] / (2 * floor)) / np.log(power[k] / power[k + 1])
+        limit = q[k] * (q[k + 1] / q[k]) ** min(max(fraction, 0.0), 1.0)
     slopes = _squared_slopes(surface, q, power)
     return NoiseFloor(
         power=floor,
-        wavelength=float(2 * np.pi / there),
+        wavelength=float(2 * np.pi / limit),
         rms=math.sqrt(floor) * 2 * math.pi / surface.spacing,
-        slope_share=float(np.sum(slopes[q > there]) / np.sum(slopes)),
+        slope_share=float(np.sum(slopes[q > limit]) / np.sum(slopes)),
     )
 
 
 def _squared_slopes(surface, q, power):
-    """What each ring of wave numbers adds to the mean square slope, but for a common factor."""
+    """Return the contribution of each ring of wave numbers to the mean square slope, but for a common factor."""
     return power * q**2 * np.diff(ring_edges(surface) ** 2)
 
 
 def _rounded_up(length: float) -> float:
-    """To two digits."""
+    """Round up to two digits."""
     digit = 10.0 ** (math.floor(math.log10(length)) - 1)
     return float(f"{math.ceil(length / digit * (1 - 1e-9)) * digit:.2g}")

@@ -1,4 +1,4 @@
-"""A scan in metres: what a file of any format says, with units and size."""
+"""A scan in metres, read from a file of any format, with its size."""
 
 import importlib
 from dataclasses import dataclass, replace
@@ -6,13 +6,14 @@ from pathlib import Path
 
 import numpy as np
 
-from icha.support import in_words
-from icha.support.in_words import printable
+from icha.support import formatting
+from icha.support.formatting import printable
 from icha.support.input_files import RefusedFile, bounded_memory, refuse_traps
 from icha.support.rules import LENGTH
 from icha.surfaces.measured.array_files import format_of_hdf5, read_hdf5, read_instrument, read_netcdf, read_npy
+from icha.surfaces.measured.fourier_files import read_fourier
 from icha.surfaces.measured.settings import LINE_SCAN, Preparation, UnfitTopography
-from icha.surfaces.measured.text_files import format_of_text, read_fourier, read_matrix, read_xyz
+from icha.surfaces.measured.text_files import format_of_text, read_matrix, read_xyz
 from icha.surfaces.measured.text_tables import SourceFile, reason_against_table
 
 READERS = {
@@ -24,17 +25,22 @@ READERS = {
     "fourier": read_fourier,
     "instrument": read_instrument,
 }
-# Libraries of the readers that have one. They are imported before memory is bounded: theirs is not the file's.
+# Libraries of the readers. They are imported before memory is bounded, since theirs is not that of the file.
 _LIBRARIES = {"netcdf": "netCDF4", "hdf5": "h5py", "instrument": "SurfaceTopography"}
 
 
 @dataclass(frozen=True, eq=False)
 class Scan:
-    """What a file says in metres: heights (ny, nx), nan where missing, first axis y, and the size (x, y) of it all.
+    """A scan in metres.
 
-    coordinate_unit: metres, where the size follows from coordinates whose unit the file does not tell. format: as
-    which the file was read. data: name of the array or channel that was taken, empty if the file has only one. steps:
-    what was read and done, in words.
+    Attributes
+    ----------
+    heights : (ny, nx), m, nan where missing, first axis y.
+    size : (x, y) of the whole, m.
+    steps : descriptions of what was read and done.
+    coordinate_unit : m, if the size follows from coordinates whose unit the file does not give.
+    format : format as which the file was read.
+    data : name of the array or channel that was read; empty if the file has only one.
     """
 
     heights: np.ndarray
@@ -50,68 +56,68 @@ class Scan:
         rows, columns = self.heights.shape
         return self.size[0] / columns, self.size[1] / rows
 
-    def after(self, heights: np.ndarray, *said: str, size: tuple[float, float] | None = None) -> "Scan":
-        """The scan with other heights after a step, what is to be said about it, and another size if it has one."""
-        return replace(self, heights=heights, size=size or self.size, steps=(*self.steps, *said))
+    def after(self, heights: np.ndarray, *steps: str, size: tuple[float, float] | None = None) -> "Scan":
+        """Return the scan with other heights after a step, its description, and another size if it has one."""
+        return replace(self, heights=heights, size=size or self.size, steps=(*self.steps, *steps))
 
     @property
     def remark_on_unit(self) -> str:
-        """What is to be added where a length of the scan is at fault."""
+        """Remark for messages about a length of the scan."""
         if self.coordinate_unit is None:
             return ""
-        unit = in_words.length(self.coordinate_unit)
+        unit = formatting.length(self.coordinate_unit)
         return f"; the coordinates are taken to be in units of {unit}, see `lateral_unit`"
 
 
 def load_scan(path: Path, how: Preparation) -> Scan:
-    """Read a file of any of the formats; errors as `icha.surfaces.measured.topography.prepared_topography`."""
+    """Read a file of any format; raises errors as `icha.surfaces.measured.topography.prepared_topography`."""
     if not path.stat().st_size:
-        raise UnfitTopography("path", "is empty; allowed: a file of heights")
+        raise UnfitTopography("path", "is empty; expected a file of heights")
     name, found = _read(path, how)
     unit = how.height_unit or found.unit
     if unit is None:
-        raise UnfitTopography("height_unit", "is missing, and the file does not say it; allowed: such as 'um'")
+        raise UnfitTopography("height_unit", "is missing, and the file does not give it; expected a unit such as 'um'")
     size, coordinate_unit = how.size or found.size, None
     if size is None and found.coordinates is not None:
         coordinate_unit = how.lateral_unit or unit
         size = tuple(each * coordinate_unit for each in found.coordinates)
     if size is None:
-        raise UnfitTopography("size", "is missing, and the file does not say it; allowed: a length, such as '90 um'")
+        raise UnfitTopography("size", "is missing, and the file does not give it; expected a length, such as '90 um'")
     rows, columns = found.heights.shape
-    said = f"{name}, {rows} rows x {columns} columns of points"
+    reading = f"{name}, {rows} rows x {columns} columns of points"
     if found.data:
-        said += f", data {printable(found.data)} of several"
-    sides = [in_words.length(float(side)) for side in size]
-    pixel = [in_words.length(size[0] / columns), in_words.length(size[1] / rows)]
-    said += f"; pixels of {' x '.join(pixel)}, {' x '.join(sides)} in all; heights in {in_words.length(unit)}"
-    said += "".join(f"; {remark}" for remark in (found.remark, _replaced(how, found)) if remark)
+        reading += f", data {printable(found.data)} of several"
+    sides = [formatting.length(float(side)) for side in size]
+    pixel = [formatting.length(size[0] / columns), formatting.length(size[1] / rows)]
+    reading += f"; pixels of {' x '.join(pixel)}, {' x '.join(sides)} in all; heights in {formatting.length(unit)}"
+    reading += "".join(f"; {remark}" for remark in (found.remark, _replaced(how, found)) if remark)
     format_ = f"{name} ({found.format})" if name == "instrument" else name
-    scan = Scan(found.heights.astype(float) * unit, tuple(size), (said,), coordinate_unit, format_, found.data)
-    if not all(np.isfinite(each) and LENGTH.holds(each) for each in size):
+    scan = Scan(found.heights.astype(float) * unit, tuple(size), (reading,), coordinate_unit, format_, found.data)
+    if not all(np.isfinite(each) and LENGTH.contains(each) for each in size):
         raise UnfitTopography(
-            "size", f"is {size[0]:g} m by {size[1]:g} m in the file{scan.remark_on_unit}; allowed: give it here"
+            "size", f"is {size[0]:g} m by {size[1]:g} m in the file{scan.remark_on_unit}; expected the size here"
         )
     return scan
 
 
 def _replaced(how, found):
-    """Say which size and unit of the file are not used, because others are given; empty if there are none."""
+    """Describe the size and unit of the file that given ones replace; empty if there are none."""
     replaced = []
     if how.size and found.size and not np.allclose(how.size, found.size, rtol=1e-3, atol=0):
-        replaced.append(f"its size {' x '.join(map(in_words.length, found.size))}")
+        replaced.append(f"its size {' x '.join(map(formatting.length, found.size))}")
     if how.height_unit and found.unit and not np.isclose(how.height_unit, found.unit, rtol=1e-3, atol=0):
-        replaced.append(f"its unit of heights {in_words.length(found.unit)}")
+        replaced.append(f"its unit of heights {formatting.length(found.unit)}")
     return f"the file has, and you replace, {' and '.join(replaced)}" if replaced else ""
 
 
 def _read(path, how):
-    """The format of a file, and what its reader finds, if that are heights."""
+    """Return the format of a file and its content, after checking that these are heights."""
     file, name = SourceFile(path, how.data), how.format
     try:
         with bounded_memory():
             refuse_traps(path)
             if name == "auto":
-                name = "xyz" if how.columns else _format_of(path)
+                name = "xyz" if how.columns else _guess_format(path)
             library = _LIBRARIES.get(name)
             if name in ("text", "matrix") and (file.layout is None or file.layout.heading):
                 library = "SurfaceTopography"
@@ -127,41 +133,46 @@ def _read(path, how):
         raise
     except RefusedFile as error:
         raise UnfitTopography("path", str(error)) from None
-    except Exception as error:  # whatever the libraries raise for files that are damaged or of another kind
+    except Exception as error:  # libraries raise all kinds for files that are damaged or of another format
+        as_format = "" if name in ("auto", "text") else f" as {name}"
         raise UnfitTopography(
             "path",
-            f"cannot be read as {name}{_own_reason(error)}: the file is damaged or of another format; allowed: a file "
-            "that is, or another `format`",
+            f"cannot be read{as_format}{_reason_of_this_package(error)}: the file is damaged or of another format; "
+            "expected a sound file, or another `format`",
         ) from None
     if how.data is not None and not found.data_known:
         raise UnfitTopography(
-            "data", f"is given, and a file that is read as {name} has one array without a name; allowed: leave it out"
+            "data", f"is given, and a file that is read as {name} has one array without a name; leave it out"
         )
-    heights = found.heights
+    _check_heights(found.heights)
+    return name, found
+
+
+def _check_heights(heights):
+    """Raise UnfitTopography unless an array is a map of real numbers."""
     if heights.dtype.kind not in "iuf":
-        raise UnfitTopography("path", f"holds {heights.dtype}, not real numbers; allowed: heights")
+        raise UnfitTopography("path", f"holds {heights.dtype}, not real numbers; expected heights")
     if heights.ndim == 1 or (heights.ndim == 2 and 0 < min(heights.shape) <= 2 < max(heights.shape)):
         # Two columns are x and z.
         raise UnfitTopography("path", LINE_SCAN.format(max(heights.shape)))
     if heights.ndim != 2 or not heights.size:
         nothing = "" if heights.size else ", no heights"
         raise UnfitTopography(
-            "path", f"holds an array of shape {heights.shape}{nothing}; allowed: rows and columns of heights"
+            "path", f"holds an array of shape {heights.shape}{nothing}; expected rows and columns of heights"
         )
-    return name, found
 
 
-def _own_reason(error):
-    """The reason in brackets if this package raised the error itself; libraries speak to programmers."""
+def _reason_of_this_package(error):
+    """Return the message of an error in brackets if this package raised it; those of libraries are for programmers."""
     trace = error.__traceback__
     while trace.tb_next is not None:
         trace = trace.tb_next
-    own = type(error) is ValueError and trace.tb_frame.f_globals.get("__name__", "").startswith("icha.")
-    return f" ({error})" if own else ""
+    module = trace.tb_frame.f_globals.get("__name__", "")
+    return f" ({error})" if type(error) is ValueError and module.startswith("icha.") else ""
 
 
-def _format_of(path: Path) -> str:
-    """The format that a file has by its name or, if it is HDF5, by what is in it; else "text", which may be others."""
+def _guess_format(path: Path) -> str:
+    """Guess the format of a file by its name or, for HDF5, by its content; else "text", which may be any other."""
     suffix = path.suffix.lower()
     known = {".npy": "npy", ".nc": "netcdf", ".nc4": "netcdf", ".h5": "hdf5", ".hdf5": "hdf5", ".xyz": "xyz"}
     if suffix in known:

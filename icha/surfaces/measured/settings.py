@@ -1,4 +1,4 @@
-"""Settings of a measured topography, what readers find in its file, and what several readers need."""
+"""Settings of a measured topography, the content of its file as a reader returns it, and helpers of several readers."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -8,43 +8,45 @@ import numpy as np
 from icha.support.rules import GRID
 from icha.support.values import conversion_factor
 
-# How edges are treated, beside `periodic` and `free` (`icha.surfaces.surface`); both end in a periodic surface.
+# Treatments of the edges besides `periodic` and `free` (`icha.surfaces.surface`); both end in a periodic surface.
 WINDOW, MIRROR = "window", "mirror"
-
-
-# What is wrong with a file of one profile.
-LINE_SCAN = "is a line scan, one profile of {} points; allowed: a topography, with heights over x and y"
+# Message for a file of one profile.
+LINE_SCAN = "is a line scan, one profile of {} points; expected a topography, with heights over x and y"
+# Differences of coordinates below this fraction of their range are rounding of text.
+_ROUNDING = 1e-6
+# Largest distance of a coordinate from its tick, in steps.
+_OFF_TICK = 0.05
 
 
 class UnfitTopography(ValueError):
-    """A file that is no topography or cannot be prepared as asked; `key`: the setting that is at fault."""
+    """A file that is no topography or cannot be prepared as asked; `key` is the setting at fault."""
 
     def __init__(self, key: str, message: str):
-        """Keep the key and the message, which says why and what is allowed."""
+        """Keep the key and the message, which gives the reason and what is expected."""
         super().__init__(message)
         self.key = key
 
 
 @dataclass(frozen=True)
 class Preparation:
-    """What the numbers of a file mean and how they become a surface.
+    """The meaning of the numbers of a file and the steps that make a surface of them.
 
     Parameters
     ----------
     format : a name of `READERS`, or "auto".
     boundary : "periodic", "window", "mirror" or "free".
-    data : name of variable, dataset or channel; None: the only one, or the file's own default.
+    data : name of variable, dataset or channel; None for the only one, or the file's own default.
     first_axis : "y" or "x", the first axis of arrays whose dimensions have no names.
-    height_unit, lateral_unit : metres; None: as the file says, and the lateral one else that of height.
-    size : (x, y) of the whole scan, m; None: as the file says.
+    height_unit, lateral_unit : m; None for those of the file; the lateral one is else that of the heights.
+    size : (x, y) of the whole scan, m; None for that of the file.
     touches_first : "high" or "low" numbers.
     missing : "refuse" or "fill".
-    crop : x, y, side (m) of the square; None: the largest, in the middle.
+    crop : x, y, side (m) of the square; None for the largest, in the middle.
     detrend : "none", "tilt" or "curvature".
-    cutoff : nesting index of the S-filter, m; None: no filter.
-    taper : with a window, the part of the side over which heights fall at each edge.
-    grid : nodes along a side of the result; None: as the scan.
-    columns : numbers, from 1, of the columns x, y and z of a text; None: it has just these.
+    cutoff : nesting index of the S-filter, m; None for no filter.
+    taper : with a window, the fraction of the side over which heights fall at each edge.
+    grid : nodes along a side of the result; None for those of the scan.
+    columns : numbers, from 1, of the columns x, y and z of a text; None if it has only these.
     """
 
     format: str
@@ -66,12 +68,18 @@ class Preparation:
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """What a reader finds: heights (ny, nx) in its own unit, nan where missing; unit and size in m, if it knows them.
+    """The content of a file.
 
-    coordinates: size (x, y) in units of length that the file does not tell. format: name of the instrument's format.
-    remark: what was left out of the file, in words.
-    data: name of the array or channel that was taken, empty if the file has only one. data_known: whether it was looked
-    for by the name that is asked for.
+    Attributes
+    ----------
+    heights : (ny, nx), in the unit of the file, nan where missing.
+    unit : unit of the heights, m; None if the file does not give it.
+    size : (x, y), m; None if the file does not give it.
+    coordinates : (x, y) in a unit that the file does not give.
+    format : name of the instrument's format.
+    remark : description of what was left out of the file.
+    data : name of the array or channel that was read; empty if the file has only one.
+    data_known : whether the reader looked for the name that is asked for.
     """
 
     heights: np.ndarray
@@ -85,64 +93,56 @@ class Found:
 
 
 def with_y_first(heights: np.ndarray, how: Preparation) -> np.ndarray:
-    """The array with y as its first axis, which in the file is the one that the settings say."""
+    """Return the array with y as its first axis; the settings give the first axis of the file."""
     return heights.T if how.first_axis == "x" else heights
 
 
 def regular_ticks(values: np.ndarray, axis: str) -> tuple[np.ndarray, int, float]:
-    """Index (n,) of every coordinate on a regular scale, and the number and distance of its ticks.
+    """Return the index (n,) of every coordinate on a regular scale, and the number and distance of its ticks.
 
-    Raises
-    ------
-    ValueError
-        If they are on no such scale; it calls them `axis`.
+    Raises ValueError, with `axis` as their name, if the coordinates are on no such scale.
     """
     if not np.all(np.isfinite(values)):
         raise ValueError(f"{axis} is not finite everywhere")
-    there = np.unique(values)
-    low, high = there[0], there[-1]
-    # Rounding of what was written as text is no step.
-    steps = np.diff(there)
-    steps = steps[steps > 1e-6 * (high - low)]
+    low, high = values.min(), values.max()
+    steps = np.diff(np.unique(values))
+    steps = steps[steps > _ROUNDING * (high - low)]
     if not len(steps):
         raise ValueError(f"{axis} is the same everywhere")
     usual = np.median(steps)
-    # Where every tick is there, counting them is safer than trusting the digits of one step.
+    # If no tick is missing, counting them is safer than trusting the digits of one step.
     count = len(steps) + 1 if np.max(steps) < 1.5 * usual else int(np.rint((high - low) / usual)) + 1
     if count > GRID.most:
         raise ValueError(f"{axis} is not on a regular grid of at most {GRID.most} points")
     step = (high - low) / (count - 1)
     index = np.rint((values - low) / step).astype(int)
-    if np.max(np.abs(values - low - index * step)) > 0.05 * step:
+    if np.max(np.abs(values - low - index * step)) > _OFF_TICK * step:
         raise ValueError(f"{axis} is not on a regular grid")
     return index, count, step
 
 
-def chosen_name(asked: str | None, there: Sequence[str], usual: Sequence[str], what: str) -> str:
-    """The variable, dataset or channel (`what`) of those `there` that is asked for; else a usual one, or the only one.
+def chosen_name(asked: str | None, names: Sequence[str], usual: Sequence[str], what: str) -> str:
+    """Return the name that is asked for; else a usual one, or the only one.
 
-    Raises
-    ------
-    UnfitTopography
-        If there is none, or if it could be several.
+    Raises UnfitTopography if no variable, dataset or channel (`what`) has it, or if several could be meant.
     """
+    expected = f"expected one of: {', '.join(names)}"
     if asked is not None:
-        if asked not in there:
-            raise UnfitTopography("data", f"is no {what} of the file; allowed: {', '.join(there) or 'none is there'}")
+        if asked not in names:
+            raise UnfitTopography("data", f"is no {what} of the file; {expected if names else 'it has none'}")
         return asked
-    found = [name for name in usual if name in there] or there
-    if not found or (len(found) > 1 and found is there):
-        many = (
-            f"is missing, and the file has {len(there)}"
-            if there
-            else f"is missing, and the file has no {what} of two dimensions"
+    for name in (*usual, *(names if len(names) == 1 else ())):
+        if name in names:
+            return name
+    if not names:
+        raise UnfitTopography(
+            "data", f"is missing, and the file has no {what} of two dimensions; expected another file"
         )
-        raise UnfitTopography("data", f"{many}; allowed: {', '.join(there) or 'another file'}")
-    return found[0]
+    raise UnfitTopography("data", f"is missing, and the file has {len(names)}; {expected}")
 
 
 def metres_of(unit: str) -> float | None:
-    """Metres of a unit; None if it is none of length."""
+    """Return the metres of a unit; None if it is no unit of length."""
     try:
         return float(conversion_factor(str(unit), "m"))
     except ValueError:

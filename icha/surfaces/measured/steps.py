@@ -1,4 +1,7 @@
-"""Steps from a scan to a surface: crop, trend, missing points, pixels, short waves, edges and grid."""
+"""Steps from a scan to a surface: crop, trend, missing points, pixels, short waves, edges and grid.
+
+Each step returns the scan after it, as the settings ask for it.
+"""
 
 import math
 
@@ -7,35 +10,32 @@ import scipy.fft
 import scipy.sparse
 import scipy.sparse.linalg
 
-from icha.support import in_words
+from icha.support import formatting
 from icha.support.input_files import TooLarge, require_room
 from icha.surfaces.measured.scan import Scan
 from icha.surfaces.measured.settings import MIRROR, WINDOW, Preparation, UnfitTopography
 from icha.surfaces.square import problem_with_heights
 from icha.surfaces.surface import FREE, PERIODIC, Surface
 
-# Rounding of the quotient of two lengths must not cost a pixel.
+# Relative rounding of the quotient of two lengths.
 _ROUNDING = 1e-9
-# Heights that differ by less than this part of the largest one, once their trend is removed, are rounding.
+# Range of heights without their trend, relative to the largest height, below which it is rounding.
 _FLAT = 1e-13
-# Relative difference of the two sides of a pixel that counts as square.
+# Largest relative difference of the two sides of a square pixel.
 SQUARE = 1e-3
 # Standard deviation of the weights over the nesting index: alpha/sqrt(2 pi), alpha = sqrt(ln 2/pi) (ISO 16610-61).
 DEVIATION = math.sqrt(math.log(2) / 2) / math.pi
-# Below so many pixels the weights are too few to have the transmission of the standard.
+# Smallest nesting index in pixels at which the weights have the transmission of the standard.
 LEAST_PIXELS = 4
-# Standard deviations after which the weights end; what is cut off is 2e-9.
+# Standard deviations after which the weights end; the fraction 2e-9 is cut off.
 _REACH = 6
 
 
 def cropped(scan: Scan, how: Preparation) -> Scan:
-    """The square that the settings ask for.
-
-    It is made of whole pixels. If these are not square, one of its sides may be too long by less than a pixel.
-    """
+    """Cut out a square of whole pixels; if these are oblong, one side may be too long by less than a pixel."""
     rows, columns = scan.heights.shape
     dx, dy = scan.pixel
-    width, height = map(in_words.length, scan.size)
+    width, height = map(formatting.length, scan.size)
     if how.crop is None:
         side = min(scan.size)
         nx, ny = (int(side / each * (1 + _ROUNDING)) for each in (dx, dy))
@@ -49,29 +49,29 @@ def cropped(scan: Scan, how: Preparation) -> Scan:
         if first_x + nx > columns or first_y + ny > rows:
             raise UnfitTopography(
                 "crop",
-                f"ends at x = {in_words.length(x + side)}, y = {in_words.length(y + side)}, outside of the scan"
-                f"{scan.remark_on_unit}; allowed: up to x = {width}, y = {height}",
+                f"ends at x = {formatting.length(x + side)}, y = {formatting.length(y + side)}, outside of the scan"
+                f"{scan.remark_on_unit}; expected at most x = {width}, y = {height}",
             )
     if nx < 8 or ny < 8:
         raise UnfitTopography(
             "crop" if how.crop else "path",
-            f"leaves {nx} x {ny} points{scan.remark_on_unit}; allowed: at least 8 x 8 of them",
+            f"leaves {nx} x {ny} points{scan.remark_on_unit}; expected at least 8 x 8",
         )
     if how.boundary == PERIODIC and ((nx, ny) != (columns, rows) or abs(nx * dx / (ny * dy) - 1) > SQUARE):
         raise UnfitTopography(
             "boundary",
-            f"needs a square, and the scan is {width} x {height}; allowed: a square one, or another boundary",
+            f"needs a square, and the scan is {width} x {height}; expected a square one, or another boundary",
         )
-    part = scan.heights[first_y : first_y + ny, first_x : first_x + nx]
-    said = () if part.shape == scan.heights.shape else (f"cut to {nx} x {ny} points from ({first_x}, {first_y})",)
-    return scan.after(part, *said, size=(nx * dx, ny * dy))
+    square = scan.heights[first_y : first_y + ny, first_x : first_x + nx]
+    step = [] if square.shape == scan.heights.shape else [f"cut to {nx} x {ny} points from ({first_x}, {first_y})"]
+    return scan.after(square, *step, size=(nx * dx, ny * dy))
 
 
 def detrended(scan: Scan, how: Preparation) -> Scan:
-    """Without the plane or paraboloid that fits the known heights best."""
+    """Remove the plane or paraboloid that fits the known heights best."""
     known = np.isfinite(scan.heights)
     if not known.any():
-        raise UnfitTopography("path", "holds no height at all in the part that is used; allowed: another part or file")
+        raise UnfitTopography("path", "holds no height within the square that is used; expected another crop or file")
     degree = {"none": 0, "tilt": 1, "curvature": 2}[how.detrend]
     if degree == 0:
         return scan
@@ -89,15 +89,16 @@ def detrended(scan: Scan, how: Preparation) -> Scan:
     return scan.after(scan.heights - trend, f"{how.detrend} removed")
 
 
-def refuse_flat(left: Scan, part: Scan, how: Preparation) -> None:
-    """Raise unless the heights that are left of a part of the scan are more than the rounding of those that it had."""
-    if np.ptp(left.heights) <= _FLAT * np.nanmax(np.abs(part.heights), where=np.isfinite(part.heights), initial=0.0):
+def refuse_flat(prepared: Scan, square: Scan, how: Preparation) -> None:
+    """Raise UnfitTopography if the prepared heights are only rounding of those of the square that was cut out."""
+    known = np.isfinite(square.heights)
+    if np.ptp(prepared.heights) <= _FLAT * np.nanmax(np.abs(square.heights), where=known, initial=0.0):
         without = "" if how.detrend == "none" else " but for the trend that is removed"
-        raise UnfitTopography("path", f"holds heights that are all the same{without}; allowed: a rough surface")
+        raise UnfitTopography("path", f"holds heights that are all the same{without}; expected a rough surface")
 
 
 def filled(scan: Scan, how: Preparation) -> Scan:
-    """Without missing points."""
+    """Fill missing points."""
     missing = ~np.isfinite(scan.heights)
     count = int(np.count_nonzero(missing))
     if not count:
@@ -105,19 +106,17 @@ def filled(scan: Scan, how: Preparation) -> Scan:
     if how.missing == "refuse":
         raise UnfitTopography(
             "missing",
-            f"stops at points without a height, and there are {count} among {missing.size}; allowed: fill, or a crop "
-            "without them",
+            f"does not allow {count} of {missing.size} points without a height; expected fill, or a crop without them",
         )
     if 2 * count > missing.size:
-        raise UnfitTopography("missing", f"would make up {count} of {missing.size} points; allowed: up to half of them")
+        raise UnfitTopography("missing", f"cannot fill {count} of {missing.size} points; expected at most half")
     heights = scan.heights.copy()
     heights[missing] = _harmonic(heights, missing, periodic=how.boundary == PERIODIC)
-    said = f"{count} missing points filled, {in_words.share(count, missing.size)} of the points"
-    return scan.after(heights, said)
+    return scan.after(heights, f"{count} missing points filled, {formatting.share(count, missing.size)} of the points")
 
 
 def _harmonic(heights, missing, *, periodic):
-    """Heights (count,) of the missing points, each the mean of those of its four neighbours; edges have fewer."""
+    """Solve Laplace's equation: each missing height (count,) is the mean of its four neighbours, fewer at edges."""
     row, column = np.nonzero(missing)
     count = len(row)
     index = np.full(missing.shape, -1)
@@ -128,23 +127,23 @@ def _harmonic(heights, missing, *, periodic):
         y, x = row + down, column + across
         if periodic:
             y, x = y % missing.shape[0], x % missing.shape[1]
-        there = np.flatnonzero((y >= 0) & (y < missing.shape[0]) & (x >= 0) & (x < missing.shape[1]))
-        neighbours[there] += 1
-        other = index[y[there], x[there]]
-        known = there[other < 0]
+        inside = np.flatnonzero((y >= 0) & (y < missing.shape[0]) & (x >= 0) & (x < missing.shape[1]))
+        neighbours[inside] += 1
+        other = index[y[inside], x[inside]]
+        known = inside[other < 0]
         right[known] += heights[y[known], x[known]]
-        pairs.append((there[other >= 0], other[other >= 0]))
+        pairs.append((inside[other >= 0], other[other >= 0]))
     first, second = (np.concatenate(each) for each in zip(*pairs, strict=True))
     coupling = scipy.sparse.csc_matrix((np.full(len(first), -1.0), (first, second)), shape=(count, count))
     return scipy.sparse.linalg.spsolve(coupling + scipy.sparse.diags(neighbours, format="csc"), right)
 
 
 def squared(scan: Scan, how: Preparation) -> Scan:
-    """On square cells as large as the shorter side of a pixel.
+    """Resample to square cells as large as the shorter side of a pixel.
 
     Lines along that side stay as they are. Across them, heights are those of their cosine series, which is
     band-limited: it keeps all measured waves, hence their rms slope, and adds none that is shorter than two pixels.
-    Periodic scans are resampled by their Fourier series, when they get their grid (`icha.surfaces.measured.steps`).
+    Periodic scans are resampled by their Fourier series when they get their grid (`bounded`).
     """
     dx, dy = scan.pixel
     if how.boundary == PERIODIC or abs(dx / dy - 1) <= SQUARE:
@@ -153,14 +152,14 @@ def squared(scan: Scan, how: Preparation) -> Scan:
     grid = int(min(scan.size) / cell * (1 + 1e-9))
     lines = np.take(scan.heights, range(grid), axis=1 - across)
     heights = _by_cosine_series(lines, across, cell / max(dx, dy), grid)
-    pixel = " x ".join(map(in_words.length, (dx, dy)))
-    said = f"pixels of {pixel} resampled to {grid} x {grid} square ones, by the cosine series along {'yx'[across]}"
-    return scan.after(heights, said, size=(grid * cell, grid * cell))
+    pixel = " x ".join(map(formatting.length, (dx, dy)))
+    step = f"pixels of {pixel} resampled to {grid} x {grid} square ones, by the cosine series along {'yx'[across]}"
+    return scan.after(heights, step, size=(grid * cell, grid * cell))
 
 
 def _by_cosine_series(heights, axis, step, count):
-    """Heights in the middle of `count` cells, `step` old ones wide, along an axis."""
-    # Slow to import, and seldom needed.
+    """Evaluate the cosine series in the middle of `count` cells, `step` old ones wide, along an axis."""
+    # Slow to import, and rarely needed.
     from scipy.signal import czt
 
     n = heights.shape[axis]
@@ -172,80 +171,76 @@ def _by_cosine_series(heights, axis, step, count):
 
 
 def without_short_waves(scan: Scan, how: Preparation) -> Scan:
-    """After the areal Gaussian filter of ISO 16610-61, whose nesting index is the cut-off: it halves that wave.
+    """Apply the areal Gaussian filter of ISO 16610-61, whose nesting index is the cut-off.
 
-    A wave of length l is multiplied by 2^-(cutoff/l)^2. At the edges heights go on by reflection (ISO 16610-28),
+    A wave of length l is multiplied by 2^-(cutoff/l)^2. Beyond the edges heights continue by reflection (ISO 16610-28),
     those of a periodic scan by its period.
     """
     if how.cutoff is None:
         return scan
-    # Slow to import, and seldom needed.
+    # Slow to import, and rarely needed.
     from scipy.ndimage import gaussian_filter
 
     least, most = LEAST_PIXELS * max(scan.pixel), min(scan.size)
     if not least * (1 - 1e-9) <= how.cutoff <= most:
         raise UnfitTopography(
             "cutoff",
-            f"is {how.cutoff / max(scan.pixel):.3g} pixels{scan.remark_on_unit}; allowed: from {LEAST_PIXELS} pixels, "
-            f"{in_words.length(least)}, to the side of the square, {in_words.length(most)}",
+            f"is {how.cutoff / max(scan.pixel):.3g} pixels{scan.remark_on_unit}; expected from {LEAST_PIXELS} pixels, "
+            f"{formatting.length(least)}, to the side of the square, {formatting.length(most)}",
         )
     dx, dy = scan.pixel
     sigma = DEVIATION * how.cutoff
     mode = "wrap" if how.boundary == PERIODIC else "reflect"
     heights = gaussian_filter(scan.heights, (sigma / dy, sigma / dx), mode=mode, truncate=_REACH)
-    said = f"Gaussian S-filter (ISO 16610-61) with a nesting index of {how.cutoff:.6g} m"
-    return scan.after(heights, said)
+    return scan.after(heights, f"Gaussian S-filter (ISO 16610-61) with a nesting index of {how.cutoff:.6g} m")
 
 
 def bounded(scan: Scan, how: Preparation) -> tuple[Surface, list[str]]:
-    """The surface with edges as its boundary has them, on the grid that is asked for; all steps that led to it."""
-    _require_room_for(how.grid or (2 if how.boundary == MIRROR else 1) * max(scan.heights.shape))
+    """Make the surface with the edges of its boundary, on the grid that is asked for; return it and all steps."""
+    nodes = how.grid or (2 if how.boundary == MIRROR else 1) * max(scan.heights.shape)
+    try:
+        # Heights are copied when they are resampled.
+        require_room(3 * 8 * nodes**2)
+    except TooLarge as error:
+        raise UnfitTopography("grid", f"gives a surface of {nodes} x {nodes} points, which {error}") from None
     heights, side = scan.heights - np.mean(scan.heights), scan.size[0]
-    said = list(scan.steps)
+    steps = list(scan.steps)
     if how.boundary == WINDOW:
         across, along = (_taper(n, how.taper) for n in heights.shape)
         heights = heights * across[:, None] * along
-        said.append(f"heights fall to their mean on {how.taper:g} of the side at every edge")
+        steps.append(f"heights fall to their mean on {how.taper:g} of the side at every edge")
     if how.boundary == MIRROR:
         heights = np.concatenate([heights, heights[:, ::-1]], axis=1)
         heights = np.concatenate([heights, heights[::-1]], axis=0)
         side = 2 * side
-        said.append("joined by its mirror images")
+        steps.append("joined by its mirror images")
     # Only periodic pixels can still be oblong.
     grid = how.grid or max(heights.shape)
     if heights.shape != (grid, grid):
         heights = _resampled(heights, grid, free=how.boundary == FREE)
-        said.append(f"resampled to {grid} x {grid} points")
+        steps.append(f"resampled to {grid} x {grid} points")
     if problem := problem_with_heights(heights):
-        raise UnfitTopography("path", f"holds {problem}; allowed: a rough surface")
+        raise UnfitTopography("path", f"holds {problem}; expected a rough surface")
     free = how.boundary == FREE
-    said.append("one square on a free half-space" if free else f"repeats after {side:.6g} m")
+    steps.append("one square on a free half-space" if free else f"repeats after {side:.6g} m")
     try:
-        return Surface(heights, side, FREE if free else PERIODIC), said
-    except ValueError as error:  # heights out of any range, over the side
+        return Surface(heights, side, FREE if free else PERIODIC), steps
+    except ValueError as error:  # the range of heights over the side is out of bounds
         raise UnfitTopography(
-            "height_unit", f"gives a surface that cannot be pressed ({error}); allowed: another"
+            "height_unit", f"gives a surface that cannot be pressed ({error}); expected another unit"
         ) from None
 
 
-def _require_room_for(grid):
-    """Refuse a grid that takes more memory than a surface from a file may; heights are copied as they are resampled."""
-    try:
-        require_room(3 * 8 * grid**2)
-    except TooLarge as error:
-        raise UnfitTopography("grid", f"gives a surface of {grid} x {grid} points, which {error}") from None
-
-
-def _taper(n, part):
-    """Tukey's window at n points, cell by cell: a cosine's half wave at either edge and one in between."""
+def _taper(n, fraction):
+    """Tukey's window at n points, cell by cell: half a cosine wave at either edge and one in between."""
     x = (np.arange(n) + 0.5) / n
-    edge = np.minimum(np.minimum(x, 1 - x) / part, 1.0)
+    edge = np.minimum(np.minimum(x, 1 - x) / fraction, 1.0)
     return np.sin(0.5 * np.pi * edge) ** 2
 
 
 def _resampled(heights, grid, *, free):
-    """The same heights on grid x grid points: by their Fourier series, or, of a free square, by their cosine series."""
-    # Slow to import, and seldom needed.
+    """Resample to grid x grid points by the Fourier series, or for a free square by the cosine series."""
+    # Slow to import, and rarely needed.
     from scipy.signal import resample
 
     for axis in (0, 1):

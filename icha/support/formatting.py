@@ -19,7 +19,7 @@ _IN_LINES = re.compile(f"[{_CONTROLS}{_UNSEEN}]")
 _IN_A_LINE = re.compile(f"[\t\n{_CONTROLS}{_UNSEEN}]")
 
 
-def counted(number: int, thing: str) -> str:
+def format_count(number: int, thing: str) -> str:
     """`1 run`, `3 runs`."""
     return f"{number} {thing}{'' if number == 1 else 's'}"
 

@@ -12,8 +12,8 @@ from icha.configuration.campaign import Campaign
 from icha.datasets.labels import RunLabels
 from icha.planning.costs import MAP_ARRAYS, RUN_SIZES, job_threads
 from icha.planning.plan import Item, memory_on
-from icha.support import in_words
-from icha.support.in_words import counted
+from icha.support import formatting
+from icha.support.formatting import format_count
 
 TAMAAS = "tamaas"
 # Sections of a campaign that ask for boundary elements at finite ranges.
@@ -104,11 +104,11 @@ def memory_wanting(items: Collection[Item], cores: int, there: float, most: floa
     if needed <= there:
         return None
     said = (
-        f"about {in_words.size(needed)} of memory are needed on {counted(cores, 'core')}, and this machine has "
-        f"{in_words.size(there)}"
+        f"about {formatting.size(needed)} of memory are needed on {format_count(cores, 'core')}, and this machine has "
+        f"{formatting.size(there)}"
     )
     fewer = next((count for count in range(cores - 1, 0, -1) if memory(count) <= there), None)
-    return f"{said}; --cores {fewer} needs {in_words.size(memory(fewer))}" if fewer else said
+    return f"{said}; --cores {fewer} needs {formatting.size(memory(fewer))}" if fewer else said
 
 
 def disk_wanting(items: Collection[Item], results: Path, there: int) -> str | None:
@@ -117,8 +117,8 @@ def disk_wanting(items: Collection[Item], results: Path, there: int) -> str | No
     if needed <= there:
         return None
     return (
-        f"about {in_words.size(needed)} of disk are needed for {results}, and {in_words.size(there)} are free there; "
-        f"make room, or work in another folder: --directory FOLDER"
+        f"about {formatting.size(needed)} of disk are needed for {results}, and {formatting.size(there)} are "
+        f"free there; make room, or work in another folder: --directory FOLDER"
     )
 
 

@@ -9,7 +9,7 @@ from scipy.special import hyp2f1
 
 from icha.asperity.jkr import JKR, wu_gap
 from icha.asperity.material import WU_HOLDS_FROM, Material
-from icha.references.jump_in import displacement_matrix, jump_in_gap, nodes
+from validation.jump_in import displacement_matrix, jump_in_gap, nodes
 
 
 def test_displacement_by_a_smooth_load_is_exact():

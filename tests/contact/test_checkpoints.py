@@ -6,7 +6,7 @@ from xarray.testing import assert_identical
 from icha import Material, Path, SelfAffineSpectrum, simulate
 from icha.boundary_elements import contact
 from icha.boundary_elements.contact import BoundaryElements
-from icha.contact.kept import prepared
+from icha.contact.checkpoints import prepare_checkpoints
 from icha.simulation import ConvergenceError
 
 SURFACE = SelfAffineSpectrum(1e-6, 1e-6, 0.5e-6, 0.8).realise(16, 1).scaled_to_rms_slope(0.3)
@@ -45,19 +45,19 @@ def followed(monkeypatch, case, folder, most):
 def test_a_path_that_was_stopped_goes_on_to_the_same_last_bit(monkeypatch, case, tmp_path):
     whole, needed = followed(monkeypatch, case, None, None)
     assert ("incomplete" in whole.attrs) == (case == "a failure") and needed > 3
-    folder = prepared(tmp_path / "kept", "this path")
+    folder = prepare_checkpoints(tmp_path / "kept", "this path")
     half = needed // 2
     assert followed(monkeypatch, case, folder, half) == (None, half)
     again, further = followed(monkeypatch, case, folder, None)
     assert_identical(again, whole)
     # What was being looked for when it was stopped is looked for again, nothing else.
     assert further == needed - half
-    assert followed(monkeypatch, case, prepared(folder, "this path"), None)[1] == 0
-    assert followed(monkeypatch, case, prepared(folder, "another"), None)[1] == needed
+    assert followed(monkeypatch, case, prepare_checkpoints(folder, "this path"), None)[1] == 0
+    assert followed(monkeypatch, case, prepare_checkpoints(folder, "another"), None)[1] == needed
 
 
 def test_what_was_kept_of_another_path_is_never_taken_for_this_ones(tmp_path, monkeypatch):
-    folder = prepared(tmp_path / "kept", "another path")
+    folder = prepare_checkpoints(tmp_path / "kept", "another path")
     (folder / "00000.npz").write_bytes(b"an equilibrium of the other path")
 
     def refuse(*_, **__):
@@ -66,13 +66,13 @@ def test_what_was_kept_of_another_path_is_never_taken_for_this_ones(tmp_path, mo
     with monkeypatch.context() as patch:
         patch.setattr("os.unlink", refuse)
         with pytest.raises(PermissionError):
-            prepared(folder, "this path")
-    prepared(folder, "this path")
+            prepare_checkpoints(folder, "this path")
+    prepare_checkpoints(folder, "this path")
     assert [file.name for file in folder.iterdir()] == ["of.txt"]
 
 
 def test_what_is_damaged_is_looked_for_again(monkeypatch, tmp_path):
-    folder = prepared(tmp_path / "kept", "this path")
+    folder = prepare_checkpoints(tmp_path / "kept", "this path")
     whole, _ = followed(monkeypatch, "areas", folder, None)
     first, second, *_ = sorted(folder.glob("*.npz"))
     first.write_bytes(first.read_bytes()[:100])
@@ -106,5 +106,5 @@ def test_of_other_programs_nothing_is_found(monkeypatch, tmp_path):
 
 
 def test_asperities_keep_nothing(tmp_path):
-    with pytest.raises(ValueError, match=r"^kept: equilibria of the model asperities cannot be kept"):
+    with pytest.raises(ValueError, match=r"^kept: the model asperities has no checkpoints"):
         simulate(SURFACE, *PATHS["areas"], kept=tmp_path)

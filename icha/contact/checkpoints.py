@@ -1,8 +1,7 @@
-"""A contact whose equilibria are kept as they are found: a path that takes hours can be gone on with.
+"""Checkpoints: save each equilibrium of a contact, so that an interrupted run can resume.
 
-What is kept is what the contact was asked for, in turn, and is named by all that had been asked up to there. So the
-same path, begun again, finds it there as far as it had come, and has the same states to the last bit; another one finds
-what it has in common with it.
+The name of a checkpoint depends on all solves up to it, in order. So a path that is repeated finds its equilibria up to
+where it was interrupted, with the same states to the last bit. Another path finds those that both have in common.
 """
 
 from __future__ import annotations
@@ -21,16 +20,21 @@ from icha.contact.model import ContactModel, Control, FullContact, NotConverged,
 from icha.support.atomic_files import whole_file
 
 _FAILURES = {kind.__name__: kind for kind in (NotConverged, FullContact)}
-# What the kept equilibria are of.
+# File that names the contact of the checkpoints of a folder.
 _OF = "of.txt"
 
 
 @dataclass(frozen=True, eq=False)
-class Kept(Generic[S]):
-    """A `ContactModel` that looks for an equilibrium only if its folder does not have it yet.
+class CheckpointedContact(Generic[S]):
+    """Contact model that solves for an equilibrium only if there is no checkpoint of it.
 
-    contact : the model. of : what tells it apart from all others of its kind. folder : of equilibria, one file each.
-    packed : arrays, by name, that a state that followed from another one is made of. unpacked : that state from these.
+    Attributes
+    ----------
+    contact : contact model.
+    of : text that identifies the contact.
+    folder : folder of the checkpoints, one file each.
+    packed : function that returns the arrays, by name, of a new state and of the state before it.
+    unpacked : function that restores the new state from these arrays and the state before it.
     """
 
     contact: ContactModel[S]
@@ -38,13 +42,13 @@ class Kept(Generic[S]):
     folder: Path
     packed: Callable[[S, S], dict[str, np.ndarray]]
     unpacked: Callable[[dict[str, np.ndarray], S], S]
-    _asked: Any = field(default_factory=hashlib.sha256)
+    _solves: Any = field(default_factory=hashlib.sha256)
 
     def equilibrium(self, state: S, separation: float, control: Control | None = None, *, let_go: int = 0) -> S:
-        """As of the contact."""
-        held = control and (control.quantity, float(control.target))
-        self._asked.update(repr((float(separation), held, let_go)).encode())
-        file = self.folder / f"{self.of}-{self._asked.hexdigest()[:32]}.npz"
+        """Load the equilibrium from its checkpoint, or find it as the contact does and save it."""
+        target = control and (control.quantity, float(control.target))
+        self._solves.update(repr((float(separation), target, let_go)).encode())
+        file = self.folder / f"{self.of}-{self._solves.hexdigest()[:32]}.npz"
         found = _read(file)
         if found is not None:
             if "failure" in found:
@@ -59,19 +63,19 @@ class Kept(Generic[S]):
         return new
 
     def __getattr__(self, name: str) -> Any:
-        """All else is the contact's."""
+        """Return any other attribute of the contact."""
         return getattr(self.contact, name)
 
 
-def prepared(folder: Path, of: str) -> Path:
-    """The folder, with nothing in it that was kept of something else.
+def prepare_checkpoints(folder: Path, of: str) -> Path:
+    """Remove the checkpoints of other contacts from a folder, and return the folder.
 
-    of : what tells the surface, the material, the path and the code apart from all others.
+    of : text that identifies surface, material, path and code.
 
     Raises
     ------
     OSError
-        If what was kept of something else cannot be removed, or nothing can be written there.
+        If other checkpoints cannot be removed, or the folder is not writable.
     """
     written = folder / _OF
     if not written.exists() or written.read_text(encoding="utf-8", errors="replace") != of:
@@ -83,7 +87,7 @@ def prepared(folder: Path, of: str) -> Path:
 
 
 def _read(file):
-    """The arrays of a file; None without one, or of one that is damaged, whose equilibrium is looked for again."""
+    """Return the arrays of a file; None if it does not exist or is damaged, so that the contact solves again."""
     try:
         with np.load(file) as arrays:
             return dict(arrays)

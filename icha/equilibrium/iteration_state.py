@@ -1,0 +1,111 @@
+"""State of the search for an equilibrium: the sites, what is known of the asperities, and the events so far."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from icha.contact.model import JUMP_IN, SPLIT, Events
+from icha.equilibrium.sites import CONTACT, ContactState, Problem, Sites
+
+
+@dataclass(frozen=True, eq=False)
+class IterationState:
+    """State of the search between two equilibria; immutable: events and Newton steps lead from one to the next.
+
+    Attributes
+    ----------
+    problem : contact problem.
+    start : equilibrium from which the search starts.
+    unloading : whether the surfaces move apart.
+    sites : table of sites.
+    site_of_asperity, last_approach, last_separation, pending : as in `ContactState`.
+    released_from : (asperities,) int, union that an asperity has just been released from; -1 for others.
+    was_released : (asperities,) bool, whether it has been released from a union during this search.
+    barred : (asperities,) bool, whether it has broken contact during this search and may not make it again.
+    new_unions : indices of the unions whose heights follow from the next evaluation of the equations.
+    log : events so far, as rows of kind, position, members, energy and asperity.
+    """
+
+    problem: Problem
+    start: ContactState
+    unloading: bool
+    sites: Sites
+    site_of_asperity: np.ndarray
+    last_approach: np.ndarray
+    last_separation: np.ndarray
+    released_from: np.ndarray
+    was_released: np.ndarray
+    barred: np.ndarray
+    new_unions: np.ndarray
+    pending: int = 0
+    log: tuple = ()
+
+    @classmethod
+    def towards(cls, problem: Problem, state: ContactState, separation: float) -> IterationState:
+        """Start from an equilibrium towards another separation, m; approaches are extrapolated by their responses."""
+        count, before = len(problem.asperities), state.sites
+        sites = replace(
+            before,
+            approach=before.approach + before.response * (separation - state.separation),
+            was_in_contact=before.status == CONTACT,
+        )
+        sites, index = sites.compact()
+        return cls(
+            problem=problem,
+            start=state,
+            unloading=separation > state.separation,
+            sites=sites,
+            # -1 takes the last entry.
+            site_of_asperity=state.site_of_asperity if index is None else index[state.site_of_asperity],
+            last_approach=state.last_approach,
+            last_separation=state.last_separation,
+            released_from=np.full(count, -1),
+            was_released=np.zeros(count, dtype=bool),
+            barred=np.zeros(count, dtype=bool),
+            new_unions=np.empty(0, dtype=int),
+        )
+
+    @property
+    def free(self) -> np.ndarray:
+        """Whether an asperity is neither a site nor merged into one, (asperities,) bool."""
+        free = self.site_of_asperity < 0
+        single = (self.sites.asperity >= 0) & self.sites.present
+        free[self.sites.asperity[single]] = False
+        return free
+
+    @property
+    def splits(self) -> int:
+        """Number of splits along the path so far."""
+        return self.start.splits + sum(row[0] == SPLIT for row in self.log)
+
+    @property
+    def jumped_in(self) -> list[int]:
+        """Indices of the asperities that have jumped into contact during this search."""
+        return [row[4] for row in self.log if row[0] == JUMP_IN]
+
+    def with_approach(self, approach) -> IterationState:
+        """Return the state with the sites at these approaches (n,), m."""
+        return replace(self, sites=replace(self.sites, approach=approach))
+
+    def with_events(self, kind, position, members, energy=0.0, asperity=-1) -> IterationState:
+        """Return the state with k more events of one kind in its log.
+
+        position : (k, 2), m; all others: (k,) or one value for all events.
+        """
+        columns = (np.broadcast_to(each, len(position)) for each in (members, energy, asperity))
+        rows = ((kind, *row) for row in zip(position, *columns, strict=True))
+        return replace(self, log=(*self.log, *rows))
+
+    def without_jumps_in(self, asperity) -> IterationState:
+        """Return the state without the jumps into contact of some asperities in its log."""
+        dropped = set(asperity.tolist())
+        return replace(self, log=tuple(row for row in self.log if row[0] != JUMP_IN or row[4] not in dropped))
+
+    def events(self) -> Events:
+        """Return the events so far."""
+        if not self.log:
+            return Events.concatenate(())
+        kind, position, members, energy, _ = zip(*self.log, strict=True)
+        return Events(np.array(kind, np.int8), np.array(position), np.array(members, int), np.array(energy, float))

@@ -1,0 +1,117 @@
+"""Rows and columns of a table that hold coordinates, or numbers of points, in place of heights.
+
+Heights of a rough surface do not rise in equal steps along a line, unless all of them do.
+"""
+
+import numpy as np
+
+from icha.surfaces.measured.settings import UnfitTopography
+
+# Largest difference of two steps of a scale, as a fraction of a step, where digits do not limit it.
+_EQUAL_STEPS = 1e-2
+# Smallest length of a scale in units of its last digit.
+_FEWEST_UNITS = 4
+# A line of heights resembles the next one if the two differ by less than `_DIFFERENCE` times the difference of the next
+# two, and if either the fraction `_SAME_SIGN` of its steps has the same sign, or those two differ by less than
+# `_SMOOTH` times their heights.
+_DIFFERENCE, _SAME_SIGN, _SMOOTH = 3, 0.8, 0.2
+# Fewest numbers of a line that can be a scale.
+_SHORTEST_SCALE = 8
+
+
+def drop_coordinates(values: np.ndarray) -> tuple[np.ndarray, tuple[float, float] | None, str]:
+    """Remove a first row and a first column that number or measure the others.
+
+    Returns
+    -------
+    heights, steps of the coordinates along x and y (None unless both are given), and a remark on what was removed.
+
+    Raises
+    ------
+    UnfitTopography
+        If a first row or column seems to hold coordinates in unequal steps, or a last one numbers the others.
+    """
+    heights, steps = values, {}
+    for name in ("row", "column"):
+        table = heights if name == "row" else heights.T
+        step = _coordinate_step(table)
+        if step is None:
+            continue
+        if np.isnan(step):
+            raise UnfitTopography(
+                "path",
+                f"has a first {name} whose numbers rise or fall in unequal steps, as coordinates do; "
+                f"expected heights in equal distances. Remove the {name}, or interpolate the heights; if these numbers "
+                "are heights, give all of them as .npy",
+            )
+        steps[name] = step
+        heights = table[1:] if name == "row" else table[1:].T
+    for name, table in (("row", heights[::-1]), ("column", heights.T[::-1])):
+        step = _coordinate_step(table)
+        if step is not None and not np.isnan(step):
+            raise UnfitTopography(
+                "path",
+                f"has numbers in equal steps in its last {name}; expected heights. Remove the {name}",
+            )
+    remark = f"first {' and '.join(steps)} left out: numbers in equal steps, not heights" if steps else ""
+    return heights, (steps["row"], steps["column"]) if len(steps) == 2 else None, remark
+
+
+def is_scale(numbers: list[float | None]) -> bool:
+    """Tell whether numbers rise or fall in equal steps, but for the first, which may stand in a corner."""
+    return len(numbers) >= _SHORTEST_SCALE and None not in numbers and _equal_step(np.array(numbers)) is not None
+
+
+def _coordinate_step(table):
+    """Step of coordinates in the first line of a table, nan if it varies; None if the line holds heights."""
+    line, others = table[0], table[1:3]
+    if len(table) < 3 or len(line) < _SHORTEST_SCALE or any(_equal_step(each) is not None for each in others):
+        return None
+    step = _equal_step(line, rounded=False)
+    if step is None and not _resembles(line[1:], others[:, 1:]):
+        step = _equal_step(line)
+        differences = np.diff(line[1:])
+        if step is None and (np.all(differences > 0) or np.all(differences < 0)):
+            step = np.nan
+    return None if step is None else abs(step)
+
+
+def _resembles(line, others):
+    """Tell whether a line can be the neighbour of two other lines of heights."""
+    known = np.isfinite(line) & np.all(np.isfinite(others), axis=0)
+    if np.count_nonzero(known) < 3:
+        return False
+    line, others = line[known], others[:, known]
+    same = np.mean(np.sign(np.diff(line)) == np.sign(np.diff(others[0])))
+    usual = np.std(others[0] - others[1])
+    smooth = usual <= _SMOOTH * np.std(others[0])
+    return (same >= _SAME_SIGN or smooth) and np.std(line - others[0]) <= _DIFFERENCE * usual
+
+
+def _equal_step(line: np.ndarray, *, rounded: bool = True) -> float | None:
+    """Step of a line of equal steps, whose first number may be anything; None if the steps are not equal.
+
+    rounded : whether the steps may differ by the last digit that is written.
+    """
+    for numbers in (line, line[1:]):
+        steps = np.diff(numbers)
+        if not len(steps) or not np.all(np.isfinite(steps)):
+            continue
+        mean = float(numbers[-1] - numbers[0]) / len(steps)
+        if mean and np.ptp(steps) <= _EQUAL_STEPS * abs(mean):
+            return mean
+        if not rounded:
+            continue
+        # Rounding shifts every number, and the ends, by half a unit of the last digit.
+        unit = _last_digit(numbers)
+        error = np.max(np.abs(numbers - numbers[0] - mean * np.arange(len(numbers))))
+        if np.all(steps * mean >= 0) and error <= 1.001 * unit and np.ptp(numbers) >= _FEWEST_UNITS * unit:
+            return mean
+    return None
+
+
+def _last_digit(numbers):
+    """Unit of the last digit of the largest number, as far as the numbers show it."""
+    largest = np.max(np.abs(numbers))
+    digits = max(len(f"{abs(number):.14e}".partition("e")[0].replace(".", "").rstrip("0")) for number in numbers)
+    return 10.0 ** (np.floor(np.log10(largest)) + 1 - digits) if largest else 0.0

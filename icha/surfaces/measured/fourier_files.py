@@ -1,0 +1,98 @@
+"""Text files with the waves of a Fourier series: qx qy Re Im in every line."""
+
+import math
+
+import numpy as np
+import scipy.fft
+
+from icha.support.input_files import require_room
+from icha.support.rules import GRID
+from icha.surfaces.measured.settings import Found, Preparation, UnfitTopography
+from icha.surfaces.measured.text_tables import SourceFile
+
+# The spectrum, its conjugate, their difference, the heights, and the masks of waves.
+_BYTES_OF_NODE = 64
+# Largest difference of conjugate amplitudes, relative to the largest amplitude.
+_CONJUGATE = 1e-4
+
+
+def looks_like_fourier(values: np.ndarray) -> bool:
+    """Tell whether lines of four numbers can be wave vectors and amplitudes.
+
+    Some wave numbers are negative, unless the waves are few, which fill no grid of coordinates. Where two wave vectors
+    are opposite, their amplitudes must be conjugate; heights of opposite points are not.
+    """
+    waves, modes = values[:, :2], values[:, 2] + 1j * values[:, 3]
+    if not np.all(np.isfinite(values)):
+        return False
+    if np.all(waves >= 0):
+        return 2 * len(waves) < len(np.unique(waves[:, 0])) * len(np.unique(waves[:, 1])) or len(waves) < 16
+    amplitudes = {tuple(wave): mode for wave, mode in zip(waves.tolist(), modes.tolist(), strict=True)}
+    opposite = [(mode, amplitudes[-x, -y]) for (x, y), mode in amplitudes.items() if (-x, -y) in amplitudes]
+    differences = [abs(mode - other.conjugate()) for mode, other in opposite]
+    return max(differences, default=0.0) <= _CONJUGATE * np.max(np.abs(modes), initial=1e-300)
+
+
+def read_fourier(file: SourceFile, how: Preparation) -> Found:
+    """Sum h = sum h_q exp(i q.r) over all waves; opposite ones that are left out are the conjugates."""
+    table = file.values
+    if table.shape[1] != 4:
+        raise ValueError(f"{table.shape[1]} numbers in a line, not qx qy Re Im")
+    k = _wave_numbers(table[:, :2], how)
+    period = 2 * np.pi * np.max(np.abs(k)) / np.max(np.abs(table[:, :2]))
+    modes = table[:, 2] + 1j * table[:, 3]
+    if not np.all(np.isfinite(modes)):
+        raise ValueError("some amplitudes are not finite")
+    if len(np.unique(k, axis=0)) < len(k):
+        raise ValueError("a wave vector is given twice")
+    highest = int(np.max(np.abs(k)))
+    n = how.grid or 2 ** math.ceil(math.log2(max(4 * highest, 8)))
+    if 2 * highest >= n:
+        raise UnfitTopography(
+            "grid",
+            f"is too coarse for waves {highest} times as short as the period; expected at least {2 * highest + 2}, "
+            f"better {4 * highest} or more",
+        )
+    require_room(_BYTES_OF_NODE * n**2)
+    spectrum, present = np.zeros((n, n), dtype=complex), np.zeros((n, n), dtype=bool)
+    spectrum[k[:, 1], k[:, 0]] = modes
+    present[k[:, 1], k[:, 0]] = True
+    opposite = np.ix_(-np.arange(n) % n, -np.arange(n) % n)
+    conjugate, opposite_present = np.conj(spectrum[opposite]), present[opposite]
+    differences = np.abs(spectrum - conjugate)[present & opposite_present]
+    if np.max(differences, initial=0.0) > _CONJUGATE * np.max(np.abs(modes)):
+        raise ValueError("opposite wave vectors have amplitudes that are not conjugate: the heights would be complex")
+    spectrum = np.where(opposite_present & ~present, conjugate, spectrum)
+    heights = scipy.fft.ifft2(spectrum, norm="forward", workers=1).real
+    return Found(heights, coordinates=(period, period), data_known=False)
+
+
+def _wave_numbers(q, how):
+    """Wave vectors (n, 2) as multiples of 2 pi over the period: as they are written if they are integers."""
+    largest = np.max(np.abs(q))
+    if not largest > 0 or not np.all(np.isfinite(q)):
+        raise ValueError("no wave vectors, or some that are not finite")
+    if how.size is not None and how.size[0] != how.size[1]:
+        raise UnfitTopography("size", "has two sides that differ, for a Fourier series; expected one length")
+    if np.all(q == np.rint(q)):
+        _require_few(largest)
+        if how.size is None:
+            raise UnfitTopography(
+                "size",
+                "is missing, and the wave vectors are integers, multiples of 2 pi/L; expected L, such as '0.1 mm'",
+            )
+        return q.astype(int)
+    unit = np.min(np.abs(q)[np.abs(q) > 1e-9 * largest])
+    highest = np.max(np.abs(np.rint(q / unit)))
+    # The longest wave fixes the unit only to the digits that it is written with; the shortest one is more accurate.
+    k = np.rint(q * (highest / largest))
+    if np.max(np.abs(q * (np.max(np.abs(k)) / largest) - k)) > 0.01:
+        raise ValueError("the wave vectors are no multiples of the smallest one")
+    _require_few(np.max(np.abs(k)))
+    return k.astype(int)
+
+
+def _require_few(highest):
+    """Raise ValueError for waves that no grid resolves."""
+    if highest > GRID.most / 2:
+        raise ValueError(f"waves {highest:g} times as short as the period, but a grid has at most {GRID.most} nodes")

@@ -1,0 +1,148 @@
+"""Lines of text files: encoding and compression, remarks, the fields of a line, and the number in each field."""
+
+import csv
+import gzip
+import re
+import zlib
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TextIO
+
+import numpy as np
+
+# Words, in small letters, that stand for a missing height.
+_MISSING = frozenset(
+    "- -- --- * ** *** **** ? nan na n/a #n/a #na bad none null nil nodata no_data missing masked invalid void "
+    "undefined undef #value! #num! #div/0! #null! #ref!".split()
+) | {"", "no data"}
+_NO_DATA = re.compile(r"\bno data\b", re.IGNORECASE)
+# Windows writes nan as 1.#IND and 1.#QNAN.
+_REMARK = re.compile(r"(?<!1\.)#(?!N/A|NA\b|VALUE!|NUM!|DIV/0!|NULL!|REF!)", re.IGNORECASE)
+_NAN = re.compile(r"[-+]?(1\.#(ind|qnan|snan)\d*|nan\(.*\))|\*+", re.IGNORECASE)
+_FORTRAN = re.compile(r"([\d.])[dD]([-+]?\d+)$")
+_DECIMAL_COMMA = re.compile(r"[-+]?\d+,\d+([eE][-+]?\d+)?$")
+# A number with three digits after its comma, which may be decimal or separate thousands.
+AMBIGUOUS_COMMA = re.compile(r"[-+]?[1-9]\d{0,2},\d{3}")
+_QUOTED = re.compile(r"\"[^\"]*\"")
+# The beginning of a number, whatever separates its thousands.
+LIKE_A_NUMBER = re.compile(r"[-+−]?\d[\d.,' ]*$")
+# Exceptions that libraries raise for a damaged compressed file.
+DAMAGED = (EOFError, zlib.error, gzip.BadGzipFile)
+
+
+def open_text(path: Path) -> TextIO:
+    """Open a text file, which may be compressed by gzip, in its encoding."""
+    with path.open("rb") as file:
+        compressed = file.read(2) == b"\x1f\x8b"
+    opener = gzip.open if compressed else open
+    with opener(path, "rb") as file:
+        start = file.read(2**12)
+    return opener(path, "rt", encoding=_guess_encoding(start), errors="replace")
+
+
+def _guess_encoding(start: bytes) -> str:
+    """Guess the encoding: UTF by its mark or its zeros, else UTF-8, else that of Windows."""
+    if start.startswith((b"\xff\xfe\0\0", b"\0\0\xfe\xff")):
+        return "utf-32"
+    if start.startswith((b"\xff\xfe", b"\xfe\xff")):
+        return "utf-16"
+    for zeros, others, encoding in ((start[1::2], start[::2], "utf-16-le"), (start[::2], start[1::2], "utf-16-be")):
+        if zeros and not any(zeros) and all(byte in b"\t\r\n" or 32 <= byte < 127 for byte in others):
+            return encoding
+    try:
+        # The last line may end within a character.
+        start[: start.rfind(b"\n") + 1].decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return "cp1252"
+    return "utf-8-sig"
+
+
+def strip_remark(line: str) -> str:
+    """Return a line up to its remark (#), without blanks around it; tabs may stand for empty fields."""
+    text = _REMARK.split(line, maxsplit=1)[0] if "#" in line else line
+    return "" if text.isspace() else text.strip(" \r\n\x1a")
+
+
+@dataclass(frozen=True)
+class Notation:
+    """How the numbers of a line are written.
+
+    Attributes
+    ----------
+    delimiter : "\\t", ";", "," or None for blanks.
+    decimal_comma : whether numbers have decimal commas.
+    """
+
+    delimiter: str | None
+    decimal_comma: bool = False
+
+    @classmethod
+    def of_line(cls, text: str) -> "Notation":
+        """Guess the notation of a single line."""
+        unquoted = _QUOTED.sub("q", text).strip()
+        notation = cls(next((each for each in "\t;," if each in unquoted), None))
+        return cls(notation.delimiter, has_decimal_commas(notation.fields(text)))
+
+    def fields(self, text: str) -> list[str]:
+        """Split a line into its fields, without blanks and quotes around them."""
+        if self.delimiter is None:
+            fields = _NO_DATA.sub("nan", text).split()
+        elif '"' in text:
+            fields = next(csv.reader([text], delimiter=self.delimiter, skipinitialspace=True))
+        else:
+            fields = text.split(self.delimiter)
+        return [field.strip().strip("\"'").strip() for field in fields]
+
+    def number(self, field: str) -> float | None:
+        """Return the number in a field, nan for a missing one; None if the field is no number."""
+        if field.lower() in _MISSING or _NAN.fullmatch(field):
+            return np.nan
+        if "_" in field:
+            return None
+        if self.decimal_comma:
+            field = field.replace(",", ".")
+        try:
+            return float(_FORTRAN.sub(r"\1e\2", field.replace("−", "-")))
+        except ValueError:
+            return None
+
+    def wrong_fields(self, fields: Iterable[str]) -> list[int]:
+        """Return the indices of the fields that are no numbers."""
+        return [k for k, field in enumerate(fields) if self.number(field) is None]
+
+
+def has_decimal_commas(fields: Iterable[str]) -> bool:
+    """Tell whether some fields have decimal commas and none has a decimal point."""
+    return any(map(_DECIMAL_COMMA.match, fields)) and not any("." in field for field in fields)
+
+
+def are_decimal_between_blanks(text: str) -> bool:
+    """Tell whether a line has several numbers with decimal commas, separated by blanks or by commas and blanks."""
+    fields = re.split(r",?\s+", text.strip())
+    return len(fields) > 1 and all(map(_DECIMAL_COMMA.match, fields))
+
+
+def are_halves_of_decimals(rows: list[list[str]]) -> bool:
+    """Tell whether the columns are in turn the digits before and after decimal commas.
+
+    The digits after a comma have no sign, and each column has one number of them. They differ from integers if some of
+    them begin with a zero, or if the columns before have other numbers of digits.
+    """
+    # A row whose last field is empty is shorter.
+    width = max(map(len, rows))
+    rows = [row for row in rows if len(row) == width]
+    if width < 6 or width % 2:
+        return False
+    columns = list(zip(*rows, strict=True))
+    evidence = False
+    for k, (before, after) in enumerate(zip(columns[::2], columns[1::2], strict=True)):
+        digits = len(after[0])
+        if not all(field.isdecimal() and len(field) == digits for field in after):
+            return False
+        if not all(re.fullmatch(r"[-+]?\d+", field) for field in before):
+            return False
+        evidence |= digits > 1 and any(field[0] == "0" for field in after)
+        # The first column may number the rows.
+        evidence |= k > 0 and any(len(field) != digits for field in before)
+    return evidence
