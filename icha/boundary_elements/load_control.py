@@ -10,7 +10,7 @@ import numpy as np
 from icha.boundary_elements.front_solver import TOLERANCES
 from icha.boundary_elements.patches import CellState
 from icha.contact.model import AREA_FRACTION, PRESSURE, ContactModel, Control, Events, NotConverged
-from icha.contact.models import HELD_CELLS, HELD_PART
+from icha.contact.models import AREA_TOLERANCE_CELLS, AREA_TOLERANCE_PART
 
 # Relative error of a load or area that is met: below that at which a path recognises a stop, 1e-9.
 _MET = 5e-10
@@ -61,8 +61,8 @@ class ControlProblem:
     def tolerance(self, scale: float) -> float:
         """Largest error of a value that meets the target."""
         if self.control.quantity == AREA_FRACTION and not self.contact.adhesive:
-            cells = HELD_CELLS * self.contact.spacing**2 / self.contact.area
-            return max(_MET * scale, min(cells, HELD_PART * scale))
+            cells = AREA_TOLERANCE_CELLS * self.contact.spacing**2 / self.contact.area
+            return max(_MET * scale, min(cells, AREA_TOLERANCE_PART * scale))
         return _MET * scale
 
     def newton_separation(self, state: CellState, before: CellState | None = None) -> float:

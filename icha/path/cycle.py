@@ -236,7 +236,7 @@ class _Cycle:
             else:
                 if step.has_jump:
                     self.event_at = min(self.event_at, self.direction * state.separation)
-                    self.event_width = 0.5 * width * min(1.0, self._unknown_work(step) / step.unresolved)
+                    self.event_width = 0.5 * width * min(1.0, self._unknown_work(step) / (step.unresolved or np.inf))
                 else:
                     self.smooth_length = min(self.smooth_length, 0.5 * width)
                 width *= 0.5
