@@ -412,7 +412,7 @@ class LinearisedFront:
 def gmres(matrix: Callable, preconditioner: Callable, right: np.ndarray, accuracy: float) -> np.ndarray:
     """Solve linear equations by right-preconditioned GMRES without restart, to a relative accuracy or _MAX_KRYLOV."""
     norm = float(np.linalg.norm(right))
-    if not norm > 0:
+    if norm == 0:
         return np.zeros_like(right)
     basis, triangle = np.zeros((_MAX_KRYLOV + 1, len(right)), right.dtype), np.zeros((_MAX_KRYLOV, _MAX_KRYLOV))
     basis[0] = right / norm

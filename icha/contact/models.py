@@ -155,7 +155,7 @@ MODELS = {
         periodic_only=True,
         least_cells=4,
         # Fronts that hop from cell to cell lose energy that only a finer grid would resolve.
-        accuracy=PathAccuracy(event=1e-5, loss=1e-4, balance=1e-5, tension=1e-5, predicts_steps=True),
+        accuracy=PathAccuracy(event=1e-5, loss=1e-5, tension=1e-5, predicts_steps=True),
         resumable=True,
     ),
 }
