@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from icha.boundary_elements.cells import mask_of
-from icha.boundary_elements.elastic_contact import AdhesiveContact, Contact, Topography, solve_adhesive_fractions
+from icha.boundary_elements.elastic_contact import AdhesiveContact, Contact, Topography
 from icha.boundary_elements.front import Front
 from icha.boundary_elements.front_solver import FrontProblem, relax_front
 from icha.boundary_elements.half_space import HalfSpace
@@ -134,11 +134,16 @@ def solve_adhesive_contact(
             if rounds > _MAX_ROUNDS:
                 raise NotConverged(f"no equilibrium after {_MAX_ROUNDS} rounds of new contacts")
             tried[new] = True
-            closed = contact.with_closed(formed)
-            relaxed = relax_in_windows(space, front, separation, closed, contact.gap, formed)
-            if relaxed is None:
-                contact = closed
+            contact, relaxed = _form_contact(problem, contact, formed)
+            if not relaxed:
                 break
-            accuracy = _ROUND_ACCURACY * front.critical_opening
-            contact = solve_adhesive_fractions(space, topography, separation, relaxed, accuracy)
             formed, new, _ = summits.new_contact(contact, margin, tried)
+
+
+def _form_contact(problem, contact, formed):
+    """Close cells (m,), and relax the fronts around them in windows; returns the contact, and whether this pays."""
+    closed = contact.with_closed(formed)
+    relaxed = relax_in_windows(problem.space, problem.front, problem.separation, closed, contact.gap, formed)
+    if relaxed is None:
+        return closed, False
+    return problem.solve_elastic(relaxed, _ROUND_ACCURACY), True

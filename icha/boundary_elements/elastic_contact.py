@@ -158,9 +158,8 @@ def solve_active_set(
         left = np.abs(misfit).max(initial=0.0)
         joining = _overlapping_cells(gap, contact.cells, max(tolerance, left))
         least = left if dtype is float and not sticky else 0.0
-        closing = (contact.pressure > 0) & (contact.fraction < 1)
-        staying = keep | (contact.pressure >= least)
-        if not closing.any() and staying.all() and not len(joining):
+        changed = _next_active_set(contact, keep, joining, least)
+        if changed is None:
             if left <= tolerance:
                 return ElasticContact(*_arrays(contact), gap, separation, misfit, tolerance)
             if not left <= LEAST_GAIN * before:
@@ -168,20 +167,32 @@ def solve_active_set(
             before, changing = left, False
             continue
         before, changing = np.inf, True
-        fraction = np.where(closing, 1.0, contact.fraction)
-        cells, *values, keep = merge_cells(
-            contact.cells[staying],
-            joining,
-            (fraction[staying], 1.0),
-            (contact.pressure[staying], 0.0),
-            (keep[staying], False),
-        )
-        contact = Contact(cells, *values)
-        if staying.all() and load is None:
-            misfit = -gap.ravel()[cells] - contact.bond_compliance * contact.pressure
+        if len(changed[0].cells) == len(contact.cells) + len(joining) and load is None:
+            contact, keep = changed
+            misfit = -gap.ravel()[contact.cells] - contact.bond_compliance * contact.pressure
         else:
-            gap = None
+            (contact, keep), gap = changed, None
     raise NotConverged("the active set of the contact did not converge")
+
+
+def _next_active_set(contact, keep, joining, least):
+    """Contact after partial cells under pressure closed, cells in tension left, and others (m,) joined.
+
+    keep : (k,) bool, cells that do not leave. least : smallest pressure of the others. None if nothing changes.
+    """
+    closing = (contact.pressure > 0) & (contact.fraction < 1)
+    staying = keep | (contact.pressure >= least)
+    if not closing.any() and staying.all() and not len(joining):
+        return None
+    fraction = np.where(closing, 1.0, contact.fraction)
+    cells, *values, keep = merge_cells(
+        contact.cells[staying],
+        joining,
+        (fraction[staying], 1.0),
+        (contact.pressure[staying], 0.0),
+        (keep[staying], False),
+    )
+    return Contact(cells, *values), keep
 
 
 def _arrays(contact):
