@@ -1,14 +1,14 @@
-# ICHA: adhesive rough contact by interacting and coalescing asperities.
-# One configuration file is one campaign: config/config.yaml, or that of --configfile. See config/README.md.
+# ICHA: adhesive rough contact with interacting and coalescing asperities.
+# One configuration file is one campaign: config/config.yaml, or the file of --configfile. See config/README.md.
 
 import os
 import sys
 
-# Files that lie here or in the working directory go after all else of their names, unless PYTHONPATH asks for them.
+# Files in this folder or in the working directory must not replace modules, unless PYTHONPATH names these folders.
 ROOT = str(workflow.current_basedir)
-HERE = {os.path.realpath(ROOT), os.path.realpath("")}
-ASKED = os.environ.get("PYTHONPATH", "").split(os.pathsep)
-sys.path.sort(key=lambda folder: os.path.realpath(folder) in HERE and folder not in filter(None, ASKED))
+LOCAL_FOLDERS = {os.path.realpath(ROOT), os.path.realpath("")}
+REQUESTED = os.environ.get("PYTHONPATH", "").split(os.pathsep)
+sys.path.sort(key=lambda folder: os.path.realpath(folder) in LOCAL_FOLDERS and folder not in filter(None, REQUESTED))
 
 from snakemake.settings.types import DeploymentMethod
 from snakemake.utils import min_version
@@ -32,10 +32,10 @@ before_jobs.prepare_process()
 
 if workflow.is_main_process:
     before_jobs.end_with_caller()
-    here = before_jobs.Campaign(
+    campaign = before_jobs.Campaign(
         RESULTS, CAMPAIGN.name, CONFIGURATION.origin, ROOT, dry_run=workflow.output_settings.dryrun
     )
-    here.have_stale_made_again([FILES.configuration, *COPIED, *FILES.computed, FILES.run_times], workflow.rules)
+    campaign.have_stale_made_again([FILES.configuration, *COPIED, *FILES.computed, FILES.run_times], workflow.rules)
 else:
     before_jobs.refuse_superseded()
 
@@ -43,19 +43,19 @@ else:
 onstart:
     before_jobs.start_jobs_freely(workflow)
     installs = DeploymentMethod.CONDA in workflow.deployment_settings.deployment_method
-    here.begin(None if installs else missing_software(CAMPAIGN))
+    campaign.begin(None if installs else missing_software(CAMPAIGN))
 
 
-# Of jobs that were killed while this call went on: the next one may have nothing to do.
+# Temporary files of jobs that were killed during this call; the next call may have no jobs.
 onsuccess:
-    here.remove_left_over()
+    campaign.remove_left_over()
 
 
 onerror:
-    here.remove_left_over()
+    campaign.remove_left_over()
 
 
-# On a cluster these are run where Snakemake runs, and not submitted: targets, and what is soon done.
+# On a cluster, these short jobs and targets run beside Snakemake and are not submitted.
 localrules:
     all,
     surfaces,
@@ -76,7 +76,7 @@ localrules:
     deposit,
 
 
-# What is lost or set aside is made again when it is asked for: a target asks for all that it is made of.
+# Targets name all results that they depend on, so that lost and renamed ones are computed again.
 rule all:
     default_target: True
     input:

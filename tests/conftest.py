@@ -99,7 +99,7 @@ def _call(project, arguments, environment, said):
         main(arguments[1:])
     finally:
         if "fingerprint" in sys.modules:
-            sys.modules["fingerprint"].keep()  # no handlers of `atexit` run in a fork
+            sys.modules["fingerprint"].save_cache()  # no handlers of `atexit` run in a fork
 
 
 def smoke_at_finite_ranges():

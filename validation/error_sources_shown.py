@@ -22,11 +22,11 @@ from icha.figures.style import (
     SKY,
     TWO_COLUMNS,
     VERMILLION,
+    in_style,
     logarithmic_axes,
     new_figure,
     panel_label,
     save,
-    styled,
 )
 from validation.error_sources import effects, relative_radius, shape_ratio, shape_ratio_of_fourth_order
 from validation.spot_by_spot import CATEGORIES
@@ -122,7 +122,7 @@ _APART = 1.06
 _HIGHEST_RATIO = 3.0
 
 
-@styled
+@in_style
 def figure(error_sources: Sequence[xr.Dataset]) -> Figure:
     """Draw datasets without adhesion at the same loads, of surfaces that differ in their seeds only."""
     fig = new_figure(TWO_COLUMNS, 5.7)

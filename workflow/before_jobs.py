@@ -1,4 +1,4 @@
-"""What is done before Snakemake decides on its jobs, and before it starts them."""
+"""Preparations before Snakemake plans its jobs, and before it starts them."""
 
 import atexit
 import contextlib
@@ -21,27 +21,29 @@ from icha.support import checksums
 from icha.support.atomic_files import Superseded, is_left_over, take_over, while_owned, why_not_writable
 from icha.support.program import beginning_of, end_with_parent
 
+ANOTHER_FOLDER = "use another folder: `icha run --directory FOLDER`, `snakemake --directory FOLDER`"
+
 
 def prepare_process() -> None:
     """Set what jobs inherit from this process."""
     if sys.platform == "linux":
-        # Jobs end with the process that wants them: see workflow/scripts/job.py.
+        # Jobs end with this process: see workflow/scripts/job.py.
         os.environ["ICHA_SNAKEMAKE"] = f"{os.getpid()} {beginning_of(os.getpid())}"
-    # No Python that is started from here takes a file of the working directory for the module of its name.
+    # A file in the working directory must not replace a module of the same name.
     os.environ["PYTHONSAFEPATH"] = "1"
-    # Snakemake puts the path of Python into commands of a shell as it stands.
+    # Snakemake inserts the path of Python into shell commands without quotes.
     multiprocessing.set_executable(sys.executable)
     sys.executable = shlex.quote(sys.executable)
 
 
 def end_with_caller() -> None:
-    """End with the `icha run` that has called, however that ends: nobody else would know that this goes on."""
+    """End with the `icha run` that started this process, even if it is killed."""
     if caller := os.environ.get("ICHA_CALLER"):
         end_with_parent(int(caller))
 
 
 def refuse_superseded() -> None:
-    """End the program, one that runs jobs of a call on another machine, if a later call owns the results."""
+    """End this process, which runs jobs on another machine, if a later call owns the results."""
     try:
         with while_owned():
             pass
@@ -50,20 +52,19 @@ def refuse_superseded() -> None:
 
 
 def plan_without_collecting() -> None:
-    """Do without Python's collector of garbage until the first job, and for what is left at the end.
+    """Disable garbage collection until the first job, and for the rest at the end.
 
-    It would go through the growing plan again and again, of which next to nothing is garbage: of the plan of ten
-    thousand runs that takes a third of the time.
+    Almost nothing in the growing plan is garbage. Collection takes a third of the time for a plan of ten thousand runs.
     """
     gc.disable()
     atexit.register(gc.freeze)
 
 
 def start_jobs_freely(workflow) -> None:
-    """Collect garbage from now on, but not in the plan; do without Snakemake's limit of jobs started a second.
+    """Enable garbage collection, except for the plan; remove Snakemake's limit of jobs started per second.
 
-    For the sake of that limit every local job that ends wakes the scheduler once a second from then on: of a thousand
-    short jobs that takes most of a core. There is no option to leave it out.
+    With this limit every finished local job wakes the scheduler once a second from then on, which uses most of a core
+    after a thousand short jobs. Snakemake has no option to disable it.
     """
     gc.collect()
     gc.freeze()
@@ -73,66 +74,67 @@ def start_jobs_freely(workflow) -> None:
 
 
 class Campaign:
-    """A campaign in this working directory that is about to be run: its results looked at, its lock held.
+    """A campaign in the working directory before its jobs, with its lock.
 
-    The Snakefile is read before all else, also for calls that only report or clean up. Those are not kept from it by
-    the lock: what has jobs to start is (`begin`).
+    Snakemake reads the Snakefile also for calls that only report or clean up. The lock does not stop these, only calls
+    that start jobs (`begin`).
     """
 
     def __init__(self, results: str, name: str, file: str, workflow: str, *, dry_run: bool):
-        """Look at the folder `results`; refuse those of another configuration file before. A dry run changes nothing.
+        """Inspect the results; a dry run changes nothing.
 
         Parameters
         ----------
-        results : the folder, from the working directory.
-        name : of the campaign.
+        results : folder of the results, relative to the working directory; refused if it belongs to another file.
+        name : name of the campaign.
         file : its configuration file.
-        workflow : the folder of the workflow.
+        workflow : folder of the workflow.
+        dry_run : whether this call is a dry run.
         """
         self.results, self.dry_run = results, dry_run
         self._origin = Path(file).resolve(), Path(workflow)
         if reason := belongs_to_another(Path(results), name, *self._origin):
             raise SystemExit(f"{reason} Nothing was computed.")
-        self._other = None if dry_run else hold_lock(f".snakemake/{Path(results).name}.lock")
-        not_whole = checksums.damaged(results)
-        unknown = dict(_of_unknown_origin(results))
-        if not_whole or unknown:
+        self._other_process = None if dry_run else hold_lock(f".snakemake/{Path(results).name}.lock")
+        damaged = checksums.damaged(results)
+        records = dict(_damaged_records(results))
+        if damaged or records:
             self._refuse_second()
-        for path in not_whole:
+        for path in damaged:
             self._set_aside(path, "damaged")
-        for path, record in unknown.items():
-            if path not in not_whole and os.path.exists(f"{results}/{path}"):
+        for path, record in records.items():
+            if path not in damaged and os.path.exists(f"{results}/{path}"):
                 self._set_aside(path, "Snakemake's record of it is damaged")
             if not dry_run:
-                record.unlink()  # Snakemake breaks off at some of them
+                record.unlink()  # some of these stop Snakemake
         if dry_run:
             return
         if os.path.isdir(results):
-            self._claim()  # results of an older version, of which nothing may be left to do
+            self._claim()  # results of an older version, for which there may be no jobs
         if not METADATA.is_dir() or not os.access(".snakemake", os.W_OK):
-            self._refuse_unwritable()  # nothing was computed yet, or Snakemake could not keep its records
+            self._refuse_unwritable()  # nothing was computed yet, or Snakemake could not write its records
         elif os.path.isdir(results) and not os.access(results, os.W_OK):
-            # Of what is missing there Snakemake says only that it is protected.
-            _remark(f"{results} cannot be written to: what is not there cannot be computed")
+            # Snakemake reports missing files in such a folder only as protected.
+            _warn(f"cannot write to {results}: missing results cannot be computed")
 
     def have_stale_made_again(self, paths: Iterable[str], rules: Iterable) -> None:
-        """Have results made again that are not those of what is asked for, where Snakemake does not see it.
+        """Mark results as incomplete that do not match the present settings, if Snakemake does not detect it.
 
-        It compares what is asked for with its own records, which may be gone, or be those of another file than is
-        there: of one that was restored from a backup. Of inputs it sees times, and not content.
+        Snakemake compares the settings with its own records. These may be missing, or describe another file, after a
+        result was restored from a backup. Of inputs it compares times, not contents.
 
         Parameters
         ----------
-        paths : results, from the working directory.
+        paths : results, relative to the working directory.
         rules : the rules of the workflow.
         """
         rules = [rule for rule in rules if rule.script]
-        found = checksums.stale(
+        stale = checksums.stale(
             self.results,
             (os.path.relpath(path, self.results) for path in paths),
-            lambda path: _asked_now(rules, f"{self.results}/{path}"),
+            lambda path: _present_settings(rules, f"{self.results}/{path}"),
         )
-        unseen = [(path, why) for path, why in found if why != checksums.OTHER_SETTINGS or not self._is_seen(path)]
+        unseen = [(path, why) for path, why in stale if why != checksums.OTHER_SETTINGS or not self._is_seen(path)]
         if not unseen:
             return
         self._refuse_second()
@@ -141,10 +143,10 @@ class Campaign:
                 mark_incomplete(f"{self.results}/{path}")
         first, why = unseen[0]
         others = f" and {len(unseen) - 1} more results" if len(unseen) > 1 else ""
-        _remark(f"to be made again: {self.results}/{first} ({why}){others}")
+        _warn(f"to be made again: {self.results}/{first} ({why}){others}")
 
-    def _is_seen(self, path):
-        """Whether Snakemake's record of a result belongs to what is there, so that it sees for itself what differs."""
+    def _is_seen(self, path: str) -> bool:
+        """Return whether Snakemake's record describes the present file, so that Snakemake itself detects changes."""
         try:
             record = json.loads(record_of(f"{self.results}/{path}", METADATA).read_bytes())
             return checksums.asked_of(record["params"]) == checksums.made_as(self.results, path)
@@ -152,26 +154,34 @@ class Campaign:
             return False
 
     def _set_aside(self, path: str, why: str) -> None:
-        """Rename a result that cannot be trusted, so that it is made again, and say so."""
+        """Rename an untrusted result, so that it is computed again, and print a warning."""
         file = f"{self.results}/{path}"
         aside = ""
         if not self.dry_run:
-            with _writing(f"{file} is not what was written, by its checksum, and cannot be set aside: its folder"):
-                aside = f" (what was there is {checksums.set_aside(self.results, path).name} now)"
-        _remark(f"{why}, to be made again: {file}{aside}")
+            with _writing(f"{file} does not match its checksum, and cannot be renamed: its folder"):
+                aside = f" (the old file is {checksums.set_aside(self.results, path).name})"
+        _warn(f"{why}, to be made again: {file}{aside}")
 
     def begin(self, missing: str | None = None) -> None:
-        """Own the results from now on, with jobs to start: what an earlier call has left running changes none of them.
+        """Take over the results before the first job: jobs that an earlier call left running cannot change them.
 
-        Ends the program with a message if another one runs the campaign, if results could not be written or read, or if
-        software is `missing`. A call that only reports takes nothing from jobs that run. So what one of those has done
-        since the results were looked at is looked for once more.
+        Results are inspected again, since such a job may have changed them in the meantime. A call that only reports
+        never comes here.
+
+        Parameters
+        ----------
+        missing : message about missing software.
+
+        Raises
+        ------
+        SystemExit
+            If another process runs the campaign, results cannot be written or read, or software is missing.
         """
         self._refuse_second()
         if "\\" in os.path.abspath(self.results):
             raise SystemExit(
-                f"{os.path.abspath(self.results)} has a backslash, which the library of netCDF takes for a slash: no "
-                f"result could be read. Nothing was computed. Rename the folder, or {_ELSEWHERE}."
+                f"{os.path.abspath(self.results)} has a backslash, which the netCDF library reads as a slash, so "
+                f"results could not be read. Nothing was computed. Rename the folder, or {ANOTHER_FOLDER}."
             )
         self._refuse_unwritable()
         if missing:
@@ -180,8 +190,8 @@ class Campaign:
             take_over(f".snakemake/{Path(self.results).name}.owner")
         if changed := checksums.damaged(self.results):
             raise SystemExit(
-                f"{self.results}/{changed[0]} has changed since the results were looked at, maybe by a job of an "
-                f"earlier call. Nothing was computed; give the same command again."
+                f"{self.results}/{changed[0]} has changed while the jobs were planned, perhaps by a job of an earlier "
+                "call. Nothing was computed; repeat the command."
             )
         self.remove_left_over()
         self._claim()
@@ -189,15 +199,15 @@ class Campaign:
             note_versions(Path(self.results))
 
     def _claim(self) -> None:
-        """Record that the results belong to the configuration file, where that can be written."""
+        """Record that the results belong to the configuration file, if this can be written."""
         with contextlib.suppress(OSError):
             claim(Path(self.results), *self._origin)
 
     def _refuse_second(self) -> None:
-        if self._other:
+        if self._other_process:
             raise SystemExit(
-                f"Process {self._other} is running this campaign in this directory; wait for it to end, or end it "
-                f"first."
+                f"Process {self._other_process} is running this campaign in this directory; wait for it to end, or "
+                "stop it."
             )
 
     def _refuse_unwritable(self) -> None:
@@ -212,50 +222,47 @@ class Campaign:
                     raise PermissionError(0, "Permission denied")
 
     def remove_left_over(self) -> None:
-        """Remove what killed programs have left among the results, which are this call's own by now."""
+        """Remove temporary files of killed programs from the results."""
         for folder, _, names in os.walk(self.results):
             for name in filter(is_left_over, names):
                 Path(folder, name).unlink(missing_ok=True)
 
 
 class _Wildcards(dict):
-    """Wildcards as the functions of rules take them."""
+    """Wildcards as functions of rules expect them."""
 
     __getattr__ = dict.__getitem__
 
 
-def _asked_now(rules, path):
-    """Checksum of what the rule that makes a result asks of its job now."""
+def _present_settings(rules, path: str) -> str:
+    """Return the checksum of the parameters that the rule of a result has now."""
     rule = next(rule for rule in rules if any(output.match(path) for output in rule.output))
     wildcards = _Wildcards(rule.get_wildcards(path))
     values = (value(wildcards) if callable(value) else value for value in rule.params)
     return checksums.asked_of(map(repr, values))
 
 
-_ELSEWHERE = "work in another one: `icha run --directory FOLDER`, `snakemake --directory FOLDER`"
-
-
 @contextlib.contextmanager
-def _writing(folder):
-    """End the program with a message if the folder cannot be written to."""
+def _writing(folder: str):
+    """End the program with a message if a folder cannot be written to."""
     try:
         yield
     except OSError as error:
         raise SystemExit(
-            f"{folder} cannot be written to: {error.strerror}. Nothing was computed. Make room there or make it "
-            f"writable, or {_ELSEWHERE}."
+            f"{folder} cannot be written to: {error.strerror}. Nothing was computed. Free some space, change its "
+            f"permissions, or {ANOTHER_FOLDER}."
         ) from None
 
 
-def _remark(text: str) -> None:
-    """Warn; `icha run` shows it, too."""
+def _warn(text: str) -> None:
+    """Print a warning, also from `icha run`."""
     logger.warning(text, extra={"remark": text})
 
 
-def _of_unknown_origin(results: str) -> Iterator[tuple[str, Path]]:
-    """Results with a record of Snakemake that is none, as it may be after a full disk: not known to be up to date.
+def _damaged_records(results: str) -> Iterator[tuple[str, Path]]:
+    """Return results whose record of Snakemake is damaged, for example after the disk was full.
 
-    Snakemake takes such a result for up to date, or breaks off; it has no public reader that would say which those are.
+    Snakemake stops at such a record, or considers the result up to date. It has no public interface to find them.
     """
     for folder, _, names in os.walk(METADATA):
         for record in (Path(folder, name) for name in names):
@@ -271,29 +278,28 @@ def _is_record(file: Path) -> bool:
         return False
 
 
-# Open as long as this process lives: the lock ends with it, however it ends.
+# Files whose locks end with this process.
 locks = []
 
 
 def hold_lock(path: str) -> str | None:
-    """Hold the lock `path` until this process ends; return the process that holds it if that is another one.
+    """Hold a lock until this process ends; return the number of another process that holds it.
 
-    Snakemake's own lock is a file, which stays behind when the program is killed; every later call then asks for an
-    `--unlock` that nobody dares to give.
+    Snakemake's own lock is a file that a killed program leaves behind, and later calls then ask for `--unlock`.
     """
     try:
         Path(path).parent.mkdir(parents=True, exist_ok=True)
-        # Opened so that starting jobs do not inherit it: what they leave behind must not keep the lock.
+        # Jobs do not inherit this file, since processes that they leave behind would keep the lock.
         file = open(path, "a+", encoding="ascii")
     except OSError:
-        return None  # where nothing can be written nothing will be computed
+        return None  # in a folder without write permission nothing can be computed
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
         file.seek(0)
         return file.read().strip() or "?"
     except OSError:
-        return None  # a file system without locks: nothing to hold
+        return None  # a file system without locks
     locks.append(file)
     with contextlib.suppress(OSError):  # a full disk
         file.truncate(0)

@@ -1,4 +1,4 @@
-"""Which configuration a call of Snakemake means, and how it is told what is wrong with it."""
+"""The configuration that a call of Snakemake selects."""
 
 from pathlib import Path
 
@@ -12,18 +12,23 @@ DEFAULT = "config/config.yaml"
 
 
 def campaign_configuration(workflow, root: str) -> Configuration:
-    """Read the file of `--configfile`, or else the default one below `root`, with the values of `--config` in place.
+    """Read the file of `--configfile`, or the default one below `root`, with the values of `--config`.
 
-    Snakemake's own `config` is not used: it would mix the campaigns of two files, and lets keys be given twice.
-    A wrong configuration ends the program with its message alone.
+    Snakemake's own `config` is not used, since it would merge two files, and accept duplicate keys.
+
+    Raises
+    ------
+    SystemExit
+        With the message of a wrong configuration.
     """
     settings = workflow.config_settings
-    files = [_as_given(path) for path in settings.configfiles]
+    files = [_shortened(path) for path in settings.configfiles]
     try:
         if len(files) > 1:
             names = ", ".join(map(str, files))
-            raise ConfigurationError(f"--configfile: {names}; allowed: one file, for one campaign is one file")
-        configuration = load_configuration(files[0] if files else _as_given(Path(root, DEFAULT)), dict(settings.config))
+            raise ConfigurationError(f"--configfile: {names}; expected one file, since a campaign is one file")
+        file = files[0] if files else _shortened(Path(root, DEFAULT))
+        configuration = load_configuration(file, dict(settings.config))
     except ConfigurationError as error:
         raise SystemExit(f"The configuration cannot be run:\n{printable_lines(error)}") from None
     for warning in configuration.warnings:
@@ -31,7 +36,7 @@ def campaign_configuration(workflow, root: str) -> Configuration:
     return configuration
 
 
-def _as_given(path) -> Path:
-    """The path relative to the working directory, where it lies in it: short in messages, and true for copies."""
+def _shortened(path: str | Path) -> Path:
+    """Return a path in the working directory as a relative one, which remains valid in a copy of the directory."""
     path = Path(path)
     return path.relative_to(Path.cwd()) if path.is_relative_to(Path.cwd()) else path

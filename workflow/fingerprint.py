@@ -1,10 +1,10 @@
-"""Fingerprints of code: what a job computes depends on its script and on the modules that the script imports.
+"""Fingerprints of code: the result of a job depends on its script and on the modules that the script imports.
 
-Snakemake's own trigger looks at the time stamp of the script, and at nothing behind it. A fingerprint is taken from the
-syntax trees, so comments, docstrings, formatting, touched files and fresh clones change nothing, and an edit of a
-module changes exactly the jobs that use it.
+Snakemake's own trigger compares only the time stamp of the script. A fingerprint is computed from syntax trees. So
+comments, docstrings, formatting, touched files and new clones change nothing, and an edit of a module affects exactly
+the jobs that use it.
 
-(`grimp` also follows imports, as fast, but only within a package: not those of scripts, and no data files.)
+(`grimp` also follows imports, but only inside a package: not those of scripts, and no data files.)
 """
 
 import ast
@@ -20,12 +20,12 @@ from pathlib import Path
 from typing import NamedTuple
 
 PACKAGE = "icha"
-# What surrounds the work of every script, from beside it: it says how jobs begin, fail and end, and changes no number.
-AROUND = "job.py"
+# The module beside the scripts that starts and ends every job. It changes no number.
+JOB_MODULE = "job.py"
 
 
 def code_fingerprint(script: str | Path, *modules: str) -> str:
-    """Fingerprint of the files that a script is made of (`files_of`)."""
+    """Return the fingerprint of a script and of what it imports (`files_of`)."""
     files = files_of(script, *modules)
     digest = hashlib.sha256("".join(files).encode())
     for file in files.values():
@@ -36,26 +36,30 @@ def code_fingerprint(script: str | Path, *modules: str) -> str:
 
 
 def files_of(script: str | Path, *modules: str) -> dict[str, Path]:
-    """Files of a script, of what it imports from the package or from beside itself, and so on, by their sorted names.
+    """Return a script and all modules that it imports from the package or from its folder, sorted by name.
 
-    `modules` are those that the script imports by a name that it gets when it runs. Packages on the way to a module are
-    not part of it, nor is what surrounds all scripts, with what only that imports; data files are, if they lie beside a
-    module whose text names them.
+    The packages that contain a module are not included, nor is `JOB_MODULE` with what only that imports. Data files are
+    included if they are beside a module that contains their name.
+
+    Parameters
+    ----------
+    script : path of the script.
+    modules : names of further modules, which the script imports by a name that it gets as a parameter.
     """
-    around = Path(script).with_name(AROUND)
-    found: set[Path] = set()
+    job_module = Path(script).with_name(JOB_MODULE)
+    files: set[Path] = set()
     pending = [Path(script), *(_module_file(name) for name in modules)]
     while pending:
         file = pending.pop()
-        if file not in found:
-            found.add(file)
-            pending += (each for each in _imports(file) if each != around)
-    return {_name(file): file for file in sorted(found, key=_name)}
+        if file not in files:
+            files.add(file)
+            pending += _imports(file) - {job_module}
+    return {_name(file): file for file in sorted(files, key=_name)}
 
 
 @cache
 def _package_folder() -> Path:
-    # The package that jobs will import, wherever it is installed.
+    """Return the folder of the package that jobs will import."""
     return Path(importlib.util.find_spec(PACKAGE).submodule_search_locations[0])
 
 
@@ -66,63 +70,62 @@ def _name(file: Path) -> str:
 
 @cache
 def _imports(file: Path) -> set[Path]:
-    found = set()
+    files = set()
     for level, module, name in _syntax_of(file).imports:
         if level:
             package = file.relative_to(_package_folder().parent).parts[:-level]
             module = ".".join([*package, *([module] if module else [])])
-        found.add(_resolve(file, module, name))
-    return found - {None}
+        files.add(_resolve(file, module, name))
+    return files - {None}
 
 
 def _resolve(file: Path, module: str, name: str | None) -> Path | None:
+    """Return the file of an import; None if it is neither in the package nor beside a script."""
     if module.split(".")[0] != PACKAGE:
-        beside = file.parent / f"{module}.py"
-        return beside if beside.is_file() and not file.is_relative_to(_package_folder()) else None
-    if name is not None:
-        submodule = _module_file(f"{module}.{name}", missing_ok=True)
-        if submodule is not None:
-            return submodule
+        neighbour = file.parent / f"{module}.py"
+        return neighbour if neighbour.is_file() and not file.is_relative_to(_package_folder()) else None
+    if name is not None and (submodule := _module_file(f"{module}.{name}", missing_ok=True)):
+        return submodule
     if module == PACKAGE:
         if name in ("__version__", None):
             return None
-        raise ValueError(f"{file}: import {name!r} from the module that defines it, so that changes there are seen")
+        raise ValueError(f"{file}: import {name!r} from the module that defines it, so that its changes are detected")
     return _module_file(module)
 
 
 def _module_file(name: str, missing_ok: bool = False) -> Path | None:
-    place = _package_folder().joinpath(*name.split(".")[1:])
-    for file in (place.with_suffix(".py"), place / "__init__.py"):
+    path = _package_folder().joinpath(*name.split(".")[1:])
+    for file in (path.with_suffix(".py"), path / "__init__.py"):
         if file.is_file():
             return file
     if missing_ok:
         return None
-    raise ValueError(f"no module {name!r} in {_package_folder()}")
+    raise ValueError(f"there is no module {name!r} in {_package_folder()}")
 
 
 @cache
 def _data_files(file: Path) -> list[Path]:
-    """Files in the module's folder that its text names by their path from there, or by that of their folder."""
-    found = set()
+    """Return the files in the folder of a module that its text names by their path, or by that of their folder."""
+    files = set()
     for name in _syntax_of(file).names:
-        place = file.parent / name
+        path = file.parent / name
         if Path(name).is_absolute():
-            continue  # a file of the system, such as one in /proc that says something else every time
-        if place.is_file() and place.suffix != ".py":
-            found.add(place)
-        elif place.is_dir() and place.parent == file.parent and not name.startswith((".", "_")):
-            found |= {data for data in place.iterdir() if data.is_file() and data.suffix not in (".py", ".pyc")}
-    return sorted(found)
+            continue  # a file of the system, such as one in /proc, whose content changes all the time
+        if path.is_file() and path.suffix != ".py":
+            files.add(path)
+        elif path.is_dir() and path.parent == file.parent and not name.startswith((".", "_")):
+            files |= {data for data in path.iterdir() if data.is_file() and data.suffix not in (".py", ".pyc")}
+    return sorted(files)
 
 
 class _Syntax(NamedTuple):
-    """What the text of a module says.
+    """Content of a module.
 
     Attributes
     ----------
-    digest : of its syntax tree, without what changes nothing.
-    imports : level (0 but for relative ones), module and the name that is imported from it (None in `import module`).
-    names : the texts in it that could be names of files.
+    digest : checksum of its syntax tree, without what changes no result.
+    imports : level (0 for absolute ones), module, and imported name (None for `import module`).
+    names : texts that may be names of files.
     """
 
     digest: str
@@ -130,10 +133,10 @@ class _Syntax(NamedTuple):
     names: list[str]
 
 
-# Syntax trees of all modules take a second to read. So what they say is kept beside Python's bytecode, by the checksum
-# of the module's text, for the same reader: this module and this version of Python.
+# Reading the syntax trees of all modules takes a second. So their content is cached beside Python's bytecode, by the
+# checksum of the text of the module, for this version of Python and of this module.
 _READER = hashlib.sha256(Path(__file__).read_bytes() + sys.version.encode()).hexdigest()[:16]
-_KEPT = Path(importlib.util.cache_from_source(__file__)).with_suffix(f".{_READER}.json")
+_CACHE = Path(importlib.util.cache_from_source(__file__)).with_suffix(f".{_READER}.json")
 _syntaxes: dict[str, list] = {}
 
 
@@ -143,21 +146,21 @@ def _syntax_of(file: Path) -> _Syntax:
     sha256 = hashlib.sha256(text).hexdigest()
     if not _syntaxes:
         with contextlib.suppress(OSError, ValueError):
-            _syntaxes.update(json.loads(_KEPT.read_text(encoding="ascii")))
+            _syntaxes.update(json.loads(_CACHE.read_text(encoding="ascii")))
     if sha256 not in _syntaxes:
-        atexit.unregister(keep)
-        atexit.register(keep)
+        atexit.unregister(save_cache)
+        atexit.register(save_cache)
         _syntaxes[sha256] = list(_read(ast.parse(text, file.name)))
     return _Syntax(*_syntaxes[sha256])
 
 
-def keep() -> None:
-    """Keep what the modules say for the next process; where nothing can be written, that reads them again."""
-    # Not by `whole_file`, which asks for the owner of results: these are none, and Snakemake has left their folder.
-    temporary = _KEPT.with_suffix(f".{os.getpid()}.tmp")
+def save_cache() -> None:
+    """Save the content of the modules for the next process, if the folder can be written to."""
+    # `whole_file` would check the owner of the results; this file is not a result.
+    temporary = _CACHE.with_suffix(f".{os.getpid()}.tmp")
     with contextlib.suppress(OSError):
         temporary.write_text(json.dumps(_syntaxes), encoding="ascii")
-        temporary.replace(_KEPT)
+        temporary.replace(_CACHE)
 
 
 def _read(tree: ast.Module) -> _Syntax:
@@ -167,17 +170,20 @@ def _read(tree: ast.Module) -> _Syntax:
             imports += [(0, alias.name, None) for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
             imports += [(node.level, node.module or "", alias.name) for alias in node.names]
-        elif isinstance(node, ast.Constant) and isinstance(node.value, str) and _could_be_a_file(node.value):
+        elif isinstance(node, ast.Constant) and isinstance(node.value, str) and _may_be_a_file(node.value):
             names.add(node.value)
     return _Syntax(hashlib.sha256(repr(_canonical(tree)).encode()).hexdigest(), imports, sorted(names))
 
 
-def _could_be_a_file(text: str) -> bool:
+def _may_be_a_file(text: str) -> bool:
     return 0 < len(text) < 80 and all(c.isalnum() or c in "._-/" for c in text)
 
 
+_DOCUMENTED = ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef
+
+
 def _canonical(node):
-    """A syntax tree without positions, docstrings and empty fields (which differ between versions of Python)."""
+    """Return a syntax tree without positions, docstrings and empty fields (which differ between versions of Python)."""
     if isinstance(node, ast.AST):
         fields = ((name, value) for name, value in ast.iter_fields(node) if value not in (None, []))
         if isinstance(node, _DOCUMENTED) and ast.get_docstring(node, clean=False) is not None:
@@ -186,6 +192,3 @@ def _canonical(node):
     if isinstance(node, list):
         return [_canonical(item) for item in node]
     return repr(node)
-
-
-_DOCUMENTED = ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef

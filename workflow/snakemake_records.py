@@ -1,8 +1,8 @@
-"""Where Snakemake keeps its records of results, for which it has no public interface.
+"""Location of Snakemake's records of results, for which it has no public interface.
 
-There is one of every file that it made, in `.snakemake/metadata`, and one in `.snakemake/incomplete` of every file
-whose job has begun and not ended well. Its name is that of the file in base64; one that is too long for the file
-system is cut, and its first parts are folders.
+`.snakemake/metadata` has a record of each file that Snakemake made, `.snakemake/incomplete` one of each file whose job
+started but did not succeed. The name of a record is that of the file in base64. A name that is too long for the file
+system is split, and its first parts are folders.
 """
 
 import json
@@ -15,7 +15,7 @@ INCOMPLETE = Path(".snakemake/incomplete")
 
 
 def record_of(name: str, records: Path) -> Path:
-    """Where the record of the file `name` is among `records`."""
+    """Return the path of the record of a file."""
     code = urlsafe_b64encode(name.encode()).decode()
     longest = os.pathconf(records, "PC_NAME_MAX") - 1
     parts = [code[start : start + longest] for start in range(0, len(code), longest)]
@@ -23,7 +23,7 @@ def record_of(name: str, records: Path) -> Path:
 
 
 def file_of(record: Path, records: Path) -> str | None:
-    """The name of the file that a record is of; None if it is no record."""
+    """Return the name of the file of a record; None if it is not a record."""
     try:
         return urlsafe_b64decode("".join(part.removeprefix("@") for part in record.relative_to(records).parts)).decode()
     except ValueError:
@@ -31,13 +31,7 @@ def file_of(record: Path, records: Path) -> str | None:
 
 
 def mark_incomplete(name: str) -> None:
-    """Have the file `name` made again when it is asked for, as if its job had not ended well.
-
-    Raises
-    ------
-    OSError
-        If that cannot be written.
-    """
+    """Make Snakemake compute a file again, as if its job had failed."""
     INCOMPLETE.mkdir(parents=True, exist_ok=True)
     record = record_of(name, INCOMPLETE)
     record.parent.mkdir(parents=True, exist_ok=True)

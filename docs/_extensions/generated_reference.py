@@ -1,6 +1,6 @@
-"""Parts of the reference that are made from the package itself when the site is built.
+"""Sections of the reference that are generated from the package when the site is built.
 
-A page names them in a comment of its own line, `<!-- reference: NAME -->`; the text is put in its place.
+The line `<!-- reference: NAME -->` of a page is replaced by the text of the function NAME.
 """
 
 import re
@@ -12,14 +12,14 @@ MARK = re.compile(r"^<!-- reference: (\w+) -->$", flags=re.MULTILINE)
 
 
 def configuration() -> str:
-    """Every key of a configuration file, a table a section."""
+    """Tables of all configuration keys, one per section."""
     from icha.configuration.schema import key_tables
 
     return key_tables().replace("### ", "## ")
 
 
 def commands() -> str:
-    """Every command of `icha`, with its arguments and options."""
+    """All commands of `icha` with their arguments and options."""
     import typer
 
     from icha.cli import app
@@ -32,7 +32,7 @@ def _command(name, command):
     import click
 
     context = click.Context(command, info_name=name)
-    # Typer marks the paragraphs that it must not fill.
+    # Typer marks paragraphs that must not be refilled.
     text = re.sub(r"\s*\x08\s*", "\n\n", command.help or "")
     usage = " ".join(command.get_usage(context).split()[1:])
     lines = [f"## `{name}`", "", text.strip(), "", "```text", usage, "```", ""]
@@ -43,7 +43,7 @@ def _command(name, command):
             names = f"`{parameter.human_readable_name}`"
         default = parameter.default() if callable(parameter.default) else parameter.default
         if parameter.required:
-            default = "needed"
+            default = "required"
         elif default in (None, (), [], False, ""):
             default = "none"
         else:
@@ -55,21 +55,21 @@ def _command(name, command):
 
 
 def run_variables() -> str:
-    """The variables of a run's file: of every run, of one that turns back, of one that ends in separation."""
+    """Variables of the file of a run."""
     from icha.contact.models import MODELS
     from icha.datasets.variables.run import CYCLE, FURTHER, LOOP, RUN
 
     sections = {
-        "Of every run": RUN,
-        **{f"Of a run by {MODELS[name].words}": variables for name, variables in FURTHER.items() if variables},
-        "Of a run that turns back": CYCLE,
-        "Of a run that ends in separation": LOOP,
+        "All runs": RUN,
+        **{f"Runs with {MODELS[name].words}": variables for name, variables in FURTHER.items() if variables},
+        "Runs that unload": CYCLE,
+        "Runs that end without contact": LOOP,
     }
     return "\n".join(f"### {heading}\n\n{_table(_rows(variables))}" for heading, variables in sections.items())
 
 
 def campaign_variables() -> str:
-    """The variables that a campaign dataset has beside those of its runs, and what each depends on."""
+    """Variables of a campaign dataset besides those of its runs, and the dimensions of all."""
     from icha.datasets.labels import LABELS
     from icha.datasets.variables.run import CYCLE, LOOP, RUN
 
@@ -91,14 +91,14 @@ def campaign_variables() -> str:
 
 
 def comparison_variables() -> str:
-    """The variables of the comparison of a study's runs."""
+    """Variables of the comparison of the runs of a study."""
     from icha.analysis.common_loads import compare_runs
 
     return _table(_rows_of(compare_runs(_small_campaign()["study"].to_dataset()).variables))
 
 
 def surface_variables() -> str:
-    """The variables of a surface's file."""
+    """Variables of the file of a surface."""
     from icha.datasets.files import read_dataset
     from icha.datasets.surface_file import write_surface
 
@@ -110,7 +110,7 @@ def surface_variables() -> str:
 
 
 def model_error_variables() -> str:
-    """The variables of the comparison with boundary elements."""
+    """Variables of the comparison with boundary elements."""
     from icha.analysis.model_error import AXES
     from icha.datasets.variables.model_error import MODEL_ERROR
 
@@ -118,7 +118,7 @@ def model_error_variables() -> str:
 
 
 def theory_variables() -> str:
-    """The variables of the theories of a surface."""
+    """Variables of the theories of a surface."""
     import icha
     from icha.references.theories import reference_dataset
     from icha.surfaces.moments import spectral_moments
@@ -137,7 +137,7 @@ def _small_spectrum():
 
 @cache
 def _small_campaign():
-    """A campaign of one run, in and back, on a surface of a few summits."""
+    """A campaign of one run with unloading on a surface of a few summits."""
     import icha
     from icha.datasets.campaign import campaign_tree
 
@@ -163,13 +163,13 @@ def _table(rows):
 
 
 def _cell(text):
-    """Text for a cell of a table, where bars and asterisks would mean something."""
+    """Escape text for a cell of a table."""
     return " ".join(text.split()).replace("|", "\\|").replace("*", "\\*")
 
 
-PARTS = {
-    part.__name__: part
-    for part in (
+SECTIONS = {
+    section.__name__: section
+    for section in (
         configuration,
         commands,
         run_variables,
@@ -182,33 +182,33 @@ PARTS = {
 }
 
 
-def fill_in(app, docname, source):
-    """Put the parts that a page asks for in their places."""
-    source[0] = MARK.sub(lambda match: PARTS[match[1]](), source[0])
+def insert_sections(app, docname, source):
+    """Replace the marks of a page by the generated sections."""
+    source[0] = MARK.sub(lambda match: SECTIONS[match[1]](), source[0])
 
 
-def always_read(app, env, added, changed, removed):
-    """The pages that ask for parts: the package may have changed, though they have not."""
+def pages_to_read(app, env, added, changed, removed):
+    """Return the pages with generated sections, because the package may have changed."""
     return [name for name in env.found_docs if MARK.search(Path(env.doc2path(name)).read_text(encoding="utf-8"))]
 
 
 ENTRY = re.compile(r"^(?P<indent>\s*)(?P<names>[*\w]+(?:, [*\w]+)*) : (?P<text>.+)$")
 
 
-# Stand for what is returned, and for a colon in the first line of an attribute, while napoleon, which would take what
-# is there for a type, is at work.
+# Placeholders for the text of "Returns" and for a colon in the first line of an attribute: napoleon would take both for
+# types.
 RETURNED, COLON = "RETURNED", "\ue000"
 
 
 def plain_docstring(app, what, name, obj, options, lines):
-    """Take `name : text` of a list of parameters for the description that it is, and bars and asterisks for signs."""
+    """Treat the text of `name : text` as a description, not as a type, and escape bars and asterisks."""
     section, new, returned = "", [], []
     for number, line in enumerate(lines):
         if number + 1 < len(lines) and re.fullmatch(r"-{3,}", lines[number + 1].strip()):
             section = line.strip()
             new.append(line)
             continue
-        match = ENTRY.match(line) if section == "Parameters" else None
+        match = ENTRY.match(line) if section in ("Parameters", "Attributes") else None
         if match:
             new += [f"{match['indent']}{match['names']}", f"{match['indent']}    {match['text']}"]
         elif section == "Returns" and line.strip() and not re.fullmatch(r"-{3,}", line.strip()):
@@ -222,23 +222,23 @@ def plain_docstring(app, what, name, obj, options, lines):
     lines[:] = [_literal(line) for line in new]
 
 
-def what_is_returned(app, what, name, obj, options, lines):
-    """Put what is returned back in its place."""
+def restore_returned_text(app, what, name, obj, options, lines):
+    """Replace the placeholders by their text."""
     text = _literal(app.env.temp_data.get("returned", ""))
     lines[:] = [re.sub(rf"\*{RETURNED}\*", lambda match: text, line).replace(COLON, ":") for line in lines]
 
 
 def _literal(line):
-    """A line whose bars and asterisks outside of code mean nothing but themselves."""
-    parts = line.split("`")
-    return "`".join(re.sub(r"([|*])", r"\\\1", part) if n % 2 == 0 else part for n, part in enumerate(parts))
+    """Escape bars and asterisks outside of code."""
+    pieces = line.split("`")
+    return "`".join(re.sub(r"([|*])", r"\\\1", piece) if n % 2 == 0 else piece for n, piece in enumerate(pieces))
 
 
 def setup(app):
     """Connect to Sphinx."""
-    app.connect("source-read", fill_in)
-    app.connect("env-get-outdated", always_read)
+    app.connect("source-read", insert_sections)
+    app.connect("env-get-outdated", pages_to_read)
     # Before napoleon, which turns sections into fields.
     app.connect("autodoc-process-docstring", plain_docstring, priority=400)
-    app.connect("autodoc-process-docstring", what_is_returned, priority=600)
+    app.connect("autodoc-process-docstring", restore_returned_text, priority=600)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

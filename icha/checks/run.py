@@ -118,7 +118,7 @@ def _check_loading(run) -> Iterator[tuple]:
 
 
 def _largest_fall(values):
-    """Return the largest fall from one value to the next; 0 if there is none."""
+    """Return the largest fall from one value to the next; 0 without any fall."""
     return float(np.max(-np.diff(values), initial=0.0))
 
 

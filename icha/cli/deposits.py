@@ -182,9 +182,9 @@ def _run(project: Path, targets: list[str], cores: str | None, anyway: bool) -> 
 
 def _print_comparison(comparison) -> bool:
     """Print the comparison; return whether everything is reproduced."""
-    from icha.deposit.compare import DIFFERENT, IDENTICAL, TOLERANCE, table
+    from icha.deposit.compare import DIFFERENT, IDENTICAL, TOLERANCE, format_comparison
 
-    echo(f"\ncomparison of the deposit with the new results:\n\n{table(comparison)}\n")
+    echo(f"\ncomparison of the deposit with the new results:\n\n{format_comparison(comparison)}\n")
     files = format_count(len(comparison.files), "file")
     if not comparison.files or comparison.verdict == DIFFERENT:
         echo("different: not everything is reproduced", fg="red")

@@ -46,11 +46,11 @@ def show(
 
 def print_run(run, file: Path) -> None:
     """Print the model, material and surface of a run, and its results."""
-    from icha.figures.style import quantity
+    from icha.figures.style import format_quantity
 
     def value(variable, unit=None):
         number = float(run[variable])
-        return number if unit is None else quantity(number, unit)
+        return number if unit is None else format_quantity(number, unit)
 
     echo(f"{file}: {printable(run.attrs.get('title', 'run'))}")
     labels = [f"{key} {printable(run.attrs[key])}" for key in ("campaign", "study") if run.attrs.get(key)]
@@ -83,7 +83,7 @@ def print_run(run, file: Path) -> None:
     if "gap/h_rms" in curves:
         echo("          u: mean separation from the half-space far away; gap: mean gap between the surfaces")
     if "hysteresis_loss" in run:
-        tension = quantity(-value("pull_off_pressure"), "Pa")
+        tension = format_quantity(-value("pull_off_pressure"), "Pa")
         echo(f"pull-off: {tension} of tension; loss {value('hysteresis_loss'):.3g} J/m²")
     echo("\n  step      p/(E* h'rms)   A/A0         u/h_rms    spots")
     rows = min(steps, MOST_ROWS)
@@ -98,7 +98,7 @@ def print_run(run, file: Path) -> None:
 def _print_surface(surface, file: Path) -> None:
     """Print attributes and statistics of a surface; those of a scan as measured, too."""
     from icha.datasets.surface_file import as_measured
-    from icha.figures.style import quantity
+    from icha.figures.style import format_quantity
 
     echo(f"{file}: {printable(surface.attrs.get('title', 'surface'))}")
     for key in ("summary", "boundary", "source_file", "preparation"):
@@ -108,17 +108,17 @@ def _print_surface(surface, file: Path) -> None:
     scale = as_measured(surface)
     if scale != 1:
         height, slope = (float(surface[name]) * scale for name in ("rms_height", "rms_slope"))
-        echo(f"as measured: rms height {quantity(height, 'm')}, rms slope {slope:.4g}")
+        echo(f"as measured: rms height {format_quantity(height, 'm')}, rms slope {slope:.4g}")
         echo("as stored, at the rms slope to which the heights are scaled:")
     for name in surface.data_vars:
         variable = surface[name]
         if variable.ndim == 0 and variable.dtype.kind in "fiu":
             unit = variable.attrs.get("units", "1")
-            text = quantity(float(variable), "m") if unit == "m" else f"{float(variable):.5g}"
+            text = format_quantity(float(variable), "m") if unit == "m" else f"{float(variable):.5g}"
             unit = "" if unit in ("1", "m") else f" {unit}"
             echo(printable(f"{variable.attrs.get('long_name', name)}: {text}{unit}"))
     heights = surface["height"].values
-    low, high = (quantity(float(height) * scale, "m") for height in (heights.min(), heights.max()))
+    low, high = (format_quantity(float(height) * scale, "m") for height in (heights.min(), heights.max()))
     echo(f"heights from {low} to {high}, as {'stored' if scale == 1 else 'measured'}; profile through the centre:")
     echo(f"  {sparkline(heights[len(heights) // 2])}")
 

@@ -94,7 +94,7 @@ class ContactModel(Protocol[S]):
 
     @property
     def adhesive(self) -> bool:
-        """Whether contact forms and breaks in jumps."""
+        """True if contact forms and breaks in jumps."""
 
     @property
     def contact_modulus(self) -> float:
@@ -162,7 +162,7 @@ class ContactModel(Protocol[S]):
         """Elastic energy less that of adhesion over nominal area, J/m^2; zero out of contact."""
 
     def is_unstable(self, state: S) -> bool:
-        """Whether a spot would approach as the surfaces part, which happens on an unstable branch only."""
+        """True if a spot would approach as the surfaces part, which happens on an unstable branch only."""
 
     def events_between(self, before: S, after: S) -> Events:
         """The events on the path from one state to a later one."""

@@ -41,7 +41,7 @@ TOLERANCE = 1e-6
 FLOOR = 1e-6
 # Allowed differences of the variables with these names.
 NOISE = {"residual": RESIDUAL_LIMIT, "gap_residual": RESIDUAL_LIMIT, "front_residual": FRONT_LIMIT}
-# Endings of files that are made from the data.
+# Endings of files that are made from the data, whose differences are remarks.
 _DERIVED = (".png", ".pdf", ".html", "checks.json")
 # Longest text of an error and of a value, in characters.
 _LONGEST_ERROR, _LONGEST_VALUE = 300, 60
@@ -163,7 +163,7 @@ def _compare_groups(a: netCDF4.Dataset, b: netCDF4.Dataset, path: str) -> Iterat
 
 
 def _paired(a: Mapping, b: Mapping) -> Iterator[tuple]:
-    """Keys of two mappings with the values of both; None where there is no value."""
+    """Pair the values of two mappings by their keys, with None for a missing value."""
     return ((key, a.get(key), b.get(key)) for key in dict.fromkeys([*a, *b]))
 
 
@@ -247,10 +247,10 @@ def _shown(value: object) -> str:
     return text if len(text) <= _LONGEST_VALUE else f"{text[: _LONGEST_VALUE - 3]}..."
 
 
-def table(comparison: Comparison, most: int = 20) -> str:
+def format_comparison(comparison: Comparison, most: int = 20) -> str:
     """Write the result as text: a line for every kind of file, and one for every variable that is not identical.
 
-    Of the latter, at most `most` that differ and as many within tolerance, those that deviate most first.
+    Variables with the largest deviations come first: at most `most` that differ, and as many within tolerance.
     """
     kinds = sorted({file.kind for file in comparison.files}, key=COMPUTED.index)
     width = max(map(len, kinds), default=0)
@@ -271,7 +271,7 @@ def table(comparison: Comparison, most: int = 20) -> str:
 
 
 def _lines(comparison: Comparison, within: bool) -> list[str]:
-    """A line for each variable of each kind of file that is within tolerance, or for each that differs more."""
+    """Return a line for each variable of each kind of file that is within tolerance, or that differs more."""
     grouped = defaultdict(list)
     for file in comparison.files:
         for each in file.differences:

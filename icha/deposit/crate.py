@@ -161,10 +161,10 @@ def _add_author(crate: ROCrate, author: Author) -> Entity:
 
 
 def _add_paper(crate: ROCrate) -> Entity:
-    """The paper of the model."""
+    """Add the paper of the model."""
     people = []
     for given, family in MODEL_PAPER.authors:
-        # Whoever wrote the paper may have made the data, too.
+        # An author of the paper may also be an author of the data.
         key = f"#person/{quote(f'{given} {family}')}"
         names = {"name": f"{given} {family}", "givenName": given, "familyName": family}
         people.append(crate.dereference(key) or _add(crate, key, "Person", **names))

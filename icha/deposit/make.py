@@ -54,7 +54,7 @@ def make_deposit(
     results : the campaign's folder of results.
     files : paths of the published results in that folder: at least config.used.yaml, checks.json and the campaign
         dataset.
-    campaign : its configuration, with complete metadata (`icha.configuration.publication.needed`).
+    campaign : its configuration, with complete metadata (`icha.configuration.publication.missing_metadata`).
     source : the source of the program.
     jobs : the jobs that made the results.
     cost : expected cost of computing the campaign.

@@ -1,4 +1,4 @@
-"""What a deposit holds, for readers: README.md, and data_dictionary.csv with every variable of every netCDF file."""
+"""Pages of a deposit for readers: README.md, and data_dictionary.csv with every variable of every netCDF file."""
 
 import csv
 import io
@@ -41,14 +41,14 @@ _KINDS = [
     for pattern in (SURFACE, RUN, SOLUTION, LOOP, THEORIES)
     for folder in ("", "<model>/")
 ]
-# Numbers of a variable that are read at once.
+# Number of values of a variable that are read at once.
 _BLOCK = 2**22
-# A longer list is cut.
+# Number of entries after which a list is cut.
 _MOST_NAMES = 12
 _METADATA = "citation, licence and provenance for people and machines"
-# An address within a text, without what may follow it.
+# A web address within a text, without punctuation after it.
 _ADDRESS = re.compile(r"(https?://[^\s<>|`\\]*[^\s<>|`\\.,;:!?()\[\]*_~'\"])")
-# What Markdown takes for more than itself: anywhere, or as the beginning of an entity; and at the beginning of a line.
+# Characters with a meaning in Markdown: anywhere, or at the beginning of an entity; and at the beginning of a line.
 _SPECIAL = re.compile(r"[\\`*\[\]<>|~$#]|(?<![^\W_])_|_(?![^\W_])|&(?=[#\w])")
 _SPECIAL_FIRST = re.compile(r"^(\d*)((?<!\d)[-+]|(?<=\d)[.)])(?!\w)")
 
@@ -113,7 +113,7 @@ def dictionary_csv(entries: Iterable[Entry]) -> str:
 
 
 def file_pattern(path: str) -> str:
-    """Return the path with placeholders for what differs between files of its kind."""
+    """Return the path with placeholders for the fields in which files of its kind differ."""
     return next((kind for kind in _KINDS if re.fullmatch(re.sub("<.*?>", "[^/]+", kind), path)), path)
 
 
@@ -175,11 +175,12 @@ def readme(
 
     Parameters
     ----------
-    campaign, dataset, checks, model_error : what was asked for, with complete metadata, and its results.
+    campaign : the configuration, with complete metadata.
     revision : that of the source.
+    dataset, checks, model_error : the results of the campaign.
     dictionary : the variables of all files.
     sizes : bytes of every file, by its path in the deposit.
-    cost : what computing the whole campaign is expected to take.
+    cost : expected cost of computing the whole campaign.
     """
     publication = campaign.published()
     authors = "; ".join(author.sorted_name for author in publication.authors)
@@ -228,7 +229,7 @@ def _template() -> jinja2.Template:
 
 
 def _asked(campaign: Campaign) -> dict:
-    """The campaign as its author wrote it, without the variants that studies made of surfaces and materials."""
+    """Return the facts of the configuration, without the variants that studies make of surfaces and materials."""
     surfaces, materials = (
         {name: each for name, each in getattr(campaign, section).items() if campaign.origin(section, name) == name}
         for section in ("surfaces", "materials")
@@ -256,7 +257,7 @@ def _known(quantity: Callable[[str], float], surface: str, form: str) -> str:
 
 
 def _outcome(publication: Publication, dataset: xr.DataTree, checks: Sequence[Check]) -> dict:
-    """Complete and incomplete runs, and their checks."""
+    """Return complete and incomplete runs, and their checks."""
     designs = _study_designs(dataset)
     known = {failure.run: failure.reason for failure in publication.known_failures}
     complete = _runs_of_status(dataset, COMPLETE)
@@ -272,7 +273,7 @@ def _outcome(publication: Publication, dataset: xr.DataTree, checks: Sequence[Ch
             for labels, (steps, failure) in incomplete.items()
         ],
         "example": example,
-        # Where surfaces have slopes of their own, these have no index by which to select.
+        # Slopes that differ between surfaces have no index by which to select.
         "slope_place": run_place(study, example)["rms_slope"] if study["rms_slope"].ndim == 2 else None,
         "checks": [replace(each, description=meaning) if each.name == COMPLETED else each for each in worst(checks)],
         "failed": [check for check in checks if not check.passed and check.name != COMPLETED],
@@ -284,7 +285,7 @@ def _outcome(publication: Publication, dataset: xr.DataTree, checks: Sequence[Ch
 
 
 def _study_designs(dataset: xr.DataTree) -> list[dict]:
-    """Labels of every study, and the number of its cells with each status."""
+    """Return the labels of every study, and the number of its runs with each status."""
     designs = []
     for name, study in dataset.children.items():
         counts = Counter(study["status"].values.ravel().tolist())
@@ -307,7 +308,7 @@ def _runs_of_status(dataset: xr.DataTree, status: int) -> dict[RunLabels, tuple[
 
 
 def _model_errors(tree: xr.DataTree) -> list[dict]:
-    """Smallest and largest errors of the model over loads, surfaces and slopes, for every entry and material."""
+    """Return the range of the model's errors over loads, surfaces and slopes, for every entry and material."""
     found = []
     for entry, node in tree.children.items():
         data = node.to_dataset()
@@ -328,7 +329,7 @@ def _model_errors(tree: xr.DataTree) -> list[dict]:
 
 
 def _short_dictionary(dictionary: Sequence[Entry], campaign: str) -> list[Entry]:
-    """The variables of the campaign dataset along the path, and those that tell runs apart, each once."""
+    """Return the variables of the campaign dataset, except those of single spots and events, each once."""
     found = {}
     for entry in dictionary:
         if entry.file == f"dataset/{campaign}.nc" and not {"spot", "event"} & set(entry.dimensions.split()):
@@ -352,15 +353,15 @@ def _parts(sizes: Mapping[str, int]) -> list[dict]:
 
 
 def _few(values: Sequence) -> str:
-    """A list, or its beginning and its length."""
+    """Write a list, or its beginning and its length."""
     shown = [markdown(value) for value in values]
     return ", ".join(shown) if len(shown) <= _MOST_NAMES else f"{', '.join(shown[:_MOST_NAMES])}, … ({len(shown)})"
 
 
 def markdown(text) -> str:
-    """Plain text in a line of Markdown that shows nothing else, in a table, too; addresses are links."""
+    """Escape plain text for a line of Markdown, also in a table; addresses become links."""
     line = " ".join(str(text).split())
-    # Of the parts, every other is an address.
+    # Every second part is an address.
     parts = [
         _link(part) if number % 2 else _SPECIAL.sub(r"\\\g<0>", part)
         for number, part in enumerate(_ADDRESS.split(line))
@@ -369,19 +370,19 @@ def markdown(text) -> str:
 
 
 def _link(address: str) -> str:
-    """A web address as a link."""
+    """Write a web address as a link."""
     plain = re.sub(r"[\s<>|`\\]", lambda found: quote(found[0]), address)
     return f"<{plain}>"
 
 
 def _span(values, form="{:z.3g}") -> str:
-    """Smallest and largest value, or the only one."""
+    """Write the smallest and largest value, or the only one."""
     least, most = form.format(min(values)), form.format(max(values))
     return least if least == most else f"{least} to {most}"
 
 
 def _seeds(values: Sequence[int]) -> str:
-    """Seeds as people write them: `1..50`, or a list."""
+    """Write seeds as a range, `1..50`, or a list."""
     values = sorted(values)
     if len(values) > 2 and values == list(range(values[0], values[-1] + 1)):
         return f"{values[0]}..{values[-1]}"

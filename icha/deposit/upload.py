@@ -59,17 +59,6 @@ _PATIENCE = Retry(
 )
 
 
-class _Bearer(requests.auth.AuthBase):
-    """The token in the header of a request; set this way, no `.netrc` replaces it."""
-
-    def __init__(self, token: str):
-        self._token = token
-
-    def __call__(self, request):
-        request.headers["Authorization"] = f"Bearer {self._token}"
-        return request
-
-
 def server_address(address: str) -> str:
     """Return the address of a server without a path.
 
@@ -101,9 +90,14 @@ class Zenodo:
         self.address = server_address(address)
         self._token = token
         self._session = requests.Session()
-        self._session.auth = _Bearer(token)
+        self._session.auth = self._authorize
         for scheme in ("https://", "http://"):
             self._session.mount(scheme, HTTPAdapter(max_retries=patience or _PATIENCE))
+
+    def _authorize(self, request: requests.PreparedRequest) -> requests.PreparedRequest:
+        """Add the token to a request; as authentication of the session, no `.netrc` replaces it."""
+        request.headers["Authorization"] = f"Bearer {self._token}"
+        return request
 
     def create(self) -> Draft:
         """Make an empty draft."""
@@ -171,7 +165,7 @@ class Zenodo:
         return Draft(number, page, bucket.removeprefix(self.address).rstrip("/"), doi, files)
 
     def _call(self, method: str, path: str, **content) -> dict:
-        """Send a request; return its JSON, or {} where there is none."""
+        """Send a request; return its JSON, or {} if the answer is empty."""
         try:
             answer = self._session.request(
                 method, f"{self.address}{path}", timeout=_TIMEOUT, allow_redirects=False, **content
@@ -211,7 +205,7 @@ class Zenodo:
 
 
 def _text(content: Any, *keys: str) -> str:
-    """Return a text or number in nested mappings of an answer, as text; empty if there is none."""
+    """Return a text or number in nested mappings of an answer, as text; empty if it is missing."""
     for key in keys:
         content = content.get(key) if isinstance(content, dict) else None
     return str(content) if isinstance(content, str | int) else ""

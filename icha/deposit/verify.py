@@ -23,7 +23,7 @@ CHECKSUMS = "SHA256SUMS"
 README, CRATE, ZENODO = "README.md", "ro-crate-metadata.json", ".zenodo.json"
 # Folder of the program's source.
 SOURCE = "source"
-# What is computed, and computed again by `icha reproduce`.
+# Results of a campaign, which `icha reproduce` computes again.
 COMPUTED = (
     *("dataset", "runs", "surfaces", "references", "aggregated", "figures"),
     *("report.html", "checks.json", "verdict.txt"),

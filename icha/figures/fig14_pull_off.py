@@ -1,4 +1,4 @@
-"""Fig. 14: how hard one has to pull, against the rms slope and against how hard it was pressed."""
+"""Fig. 14: pull-off against the rms slope and against the largest load."""
 
 from __future__ import annotations
 
@@ -9,13 +9,22 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from pydantic import Field
 
-from icha.figures.curves import plausible
+from icha.figures.curves import drop_rounding_errors
 from icha.figures.declaration import Campaign, Declaration, StudyFigure, not_unloaded, studies_problems
 from icha.figures.ensembles import Points, points_handles
 from icha.figures.hysteresis import detached_lines, name_model
 from icha.figures.legends import legend_below
 from icha.figures.looks import looks_of_studies
-from icha.figures.style import GREY, ONE_COLUMN, TWO_COLUMNS, new_panels, number, slope_label, styled, unit_for
+from icha.figures.style import (
+    GREY,
+    ONE_COLUMN,
+    TWO_COLUMNS,
+    choose_unit,
+    format_number,
+    in_style,
+    new_panels,
+    slope_label,
+)
 from icha.support.values import Problem, list_of_names
 
 if TYPE_CHECKING:
@@ -36,11 +45,11 @@ class PullOffFigure(StudyFigure):
     )
 
     def studies_of(self, campaign: Campaign) -> tuple[str, ...]:
-        """Those of both panels."""
+        """Return the studies of both panels."""
         return tuple(dict.fromkeys([self.study, *(self.load_studies or ())]))
 
     def problems(self, campaign: Campaign) -> Iterator[Problem]:
-        """Studies of the second panel that are not there, and studies that do not come back, are more."""
+        """Yield in addition the problems of studies that are unknown or do not unload completely."""
         yield from studies_problems(campaign, "load_studies", self.load_studies or ())
         yield from super().problems(campaign)
         yield from not_unloaded(campaign, ("study",), self.study, partly=False)
@@ -55,12 +64,12 @@ _QUANTITIES = {
     "pull_off_over_strength": "pull-off / strength of the interface",
     "pull_off_over_summits": "pull-off / all summits at their most",
 }
-# Values that span more than this are drawn on a logarithmic axis.
+# Ratio of values above which their axis is logarithmic.
 _SPAN = 30.0
 _LINE = {"lw": 0.9}
 
 
-@styled
+@in_style
 def figure(
     campaign: xr.DataTree, *, study: str, load_studies: Sequence[str] = (), quantity: str = "pull_off_pressure"
 ) -> Figure:
@@ -70,12 +79,12 @@ def figure(
     by_load = detached_lines(campaign, load_studies)
     loaded_slopes = {slope for (*_, slope), _ in by_load}
     if len(loaded_slopes) == 1:
-        # The panel's title names it, and the lines look like those of (a).
+        # The title of the panel names the slope, and lines have the looks of those in (a).
         by_load = detached_lines(campaign, load_studies, along_slopes=True)
     looks = looks_of_studies(campaign, [study, *load_studies], [contact for contact, _ in (*by_slope, *by_load)])
     points = itertools.chain(*by_slope.values(), *by_load.values())
     largest = max(float(run[quantity]) for point in points for run in point.runs.values())
-    factor, unit = unit_for(largest, "Pa") if quantity == "pull_off_pressure" else (1.0, "")
+    factor, unit = choose_unit(largest, "Pa") if quantity == "pull_off_pressure" else (1.0, "")
 
     fig, [panels] = new_panels(2.9, columns=2 if by_load else 1, width=TWO_COLUMNS if by_load else ONE_COLUMN)
     counts = []
@@ -98,7 +107,7 @@ def figure(
 
 
 def _label_slopes(ax, slopes):
-    """Label the axis of slopes by those that there are."""
+    """Label the axis of slopes by the slopes that are drawn."""
     ax.set_xlabel(r"rms slope  $h_{\mathrm{rms}}^{\prime}$")
     ax.set_xscale("log" if slopes[-1] > 3 * slopes[0] else "linear")
     ax.set_xticks(slopes, [f"{slope:g}" for slope in slopes])
@@ -113,15 +122,15 @@ def _label_loads(ax, loads):
     if loads.min() > 0 and loads.max() > 2 * loads.min():
         ax.set_xscale("log")
         ax.xaxis.set_major_locator(LogLocator(subs=(1.0, 3.0)))
-        ax.xaxis.set_major_formatter(lambda value, _: number(value))
+        ax.xaxis.set_major_formatter(lambda value, _: format_number(value))
         ax.xaxis.set_minor_formatter(NullFormatter())
     elif np.ptp(loads) < 1e-3 * np.abs(loads).max():
         ax.set_xlim(0, 2 * loads.max())
 
 
 def _scale(ax, values):
-    """An axis on which all values have a place, logarithmic where they span decades."""
-    positive = plausible(values)
+    """Scale an axis so that it shows all values: logarithmic if they span decades, linear around zero."""
+    positive = drop_rounding_errors(values)
     if len(positive) and positive.max() > _SPAN * positive.min():
         least = 10.0 ** np.floor(np.log10(positive.min()))
         ax.set_yscale("symlog", linthresh=least, linscale=0.4)

@@ -19,16 +19,16 @@ from icha.figures.curves import (
     area_points,
     cross_look,
     draw_curves,
+    drop_rounding_errors,
     gap_label,
     gap_points,
-    plausible,
     study_curves,
-    whose_theories,
+    theories_handle,
 )
 from icha.figures.declaration import Campaign, Declaration, Inputs, StudyFigure, finite_range_error
 from icha.figures.ensembles import draw_members, mark_fewer
 from icha.figures.select import asked_of_entry, errors_of_run, finite_range_errors
-from icha.figures.style import BLACK, GREY, TWO_COLUMNS, logarithmic_axes, new_figure, panel_label, styled
+from icha.figures.style import BLACK, GREY, TWO_COLUMNS, in_style, logarithmic_axes, new_figure, panel_label
 from icha.support.statistics import ensemble
 
 if TYPE_CHECKING:
@@ -55,7 +55,7 @@ _LOWER = 0.42
 _SAME_LOAD = 1e-6
 
 
-@styled
+@in_style
 def figure(
     campaign: xr.DataTree, references: xr.Dataset | None = None, model_error: xr.DataTree | None = None, *, study: str
 ) -> Figure:
@@ -78,7 +78,7 @@ def figure(
     if curves.unloaded:
         left.plot([], [], color=GREY, label="unloading", **UNLOADING)
     states = [(p, areas, gaps), *_draw_solutions([left, right], curves.looks, entries)]
-    pressures, areas, gaps = (plausible(np.concatenate(values)) for values in zip(*states, strict=True))
+    pressures, areas, gaps = (drop_rounding_errors(np.concatenate(values)) for values in zip(*states, strict=True))
     x = (pressures.min() / 1.6, pressures.max() * 1.6)
     if references is not None:
         if "gfmd_reduced_pressure" in references:
@@ -99,7 +99,7 @@ def figure(
         lowest = letter in mosaic.split(";")[1]
         ax.tick_params(labelbottom=lowest)
         ax.set_xlabel(PRESSURE_LABEL if lowest else "")
-    add_legend(fig, [left, right], curves, whose_theories(dataset) if references is not None else {})
+    add_legend(fig, [left, right], curves, theories_handle(dataset) if references is not None else {})
     return fig
 
 
@@ -131,22 +131,22 @@ def _differences(curves, entries, references):
     """Return the differences of contact area and separation from boundary elements or else from theories."""
     from icha.references.persson import persson_area
 
-    # The limit of a short range comes first: the other one with adhesion only bounds it.
-    truths = {truth.contact: truth for truth in curves.beside}
+    # The limit of a short range comes first: with adhesion, finite ranges only bound it.
+    truths = {truth.runs.contact: truth for truth in curves.crosses}
     areas, separations = [], []
     for line in curves.lines:
-        if truth := truths.get(line.contact):
-            asked = min(line.asked, truth.asked)
-            areas.append((line, *_from_runs(line.runs, truth.runs, area_points, logarithmic=True), asked))
-            separations.append((line, *_from_runs(line.runs, truth.runs, gap_points, logarithmic=False), asked))
+        if truth := truths.get(line.runs.contact):
+            asked = min(line.runs.asked, truth.runs.asked)
+            areas.append((line, *_from_runs(line, truth, area_points, logarithmic=True), asked))
+            separations.append((line, *_from_runs(line, truth, gap_points, logarithmic=False), asked))
             continue
-        for errors in errors_of_run(entries, line.labels, "surface", "rms_slope", "material"):
+        for errors in errors_of_run(entries, line.runs.labels, "surface", "rms_slope", "material"):
             if np.isfinite(errors["area_error"].values).any():
                 errors = errors.dropna("reduced_pressure", how="all", subset=["area_error"])
                 load, asked = errors["reduced_pressure"].values, asked_of_entry(errors)
-                own = errors.sel(seed=[seed for seed in line.runs if seed in errors["seed"].values])
-                areas.append((line, load, _per_cent(own["area_error"]), asked))
-                separations.append((line, load, _per_cent(own["separation_error"]), asked))
+                of_seeds = errors.sel(seed=[seed for seed in line.runs.runs if seed in errors["seed"].values])
+                areas.append((line, load, _per_cent(of_seeds["area_error"]), asked))
+                separations.append((line, load, _per_cent(of_seeds["separation_error"]), asked))
                 break
     if areas:
         return [
@@ -161,14 +161,14 @@ def _differences(curves, entries, references):
     return [*found, _Difference(drawn, r"$\bar{u}/\bar{u}_{\mathrm{Persson}}-1$  (%)")]
 
 
-def _from_runs(runs, truths, points, *, logarithmic):
-    """Return loads, and differences (seeds, loads) of runs from those by boundary elements with the same seed.
+def _from_runs(line, truth, points, *, logarithmic):
+    """Return loads, and differences (seeds, loads) of runs from boundary elements with the same seed, in per cent.
 
-    They are at the runs' own loads as far as boundary elements reach, between whose stops values are interpolated.
+    The loads are those of the runs, as far as boundary elements reach. Their values are interpolated.
     """
     from icha.analysis.common_loads import at_common_loads, interpolated
 
-    members = []
+    members, runs, truths = [], line.stops, truth.stops
     for seed in [seed for seed in runs if seed in truths]:
         (load, values), (true_load, true_values) = points(runs[seed]), points(truths[seed])
         pressed = true_load > 0
@@ -193,16 +193,16 @@ def _from_theory(lines, points, theory):
     found = []
     for line in lines:
         members = []
-        for run in line.runs.values():
+        for run in line.stops.values():
             load, values = points(run)
             load, values = load[load > 0], values[load > 0]
             members.append((load, 100 * (values / theory(load) - 1)))
-        found.append((line, *at_common_loads(members, logarithmic=False), line.asked))
+        found.append((line, *at_common_loads(members, logarithmic=False), line.runs.asked))
     return found
 
 
 def _draw_difference(ax, difference, lines):
-    """Draw the differences of all lines."""
+    """Draw the differences of all lines in a lower panel."""
     for line, load, members, asked in difference.drawn:
         if members.size:
             look = line.look | {"ls": "-", "lw": 0.6}
@@ -218,11 +218,11 @@ def _draw_solutions(panels, looks, entries):
     for errors in entries:
         for (surface, slope), material in itertools.product(surfaces_and_slopes(errors), errors["material"].values):
             labels = {"material": material, "surface": surface, "rms_slope": slope}
-            own = errors.isel(place_of(errors, labels)).transpose("seed", ...)
-            members = [own[f"{name}_boundary_elements"].values for name in quantities]
+            solutions = errors.isel(place_of(errors, labels)).transpose("seed", ...)
+            members = [solutions[f"{name}_boundary_elements"].values for name in quantities]
             # A surface has no states at the slopes of others.
             known = np.isfinite(members[0])
-            p = own["reduced_pressure"].values
+            p = solutions["reduced_pressure"].values
             if not known.any():
                 continue
             means = [ensemble(values).mean for values in members]
@@ -231,7 +231,7 @@ def _draw_solutions(panels, looks, entries):
             look = cross_look(looks, (material, surface, slope), FINITE_RANGE)
             for ax, values in zip(panels, states[-1][1:], strict=True):
                 ax.plot(states[-1][0], values, **look)
-                mark_fewer(ax, states[-1][0], values, known[:, solved], look, int(asked_of_entry(own)))
+                mark_fewer(ax, states[-1][0], values, known[:, solved], look, int(asked_of_entry(solutions)))
     if states:
         for ax in panels:
             ax.plot([], [], **look | {"color": GREY, "mec": GREY, "ms": 8}, label=FINITE_RANGE)
@@ -260,10 +260,10 @@ def _draw_separate_summits(left, right, references, dataset, colours):
     if "greenwood_williamson_reduced_pressure" in references:
         curves.append(("Greenwood & Williamson", (0, (5, 2, 1, 2)), GREY, "greenwood_williamson", references))
     for k in range(references.sizes.get("fuller_tabor_curve", 0)):
-        own = references.isel(fuller_tabor_curve=k)
-        material, slope = str(own["fuller_tabor_material"].values), float(own["fuller_tabor_rms_slope"])
+        theory = references.isel(fuller_tabor_curve=k)
+        material, slope = str(theory["fuller_tabor_material"].values), float(theory["fuller_tabor_rms_slope"])
         if material in colours and np.isclose(slope, dataset["rms_slope"].values, rtol=1e-9).any():
-            curves.append(("Fuller & Tabor", (0, (1, 1.5)), colours[material], "fuller_tabor", own))
+            curves.append(("Fuller & Tabor", (0, (1, 1.5)), colours[material], "fuller_tabor", theory))
     for label, dashes, colour, name, theory in curves:
         p, separation = (theory[f"{name}_reduced_{quantity}"].values for quantity in ("pressure", "separation"))
         look = {"ls": dashes, "lw": 0.8, "zorder": 1.8}

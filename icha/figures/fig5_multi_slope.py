@@ -1,4 +1,4 @@
-"""Fig. 5: contact area against load for several rms slopes and materials, with measurements where there are any."""
+"""Fig. 5: contact area against load for several rms slopes and materials, with measurements."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from icha.figures.curves import (
     study_curves,
 )
 from icha.figures.declaration import Campaign, Declaration, Inputs, TruthFigure
-from icha.figures.style import BLACK, DASHES, GREY, legend_handle, material_label, new_panels, styled
+from icha.figures.style import BLACK, DASHES, GREY, in_style, legend_handle, material_label, new_panels
 from icha.support.input_files import read_columns
 
 if TYPE_CHECKING:
@@ -26,13 +26,13 @@ if TYPE_CHECKING:
 
 
 def inputs(campaign: Campaign, options: TruthFigure, files: results.ResultFiles) -> Inputs:
-    """The runs, and tables of measurements that belong to the study, if there are any."""
+    """Return the runs, and tables of measurements that belong to the study, if there are any."""
     tables = [measurement.path for measurement in _measurements(campaign, options)]
     return {"campaign": files.path(results.DATASET)} | ({"tables": tables} if tables else {})
 
 
 def arguments(campaign: Campaign, options: TruthFigure) -> dict[str, Any]:
-    """What is to be known of each table."""
+    """Return what the figure needs to know about each table."""
     known = [
         {
             "label": measurement.label,
@@ -51,7 +51,7 @@ def _measurements(campaign, options):
 
 
 def _load_unit(campaign, measurement) -> float:
-    """What a measured load is divided by to become p/(E* h'rms)."""
+    """Return the divisor that turns a measured load into p/(E* h'rms)."""
     if not measurement.load_is_pressure:
         return 1.0
     return campaign.materials[measurement.material].contact_modulus * measurement.rms_slope
@@ -65,7 +65,7 @@ DECLARATION = Declaration(
 )
 
 
-@styled
+@in_style
 def figure(
     campaign: xr.DataTree,
     tables: Sequence[str | os.PathLike] = (),
@@ -79,21 +79,19 @@ def figure(
     Parameters
     ----------
     campaign : the campaign dataset.
-    tables : files of measured curves to lay over; in panel (b) only those whose slope is known.
-    measurements : of each table its `label`, `columns` (headings of load and area, with factors), `load_unit` (what a
-        load is divided by to become p/(E* h'rms)), and `material` and `rms_slope`, None where they are not known.
+    tables : files of measured curves; panel (b) shows only those whose slope is known.
+    measurements : of each table its `label`, `columns` (headings of load and area, with factors), `load_unit` (the
+        divisor that turns a load into p/(E* h'rms)), and `material` and `rms_slope`, None if they are not known.
     """
     curves = study_curves(campaign, study, boundary_elements)
     dataset, colours = campaign[study].to_dataset(), curves.looks.colours
-    # Of curves that lie on each other all stay visible: later materials have smaller markers.
-    size = {name: max(7.0 * 0.7**k, 1.6) for k, name in enumerate(curves.looks.materials)}
+    # All of several curves that coincide stay visible: markers are open, and smaller for every further material.
+    looks = {name: {"mfc": "none", "ms": max(7.0 * 0.7**k, 1.6)} for k, name in enumerate(curves.looks.materials)}
 
     fig, [(left, right)] = new_panels(3.5, sharey=True)
     if not curves.looks.scale:
-        own = [
-            line._replace(look=line.look | {"mfc": "none", "ms": size[line.labels.material]}) for line in curves.lines
-        ]
-        curves = curves._replace(lines=own)
+        lines = [line._replace(look=line.look | looks[line.runs.labels.material]) for line in curves.lines]
+        curves = curves._replace(lines=lines)
     draw_curves(curves, {left: area_points, right: _points_at_load}, unloading=True)
     for k, (table, known) in enumerate(zip(tables, measurements, strict=True)):
         _draw_measured(left, right, table, known, colours.get(known["material"], BLACK), DASHES[k % len(DASHES)])
@@ -103,14 +101,11 @@ def figure(
 
     further = {"unloading": legend_handle(color=GREY, **UNLOADING)} if curves.unloaded else {}
     if not curves.looks.scale:
-        further = {material_label(dataset, name): _open(colours[name], size[name]) for name in size} | further
+        for name, look in looks.items():
+            shape = {"ls": "none", "marker": "o", "mew": 1.1, "color": colours[name]}
+            further[material_label(dataset, name)] = legend_handle(**shape | look)
     add_legend(fig, [left, right], curves, further)
     return fig
-
-
-def _open(colour, size):
-    """What the legend shows of a material."""
-    return legend_handle(ls="none", marker="o", color=colour, mfc="none", mew=1.1, ms=size)
 
 
 def _draw_measured(left, right, table, known, colour, dashes):

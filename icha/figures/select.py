@@ -13,18 +13,18 @@ import numpy as np
 from icha.contact.models import REFERENCE_MODEL, first_model
 from icha.datasets.labels import LABELS, RunLabels, place_of, slopes_of
 from icha.datasets.variables.model_error import FINITE_RANGE
-from icha.figures.style import number, slope_label
+from icha.figures.style import format_number, slope_label
 
 if TYPE_CHECKING:
     import xarray as xr
 
 
 class NothingToDraw(ValueError):
-    """A study has no complete run of the kind that a figure shows; the message says what is lacking."""
+    """A study has no complete run of the kind that a figure shows; the message names what is missing."""
 
 
 class ContactRuns(NamedTuple):
-    """The complete runs of one contact by one model, one for each seed.
+    """The complete runs of one contact with one model, one for each seed.
 
     Runs to which the asperity model is not applicable are apart from the others.
 
@@ -32,7 +32,7 @@ class ContactRuns(NamedTuple):
     ----------
     labels : labels of the first run.
     runs : the runs, by seed.
-    asked : number of seeds that the study asks for.
+    asked : number of seeds that the study requests.
     applicable : whether the asperity model is applicable to the runs.
     """
 
@@ -62,7 +62,7 @@ def group_by_contact(campaign: xr.DataTree, runs: Iterable[tuple[RunLabels, xr.D
 def study_runs(
     campaign: xr.DataTree, study: str, *, ragged: bool = True, model: str | None = None
 ) -> list[tuple[RunLabels, xr.Dataset]]:
-    """Return all complete runs of a study by a model, at least one.
+    """Return all complete runs of a study with a model, at least one.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ def study_runs(
 def runs_by_boundary_elements(
     campaign: xr.DataTree, study: str, *, ragged: bool = False
 ) -> list[tuple[RunLabels, xr.Dataset]]:
-    """All complete runs of a study by boundary elements, if any, without patches and events if not `ragged`."""
+    """Return all complete runs of a study with boundary elements, if any; `ragged` as for `study_runs`."""
     try:
         return study_runs(campaign, study, ragged=ragged, model=REFERENCE_MODEL)
     except NothingToDraw:
@@ -104,7 +104,7 @@ def runs_by_boundary_elements(
 
 
 def asked_seeds(study: xr.Dataset, labels: RunLabels) -> int:
-    """Number of seeds that a study asks for of a run's model, surface, slope and material, whatever became of them."""
+    """Return the number of seeds that a study requests of a run's model, surface, slope and material."""
     from icha.datasets.variables.campaign import COMPUTED_RUNS, MISSING
 
     at = place_of(study, {label: getattr(labels, label) for label in LABELS if label != "seed"})
@@ -112,12 +112,12 @@ def asked_seeds(study: xr.Dataset, labels: RunLabels) -> int:
 
 
 def is_applicable(run: xr.Dataset) -> bool:
-    """Whether nothing is known that makes the asperity model not applicable to a run."""
+    """Return whether the asperity model is applicable to a run, as far as known."""
     return not run.attrs.get("applicability")
 
 
 def shown_model(study: xr.Dataset) -> str:
-    """The model whose runs figures show first of a study: asperities, or else the study's first."""
+    """Return the model that figures show first of a study: asperities, or else the study's first model."""
     return first_model(study["model"].values.tolist())
 
 
@@ -183,13 +183,13 @@ def run_on_topography(
     campaign: xr.DataTree, study: str, topography: xr.Dataset, *, surface_name: str | None = None, **labels: object
 ) -> tuple[RunLabels, xr.Dataset]:
     """Return the run of `pick_run`; raise ValueError unless a surface file's dataset is its topography."""
-    own, run = pick_run(campaign, study, surface=surface_name, **labels)
+    found, run = pick_run(campaign, study, surface=surface_name, **labels)
     same = np.isclose(float(topography["period"]), float(run["period"]), rtol=1e-9)
     if not same or int(topography["grid"]) != int(run["grid"]):
-        raise ValueError(f"{own}: the surface given has another period or grid")
-    if "seed" in topography and int(topography["seed"]) != own.seed:
-        raise ValueError(f"{own}: the surface given has seed {int(topography['seed'])}")
-    return own, run
+        raise ValueError(f"{found}: the surface given has another period or grid")
+    if "seed" in topography and int(topography["seed"]) != found.seed:
+        raise ValueError(f"{found}: the surface given has seed {int(topography['seed'])}")
+    return found, run
 
 
 def path_steps(run: xr.Dataset) -> xr.Dataset:
@@ -222,7 +222,7 @@ class Snapshots(NamedTuple):
     ----------
     runs : the runs.
     members : each run, and the position of its snapshot.
-    truths : the same by boundary elements, of those seeds that have it; none if the runs are by boundary elements.
+    truths : the same with boundary elements, of the seeds that have it; empty if `runs` are boundary elements.
     """
 
     runs: ContactRuns
@@ -256,7 +256,7 @@ def snapshots_of_materials(
 
 
 def _positions(run, kind, target):
-    """Position of a snapshot, or nothing if the run does not keep it."""
+    """Return the position of a snapshot in a list, which is empty if the run does not keep it."""
     from icha.datasets.campaign import find_snapshot
 
     try:
@@ -266,7 +266,7 @@ def _positions(run, kind, target):
 
 
 def name_of_place(dataset: xr.Dataset, surface: str, rms_slope: float) -> str:
-    """A surface and rms slope in words, as far as their study has several of them."""
+    """Return surface and rms slope in words, as far as their study has several of them."""
     several = {surface: dataset.sizes["surface"] > 1, slope_label(rms_slope): len(slopes_of(dataset)) > 1}
     return ", ".join(text for text, shown in several.items() if shown)
 
@@ -280,11 +280,11 @@ _KIND_LABELS = {
 
 
 def snapshot_label(run: xr.Dataset, snapshot: int) -> str:
-    """At which load, area or separation a snapshot was taken, for figures."""
+    """Return load, area or separation of a snapshot in words."""
     kind, value = str(run["snapshot_kind"].values[snapshot]), float(run["snapshot_target"].values[snapshot])
     if kind == "pull_off":
         return "pull-off"
-    return f"{_KIND_LABELS[kind]} = {number(value)}"
+    return f"{_KIND_LABELS[kind]} = {format_number(value)}"
 
 
 def study_errors(model_error: xr.DataTree | None, study: str) -> dict[str, xr.Dataset]:

@@ -1,14 +1,13 @@
-"""One look for all figures, and files with the same bytes whenever they are drawn from the same data.
+"""Style of all figures, labels, units, and files with the same bytes whenever they are drawn from the same data.
 
-Matplotlib is imported where something is drawn: whoever reads a configuration need not wait for it.
+Matplotlib is imported only where something is drawn, so that reading a configuration does not wait for it.
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
 from contextlib import contextmanager
-from functools import cache, wraps
+from functools import cache
 from string import ascii_lowercase
 from typing import TYPE_CHECKING
 
@@ -24,7 +23,7 @@ if TYPE_CHECKING:
 ONE_COLUMN = 3.5
 TWO_COLUMNS = 7.1
 
-# M. Okabe and K. Ito, Color Universal Design (2008): told apart with any colour vision.
+# M. Okabe and K. Ito, Color Universal Design (2008): distinguishable with any colour vision.
 BLUE, VERMILLION, GREEN = "#0072B2", "#D55E00", "#009E73"
 ORANGE, SKY, PURPLE, BLACK = "#E69F00", "#56B4E9", "#CC79A7", "#000000"
 COLOURS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY, BLACK)
@@ -61,19 +60,9 @@ RC = {
 }
 
 
-def styled(draw: Callable[..., Figure]) -> Callable[..., Figure]:
-    """Decorate a function that draws a figure: it draws in the style above, whatever the user's settings."""
-
-    @wraps(draw)
-    def drawn(*args, **kwargs):
-        with _in_style():
-            return draw(*args, **kwargs)
-
-    return drawn
-
-
 @contextmanager
-def _in_style():
+def _style():
+    """Draw in the style above, whatever the user's settings."""
     import matplotlib as mpl
 
     with mpl.rc_context():
@@ -82,8 +71,12 @@ def _in_style():
         yield
 
 
+# Decorator of functions that draw a figure.
+in_style = _style()
+
+
 def new_figure(width: float, height: float) -> Figure:
-    """An empty figure that belongs to no window and to no global state; sizes in inches."""
+    """Return an empty figure that belongs to no window and to no global state; sizes in inches."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -96,7 +89,7 @@ def new_figure(width: float, height: float) -> Figure:
 def new_panels(
     height: float, rows: int = 1, columns: int = 2, *, width: float = TWO_COLUMNS, **options: object
 ) -> tuple[Figure, np.ndarray]:
-    """A figure and its panels (rows, columns), which are marked as (a), (b), …; `options` as for `Figure.subplots`."""
+    """Return a figure and its panels (rows, columns), marked as (a), (b), …; `options` as for `Figure.subplots`."""
     figure = new_figure(width, height)
     panels = figure.subplots(rows, columns, squeeze=False, **options)
     for axes, letter in zip(panels.ravel(), ascii_lowercase, strict=False):
@@ -105,8 +98,8 @@ def new_panels(
 
 
 def save(figure: Figure, png: str | os.PathLike, pdf: str | os.PathLike) -> None:
-    """Write a figure to both formats, without date or name of the software that would change with its version."""
-    with _in_style():
+    """Write a figure to both formats, without the date and the name of the software."""
+    with _style():
         with whole_file(png) as temporary:
             figure.savefig(temporary, format="png", metadata={"Software": None})
         with whole_file(pdf) as temporary:
@@ -115,7 +108,7 @@ def save(figure: Figure, png: str | os.PathLike, pdf: str | os.PathLike) -> None
 
 
 def logarithmic_axes(axes, directions: str = "xy") -> None:
-    """Make the axes of these directions logarithmic; between powers of ten only as much is labelled as has room."""
+    """Make the axes of these directions logarithmic, with few labels between powers of ten."""
     for direction in directions:
         axes.set(**{f"{direction}scale": "log"})
         getattr(axes, f"{direction}axis").set_minor_formatter(_few_labels()())
@@ -127,41 +120,33 @@ def _few_labels() -> type:
     from matplotlib.ticker import LogFormatterSciNotation
 
     class FewLabels(LogFormatterSciNotation):
-        """Labels of the ticks between powers of ten: twos and fives where an axis shows less than two powers.
-
-        Where these are too few as well, some of the ticks that there are.
-        """
+        """Labels between powers of ten, of axes that show less than two powers: twos and fives, or else some ticks."""
 
         _MOST = 3
 
         def set_locs(self, locs):
-            """Choose among the ticks."""
+            """Choose the ticks that have a label."""
             low, high = sorted(self.axis.get_view_interval())
             powers = np.floor(np.log10(high)) - np.ceil(np.log10(low)) + 1
-            inside = [at for at in locs if low <= at <= high]
-            digits = [at / 10 ** np.floor(np.log10(at)) for at in inside]
-            chosen = [at for at, digit in zip(inside, digits, strict=True) if np.isclose(digit, (2, 5)).any()]
+            inside = np.array([at for at in locs if low <= at <= high])
+            digits = inside / 10 ** np.floor(np.log10(inside))
+            chosen = inside[np.isclose(digits, 2) | np.isclose(digits, 5)]
             if len(chosen) + powers < 2:
                 chosen = inside[:: -(-len(inside) // self._MOST) or 1]
             self._chosen = chosen if powers < 2 else []
 
         def __call__(self, x, pos=None):
-            """The label of a tick."""
+            """Return the label of a tick."""
             return super().__call__(x, pos) if x in self._chosen else ""
 
     return FewLabels
 
 
-def line_artist(x, y, **look) -> Line2D:
-    """A line that belongs to no axes yet; `look` as for `Axes.plot`."""
+def legend_handle(x=(), y=(), **look) -> Line2D:
+    """Return a line that belongs to no axes, as legends show it; `look` as for `Axes.plot`."""
     from matplotlib.lines import Line2D
 
     return Line2D(x, y, **look)
-
-
-def legend_handle(**look) -> Line2D:
-    """A line that only a legend shows."""
-    return line_artist([], [], **look)
 
 
 def panel_label(axes, letter: str) -> None:
@@ -169,8 +154,8 @@ def panel_label(axes, letter: str) -> None:
     axes.set_title(f"({letter})", loc="left", fontweight="bold")
 
 
-def number(value: float) -> str:
-    """A value in text: `0.01`, `25`, `3.2 × 10⁻⁵` in mathtext."""
+def format_number(value: float) -> str:
+    """Return a value in text, such as `0.01`, `25`, or `3.2 × 10⁻⁵` in mathtext."""
     if value == 0:
         return "0"
     exponent = int(np.floor(np.log10(abs(value)) + 1e-12))
@@ -184,36 +169,45 @@ def number(value: float) -> str:
 _PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 
 
-def unit_for(value: float, unit: str) -> tuple[float, str]:
-    """Factor and name of the prefixed unit in which `value` (SI) lies between 1 and 1000."""
+def choose_unit(value: float, unit: str) -> tuple[float, str]:
+    """Return factor and name of the prefixed unit in which `value` (SI) lies between 1 and 1000."""
     exponent = 0 if value == 0 else int(np.floor(np.log10(abs(value)) / 3 + 1e-12)) * 3
     exponent = min(max(exponent, min(_PREFIXES)), max(_PREFIXES))
     return 10.0**-exponent, f"{_PREFIXES[exponent]}{unit}"
 
 
-def quantity(value: float, unit: str) -> str:
-    """A value with a prefixed unit, such as `25 MPa`."""
-    factor, name = unit_for(value, unit)
+def format_quantity(value: float, unit: str) -> str:
+    """Return a value with a prefixed unit, such as `25 MPa`."""
+    factor, name = choose_unit(value, unit)
     return f"{value * factor:.4g} {name}"
 
 
-def material_label(study, material: str) -> str:
-    """What distinguishes a material, for legends: modulus and surface energy, in the same units for a whole study.
+# Variables that distinguish materials, with their symbols and units.
+INTERFACE = {
+    "contact_modulus": (r"$E^{\ast}$", "Pa"),
+    "surface_energy": (r"$\Delta\gamma$", "J/m²"),
+    "interaction_range": ("range of attraction", "m"),
+}
 
-    The range of attraction is added where the others do not tell two materials apart.
+
+def material_label(study, material: str) -> str:
+    """Return modulus and surface energy of a material, in the same units for a whole study, for legends.
+
+    The range of attraction is added if the others do not distinguish two materials.
     """
-    own = study.sel(material=material)
-    parts = []
-    for name, symbol, unit in (("contact_modulus", r"$E^{\ast}$", "Pa"), ("surface_energy", r"$\Delta\gamma$", "J/m²")):
-        value = float(own[name])
-        factor, prefixed = unit_for(float(study[name].max()), unit)
-        parts.append(f"{symbol} = {value * factor:.4g} {prefixed}" if value > 0 else f"{symbol} = 0")
-    alike = (study["contact_modulus"] == own["contact_modulus"]) & (study["surface_energy"] == own["surface_energy"])
+    values = study.sel(material=material)
+    words, alike = [], True
+    for name in ("contact_modulus", "surface_energy"):
+        symbol, unit = INTERFACE[name]
+        value = float(values[name])
+        factor, prefixed = choose_unit(float(study[name].max()), unit)
+        words.append(f"{symbol} = {value * factor:.4g} {prefixed}" if value > 0 else f"{symbol} = 0")
+        alike &= study[name] == values[name]
     if int(alike.sum()) > 1:
-        parts.append(f"range {quantity(float(own['interaction_range']), 'm')}")
-    return ", ".join(parts)
+        words.append(f"range {format_quantity(float(values['interaction_range']), 'm')}")
+    return ", ".join(words)
 
 
 def slope_label(slope: float) -> str:
-    """An rms slope in text."""
+    """Return an rms slope in text."""
     return rf"$h_{{\mathrm{{rms}}}}^{{\prime}}$ = {slope:g}"

@@ -1,8 +1,8 @@
 """Cycles of loading and unloading: all equilibria of a path that continues after the first loading.
 
 On unloading every spot follows its stable branch until it jumps off, up to complete separation or a turning point.
-Unloading visits the separations of the first loading again, so that both curves can be compared. Where an event changes
-the pressure, steps become so short that the work lost in the event is known, whatever the longest step.
+Unloading visits separations of the first loading again, the stations, so that both curves can be compared. Where an
+event changes the pressure, steps become so short that the work lost in the event is known, whatever the longest step.
 """
 
 from __future__ import annotations
@@ -135,7 +135,7 @@ class _Cycle:
 
     @property
     def loading(self) -> bool:
-        """Whether the surfaces approach each other."""
+        """True if the surfaces approach each other."""
         return self.leg % 2 == 0
 
     @property
@@ -185,14 +185,11 @@ class _Cycle:
                 step = Step.between(self.contact, self.state, met)
             listed = None if target is sent else target
             self.progress.require_validity(self.state, met, listed, pending, self.loading)
-            # The very first step is as short as the first contact is sharp.
+            # The first contact forms in the shortest step; after that the longest one is tried.
             first = leg == 0 and len(visited) == 1
             self.step_length = self.longest if first else self._next_length(step, met)
-            self.effort += abs(step.work) + abs(step.loss)
-            self.jump_energy += step.jump_energy(self.contact)
-            self.lowest_pressure = min(self.lowest_pressure, self.contact.pressure(met))
-            self.progress.record_equilibrium(met, self.loading)
-            self.state, width_limit = met, np.inf
+            self._accept(met, step)
+            width_limit = np.inf
             if self._is_new_station(met.separation, visited[-1]):
                 visited.append(met.separation)
             if listed is not None:
@@ -207,11 +204,19 @@ class _Cycle:
             new = (separation for separation in [*visited, self.state.separation] if separation < lowest)
             self.stations = sorted({*self.stations, *new})
 
+    def _accept(self, state, step):
+        """Move to the next state, and add the step to the sums over all steps."""
+        self.effort += abs(step.work) + abs(step.loss)
+        self.jump_energy += step.jump_energy(self.contact)
+        self.lowest_pressure = min(self.lowest_pressure, self.contact.pressure(state))
+        self.progress.record_equilibrium(state, self.loading)
+        self.state = state
+
     def find_next(self, width: float) -> tuple[State, Step]:
         """Find the next equilibrium, so close that the work up to it is known, and the step to it.
 
-        On unloading the spots may lose their equilibrium together before any of them has come to its own jump-off: then
-        the one that is closest to it, at the rate at which all of them approach it, breaks contact.
+        The step is halved until an equilibrium is found and the work is known, or until it is the shortest one. A step
+        in which the tension has a new maximum ends at the maximum.
 
         width : length of the step that is tried first, m.
         """
@@ -243,7 +248,11 @@ class _Cycle:
             self.step_length = min(self.step_length, width)
 
     def _find_equilibrium(self, separation, width):
-        """Find the equilibrium at a separation; in a short step on unloading, spots may break contact for it."""
+        """Find the equilibrium at a separation.
+
+        On unloading all spots may lose their equilibrium together before any of them has reached its own jump-off. Then
+        the spot that would reach it first breaks contact; if that does not help, two, four, … of them.
+        """
         contact, start = self.contact, self.state
         try:
             state = contact.equilibrium(start, separation)
@@ -266,7 +275,12 @@ class _Cycle:
         return width
 
     def _is_work_known(self, state, step):
-        """Return whether the work of a step is known well enough."""
+        """Return whether the work of a step is known well enough.
+
+        It is not if the events of the step, which may happen anywhere in it, leave too much of the work open; if spots
+        unite in a long step; or if the integral of the pressure is inaccurate and does not agree with the change of the
+        stored energy in a step without events.
+        """
         width = abs(step.width)
         if step.unresolved > self._unknown_work(step):
             return False
@@ -276,7 +290,8 @@ class _Cycle:
         accuracy = self.contact.path_accuracy
         scale = effort = self.effort + abs(step.work) + abs(step.loss)
         if step.width > 0 and self.contact.pressure(state) < 0:
-            # In tension there is no loading curve with the same error.
+            # In compression loading and unloading visit the same stations, so that their errors cancel. In tension
+            # they do not: the error is relative to the losses.
             scale = min(effort, max(10 * self.jump_energy, _LEAST_LOSS * effort))
         unbalanced = step.integration_error > _CURVED_WORK * scale and abs(step.loss) > accuracy.balance * scale
         return step.has_jump or not unbalanced or width <= self.longest / 256
@@ -329,12 +344,8 @@ class _Cycle:
         lowest = p + slope * meet
         if lowest >= self.lowest_pressure or min(p, q) - lowest <= contact.path_accuracy.tension * abs(lowest):
             return None
-        # The import takes long, and loading does not need it.
-        from scipy.interpolate import CubicHermiteSpline
-
-        curve = CubicHermiteSpline([0.0, step.width], [p, q], [slope, end_slope])
-        turns = [u for u in curve.derivative().roots(extrapolate=False) if 0 < u < step.width]
-        return start.separation + (min(turns, key=curve) if turns else meet)
+        lowest_at = _minimum_of_cubic(step.width, (p, q), (slope, end_slope))
+        return start.separation + (meet if lowest_at is None else lowest_at)
 
     def _is_apart(self):
         """Return whether nothing touches, at least as far up as where contact was about to be made first."""
@@ -362,3 +373,13 @@ class _Cycle:
             tension = max(0.0, -self.lowest_pressure / target.target.quantity.scale(self.contact))
             reason += f"; the largest tension is {tension:.4g}"
         return NotConverged(reason)
+
+
+def _minimum_of_cubic(width, values, slopes):
+    """Return where the cubic with these values and slopes at 0 and `width` has its lowest turn between; or None."""
+    # The import takes long, and loading does not need it.
+    from scipy.interpolate import CubicHermiteSpline
+
+    curve = CubicHermiteSpline([0.0, width], values, slopes)
+    turns = [u for u in curve.derivative().roots(extrapolate=False) if 0 < u < width]
+    return min(turns, key=curve, default=None)

@@ -111,7 +111,7 @@ def _read(section):
     from icha.surfaces.measured.array_files import read_height_map
     from icha.surfaces.surface import Surface
 
-    return Surface(read_height_map(section.path, section.metres_per_unit), section.period)
+    return Surface(read_height_map(section.path, section.height_unit), section.period)
 
 
 def expected_validity(campaign: Campaign) -> list[Statement]:

@@ -17,7 +17,7 @@ from icha.datasets.surface_file import as_measured
 from icha.datasets.variables.model_error import SHORT_RANGE
 from icha.figures.legends import legend_below, named_handles
 from icha.figures.looks import MOST_COLOURS, Scale
-from icha.figures.style import COLOURS, TWO_COLUMNS, logarithmic_axes, new_figure, quantity, styled
+from icha.figures.style import COLOURS, TWO_COLUMNS, format_quantity, in_style, logarithmic_axes, new_figure
 from icha.support.formatting import format_count
 from icha.support.statistics import ENOUGH, ensemble
 
@@ -95,10 +95,10 @@ def surface_row(surface: xr.Dataset) -> dict:
         "boundary": surface.attrs.get("boundary", "periodic"),
         "measured": "measured_rms_slope" in surface,
         "rms_slope": float(surface["rms_slope"]) * scale,
-        "rms_height": quantity(float(surface["rms_height"]) * scale, "m"),
-        "curvature_radius": quantity(1 / (float(surface["rms_curvature"]) * scale), "m"),
+        "rms_height": format_quantity(float(surface["rms_height"]) * scale, "m"),
+        "curvature_radius": format_quantity(1 / (float(surface["rms_curvature"]) * scale), "m"),
         **{name: float(surface[name]) if name in surface else None for name in ("hurst", "nayak_parameter")},
-        **{name: quantity(float(surface[name]), "m") for name in lengths if name in surface},
+        **{name: format_quantity(float(surface[name]), "m") for name in lengths if name in surface},
     }
 
 
@@ -122,7 +122,7 @@ def spectra(surfaces) -> str | None:
     return base64.b64encode(file.getvalue()).decode("ascii")
 
 
-@styled
+@in_style
 def _draw_spectra(members):
     """Draw a curve for each surface; many surfaces have a colour scale instead of a legend."""
     scale = Scale(list(members)) if len(members) > MOST_COLOURS else None

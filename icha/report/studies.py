@@ -11,7 +11,7 @@ from icha.datasets.campaign import loading_stops, reduced_gap, run_place, runs_o
 from icha.datasets.labels import LABELS, RunLabels, labels_at, slopes_of
 from icha.datasets.variables.campaign import COMPLETE, COMPUTED_RUNS, FAILED_CHECKS, INCOMPLETE, MISSING, RAGGED
 from icha.figures.select import asked_seeds, path_steps
-from icha.figures.style import quantity, unit_for
+from icha.figures.style import choose_unit, format_quantity
 from icha.report.template import MOST_ROWS, scientific
 from icha.support.statistics import ENOUGH, ensemble
 
@@ -82,7 +82,9 @@ def _reason(dataset: xr.Dataset, name: str, labels: RunLabels) -> str:
 
 def _material(dataset: xr.Dataset) -> dict[str, str]:
     units = {"contact_modulus": "Pa", "surface_energy": "J/m²", "interaction_range": "m"}
-    values = {key: quantity(float(dataset[key]), unit) for key, unit in units.items() if np.isfinite(dataset[key])}
+    values = {
+        key: format_quantity(float(dataset[key]), unit) for key, unit in units.items() if np.isfinite(dataset[key])
+    }
     return {"name": dataset["material"].item()} | values
 
 
@@ -107,8 +109,8 @@ def _run(labels: RunLabels, run: xr.Dataset) -> dict:
         "steps": run.sizes["step"],
         "tabor": float(run["tabor_parameter"]) if adhesive else None,
         "asperities": int(run["asperity_count"]),
-        "rms_height": quantity(float(run["rms_height"]), "m"),
-        "period": quantity(float(run["period"]), "m"),
+        "rms_height": format_quantity(float(run["rms_height"]), "m"),
+        "period": format_quantity(float(run["period"]), "m"),
         "grid": int(run["grid"]),
         "nayak_parameter": float(run["nayak_parameter"]),
         "stickiness": float(run["stickiness"]),
@@ -288,7 +290,7 @@ def _loop(dataset: xr.Dataset, members: list[tuple], asked: int) -> dict:
 
 def _with_unit(values: np.ndarray, unit: str = "") -> Markup:
     """Format a mean with its unit, and its accuracy below it."""
-    factor, unit = unit_for(float(np.mean(values)), unit) if unit else (1.0, "")
+    factor, unit = choose_unit(float(np.mean(values)), unit) if unit else (1.0, "")
     mean = scientific(float(np.mean(values)) * factor) + (f" {unit}" if unit else "")
     text = _range(values * factor, scientific)
     return (mean + (Markup("<br>") + text if text else "")).replace("-", "−")

@@ -61,6 +61,7 @@ def test_jump_off_is_the_least_approach(law):
     assert law.jump_off_radius(R) / a_unit == pytest.approx(found.x, rel=1e-6)
     assert law.jump_off_approach(R) / delta_unit == pytest.approx(found.fun, rel=1e-12)
     assert law.approach_derivative(law.jump_off_radius(R), R) == pytest.approx(0, abs=1e-12)
+    assert law.contact_radius(1.5 * law.jump_off_approach(R), R) == pytest.approx(law.jump_off_radius(R), rel=1e-12)
 
 
 def test_hertz(hertz):
@@ -91,11 +92,6 @@ def test_contact_radius_inverts_the_approach_on_the_stable_branch(energy):
     assert np.all(law.approach_derivative(a, radii) > 0)
 
 
-def test_below_jump_off_the_radius_stays_that_of_jump_off(law):
-    lowest = law.jump_off_approach(R)
-    assert law.contact_radius(1.5 * lowest, R) == pytest.approx(law.jump_off_radius(R), rel=1e-12)
-
-
 def test_jump_in_is_wus_formula_between_its_clamps():
     # 2.641 mu^(3/7) with mu = 3: an approach of -3.229 ranges, a gap.
     radius = 27 * RANGE**3 / (ENERGY / MODULUS) ** 2
@@ -113,10 +109,6 @@ def test_jump_in_is_wus_formula_between_its_clamps():
     # The two curves cross at mu = 1.065.
     crossing = scipy.optimize.brentq(lambda mu: wu(mu) + 0.75 * np.pi ** (2 / 3) * mu * RANGE, 0.6, 2)
     assert crossing == pytest.approx(1.065, abs=1e-3)
-
-
-def test_challenge_tabor_parameter(law):
-    assert law.material.tabor_parameter(60.1e-9) == pytest.approx(3.00, abs=0.005)
 
 
 def test_derivatives_by_differences(law):

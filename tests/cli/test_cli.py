@@ -27,7 +27,7 @@ from icha.configuration.load import load_configuration
 from icha.datasets.campaign_file import write_campaign
 from icha.datasets.files import read_dataset, write_dataset
 from icha.datasets.surface_file import write_surface
-from icha.figures.style import quantity
+from icha.figures.style import format_quantity
 from icha.planning.ownership import belongs_to_another, claim
 from icha.planning.plan import CHANGED, DAMAGED, DONE, FAILED, TO_DO, failed_runs, plan, time_on, total
 from icha.references.theories import reference_dataset
@@ -562,7 +562,7 @@ def test_scans_are_shown_as_measured(empty_folder):
     write_surface("surface.nc", small.surface(), name="rough", seed=1)
     surface = read_dataset("surface.nc")
     write_dataset(surface.assign(measured_rms_slope=surface["rms_slope"] * 1e-3), "scan.nc")
-    height = quantity(1e-3 * float(surface["rms_height"]), "m")
+    height = format_quantity(1e-3 * float(surface["rms_height"]), "m")
     assert f"as measured: rms height {height}, rms slope 0.001" in printed("show", "scan.nc")
     assert ", as stored; profile" in printed("show", "surface.nc")
 

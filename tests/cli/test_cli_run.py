@@ -67,7 +67,7 @@ def project(tmp_path_factory):
 def test_a_job_that_crashes_is_named_with_its_log_and_stops_no_other(project):
     script = project / "workflow/scripts/run_sweep.py"
     whole = script.read_text()
-    begin = "    pressed = read_surface"
+    begin = "    contact = read_surface"
     assert whole.count(begin) == 1
     script.write_text(whole.replace(begin, CRASH + begin))
     try:
@@ -119,7 +119,7 @@ def test_damaged_files_are_made_again(project):
     done = run(project, "dataset")
     for path in paths:
         aside = (results / path).with_name((results / path).name + ".damaged")
-        assert f"damaged, to be made again: results/tiny/{path} (what was there is {aside.name} now)\n" in done.stdout
+        assert f"damaged, to be made again: results/tiny/{path} (the old file is {aside.name})\n" in done.stdout
         assert len(aside.read_bytes()) < len(before[path])
         assert (results / path).read_bytes() == before[path]
     # No job fails but the verdict on the run that cannot be completed.

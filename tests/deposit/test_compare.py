@@ -18,7 +18,7 @@ from icha.deposit.compare import (
     WITHIN,
     compare_folders,
     compare_values,
-    table,
+    format_comparison,
     write_json,
 )
 
@@ -61,32 +61,20 @@ def folders(tmp_path):
 
 
 def changed(name, index, value):
-    def change(file):
-        file[name][index] = value
-
-    return change
-
-
-def renamed(kind, old, new):
-    def change(file):
-        getattr(file, f"rename{kind}")(old, new)
-
-    return change
+    return lambda file: file[name].__setitem__(index, value)
 
 
 def attribute(name, key, value):
-    def change(file):
-        (file[name] if name else file).setncattr(key, value)
-
-    return change
+    return lambda file: (file[name] if name else file).setncattr(key, value)
 
 
-def of_type(kind):
-    def change(file):
-        file.renameVariable("height", "old")
-        file.createVariable("height", kind, ())[...] = 2.0
+def rename(kind, old, new):
+    return lambda file: getattr(file, f"rename{kind}")(old, new)
 
-    return change
+
+def replace_by_single(file):
+    file.renameVariable("height", "old")
+    file.createVariable("height", "f4", ())[...] = 2.0
 
 
 PLANTED = {
@@ -111,17 +99,17 @@ PLANTED = {
     "text": (changed("note", ..., "hard"), "/note", DIFFERENT, "'soft' and 'hard'"),
     "characters": (changed("branch", slice(1, 2), np.array(["unload"])), "/branch", DIFFERENT, "[1]: 'loading' and"),
     "in a group": (changed("study/radius", 2, 3.1), "/study/radius", DIFFERENT, "[2]: 3.0 and 3.1"),
-    "type": (of_type("f4"), "/height", DIFFERENT, "dtype: float64 and float32"),
-    "dimension": (renamed("Dimension", "step", "stop"), "/pressure", DIFFERENT, "dimensions: ('step',) and ('stop',)"),
+    "type": (replace_by_single, "/height", DIFFERENT, "dtype: float64 and float32"),
+    "dimension": (rename("Dimension", "step", "stop"), "/pressure", DIFFERENT, "dimensions: ('step',) and ('stop',)"),
     "attribute": (attribute("pressure", "units", "kPa"), "/pressure", DIFFERENT, "attribute units: not equal"),
     "number of an attribute": (attribute("pressure", "factor", np.float64(2.5 + 1e-12)), "/pressure", WITHIN, "factor"),
     "type of an attribute": (attribute("pressure", "factor", "2.5"), "/pressure", DIFFERENT, "attribute factor"),
     "more attributes": (attribute("pressure", "comment", "x"), "/pressure", DIFFERENT, "attribute comment: extra"),
     "attribute of the file": (attribute("", "title", "Another"), "/ (attributes)", DIFFERENT, "attribute title"),
-    "missing variable": (renamed("Variable", "count", "number"), "/count", MISSING, "the rerun has none"),
-    "extra variable": (renamed("Variable", "count", "number"), "/number", EXTRA, "the deposit has none"),
-    "missing group": (renamed("Group", "study", "other"), "/study (group)", MISSING, "the rerun has none"),
-    "extra group": (renamed("Group", "study", "other"), "/other (group)", EXTRA, "the deposit has none"),
+    "missing variable": (rename("Variable", "count", "number"), "/count", MISSING, "the rerun has none"),
+    "extra variable": (rename("Variable", "count", "number"), "/number", EXTRA, "the deposit has none"),
+    "missing group": (rename("Group", "study", "other"), "/study (group)", MISSING, "the rerun has none"),
+    "extra group": (rename("Group", "study", "other"), "/other (group)", EXTRA, "the deposit has none"),
 }  # fmt: skip
 
 
@@ -137,23 +125,18 @@ def test_a_planted_difference_is_found_and_nothing_else(planted, folders):
     assert comparison.verdict == file.verdict == (WITHIN if verdict == WITHIN else DIFFERENT)
     renaming = planted in ("type", "dimension") or planted.startswith(("missing", "extra"))
     assert renaming or set(found) == {name}
-    assert name.lstrip("/") in table(comparison) and verdict in table(comparison)
+    assert name.lstrip("/") in format_comparison(comparison) and verdict in format_comparison(comparison)
 
 
 def test_the_same_content_is_identical_however_it_is_stored(folders):
-    deposit, rerun = folders
+    def again(file, compressed):
+        file.renameVariable("pressure", "old")
+        file.createVariable("pressure", "f8", ("step",), zlib=compressed)[:] = file["old"][:]
 
-    def again(compressed):
-        def change(file):
-            file.renameVariable("pressure", "old")
-            file.createVariable("pressure", "f8", ("step",), zlib=compressed)[:] = file["old"][:]
-
-        return change
-
-    write(deposit / FILE, again(False))
-    write(rerun / FILE, again(True))
-    assert (deposit / FILE).read_bytes() != (rerun / FILE).read_bytes()
-    assert compare_folders(deposit, rerun).verdict == IDENTICAL
+    for folder, compressed in zip(folders, (False, True), strict=True):
+        write(folder / FILE, lambda file, compressed=compressed: again(file, compressed))
+    assert (folders[0] / FILE).read_bytes() != (folders[1] / FILE).read_bytes()
+    assert compare_folders(*folders).verdict == IDENTICAL
 
 
 def test_ragged_variables_of_other_lengths_are_different(folders):
@@ -219,7 +202,7 @@ def test_files_that_are_missing_extra_damaged_or_drawn_otherwise(change, path, v
         {path: verdict} if path else {}
     )
     assert comparison.verdict == of_all
-    assert path is None or path.split("/")[0] in table(comparison)
+    assert path is None or path.split("/")[0] in format_comparison(comparison)
     assert compare_folders(*twice, ["figures/b.pdf"]).verdict == IDENTICAL
     write_json(comparison, tmp_path / "out.json")
     assert json.loads((tmp_path / "out.json").read_text())["verdict"] == of_all
@@ -231,19 +214,18 @@ def test_values_that_cannot_be_read_are_different(folders):
         with netCDF4.Dataset(folder / FILE, "w") as file:
             file.createDimension("step", 1000)
             file.createVariable("pressure", "f8", ("step",), zlib=True, fletcher32=True)[:] = np.sqrt(np.arange(1000))
-    spoilt = bytearray((folders[1] / FILE).read_bytes())
-    spoilt[-2000:-1900] = bytes(100)
-    (folders[1] / FILE).write_bytes(spoilt)
+    content = bytearray((folders[1] / FILE).read_bytes())
+    content[-2000:-1900] = bytes(100)
+    (folders[1] / FILE).write_bytes(content)
     (found,) = compare_folders(*folders).files
     assert found.verdict == DIFFERENT and "cannot be compared: RuntimeError" in found.differences[0].detail
 
 
 def test_a_file_with_links_to_other_files_is_not_opened(folders, tmp_path):
-    deposit, rerun = folders
-    write(rerun / FILE)
-    with h5py.File(rerun / FILE, "a") as file:
+    write(folders[1] / FILE)
+    with h5py.File(folders[1] / FILE, "a") as file:
         file["elsewhere"] = h5py.ExternalLink(str(tmp_path / "other.nc"), "/step")
-    (found,) = compare_folders(deposit, rerun).files
+    (found,) = compare_folders(*folders).files
     assert found.verdict == DIFFERENT and "is a link to another file" in found.differences[0].detail
 
 
@@ -252,8 +234,8 @@ def test_the_same_difference_in_many_files_is_one_line(tmp_path):
         path = f"runs/load/rough/seed{k}/slope1/soft.nc"
         write(tmp_path / "deposit" / path)
         write(tmp_path / "rerun" / path, changed("pressure", 3, 1e3 * (1 + k * 1e-8)))
-    text = table(compare_folders(tmp_path / "deposit", tmp_path / "rerun"))
+    text = format_comparison(compare_folders(tmp_path / "deposit", tmp_path / "rerun"))
     assert text.count("pressure") == 1 and "3e-08 at most (3 files, most in runs/load/rough/seed3" in text
     write(tmp_path / "rerun" / path, changed("pressure", 3, 2e3))
-    lines = table(compare_folders(tmp_path / "deposit", tmp_path / "rerun")).splitlines()
+    lines = format_comparison(compare_folders(tmp_path / "deposit", tmp_path / "rerun")).splitlines()
     assert "different" in lines[2] and "within tolerance" in lines[3]  # after headings and counts

@@ -1,4 +1,4 @@
-"""The deposit as an RO-Crate: what it says of files and jobs is so, and other programs read it."""
+"""The deposit as an RO-Crate: its statements on files and jobs, and other programs that read it."""
 
 import hashlib
 import json
@@ -18,42 +18,29 @@ from icha.deposit.verify import CRATE
 
 SCRIPTS = "source/workflow/scripts"
 SCAN = "inputs/scan 1 µm.npy"
+RUNS = tuple(f"runs/load/a/seed1/slope{slope}/soft+dry.nc" for slope in ("0.5", "1"))
 JOBS = (
     Job("surface", (SCAN,), ("surfaces/a/seed1.nc",), (("kind", "measured"),), "Make it.", f"{SCRIPTS}/surface.py"),
     *(
         Job(
             "run",
             ("surfaces/a/seed1.nc",),
-            (f"runs/load/a/seed1/slope{slope}/soft+dry.nc",),
+            (run,),
             (("material.contact_modulus", "2000000.0"), ("rms_slope", slope)),
             "Press it.",
             f"{SCRIPTS}/run.py",
         )
-        for slope in ("0.5", "1")
+        for run, slope in zip(RUNS, ("0.5", "1"), strict=True)
     ),
-    Job(
-        "gather",
-        ("runs/load/a/seed1/slope0.5/soft+dry.nc", "runs/load/a/seed1/slope1/soft+dry.nc"),
-        ("dataset/mine.nc",),
-        (),
-        "Gather them.",
-        f"{SCRIPTS}/gather.py",
-    ),
-    Job(
-        "figure",
-        ("config.used.yaml", "dataset/mine.nc"),
-        ("figures/fig.pdf", "figures/fig.png"),
-        (),
-        "Draw them.",
-        f"{SCRIPTS}/figure.py",
-    ),
+    Job("gather", RUNS, ("dataset/mine.nc",), (), "Gather them.", f"{SCRIPTS}/gather.py"),
+    Job("figure", ("config.used.yaml", "dataset/mine.nc"), ("figures/fig.pdf",), (), "Draw.", f"{SCRIPTS}/figure.py"),
 )
 OTHERS = ("README.md", "LICENSE.txt", "CITATION.cff", "source/Snakefile", "source/uv.lock", "source/LICENSE")
 OTHERS += ("source/icha/path/follow.py",)
 
 
 def checksums_of(folder):
-    """What `sha256sum` would say of all files."""
+    """The checksums of all files, as `sha256sum` prints them."""
     files = sorted(path for path in folder.rglob("*") if path.is_file() and path.name != CRATE)
     return {str(path.relative_to(folder)): hashlib.sha256(path.read_bytes()).hexdigest() for path in files}
 
@@ -74,7 +61,7 @@ def deposit(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def entities(deposit):
-    """What the crate says, by identifiers."""
+    """The entities of the crate, by identifier."""
     graph = json.loads((deposit / CRATE).read_bytes())["@graph"]
     assert len({entity["@id"] for entity in graph}) == len(graph)
     return {entity["@id"]: entity for entity in graph}
@@ -94,7 +81,7 @@ def tool_actions(entities):
     return [action for action in of_type(entities, "CreateAction") if action["instrument"]["@id"] != "source/Snakefile"]
 
 
-def test_whatever_is_named_is_described(entities):
+def test_every_reference_has_an_entity(entities):
     for entity in entities.values():
         for key, value in entity.items():
             for name in references(value):
@@ -111,7 +98,7 @@ def test_files_are_those_of_the_deposit_with_size_and_checksum(deposit, entities
         assert file["sha256"] == known[path]
         assert int(file["contentSize"]) == (deposit / path).stat().st_size
     assert files["dataset/mine.nc"]["encodingFormat"] == "application/netcdf"
-    assert files["figures/fig.png"]["encodingFormat"] == "image/png"
+    assert files["figures/fig.pdf"]["encodingFormat"] == "application/pdf"
     parts = {unquote(name) for name in references(entities["./"]["hasPart"])}
     assert set(files) | {"source/"} == parts
     assert entities["source/"]["version"] == COMMIT
@@ -145,7 +132,7 @@ def test_steps_stand_in_the_order_of_the_data(entities):
         assert step["workExample"] == action["instrument"]
 
 
-def test_who_made_it_under_which_licence_and_of_which_model(entities, tmp_path):
+def test_authors_licence_and_paper_of_the_model(entities, tmp_path):
     root = entities["./"]
     people = [entities[name] for name in references(root["author"])]
     assert [person["@type"] for person in people] == ["Person", "Organization", "Person"]
@@ -159,7 +146,7 @@ def test_who_made_it_under_which_licence_and_of_which_model(entities, tmp_path):
     assert paper["@id"] == MODEL_PAPER.address and paper["name"] == MODEL_PAPER.title
     authors = [entities[name] for name in references(paper["author"])]
     assert [(author["givenName"], author["familyName"]) for author in authors] == list(MODEL_PAPER.authors)
-    # Whoever wrote it and made the data is the same person, with all that is said of them.
+    # An author of the paper who also made the data is one person, with affiliation.
     given, family = MODEL_PAPER.authors[0]
     own = LEAST.model_copy(update={"authors": [Author(family_names=family, given_names=given, affiliation="Here")]})
     graph = json.loads((written(tmp_path, own) / CRATE).read_bytes())["@graph"]

@@ -30,12 +30,12 @@ RELATED = [
 
 
 def written(folder, publication):
-    """Write all that says how a deposit is cited."""
+    """Write the files of citation and metadata."""
     folder.mkdir()
     (folder / "CITATION.cff").write_text(citation_cff(publication, COMMIT), encoding="utf-8")
     (folder / ".zenodo.json").write_text(json.dumps(zenodo_metadata(publication)), encoding="utf-8")
     (folder / "datacite.json").write_text(json.dumps(datacite_metadata(publication)), encoding="utf-8")
-    (folder / "ro-crate-metadata.json").write_text("{}")  # by which a deposit is known
+    (folder / "ro-crate-metadata.json").write_text("{}")  # which every deposit has
     return folder
 
 
@@ -71,7 +71,7 @@ def test_statements_are_the_same_everywhere(publication):
     assert cff["references"] == [paper]
     assert zenodo["references"] == [MODELS[DEFAULT_MODEL].references.split("; ")[0]] == [MODEL_PAPER.line]
     assert web_address(datacite["relatedIdentifiers"][-1]["relatedIdentifier"]) == paper["url"]
-    # Nothing is said of what is not given.
+    # Entries that are not given are absent.
     for content in (cff, zenodo, datacite):
         assert all(value not in (None, "", [], {}) for value in content.values())
 
@@ -138,7 +138,7 @@ def test_licences_are_those_of_spdx():
 @pytest.mark.parametrize(
     "text", ["[1]", 100_000 * "[", "\xff", '{"title": ["a"], "creators": {"name": 1}, "communities": [1]}']
 )
-def test_metadata_of_strangers_are_checked(text, tmp_path):
+def test_metadata_from_unknown_makers_are_checked(text, tmp_path):
     (tmp_path / ".zenodo.json").write_text(text, encoding="latin-1")
     if text.startswith("{"):
         assert summary_of(read_zenodo_metadata(tmp_path))["title"] == "['a']"

@@ -1,4 +1,4 @@
-"""The page of a deposit: texts shown as they are written, and what it says of a campaign in memory."""
+"""The page of a deposit: texts are shown as they are written, and facts are those of a campaign in memory."""
 
 import itertools
 import re
@@ -20,7 +20,7 @@ from icha.datasets.campaign_file import write_campaign
 from icha.deposit.readme import markdown, readme
 from icha.planning.costs import Cost
 
-# What Markdown, HTML or a table would take for something else.
+# Texts with a meaning in Markdown, HTML or a table.
 ODD = (
     "<load>|*x*|**x**|_x_|__a b__|a_b_c _d e_|`code`|[text](address)|![image]|~~gone~~|\\|\\*x\\*|&lt;|&#60;|R&D &c|"
     "<!-- not here -->|<b>bold</b>|# one #|> two|- three|+ four|5. five|6) six|1.5 mm|-7 °C|---|===|***|```|~~~|[a]: b|"
@@ -28,21 +28,20 @@ ODD = (
 )
 ODD += ["a | b", "\\|", "a ||| b |", "see (https://example.org/a|b)."]
 
-
-# That of GitHub, with its formulas; what is no link by its brackets is none.
+# The Markdown of GitHub with its formulas; links need brackets.
 MARKDOWN = MarkdownIt("gfm-like", {"linkify": False}).use(dollarmath_plugin)
 
 
 def shown(text, kind="paragraph"):
-    """What a reader sees of all paragraphs, headings or cells of a page."""
+    """The visible texts of all paragraphs, headings or cells of a page."""
     tokens = MARKDOWN.parse(text)
-    said = []
+    texts = []
     for opened, inline in itertools.pairwise(tokens):
         if opened.type == f"{kind}_open":
             plain = {"text", "text_special", "link_open", "link_close", "code_inline"}
             assert {child.type for child in inline.children} <= plain
-            said.append("".join(child.content for child in inline.children))
-    return said
+            texts.append("".join(child.content for child in inline.children))
+    return texts
 
 
 def test_texts_are_shown_as_they_are_written_wherever_they_stand():
@@ -62,6 +61,20 @@ def test_links_lead_to_the_address():
         assert link == "https://example.org/~me/a_b_?c=1&d=*2"
 
 
+def page_of(tree, checks, campaign):
+    """The page of a campaign dataset, with files of given sizes."""
+    return readme(
+        campaign,
+        revision=COMMIT,
+        dataset=tree,
+        checks=checks,
+        model_error=None,
+        dictionary=[],
+        sizes={"dataset/smoke.nc": 2_000_000, "report.html": 340_000, "source/icha/asperity/jkr.py": 10**9},
+        cost=Cost(60.0, 2e8, 7e6),
+    )
+
+
 @pytest.fixture(scope="module")
 def small_readme():
     """A function that writes the page of the small campaign in `small_campaign`, with one of its runs failed."""
@@ -73,16 +86,7 @@ def small_readme():
 
     def written(publication, checks=checks):
         campaign = load_configuration(REPOSITORY / "config/campaigns/smoke.yaml").campaign
-        return readme(
-            campaign.model_copy(update={"publication": publication}),
-            revision=COMMIT,
-            dataset=tree,
-            checks=checks,
-            model_error=None,
-            dictionary=[],
-            sizes={"dataset/smoke.nc": 2_000_000, "report.html": 340_000, "source/icha/asperity/jkr.py": 10**9},
-            cost=Cost(60.0, 2e8, 7e6),
-        )
+        return page_of(tree, checks, campaign.model_copy(update={"publication": publication}))
 
     written.failed, written.reason, written.steps = str(failed), reason, small.runs()[0][1].sizes["step"]
     return written
@@ -102,15 +106,15 @@ def test_the_page_shows_whatever_texts_a_publication_has(small_readme):
     page = small_readme(publication)
     assert shown(page, "heading")[0] == title
     tokens = [token for token in MARKDOWN.parse(page) if token.type in ("inline", "html_block")]
-    said = ["".join(child.content for child in token.children or ()) for token in tokens]
+    texts = ["".join(child.content for child in token.children or ()) for token in tokens]
     assert not any(token.type == "html_block" for token in tokens)
-    assert said[1:4] == [f"{other} {other}", "- no list", f"1. {title}"]
-    assert f"Funded by {other} ({title})." in said
-    (citation,) = (text for text in said if text.startswith(other + ", *Jo*; "))
+    assert texts[1:4] == [f"{other} {other}", "- no list", f"1. {title}"]
+    assert f"Funded by {other} ({title})." in texts
+    (citation,) = (text for text in texts if text.startswith(other + ", *Jo*; "))
     assert title in citation
     for cell in (f"*Jo* {other}", f"<{other}>", small_readme.failed, small_readme.reason, other):
-        assert cell in said, cell
-    assert "ORCID" not in said
+        assert cell in texts, cell
+    assert "ORCID" not in texts
 
 
 def test_makers_have_columns_only_for_what_is_known_of_them(small_readme):
@@ -125,13 +129,13 @@ def test_makers_have_columns_only_for_what_is_known_of_them(small_readme):
     assert shown(page, "th")[:3] == ["made by", "ORCID", "affiliation"]
 
 
-def test_the_page_says_what_failed_and_that_it_fails_again(small_readme):
+def test_the_page_lists_failures_that_a_rerun_repeats(small_readme):
     known = [KnownFailure(run=small_readme.failed, reason="It | shows it.")]
     page = small_readme(LEAST.model_copy(update={"known_failures": known}))
     cells = shown(page, "td")
     at = cells.index(small_readme.failed)
     assert cells[at : at + 4] == [small_readme.failed, str(small_readme.steps), small_readme.reason, "It | shows it."]
-    assert cells.count(small_readme.reason) == 1  # and not where it is said what the check is
+    assert cells.count(small_readme.reason) == 1  # and not in the description of the check
     completed = cells[cells.index("completed") :][:5]
     assert completed == ["completed", "6", "-1", "0", "0 if the run reached the end of its path, else 1"]
     assert "-0" not in cells
@@ -144,16 +148,7 @@ def test_the_page_says_what_failed_and_that_it_fails_again(small_readme):
 def test_the_example_selects_a_run_of_surfaces_with_slopes_of_their_own(tmp_path, monkeypatch):
     runs = [(labels, run) for labels, run in crops.runs().items() if labels.model == "asperities"]
     tree = small.campaign_tree(runs, attrs={"campaign": "crops"})
-    page = readme(
-        load_configuration(REPOSITORY / "config/campaigns/smoke.yaml").campaign,
-        revision=COMMIT,
-        dataset=tree,
-        checks=check_campaign(tree),
-        model_error=None,
-        dictionary=[],
-        sizes={"dataset/smoke.nc": 2_000_000},
-        cost=Cost(60.0, 2e8, 7e6),
-    )
+    page = page_of(tree, check_campaign(tree), load_configuration(REPOSITORY / "config/campaigns/smoke.yaml").campaign)
     write_campaign(runs, tmp_path / "dataset/smoke.nc")
     monkeypatch.chdir(tmp_path)
     example = re.search(r"^study = .*\nruns = .*$", page, re.MULTILINE)[0]

@@ -19,6 +19,7 @@ from icha.deposit.reproduce import changed_files
 from icha.deposit.verify import verify_deposit
 
 SOFT, HARD = "load/plate/seed0/slope0.5/soft", "load/plate/seed0/slope0.5/hard"
+RUNS = (f"runs/{SOFT}.nc", f"runs/{HARD}.nc")
 CAMPAIGN = """
 name: tiny
 title: Tiny
@@ -106,7 +107,7 @@ def computed(monkeypatch, tmp_path):
         calls.append((configuration, targets, cores, anyway))
         results = folder / "results/tiny"
         asked = [each.removeprefix("results/tiny/") for each in targets if each != "all"]
-        for path in asked or [f"runs/{SOFT}.nc", f"runs/{HARD}.nc"]:
+        for path in asked or RUNS:
             write_run(
                 results / path, factor=calls.factor if "soft" in path else 1.0, size=1000 if "hard" in path else 1
             )
@@ -125,37 +126,36 @@ def computed(monkeypatch, tmp_path):
 def test_what_is_the_same_is_identical_and_leaves_nothing_behind(ending, deposit, reproduce, computed, tmp_path):
     folder = deposit()
     before = {path: path.stat().st_mtime_ns for path in folder.rglob("*")}
-    status, said = reproduce(folder.with_name(folder.name + ending), "--cores", "3", "--anyway")
-    assert status == 0 and "identical: 4 files, every value" in said, said
-    assert "its metadata, which ICHA cannot verify:\n  title:    A \\x1b[2J title\n  authors:  Carb" in said
-    assert f"program:    the installed ICHA {version('icha')}; nothing in the deposit is executed" in said
+    status, output = reproduce(folder.with_name(folder.name + ending), "--cores", "3", "--anyway")
+    assert status == 0 and "identical: 4 files, every value" in output, output
+    assert "its metadata, which ICHA cannot verify:\n  title:    A \\x1b[2J title\n  authors:  Carb" in output
+    assert f"program:    the installed ICHA {version('icha')}; nothing in the deposit is executed" in output
     ((_, targets, cores, anyway),) = computed
     assert (targets, cores, anyway) == (["all"], "3", True)
     assert list((tmp_path / "temporary").iterdir()) == []
     assert {path: path.stat().st_mtime_ns for path in folder.rglob("*")} == before
 
 
-@pytest.mark.parametrize(("factor", "status", "told"), [(1 + 1e-9, 0, "within tolerance: 4"), (1.001, 1, "different:")])
-def test_differences_are_told_by_variable(factor, status, told, deposit, reproduce, computed, tmp_path):
+@pytest.mark.parametrize(
+    ("factor", "status", "message"), [(1 + 1e-9, 0, "within tolerance: 4"), (1.001, 1, "different:")]
+)
+def test_differences_are_listed_by_variable(factor, status, message, deposit, reproduce, computed, tmp_path):
     computed.factor = factor
-    ended, said = reproduce(deposit(), "--json", tmp_path / "out.json")
-    assert ended == status and told in said and "runs: pressure: " in said, said
+    ended, output = reproduce(deposit(), "--json", tmp_path / "out.json")
+    assert ended == status and message in output and "runs: pressure: " in output, output
     (differing,) = [each for each in json.loads((tmp_path / "out.json").read_text())["files"] if each["variables"]]
     assert differing["path"] == f"runs/{SOFT}.nc"
     assert len(list((tmp_path / "temporary").iterdir())) == status  # what differs is kept
 
 
 def test_single_runs(deposit, reproduce, computed, tmp_path):
-    own = deposit()
-    for asked, runs in (
-        (["smallest"], [SOFT]),
-        ([HARD, f"runs/{SOFT}.nc"], [HARD, SOFT]),
-    ):
-        status, said = reproduce(own, *(f"--only={each}" for each in asked), "--folder", tmp_path / "again")
-        assert status == 0 and f"identical: {len(runs) + 1} files" in said, said  # and the surface of both
+    packed = deposit()
+    for only, runs in ((["smallest"], [SOFT]), ([HARD, f"runs/{SOFT}.nc"], [HARD, SOFT])):
+        status, output = reproduce(packed, *(f"--only={each}" for each in only), "--folder", tmp_path / "again")
+        assert status == 0 and f"identical: {len(runs) + 1} files" in output, output  # and the surface of both
         assert computed[-1][1] == [f"results/tiny/runs/{run}.nc" for run in runs]
-    status, said = reproduce(own, "--only", "load/plate/seed3/slope1/soft")
-    assert status == 2 and "has no such run; expected smallest, or one of its 2 runs" in said and HARD in said
+    status, output = reproduce(packed, "--only", "load/plate/seed3/slope1/soft")
+    assert status == 2 and "has no such run; expected smallest, or one of its 2 runs" in output and HARD in output
 
 
 def test_the_smallest_run_is_the_smallest_that_is_complete(deposit, reproduce, computed, tmp_path):
@@ -163,34 +163,32 @@ def test_the_smallest_run_is_the_smallest_that_is_complete(deposit, reproduce, c
     failed = (tmp_path / "failed.nc").read_bytes()
     assert reproduce(deposit(**{f"runs/{SOFT}.nc": failed}), "--only", "smallest")[0] == 0
     assert computed[-1][1] == [f"results/tiny/runs/{HARD}.nc"]
-    status, said = reproduce(
-        deposit(**dict.fromkeys([f"runs/{SOFT}.nc", f"runs/{HARD}.nc"], failed)), "--only=smallest"
-    )
-    assert status == 2 and "no run of the deposit is complete" in said
+    status, output = reproduce(deposit(**dict.fromkeys(RUNS, failed)), "--only=smallest")
+    assert status == 2 and "no run of the deposit is complete" in output
 
 
 def test_a_folder_continues_its_own_rerun_only(deposit, reproduce, computed, tmp_path):
-    own = deposit()
+    packed = deposit()
     computed.fails = True
-    status, said = reproduce(own, "--folder", tmp_path / "again")
-    assert status == 1 and "nothing was computed" in said
+    status, output = reproduce(packed, "--folder", tmp_path / "again")
+    assert status == 1 and "nothing was computed" in output
     computed.fails = False
-    assert reproduce(own, "--folder", tmp_path / "again")[0] == 0
+    assert reproduce(packed, "--folder", tmp_path / "again")[0] == 0
     (tmp_path / "again/rerun-of.sha256").write_text("another")
     (tmp_path / "other").mkdir()
     (tmp_path / "other/file").write_text("mine")
-    for folder, said in (
+    for folder, message in (
         (tmp_path / "again", "belongs to another deposit"),
         (tmp_path / "other", "has other files in it"),
-        (own / "again", "is in the deposit"),
+        (packed / "again", "is in the deposit"),
     ):
-        status, told = reproduce(own, "--folder", folder)
-        assert status == 2 and said in told, told
-    assert verify_deposit(own) == [] and len(computed) == 2
+        status, output = reproduce(packed, "--folder", folder)
+        assert status == 2 and message in output, output
+    assert verify_deposit(packed) == [] and len(computed) == 2
 
 
 @pytest.mark.parametrize(
-    ("changes", "said"),
+    ("changes", "message"),
     [
         ({"source/pyproject.toml": '[project]\nversion = "99.0"\n'}, "is installed, 99.0 made the deposit"),
         ({"source/uv.lock": lock("0.1")}, "is installed, 0.1 is locked"),
@@ -210,15 +208,15 @@ def test_a_folder_continues_its_own_rerun_only(deposit, reproduce, computed, tmp
         ({".zenodo.json": "[1]"}, ".zenodo.json: is not a mapping"),
     ],
 )
-def test_what_a_deposit_says_is_checked(changes, said, deposit, reproduce, computed):
-    status, told = reproduce(deposit(**changes))
-    assert status == 2 and said in told and not computed, told
+def test_the_content_of_a_deposit_is_checked(changes, message, deposit, reproduce, computed):
+    status, output = reproduce(deposit(**changes))
+    assert status == 2 and message in output and not computed, output
 
 
 def test_damaged_deposits_and_those_without_results_are_refused(deposit, reproduce, computed, tmp_path):
-    (own := deposit()).joinpath("verdict.txt").write_text("Passed")
-    status, said = reproduce(own)
-    assert status == 2 and "damaged" in said and "verdict.txt" in said
+    (packed := deposit()).joinpath("verdict.txt").write_text("Passed")
+    status, output = reproduce(packed)
+    assert status == 2 and "damaged" in output and "verdict.txt" in output
     assert reproduce(tmp_path / "none")[0] == 2 and not computed
 
 
@@ -228,21 +226,19 @@ def test_what_is_called_a_run_and_is_none_is_not_followed(content, deposit, repr
         with h5py.File(tmp_path / "run.nc", "w") as file:
             file["step"] = h5py.ExternalLink(str(tmp_path / "other.nc"), "/step")
         content = (tmp_path / "run.nc").read_bytes()
-    status, said = reproduce(
-        deposit(**dict.fromkeys([f"runs/{SOFT}.nc", f"runs/{HARD}.nc"], content)), "--only=smallest"
-    )
-    assert status == 2 and re.search("soft.nc: is not a run|hard.nc: is not a run", said) and not computed, said
+    status, output = reproduce(deposit(**dict.fromkeys(RUNS, content)), "--only=smallest")
+    assert status == 2 and re.search("soft.nc: is not a run|hard.nc: is not a run", output) and not computed, output
 
 
 def test_a_deposit_that_does_not_fit_leaves_nothing_behind(deposit, reproduce, monkeypatch, tmp_path):
-    own = deposit()
+    packed = deposit()
     monkeypatch.setattr("shutil.disk_usage", lambda path: SimpleNamespace(free=3))
-    status, said = reproduce(own.with_name("tiny.zip"))
-    assert status == 1 and "3 B are free" in said and list((tmp_path / "temporary").iterdir()) == []
+    status, output = reproduce(packed.with_name("tiny.zip"))
+    assert status == 1 and "3 B are free" in output and list((tmp_path / "temporary").iterdir()) == []
 
 
-def test_whatever_differs_of_the_program_is_counted(tmp_path):
-    """Of the package and of the workflow, which decides as much."""
+def test_different_files_of_the_program_are_counted(tmp_path):
+    """In the package and in the workflow."""
     ours = {"Snakefile", *(f"icha/{path.name}" for path in (REPOSITORY / "icha").glob("*.py"))}
     (tmp_path / "SHA256SUMS").write_text(f"{64 * '0'}  source/docs/model.md\n{64 * '0'}  README.md\n")
     everything = changed_files(tmp_path)
@@ -258,10 +254,10 @@ def test_nothing_in_a_deposit_is_executed(deposit, reproduce, tmp_path, monkeypa
     names = ("Snakefile", "icha/__init__.py", "sitecustomize.py", "workflow/rules/runs.smk", "workflow/scripts/job.py")
     names += ("workflow/scripts/run_sweep.py", "numpy.py")
     places = [f"{folder}{name}" for folder in ("source/", "inputs/", "") for name in names]
-    own = deposit(**dict.fromkeys(places, mark))
-    monkeypatch.chdir(own / "source")
-    status, said = reproduce(own, "--only", SOFT, "--folder", tmp_path / "again")
+    packed = deposit(**dict.fromkeys(places, mark))
+    monkeypatch.chdir(packed / "source")
+    status, output = reproduce(packed, "--only", SOFT, "--folder", tmp_path / "again")
     assert not (tmp_path / "mark").exists()
-    assert status == 1 and "different: not everything is reproduced" in said, said
+    assert status == 1 and "different: not everything is reproduced" in output, output
     with netCDF4.Dataset(tmp_path / f"again/data/results/tiny/runs/{SOFT}.nc") as file:
         assert float(file["reduced_pressure"][-1]) == pytest.approx(1e-3)  # it was computed

@@ -1,4 +1,4 @@
-"""The validators of others see what is wrong with a deposit's files; those that cannot fail would say nothing."""
+"""The validators of other projects find problems in the files of a deposit."""
 
 import re
 import socket
@@ -18,7 +18,7 @@ NAMES = ("sha256sum", "compliance-checker", "cf-units")
 def deposit(folder, unit="Pa", where="study"):
     """A netCDF file with a variable in a group, whose axis is in the group above; and its checksum."""
     folder.mkdir()
-    (folder / "ro-crate-metadata.json").write_text("{}")  # by which a deposit is known
+    (folder / "ro-crate-metadata.json").write_text("{}")  # which every deposit has
     with netCDF4.Dataset(folder / "data.nc", "w") as data:
         data.setncatts({"Conventions": "CF-1.11", "title": "Loads", "history": "made up"})
         data.createDimension("step", 3)
@@ -101,7 +101,7 @@ def test_make_hands_any_name_over_as_it_is(tmp_path):
 def test_what_is_no_deposit_is_refused(tmp_path):
     (tmp_path / "SHA256SUMS").touch()
     done = validated(tmp_path)
-    assert done.returncode == 1 and "is no deposit" in done.stderr
+    assert done.returncode == 1 and "is not a deposit" in done.stderr
     (tmp_path / "ro-crate-metadata.json").write_text("{}")
     done = validated(sealed(tmp_path), "cffconvert", "sha256sum")
     assert done.returncode == 1 and "CITATION.cff is missing" in done.stdout

@@ -1,4 +1,4 @@
-"""Deposits of strangers: what is wrong is found, nothing outside is read or written, and limits hold."""
+"""Deposits from unknown makers: problems are found, no other file is read or written, and limits hold."""
 
 import os
 import random

@@ -15,17 +15,7 @@ PERIOD = 1.0
 
 
 def equivalent(position, a, R):
-    pairs = np.array([[0, 1]])
-    return equivalent_spots(
-        LAW,
-        position[pairs[:, 0]],
-        a[[0]],
-        R[[0]],
-        position[pairs[:, 1]],
-        a[[1]],
-        R[[1]],
-        PERIOD,
-    )
+    return equivalent_spots(LAW, position[[0]], a[[0]], R[[0]], position[[1]], a[[1]], R[[1]], PERIOD)
 
 
 def test_area_radius_and_centroid_as_written():

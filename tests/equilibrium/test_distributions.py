@@ -13,18 +13,16 @@ from icha import Material, SelfAffineSpectrum, Surface
 from icha.asperity.jkr import JKR
 from icha.contact.model import GAP_BINS, PRESSURE_BINS, gap_bins
 from icha.equilibrium.distributions import _gap_bin, contact_cover, gap_distribution, pressure_distribution
-from icha.equilibrium.interacting_asperities import InteractingAsperities
+from icha.equilibrium.interacting_asperities import contact_of
 from icha.equilibrium.sites import Spots
 from icha.half_space.grid_displacement import row_blocks
-from icha.surfaces.summits import find_summits
 
 PERIOD, MODULUS = 100e-6, 25e6
 
 
 def pressed(energy, levels=(2.5, 2.0, 1.5, 1.2), grid=64, seed=1):
     surface = SelfAffineSpectrum(PERIOD, 0.2 * PERIOD, PERIOD / 16, 0.8).realise(grid, seed)
-    law = JKR(Material(MODULUS, energy, 2.071e-9))
-    contact = InteractingAsperities(law, find_summits(surface), surface.rms_height)
+    contact = contact_of(surface, Material(MODULUS, energy, 2.071e-9))
     state = contact.untouched()
     for level in levels:
         state = contact.equilibrium(state, level * surface.rms_height)
@@ -44,8 +42,8 @@ def spots_of(position, a):
 @pytest.mark.parametrize("grid", [16, 17])
 def test_cover_of_cells_against_counting(grid):
     surface = Surface(np.random.default_rng(0).normal(size=(grid, grid)), 1.0)
-    # Large, smaller than a cell, on a node, and across two borders.
-    position, a = [[0.31, 0.42], [0.75, 0.125], [0.99, 0.985]], [0.2, 0.02, 0.11]
+    # Large, smaller than a cell, on a node, across two borders, and of no radius.
+    position, a = [[0.31, 0.42], [0.75, 0.125], [0.99, 0.985], [0.5, 0.9]], [0.2, 0.02, 0.11, 0.0]
     cover = contact_cover(surface, spots_of(position, a))
     fine = 60
     # Sub-cells of the cells around the nodes.
@@ -58,17 +56,8 @@ def test_cover_of_cells_against_counting(grid):
     np.testing.assert_allclose(cover, counted, atol=3 / fine)
     assert cover.mean() == pytest.approx(np.sum(np.pi * np.square(a)), rel=1e-12)
     assert np.all((cover > -1e-12) & (cover < 1 + 1e-12))
-
-
-def test_covered_nodes_by_counting():
-    surface = Surface(np.random.default_rng(0).normal(size=(20, 20)), 1.0)
-    position, a = [[0.313, 0.42], [0.985, 0.99]], [0.2, 0.11]
-    x = np.arange(20) / 20
-    expected = np.zeros((20, 20), dtype=bool)
-    for (cx, cy), radius in zip(position, a, strict=True):
-        dx, dy = x - cx, x - cy
-        expected |= np.hypot((dx - np.rint(dx))[None, :], (dy - np.rint(dy))[:, None]) < radius
-    np.testing.assert_array_equal(covered_nodes(surface, spots_of(position, a)), expected)
+    nodes = np.arange(grid)[:, None] * fine + fine // 2, np.arange(grid) * fine + fine // 2
+    assert np.count_nonzero(covered_nodes(surface, spots_of(position, a)) != inside[nodes]) <= 2
 
 
 def test_the_mean_of_the_gap_field_is_the_mean_separation(case):
@@ -106,23 +95,6 @@ def test_identity_of_the_gap_distribution(case):
     np.testing.assert_allclose(gaps.edges, GAP_BINS * surface.rms_height)
 
 
-def test_gap_distribution_by_counting_nodes(case):
-    surface, contact, state = case
-    gaps = gap_distribution(contact.law, surface, state)
-    u = gap(contact.law, surface, state)
-    # Of gaps not near zero the nodes outside the spots are counted; those whose cells a spot's edge cuts count less.
-    edge = int(np.searchsorted(gaps.edges, 0.3 * surface.rms_height))
-    content = gaps.density * np.diff(gaps.edges)
-    counted, _ = np.histogram(u[~covered_nodes(surface, state.spots)], bins=gaps.edges)
-    difference = counted[edge:] / surface.grid**2 - content[edge:]
-    assert np.all(difference > -1e-12)
-    assert np.sum(difference) < 0.01
-    np.testing.assert_allclose(content[-22:], counted[-22:] / surface.grid**2, atol=1e-12)
-    mean = np.sum(content * 0.5 * (gaps.edges[1:] + gaps.edges[:-1]))
-    # The mean gap is the mean separation up to what the spots and the overlap hide.
-    assert mean == pytest.approx(state.separation, rel=0.05)
-
-
 @pytest.fixture(scope="module")
 def rough():
     """A surface of several blocks of rows with disjoint spots of all sizes on it, in no particular equilibrium."""
@@ -133,8 +105,7 @@ def rough():
     lattice = np.stack(np.meshgrid(np.arange(12), np.arange(12)), axis=-1).reshape(-1, 2)
     a = 10 ** rng.uniform(-4.5, -1.45, len(lattice)) * PERIOD
     spots = spots_of((lattice + 0.5 * rng.random(lattice.shape)) * (PERIOD / 12), a)
-    radius = a**2 / (0.3 * surface.rms_height)
-    spots = Spots(spots.position, spots.height, radius, a, spots.approach, spots.members)
+    spots = replace(spots, radius_of_curvature=a**2 / (0.3 * surface.rms_height))
     return surface, JKR(Material(MODULUS, 0.0, 1e-9)), SimpleNamespace(spots=spots, separation=2 * surface.rms_height)
 
 
@@ -172,12 +143,6 @@ def test_distributions_have_the_same_bits_on_any_number_of_cores(rough, monkeypa
     assert bits[0] == bits[1]
 
 
-def test_spots_of_no_radius_cover_nothing():
-    surface = Surface(np.random.default_rng(0).normal(size=(16, 16)), 1.0)
-    both, one = spots_of([[0.5, 0.5], [0.3, 0.3]], [0.0, 0.1]), spots_of([[0.3, 0.3]], [0.1])
-    np.testing.assert_array_equal(contact_cover(surface, both), contact_cover(surface, one))
-
-
 def test_gap_distribution_around_one_hertz_spot():
     # One paraboloid on a fine grid: the area with gaps up to u is a ring whose radius follows from closed forms.
     n, R = 256, 100e-6
@@ -185,7 +150,7 @@ def test_gap_distribution_around_one_hertz_spot():
     r2 = ((x - np.rint(x)) ** 2)[None, :] + ((x - np.rint(x)) ** 2)[:, None]
     heights = -r2 * PERIOD**2 / (2 * R)
     surface = Surface(heights, PERIOD)
-    contact = InteractingAsperities(JKR(Material(MODULUS, 0.0, 1e-9)), find_summits(surface), surface.rms_height)
+    contact = contact_of(surface, Material(MODULUS, 0.0, 1e-9))
     top = -heights.mean()
     state = contact.equilibrium(contact.untouched(), top - 4e-7)
     a = state.spots.contact_radius[0]
@@ -223,6 +188,8 @@ def test_identities_of_the_pressure_distribution(case):
     width = np.diff(pressures.edges)
     assert np.sum(pressures.density * width) == pytest.approx(contact.area_fraction(state), rel=1e-12)
     assert np.sum(pressures.density * width * pressures.mean) == pytest.approx(contact.pressure(state), rel=1e-12)
+    tension = pressures.density[pressures.edges[1:] <= 0].sum()
+    assert (tension > 0) == (contact.law.material.surface_energy > 0)
     filled = np.flatnonzero(pressures.density > 0)
     # A bin's mean lies in it; the first also holds the tail to minus infinity.
     inner = filled[filled > 0]
@@ -245,23 +212,9 @@ def test_pressure_distribution_by_sampling_the_spots(case):
     np.testing.assert_allclose(pressures.density * np.diff(pressures.edges), counted, atol=2e-4 * counted.sum())
 
 
-def test_tension_only_with_adhesion(case):
-    surface, contact, state = case
-    pressures = pressure_distribution(contact.law, surface, state.spots)
-    tension = pressures.density[pressures.edges[1:] <= 0].sum()
-    assert (tension > 0) == (contact.law.material.surface_energy > 0)
-
-
 def test_pressures_and_gaps_beyond_the_bins_are_counted_in_the_last_one():
     surface, contact, state = pressed(0.0)
-    sharp = Spots(
-        state.spots.position,
-        state.spots.height,
-        1e-6 * state.spots.radius_of_curvature,
-        state.spots.contact_radius,
-        state.spots.approach,
-        state.spots.members,
-    )
+    sharp = replace(state.spots, radius_of_curvature=1e-6 * state.spots.radius_of_curvature)
     pressures = pressure_distribution(contact.law, surface, sharp)
     content = pressures.density * np.diff(pressures.edges)
     assert content[-1] > 0

@@ -7,13 +7,13 @@ from half_space import all_pairs, jkr_approach, jkr_force, periodic_displacement
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-import icha.equilibrium.solver
 from icha import Material, SelfAffineSpectrum, Surface
 from icha.asperity.jkr import JKR
 from icha.contact.model import Control, NotConverged
 from icha.contact.models import RESIDUAL_TOLERANCE
-from icha.equilibrium.interacting_asperities import InteractingAsperities
-from icha.half_space.ewald import HalfSpace
+from icha.equilibrium import solver
+from icha.equilibrium.interacting_asperities import InteractingAsperities, contact_of
+from icha.half_space.ewald import PointHalfSpace
 from icha.half_space.interaction import Interaction, displacement_at
 from icha.surfaces.square import periodic_difference
 from icha.surfaces.summits import Asperities, find_summits
@@ -35,8 +35,7 @@ def bump_heights(n=64, centre=(0.503, 0.4963)):
 
 def bump(energy):
     """The contact problem of one paraboloid on a grid, and the height of its top above the mean plane."""
-    surface = Surface(bump_heights(), PERIOD)
-    contact = InteractingAsperities(JKR(Material(MODULUS, energy, RANGE)), find_summits(surface), surface.rms_height)
+    contact = contact_of(Surface(bump_heights(), PERIOD), Material(MODULUS, energy, RANGE))
     assert len(contact.asperities) == 1
     return contact, -bump_heights().mean()
 
@@ -107,18 +106,6 @@ def test_jump_off_of_a_bump_happens_at_the_jkr_limit():
     np.testing.assert_array_equal(detached.spot_of_asperity, [-1])
 
 
-def test_strongest_pull_of_a_bump_is_that_of_jkr():
-    # Under load control pull-off is at 3 pi/2 gamma R, whatever the images do.
-    contact, top = bump(ENERGY)
-    state = contact.equilibrium(contact.untouched(), top)
-    forces = []
-    for separation in np.linspace(top, top + 1.55 * np.cbrt((ENERGY / MODULUS) ** 2 * R), 60):
-        state = contact.equilibrium(state, separation)
-        forces.append(contact.pressure(state) * PERIOD**2)
-    assert min(forces) == pytest.approx(-1.5 * np.pi * ENERGY * R, rel=1e-3)
-    assert min(forces) > -1.5 * np.pi * ENERGY * R * (1 + 1e-9)
-
-
 # --- several asperities -------------------------------------------------------------------------------------
 
 
@@ -177,36 +164,6 @@ def test_interacting_spots_against_an_independent_solution(count, energy):
     assert contact.pressure(state) * PERIOD**2 == pytest.approx(force, rel=5e-6)
 
 
-def test_two_spots_in_the_limit_of_a_large_cell():
-    # Johnson, Contact Mechanics: on an infinite half-space two equal Hertz spots at distance d obey
-    # a^2/R + w(d; a) = delta; only the cell's own constant remains to be added.
-    d, a = 20e-6, 2e-6
-    cell = 200 * d
-    from half_space import displacement_by_quadrature
-
-    law = JKR(Material(MODULUS, 0.0, RANGE))
-    force = jkr_force(a, R, MODULUS, 0.0)
-    constant = -3.900265 * 2 * force / (np.pi * MODULUS * cell)
-    depth = a**2 / R + displacement_by_quadrature(d, a, R, MODULUS, 0.0) + constant
-    position = np.array([[0.0, 0.0], [d, 0.0]])
-    contact = InteractingAsperities(law, Asperities(position, np.full(2, 1e-6), np.full(2, R), cell), rms_height=1e-6)
-    state = contact.equilibrium(contact.untouched(), 1e-6 - depth)
-    np.testing.assert_allclose(state.spots.contact_radius, a, rtol=1e-6)
-
-
-@pytest.mark.parametrize("energy", [0.0, ENERGY])
-def test_the_order_of_the_asperities_does_not_matter(energy):
-    contact = group(3, energy)
-    asperities, order = contact.asperities, [2, 0, 1]
-    shuffled = InteractingAsperities(
-        contact.law,
-        Asperities(asperities.position[order], asperities.height[order], asperities.radius_of_curvature[order], PERIOD),
-        contact.rms_height,
-    )
-    one, other = (c.equilibrium(c.untouched(), 0.85e-6) for c in (contact, shuffled))
-    np.testing.assert_allclose(np.sort(one.spots.contact_radius), np.sort(other.spots.contact_radius), rtol=1e-9)
-
-
 def test_a_shielded_asperity_does_not_touch():
     # Lower than its neighbour's displacement there, though above the undeformed plane.
     low = 1e-6 - 0.3e-6
@@ -228,8 +185,7 @@ def test_a_shielded_asperity_does_not_touch():
 
 def rough(energy, grid=64, seed=1, ratio=16):
     surface = SelfAffineSpectrum(PERIOD, 0.2 * PERIOD, PERIOD / ratio, 0.8).realise(grid, seed)
-    material = Material(MODULUS, energy, 2.071e-9)
-    return InteractingAsperities(JKR(material), find_summits(surface), surface.rms_height)
+    return contact_of(surface, Material(MODULUS, energy, 2.071e-9))
 
 
 @pytest.mark.parametrize("energy", [0.0, ENERGY])
@@ -298,7 +254,7 @@ def assert_consistent(contact, state):
         law.approach(spots.contact_radius, spots.radius_of_curvature), spots.approach, atol=1e-10 * contact.rms_height
     )
     a, R = spots.contact_radius, spots.radius_of_curvature
-    half_space = HalfSpace.at(spots.position, period, law.material.contact_modulus)
+    half_space = PointHalfSpace.at(spots.position, period, law.material.contact_modulus)
     w = Interaction.between(law, half_space, R, a).displacement(a)
     error = spots.approach + w + state.separation - spots.height
     # The sum over the spots alone is split otherwise than that over the sites of the solve.
@@ -323,19 +279,19 @@ def assert_consistent(contact, state):
     assert np.count_nonzero(beyond) <= state.pending
 
 
-def counting(monkeypatch, most):
+def count_rounds(monkeypatch, most):
     """Count the rounds of events, and stop at more than `most`."""
-    calls = []
-    original = icha.equilibrium.solver.apply_events
+    rounds = []
+    original = solver.apply_events
 
-    def events(*arguments):
-        search, changed = original(*arguments)
-        calls.append(changed)
-        assert sum(calls) <= most, "the rounds do not end"
-        return search, changed
+    def apply_events(*arguments):
+        state, changed = original(*arguments)
+        rounds.append(changed)
+        assert sum(rounds) <= most, "the rounds do not end"
+        return state, changed
 
-    monkeypatch.setattr(icha.equilibrium.solver, "apply_events", events)
-    return calls
+    monkeypatch.setattr(solver, "apply_events", apply_events)
+    return rounds
 
 
 # Here contacts that break would be made again for ever.
@@ -366,10 +322,10 @@ def test_equilibrium_always_ends(seed, noise, adhesion, tabor, first, moves):
     state, separation = contact.untouched(), first * surface.rms_height
     with pytest.MonkeyPatch.context() as monkeypatch:
         # Every round but the last adds an asperity, loses one for good, or unites two spots.
-        calls = counting(monkeypatch, 3 * len(asperities) + 2)
+        rounds = count_rounds(monkeypatch, 3 * len(asperities) + 2)
         for move in [0.0, *moves]:
             separation += move * surface.rms_height
-            calls.clear()
+            rounds.clear()
             try:
                 state = contact.equilibrium(state, separation)
             except NotConverged:
@@ -382,39 +338,23 @@ def test_equilibrium_always_ends(seed, noise, adhesion, tabor, first, moves):
 def test_states_along_a_path_are_consistent(energy):
     contact = rough(energy, seed=3)
     state = contact.untouched()
-    for level in np.arange(2.8, 0.6, -0.2):
-        state = contact.equilibrium(state, level * contact.rms_height)
-        assert_consistent(contact, state)
-    assert state.coalescences > 0
-    # Back up, where contacts break.
-    for level in np.arange(0.8, 3.2, 0.4):
-        state = contact.equilibrium(state, level * contact.rms_height)
-        assert_consistent(contact, state)
-    assert state.jump_offs > 0
-    # And down again, where they are made anew.
-    for level in np.arange(2.6, 0.6, -0.3):
-        state = contact.equilibrium(state, level * contact.rms_height)
-        assert_consistent(contact, state)
+    for levels in (np.arange(2.8, 0.6, -0.2), np.arange(0.8, 3.2, 0.4), np.arange(2.6, 0.6, -0.3)):
+        for level in levels:
+            state = contact.equilibrium(state, level * contact.rms_height)
+            assert_consistent(contact, state)
+    assert state.coalescences > 0 and state.jump_offs > 0
 
 
 def test_too_few_newton_steps_are_reported_not_passed_off(monkeypatch):
     contact = rough(ENERGY)
-    monkeypatch.setattr(icha.equilibrium.solver, "_MAX_NEWTON_STEPS", 1)
+    monkeypatch.setattr(solver, "_MAX_NEWTON_STEPS", 1)
     with pytest.raises(NotConverged, match="equilibrium error"):
         contact.equilibrium(contact.untouched(), 1.5 * contact.rms_height)
 
 
 def test_events_that_lead_back_to_the_same_spots_end_soon(monkeypatch):
-    """Unions made and undone in a circle: after ten rounds it is known that there is no equilibrium."""
-    rounds = 0
-
-    def always(search, point, margin):
-        nonlocal rounds
-        rounds += 1
-        return search, True
-
-    monkeypatch.setattr(icha.equilibrium.solver, "apply_events", always)
+    """If unions are made and undone in a circle, ten rounds show that there is no equilibrium."""
+    monkeypatch.setattr(solver, "apply_events", lambda state, point, margin: (state, True))
     contact, top = bump(ENERGY)
     with pytest.raises(NotConverged, match="no equilibrium after 11 rounds of jumps and unions"):
         contact.equilibrium(contact.untouched(), top)
-    assert rounds == 11

@@ -34,7 +34,16 @@ from icha.figures import (
 from icha.figures.looks import Scale, material_colours, materials_scale, place_markers, places_scale
 from icha.figures.maps import block_means, circles_in_cell
 from icha.figures.select import NothingToDraw, branches, path_steps, study_runs
-from icha.figures.style import BLACK, logarithmic_axes, new_figure, number, quantity, save, slope_label, unit_for
+from icha.figures.style import (
+    BLACK,
+    choose_unit,
+    format_number,
+    format_quantity,
+    logarithmic_axes,
+    new_figure,
+    save,
+    slope_label,
+)
 from icha.references.persson import persson_area
 from icha.references.theories import reference_dataset
 from icha.support.statistics import ensemble
@@ -493,13 +502,17 @@ def test_only_complete_runs_are_drawn():
 
 
 def test_units_as_people_write_them():
-    assert quantity(25e6, "Pa") == "25 MPa"
-    assert quantity(0.05, "J/m²") == "50 mJ/m²"
-    assert quantity(2.071e-9, "m") == "2.071 nm"
-    assert quantity(0.0, "J/m²") == "0 J/m²"
-    assert unit_for(100e-6, "m")[1] == "µm" and unit_for(0.1, "m")[1] == "mm"
-    assert unit_for(1e-3, "m") == (pytest.approx(1e3), "mm")
-    assert number(0.01) == "0.01" and number(1e-5) == "$10^{-5}$" and number(3.2e-5) == r"$3.2\times10^{-5}$"
+    assert format_quantity(25e6, "Pa") == "25 MPa"
+    assert format_quantity(0.05, "J/m²") == "50 mJ/m²"
+    assert format_quantity(2.071e-9, "m") == "2.071 nm"
+    assert format_quantity(0.0, "J/m²") == "0 J/m²"
+    assert choose_unit(100e-6, "m")[1] == "µm" and choose_unit(0.1, "m")[1] == "mm"
+    assert choose_unit(1e-3, "m") == (pytest.approx(1e3), "mm")
+    assert (
+        format_number(0.01) == "0.01"
+        and format_number(1e-5) == "$10^{-5}$"
+        and format_number(3.2e-5) == r"$3.2\times10^{-5}$"
+    )
 
 
 # --- ensembles --------------------------------------------------------------------------------------------------

@@ -12,7 +12,7 @@ from icha.figures.registry import DECLARATIONS, figure_module, figure_number
 MODULE = """
 from icha.figures.declaration import Declaration, StudyFigure
 from icha.figures.select import study_runs
-from icha.figures.style import new_figure, styled
+from icha.figures.style import in_style, new_figure
 
 DECLARATION = Declaration(
     description="Contact area against load, and nothing else.",
@@ -20,7 +20,7 @@ DECLARATION = Declaration(
 )
 
 
-@styled
+@in_style
 def figure(campaign, *, study):
     drawing = new_figure(3, 2)
     axes = drawing.subplots()

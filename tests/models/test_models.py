@@ -79,12 +79,6 @@ def test_a_run_says_by_which_model_it_is(runs, tmp_path):
     )
 
 
-def test_areas_of_spots_are_those_of_their_circles(runs):
-    one = runs[labels(DEFAULT_MODEL)]
-    np.testing.assert_allclose(one["spot_area"], np.pi * one["spot_radius"] ** 2)
-    np.testing.assert_allclose(one["spot_perimeter"] ** 2, 4 * np.pi * one["spot_area"])
-
-
 def test_model_is_the_first_dimension_of_every_study(runs, tmp_path):
     assert LABELS[0] == "model"
     tree = small.tree()

@@ -1,6 +1,6 @@
-"""What becomes of the work: losses against closed forms, their parts, and what they do not depend on.
+"""Energy balance: losses against closed forms, their parts, and what they do not depend on.
 
-Asperities as in the tests of unloading: of radius 1 in units in which modulus and surface energy are 1.
+Asperities have radius 1 in units of modulus and surface energy.
 """
 
 from functools import cache
@@ -201,13 +201,8 @@ def test_without_adhesion_a_union_costs_next_to_nothing():
     contact = pair(1.0, 4.0, BARE)
     waypoints = travelled(contact, [0.03], unload=True)
     end = closed_again(waypoints)
-    assert end.coalescences == end.splits == 1
+    assert end.coalescences == end.splits == 1  # every union is undone
     assert abs(lost(contact, waypoints)[0]) < 1e-3 * max(w.balance.work * contact.area for w in waypoints)
-
-
-def test_without_adhesion_every_union_is_undone():
-    run = icha.simulate(small()[0], Material(1e6, 0.0, 2e-9), Path([7e-2], unload=True))
-    assert int(run.coalescence_count[-1]) == int(run.split_count[-1]) > 0
 
 
 # --- united spots -------------------------------------------------------------------------------------------
@@ -273,7 +268,7 @@ def test_the_step_does_not_matter(monkeypatch):
 @pytest.mark.slow
 def test_next_to_no_adhesion_is_no_more_work_than_a_little():
     """Where jumps set next to nothing free, it need not be known where they happen to more than the work is known."""
-    surface = icha.SelfAffineSpectrum(1e-4, 5e-5, 1.25e-5, 0.8, 1.0).realise(64, 1)
+    surface = icha.SelfAffineSpectrum(1e-4, 5e-5, 2e-5, 0.8, 1.0).realise(40, 1)
     steps = {}
     for adhesion in (1e-14, 1e-5):
         material = Material(25e6, adhesion, max(1e-3 * adhesion, 1e-18))

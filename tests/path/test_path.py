@@ -8,7 +8,7 @@ from icha.asperity.jkr import JKR
 from icha.checks.run import check_run
 from icha.contact.model import NotConverged
 from icha.contact.models import RESIDUAL_TOLERANCE
-from icha.equilibrium.interacting_asperities import InteractingAsperities
+from icha.equilibrium.interacting_asperities import InteractingAsperities, contact_of
 from icha.path.follow import follow
 from icha.path.targets import MAX_AREA_FRACTION, MAX_REDUCED_PRESSURE
 from icha.surfaces.summits import find_summits
@@ -29,17 +29,17 @@ def large():
     return SelfAffineSpectrum(PERIOD, 0.2 * PERIOD, PERIOD / 32, 0.8).realise(128, 1)
 
 
-def contact_of(surface, material, model=InteractingAsperities):
-    return model(JKR(material), find_summits(surface), surface.rms_height, surface.rms_slope)
+BOTH = pytest.mark.parametrize("material", [ADHESIVE, BARE], ids=["adhesive", "bare"])
 
 
-@pytest.mark.parametrize("material", [ADHESIVE, BARE], ids=["adhesive", "bare"])
-def test_stops_of_every_kind_are_hit_exactly(surface, material):
-    snapshots = [("relative_load", 7e-3), ("mean_separation", 1.7 * surface.rms_height), ("area_fraction", 0.013)]
+@BOTH
+def test_targets_of_every_kind_are_met_exactly_and_in_the_order_of_the_path(surface, material):
+    height = surface.rms_height
+    snapshots = [("relative_load", 7e-3), ("mean_separation", 1.7 * height), ("area_fraction", 0.013)]
     for stops in (
         {"reduced_pressures": [1e-4, 2e-3, 1.1e-2, 3e-2]},
         {"area_fractions": [1e-3, 9e-3, 5e-2]},
-        {"mean_separations": [2.2 * surface.rms_height, 1.1 * surface.rms_height]},
+        {"mean_separations": [2.2 * height, 1.1 * height]},
     ):
         run = simulate(surface, material, Path(**stops, snapshots=snapshots))
         assert run.sizes["step"] == len(next(iter(stops.values()))) + 3
@@ -52,73 +52,46 @@ def test_stops_of_every_kind_are_hit_exactly(surface, material):
         for step in run.step.values:
             kind, target = str(run.step_kind[step].item()), float(run.step_target[step])
             assert float(reached[kind][step]) == pytest.approx(target, rel=1e-9), (kind, target)
-        assert np.all(np.diff(run.mean_separation) < 0)
+        assert np.all(np.diff(run.mean_separation) < 0) and np.all(np.diff(run.contact_area_fraction) > 0)
+        assert material is ADHESIVE or np.all(np.diff(run.nominal_pressure) > 0)
         assert np.all(run.residual <= RESIDUAL_TOLERANCE)
         assert sorted(run.snapshot_kind.values) == ["area_fraction", "mean_separation", "relative_load"]
-        kinds = run.step_kind.values[run.snapshot_step.values]
-        np.testing.assert_array_equal(kinds, run.snapshot_kind.values)
-        np.testing.assert_array_equal(run.step_target.values[run.snapshot_step.values], run.snapshot_target.values)
+        at = run.snapshot_step.values
+        assert np.all(np.diff(at) > 0)
+        np.testing.assert_array_equal(run.step_kind.values[at], run.snapshot_kind.values)
+        np.testing.assert_array_equal(run.step_target.values[at], run.snapshot_target.values)
 
 
-def test_a_stop_that_is_also_a_snapshot_is_one_step(surface):
-    path = Path(reduced_pressures=[1e-3, 1e-2], snapshots=[("reduced_pressure", 1e-2)])
-    assert len(path.targets) == 2
-    run = simulate(surface, BARE, path)
-    assert run.sizes["step"] == 2
-    assert run.snapshot_step.values.tolist() == [1]
-    # None: the last stop; an empty list: none.
-    assert [t.snapshot for t in Path(area_fractions=[0.01, 0.02]).targets] == [False, True]
-    assert [t.snapshot for t in Path(area_fractions=[0.01, 0.02], snapshots=[]).targets] == [False, False]
+def test_a_target_that_is_also_a_snapshot_is_one_step(surface):
+    run = simulate(surface, BARE, Path([1e-3, 1e-2], snapshots=[("reduced_pressure", 1e-2)]))
+    assert run.sizes["step"] == 2 and run.snapshot_step.values.tolist() == [1]
+    # None: the last target; an empty list: no snapshot.
+    for snapshots, expected in ((None, [False, True]), ([], [False, False])):
+        assert [t.snapshot for t in Path(area_fractions=[0.01, 0.02], snapshots=snapshots).targets] == expected
 
 
-@pytest.mark.parametrize("material", [ADHESIVE, BARE], ids=["adhesive", "bare"])
-def test_a_stop_does_not_depend_on_the_kind_by_which_it_is_reached(surface, material):
-    one = simulate(surface, material, Path(reduced_pressures=[2e-2]))
-    others = [
-        simulate(surface, material, Path(area_fractions=[float(one.contact_area_fraction[0])])),
-        simulate(surface, material, Path(mean_separations=[float(one.mean_separation[0])])),
-        simulate(
-            surface,
-            material,
-            Path(reduced_pressures=[0.1], snapshots=[("relative_load", 2e-2 * surface.rms_slope)]),
-        ),
-    ]
-    for other in others:
+@BOTH
+def test_a_state_does_not_depend_on_the_kind_of_its_target(surface, material):
+    one = simulate(surface, material, Path([2e-2]))
+    for path in (
+        Path(area_fractions=[float(one.contact_area_fraction[0])]),
+        Path(mean_separations=[float(one.mean_separation[0])]),
+        Path([0.1], snapshots=[("relative_load", 2e-2 * surface.rms_slope)]),
+    ):
+        other = simulate(surface, material, path)
         for name in ("contact_area_fraction", "nominal_pressure", "mean_separation", "contact_stiffness"):
             assert float(other[name][0]) == pytest.approx(float(one[name][0]), rel=1e-7), name
 
 
-@pytest.mark.parametrize("material", [ADHESIVE, BARE], ids=["adhesive", "bare"])
-def test_halving_the_step_changes_the_area_by_less_than_a_per_cent(large, material):
-    pressures = [3e-4, 1e-3, 3e-3, 1e-2, 3e-2]
-    runs = [simulate(large, material, Path(reduced_pressures=pressures, max_step=step)) for step in (0.1, 0.05)]
-    coarse, fine = (run.contact_area_fraction.values for run in runs)
-    np.testing.assert_allclose(coarse, fine, rtol=0.01)
-    # The mean separation likewise.
-    np.testing.assert_allclose(runs[0].mean_separation, runs[1].mean_separation, rtol=0.01)
+@BOTH
+def test_steps_of_half_the_length_and_more_targets_change_the_area_by_less_than_a_per_cent(large, material):
+    few = simulate(large, material, Path([1e-3, 1e-2], max_step=0.1))
+    many = simulate(large, material, Path([3e-4, 1e-3, 2e-3, 5e-3, 1e-2], max_step=0.05))
+    for name in ("contact_area_fraction", "mean_separation"):
+        np.testing.assert_allclose(many[name][[1, -1]], few[name], rtol=0.01)
 
 
-@pytest.mark.parametrize("material", [ADHESIVE, BARE], ids=["adhesive", "bare"])
-def test_more_stops_change_the_area_by_less_than_a_per_cent(large, material):
-    few = simulate(large, material, Path(reduced_pressures=[1e-3, 1e-2]))
-    many = simulate(large, material, Path(reduced_pressures=[1e-3, 2e-3, 3e-3, 5e-3, 7e-3, 1e-2]))
-    np.testing.assert_allclose(many.contact_area_fraction[[0, -1]], few.contact_area_fraction, rtol=0.01)
-
-
-def test_stops_are_met_in_the_order_of_the_path(surface):
-    # Snapshots of other kinds fall between the stops wherever the path meets them.
-    path = Path(
-        reduced_pressures=[1e-3, 1e-2, 5e-2],
-        snapshots=[("area_fraction", 0.15), ("mean_separation", 2.4 * surface.rms_height), ("area_fraction", 4e-3)],
-    )
-    run = simulate(surface, BARE, path)
-    assert np.all(np.diff(run.mean_separation) < 0)
-    assert np.all(np.diff(run.contact_area_fraction) > 0)
-    assert np.all(np.diff(run.nominal_pressure) > 0)
-    assert run.snapshot_target.values.tolist() == [2.4 * surface.rms_height, 4e-3, 0.15]
-
-
-def test_a_stop_inside_a_jump_is_met_on_the_branch_beyond_as_far_as_that_reaches_back(surface):
+def test_a_target_inside_a_jump_is_met_on_the_branch_after_it_as_far_as_that_reaches_back(surface):
     """The first contact with adhesion jumps to a finite area, which shrinks to jump-off as the surfaces part again."""
     contact = contact_of(surface, ADHESIVE)
     first = contact.equilibrium(contact.untouched(), contact.untouched().separation * (1 - 1e-9))
@@ -144,6 +117,10 @@ def test_the_path_starts_where_the_first_asperity_makes_contact(surface):
     assert run.spot_count.values.tolist() == [0, 1]
 
 
+def model_of(surface, model):
+    return model(JKR(BARE), find_summits(surface), surface.rms_height, surface.rms_slope)
+
+
 def test_no_step_is_longer_than_asked(surface):
     seen = []
 
@@ -153,7 +130,7 @@ def test_no_step_is_longer_than_asked(surface):
             seen.append((state.separation - reached.separation) / self.rms_height)
             return reached
 
-    contact = contact_of(surface, BARE, Watched)
+    contact = model_of(surface, Watched)
     for _ in follow(contact, Path(reduced_pressures=[1e-2], max_step=0.07)):
         pass
     assert 0.069 < max(seen) <= 0.07 * (1 + 1e-9)
@@ -171,7 +148,7 @@ def test_steps_that_fail_are_halved_and_then_given_up(surface):
             return super().equilibrium(state, separation, control)
 
     path = Path(reduced_pressures=[1e-3, 1e-1])
-    stops = follow(contact_of(surface, BARE, Failing), path)
+    stops = follow(model_of(surface, Failing), path)
     assert next(stops).target.value == 1e-3
     with pytest.raises(NotConverged, match=r"after 1 of 2 stops: on purpose"):
         next(stops)
@@ -179,7 +156,7 @@ def test_steps_that_fail_are_halved_and_then_given_up(surface):
     assert 2.0**-14 <= min(widths) / max(widths) < 2.0**-13
 
 
-def test_progress_tells_every_stop(surface):
+def test_progress_reports_every_target(surface):
     lines = []
     simulate(surface, BARE, Path(reduced_pressures=[1e-3, 1e-2]), progress=lines.append)
     assert [line.split(":")[0] for line in lines] == ["stop 1 of 2", "stop 2 of 2"]
@@ -201,8 +178,8 @@ def test_progress_tells_every_stop(surface):
         ({"reduced_pressures": [-0.1]}, r"reduced_pressures\[0\]"),
         ({"reduced_pressures": [float("nan")]}, r"reduced_pressures\[0\]"),
         ({"reduced_pressures": ["0.1"]}, r"reduced_pressures\[0\]"),
-        ({"reduced_pressures": [MAX_REDUCED_PRESSURE * 1.001]}, r"reduced_pressures\[0\].*beyond"),
-        ({"area_fractions": [0.1, MAX_AREA_FRACTION * 1.001]}, r"area_fractions\[1\].*beyond"),
+        ({"reduced_pressures": [MAX_REDUCED_PRESSURE * 1.001]}, r"reduced_pressures\[0\]: .*asperity model"),
+        ({"area_fractions": [0.1, MAX_AREA_FRACTION * 1.001]}, r"area_fractions\[1\]: .*asperity model"),
         ({"reduced_pressures": [0.1], "unload": 1}, "unload: expected True or False, got 1"),
         ({"reduced_pressures": [0.1], "max_step": 0.0}, "max_step"),
         ({"reduced_pressures": [0.1], "max_step": 0.51}, "max_step"),
@@ -212,8 +189,40 @@ def test_progress_tells_every_stop(surface):
         ({"mean_separations": b"1"}, "mean_separations: expected a list of numbers, got b'1'"),
         ({"reduced_pressures": [0.1], "snapshots": [0.1]}, r"snapshots\[0\]"),
         ({"reduced_pressures": [0.1], "snapshots": [("area_fraction", -0.1)]}, r"snapshots\[0\]"),
-        ({"reduced_pressures": [0.1], "snapshots": [("area_fraction", 0.9)]}, r"snapshots\[0\].*beyond"),
+        ({"reduced_pressures": [0.1], "snapshots": [("area_fraction", 0.9)]}, r"snapshots\[0\]: .*asperity model"),
         ({"reduced_pressures": [0.1], "snapshots": [("area_fraction", 0.1)] * 2}, r"snapshots\[1\].*twice"),
+        # Numbers far from anything physical.
+        ({"reduced_pressures": [1e-80]}, r"^reduced_pressures\[0\]: 1e-80 must be a number in \[1e-12, 0.15\]"),
+        ({"area_fractions": [5e-324]}, r"^area_fractions\[0\]: 5e-324 must be a number in \[1e-9, 0.25\]"),
+        ({"mean_separations": [1e100]}, r"^mean_separations\[0\]: 1e\+100 must be a number in \[1e-24, 1e9\]"),
+        ({"reduced_pressures": [1e-2], "max_step": 5e-324}, r"^max_step: 5e-324 must be a number in \[1e-4, 0.5\]"),
+        # Unloading.
+        ({"reduced_pressures": [0.1], "control": "force", "unload": True}, "^control: 'force' must be one of sep"),
+        ({"reduced_pressures": [0.1], "control": None}, "^control: None"),
+        ({"reduced_pressures": [0.1], "control": "load"}, "^control: 'load'"),
+        *(
+            ({"reduced_pressures": [0.1], "turning_points": turns}, message)
+            for turns, message in (
+                (0.1, "^turning_points: expected a list of pairs"),
+                ([0.1], r"^turning_points\[0\]: expected a pair"),
+                ([("pressure", 0.01)], r"^turning_points\[0\]: kind 'pressure' must be one of"),
+                ([("reduced_pressure", 0.11)], r"^turning_points\[0\]: 0.11 .*0\.1"),
+                ([("reduced_pressure", 0.1)], r"^turning_points\[0\]: 0.1 .*0\.1"),
+                ([("reduced_pressure", -1e-80)], r"^turning_points\[0\]: -1e-80"),
+                ([("reduced_pressure", 0.05), ("reduced_pressure", 0.04)], r"^turning_points\[1\]: 0.04"),
+                ([("reduced_pressure", float("nan"))], r"^turning_points\[0\]: nan is not finite"),
+                ([("reduced_pressure", -0.01), ("reduced_pressure", -0.001)], r"^turning_points\[1\]"),
+                ([("area_fraction", 0.0)], r"^turning_points\[0\]: 0.0"),
+                ([("mean_separation", -1e-6)], r"^turning_points\[0\]: -1e-06"),
+            )
+        ),
+        *(
+            (
+                {"reduced_pressures": [0.1], "control": "load", "unload": True, name: [("area_fraction", 0.05)]},
+                "^control: 'load'",
+            )
+            for name in ("turning_points", "snapshots")
+        ),
     ],
 )
 def test_bad_paths_are_refused_by_name(arguments, message):
@@ -221,7 +230,7 @@ def test_bad_paths_are_refused_by_name(arguments, message):
         Path(**arguments)
 
 
-def test_the_way_to_first_contact_costs_nothing(surface):
+def test_the_approach_to_first_contact_costs_nothing(surface):
     """A stop a metre up is met, without a step for every tenth of h_rms on the way down."""
     path = Path(mean_separations=[1.0, 1.5 * surface.rms_height], snapshots=[])
     stops = [(w.target, w.state) for w in follow(contact_of(surface, BARE), path)]
@@ -247,7 +256,7 @@ def egg_box(waves=4, grid=64):
     return Surface(heights=1e-6 * (np.cos(x)[None, :] + np.cos(x)[:, None]), period=PERIOD)
 
 
-def test_stops_inside_a_jump_are_left_out_and_the_others_kept():
+def test_targets_inside_a_jump_are_left_out_and_the_others_met():
     surface = egg_box()
     first_contact = contact_of(surface, ADHESIVE).untouched().separation
     jumped = simulate(surface, ADHESIVE, Path(mean_separations=[first_contact * (1 - 1e-9)]))
@@ -263,7 +272,7 @@ def test_stops_inside_a_jump_are_left_out_and_the_others_kept():
     np.testing.assert_allclose(run.mean_separation, kept.mean_separation, rtol=1e-6)
 
 
-def test_no_stop_beyond_the_covered_area_is_handed_out(surface):
+def test_no_state_outside_the_range_of_the_model_is_returned(surface):
     with pytest.raises(ConvergenceError, match=r"grows to 0\.\d\d of the nominal area, outside the range") as caught:
         simulate(surface, Material(MODULUS, 0.3, 2.071e-9), Path(mean_separations=[surface.rms_height, 1e-12]))
     assert caught.value.dataset.sizes["step"] == 1

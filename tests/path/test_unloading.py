@@ -1,7 +1,7 @@
-"""The way back from contact: the stable JKR branch of every spot, its jumps, turning points, and what is refused.
+"""Unloading: the stable JKR branch of every spot, its jumps, turning points, and what is refused.
 
-Asperities of radius 1 in units in which modulus and surface energy are 1 as well; in a cell so large that its images
-do not matter, unless the test says so.
+Asperities have radius 1 in units of modulus and surface energy; the cell is so large that its images do not matter,
+unless a test has another period.
 """
 
 from itertools import pairwise
@@ -69,15 +69,6 @@ def test_one_asperity_is_on_its_stable_branch_from_jump_in_to_jump_off():
         if last:
             assert d[-1] == pytest.approx(last, abs=1e-6)
             assert forces[-1] == pytest.approx(-5 / 6 * np.pi, rel=1e-4)
-
-
-def test_before_jump_in_and_after_jump_off_there_is_nothing():
-    _, waypoints = alone()
-    for w in waypoints:
-        d = HEIGHT - w.state.separation
-        assert len(w.state.spots) == (d > (WU if w.leg == 0 else JUMP_OFF_APPROACH) + 1e-6) or (
-            abs(d - (WU if w.leg == 0 else JUMP_OFF_APPROACH)) < 2e-6
-        )
     assert closed_again(waypoints).jump_offs == waypoints[-1].state.jump_ins == 1
 
 
@@ -146,14 +137,13 @@ def test_two_equal_asperities_let_go_at_their_common_limit_point():
     np.testing.assert_allclose(np.sort(events.position[events.kind == JUMP_OFF, 0]), FAR / 2 + np.array([-4, 4]))
 
 
-def test_four_equal_asperities_let_go_at_their_common_limit_point():
+def test_four_equal_asperities_break_contact_at_their_common_limit_point():
     side = 12.0
     contact = contact_of([HEIGHT] * 4, [[0, 0], [side, 0], [0, side], [side, side]])
     waypoints = travelled(contact, [0.005], unload=True)
     above, _ = limit_point(lambda a: 2 * beside(side, a) + beside(np.sqrt(2) * side, a))
     last = [w.state for w in waypoints if len(w.state.spots)][-1]
-    assert len(last.spots) == 4
-    assert last.separation - HEIGHT == pytest.approx(above, abs=2e-5)
+    assert len(last.spots) == 4 and last.separation - HEIGHT == pytest.approx(above, abs=2e-5)
     assert closed_again(waypoints).jump_offs == 4
 
 
@@ -161,8 +151,8 @@ def test_four_equal_asperities_let_go_at_their_common_limit_point():
 
 
 def some():
-    """Three asperities that feel each other and their images."""
-    return contact_of([HEIGHT, HEIGHT - 1.5, HEIGHT - 3.1], [[-9, 0], [8, 3], [1, -11]], period=60.0)
+    """Two asperities that interact with each other and with their images."""
+    return contact_of([HEIGHT, HEIGHT - 1.5], [[-9, 0], [8, 3]], period=60.0)
 
 
 def value_of(kind, contact, waypoint):
@@ -201,12 +191,12 @@ def test_turning_points_are_hit_exactly(kind, back, forth, control):
     closed_again(waypoints)
 
 
-def test_inside_a_loop_without_events_the_way_is_the_same_and_costs_nothing():
+def test_a_loop_without_events_is_reversible():
     contact = some()
     waypoints = travelled(contact, [0.01], turning_points=[("reduced_pressure", -0.002), ("reduced_pressure", 0.01)])
     there, back, again = ([w for w in waypoints if w.leg == leg] for leg in range(3))
     assert there[-1].state.jump_offs == again[-1].state.jump_offs == 0
-    assert there[-1].state.jump_ins == again[-1].state.jump_ins == 3
+    assert there[-1].state.jump_ins == again[-1].state.jump_ins == 2
     assert again[-1].state.separation == pytest.approx(there[-1].state.separation, rel=1e-9)
     assert abs(again[-1].balance.work - there[-1].balance.work) < 1e-6 * abs(there[-1].balance.work)
     # All separations of the way back but that of its end, which is the turning point, are met again.
@@ -242,8 +232,8 @@ def scattered(count, seed):
 
 
 @pytest.mark.parametrize("control", [pytest.param("separation", marks=pytest.mark.slow), "load"])
-def test_every_state_has_the_history_of_the_states_before_it(control):
-    waypoints = travelled(scattered(4, 0), [0.02], unload=True, control=control)
+def test_every_state_continues_the_history_of_the_state_before_it(control):
+    waypoints = travelled(scattered(3, 0), [0.02], unload=True, control=control)
     for before, after in pairwise(waypoints):
         assert after.state.history[: len(before.state.history)] == before.state.history
     counts = [history(waypoints).count(kind) for kind in (JUMP_IN, JUMP_OFF, COALESCENCE, SPLIT)]
@@ -251,7 +241,7 @@ def test_every_state_has_the_history_of_the_states_before_it(control):
     assert counts == [end.jump_ins, end.jump_offs, end.coalescences, end.splits]
 
 
-def test_contact_without_an_equilibrium_was_never_made():
+def test_a_contact_without_an_equilibrium_is_not_recorded():
     """The images of an asperity that jumps in draw it off again at once: at its jump-in there is no equilibrium."""
     contact = contact_of([HEIGHT], period=20.0, material=Material(1.0, 1.0, 1 / 1.1))
     start = contact.untouched()
@@ -263,7 +253,7 @@ def test_contact_without_an_equilibrium_was_never_made():
 # --- united spots -------------------------------------------------------------------------------------------
 
 
-def test_a_united_spot_that_lets_go_falls_into_its_asperities():
+def test_a_union_that_jumps_off_releases_its_asperities():
     """Where both of them have a stable state they stay in contact, and unite again."""
     contact = pair(3.0, 4.0)
     united = [w.state for w in travelled(contact, [0.03]) if w.state.spots.members.tolist() == [2]][-1]
@@ -273,7 +263,7 @@ def test_a_united_spot_that_lets_go_falls_into_its_asperities():
     assert after.spots.members.tolist() == [2]
 
 
-def test_an_overlap_parts_where_it_began():
+def test_a_union_splits_where_it_was_made():
     """The two spots that a union was made of come apart about where they met, and break one after the other."""
     waypoints = travelled(pair(3.0, 6.0), [0.04], unload=True)
     end = closed_again(waypoints)
@@ -307,17 +297,15 @@ def test_the_log_of_events_agrees_with_the_counts():
         np.testing.assert_array_equal(np.cumsum(logged), run[name])
     assert np.all(np.diff(run.event_step) >= 0)
     np.testing.assert_array_equal(run.event_separation, run.mean_separation[run.event_step.values])
-
-
-def test_single_asperities_jump_in_where_they_are():
-    run, (surface, _) = united_run(), small()
+    # Single asperities jump in where they are, each once in one loading.
+    surface, _ = small()
     summits = find_summits(surface).position
     inward = run.event_kind.values == JUMP_IN
     where = np.stack([run.event_x.values, run.event_y.values], axis=1)[inward]
     assert np.all(run.event_members.values[inward] == 1)
     nearest = np.min(np.linalg.norm(where[:, None] - summits, axis=2), axis=1)
     assert len(where) and np.all(nearest < 1e-12)
-    assert len(np.unique(where, axis=0)) == len(where)  # nobody twice, on one way in
+    assert len(np.unique(where, axis=0)) == len(where)
 
 
 def test_a_run_is_the_same_to_the_last_bit():
@@ -336,31 +324,6 @@ def test_a_turning_point_beyond_the_model_is_refused_before_anything_runs():
     path = Path([1e-3], turning_points=[("reduced_pressure", 0.0), ("relative_load", beyond)])
     with pytest.raises(ValueError, match=r"^path: relative_load = .*beyond the range of the asperity model"):
         icha.simulate(surface, STICKY, path)
-
-
-@pytest.mark.parametrize(
-    ("settings", "message"),
-    [
-        ({"control": "force", "unload": True}, "^control: 'force' must be one of separation, load"),
-        ({"control": None}, "^control: None"),
-        ({"control": "load"}, "^control: 'load'"),
-        ({"turning_points": 0.1}, "^turning_points: expected a list of pairs"),
-        ({"turning_points": [0.1]}, r"^turning_points\[0\]: expected a pair"),
-        ({"turning_points": [("pressure", 0.01)]}, r"^turning_points\[0\]: kind 'pressure' must be one of"),
-        ({"turning_points": [("reduced_pressure", 0.11)]}, r"^turning_points\[0\]: 0.11 .*0\.1"),
-        ({"turning_points": [("reduced_pressure", 0.1)]}, r"^turning_points\[0\]: 0.1 .*0\.1"),
-        ({"turning_points": [("reduced_pressure", 0.05), ("reduced_pressure", 0.04)]}, r"^turning_points\[1\]: 0.04"),
-        ({"turning_points": [("reduced_pressure", float("nan"))]}, r"^turning_points\[0\]: nan is not finite"),
-        ({"turning_points": [("reduced_pressure", -0.01), ("reduced_pressure", -0.001)]}, r"^turning_points\[1\]"),
-        ({"turning_points": [("area_fraction", 0.0)]}, r"^turning_points\[0\]: 0.0"),
-        ({"turning_points": [("mean_separation", -1e-6)]}, r"^turning_points\[0\]: -1e-06"),
-        ({"turning_points": [("area_fraction", 0.05)], "control": "load"}, "^control: 'load'.*area_fraction = 0.05"),
-        ({"snapshots": [("area_fraction", 0.05)], "control": "load", "unload": True}, "^control: 'load'"),
-    ],
-)
-def test_wrong_ways_back_are_refused_by_name(settings, message):
-    with pytest.raises(ValueError, match=message):
-        Path([0.1], **settings)
 
 
 def test_an_edge_of_contact_within_the_accuracy_of_the_solver_is_passed():

@@ -238,4 +238,4 @@ def test_theories_that_hold_for_no_such_surface_are_left_out(tmp_path, capsys):
     )
     found = read_dataset(tmp_path / "theories.nc")
     assert "persson_area_fraction" in found and not [name for name in found if name.startswith("greenwood")]
-    assert "No theories of separate summits" in capsys.readouterr().out
+    assert "Theories of separate summits do not apply" in capsys.readouterr().out

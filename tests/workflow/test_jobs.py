@@ -23,12 +23,12 @@ SCRIPT = f"""
 import sys
 from types import SimpleNamespace
 sys.path.insert(0, {str(REPOSITORY / "workflow/scripts")!r})
-from job import guarded
+from job import job_context
 snakemake = SimpleNamespace(
     input=["{RESULTS}/surfaces/a.nc", "elsewhere.txt"], output=["{RESULTS}/runs/b.nc"], log=[sys.argv[1]],
     params=[{{"seed": 1}}, "code"],
 )
-with guarded(snakemake):
+with job_context(snakemake):
     print("at work", flush=True)
 """
 WORK = f"    open('{RESULTS}/runs/b.nc', 'w').write('a result')\n"
@@ -84,7 +84,7 @@ def test_a_job_refuses_what_the_disk_has_spoilt_and_the_next_call_knows(job):
     assert is_whole(job.results, "surfaces/a.nc")
     assert ended(job(WORK))[0] == 1
     said = (job.results / "logs/b.log").read_text()
-    assert said.startswith(f"Error: {RESULTS}/surfaces/a.nc: not what was written") and "at work" not in said
+    assert said.startswith(f"Error: {RESULTS}/surfaces/a.nc: does not match its checksum") and "at work" not in said
     assert not (job.results / "runs/b.nc").exists()
     assert not is_whole(job.results, "surfaces/a.nc")
 
@@ -179,7 +179,7 @@ def test_a_call_that_has_no_jobs_takes_nothing_from_those_that_run(job, tmp_path
     assert ended(job(WORK, ICHA_OWNER=earlier)) == (0, "")
     # With jobs to start it owns the results, but not if they are not those any more that it has looked at.
     (job.results / "runs/b.nc").write_text("another result")
-    with pytest.raises(SystemExit, match=r"runs/b\.nc has changed since"):
+    with pytest.raises(SystemExit, match=r"runs/b\.nc has changed while"):
         own.begin()
     (job.results / "runs/b.nc").unlink()
     own.begin()
@@ -211,7 +211,7 @@ def test_a_file_that_has_changed_since_it_was_looked_at_is_neither_a_surface_nor
     assert copy.read_bytes() == file.read_bytes() and surface.exists()
     surface.unlink()
     np.save(file, np.random.default_rng(2).normal(size=(16, 16)))
-    with pytest.raises(ValueError, match=r"heights\.npy has changed since the campaign was begun; give the same"):
+    with pytest.raises(ValueError, match=r"heights\.npy has changed since the campaign started; repeat the command"):
         both(looked_at)
     with pytest.raises(ValueError, match=r"heights\.npy has changed"):
         write_configuration(tmp_path / "used.yaml", text="name: a", copies={copy: file}, sha256=[looked_at])

@@ -201,13 +201,13 @@ def test_fingerprints_refuse_imports_that_they_cannot_follow(tmp_path, fingerpri
 
 @pytest.mark.parametrize("kept", ["whole", "cut off", "not to be written"])
 def test_what_a_module_says_is_read_again_when_it_says_something_else(kept, tmp_path, fingerprint, monkeypatch):
-    monkeypatch.setattr(fingerprint, "_KEPT", tmp_path / "kept.json")
+    monkeypatch.setattr(fingerprint, "_CACHE", tmp_path / "kept.json")
     module = tmp_path / "module.py"
     module.write_text('from os import path, sep\n\nNAME = "data.csv"\n')
     first = fingerprint.code_fingerprint(module)
     if kept == "not to be written":
         (tmp_path / "kept.json").mkdir()
-    fingerprint.keep()
+    fingerprint.save_cache()
 
     def begin():
         fingerprint._syntaxes.clear()

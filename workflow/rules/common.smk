@@ -1,4 +1,4 @@
-# What all rules share: the campaign, its files, and how parameters are written.
+# Shared by all rules: the campaign, its files, and functions for parameters.
 
 import os
 import sys
@@ -22,18 +22,18 @@ CONFIGURATION = campaign_configuration(workflow, ROOT)
 CAMPAIGN = CONFIGURATION.campaign
 PUBLICATION = CAMPAIGN.published()
 RESULTS = f"results/{CAMPAIGN.name}"
-# All results, and what each of them holds.
+# All results with their labels.
 FILES = campaign_files(CAMPAIGN, RESULTS)
 
-# The configuration is kept with copies of the files that it names (of a kept configuration, they are there).
+# The configuration as used has copies of the files that it names beside it.
 CONFIG_TEXT, NAMED_FILES = with_files_beside_it(CONFIGURATION)
 INPUTS = {f"{RESULTS}/{place}": file for place, file in NAMED_FILES.items()}
 COPIED = {copy: file for copy, file in INPUTS.items() if Path(copy).resolve() != Path(file).resolve()}
 
-# Checksum of what determines a run, by its labels.
+# Checksum of the settings of a run, by its labels.
 SHA256_OF_RUN = cache(lambda case: run_sha256(CAMPAIGN, case))
 
-# Attributes of every dataset of the campaign, but for its `id`, which is its path (see workflow/scripts/job.py).
+# Attributes of every dataset; workflow/scripts/job.py adds its `id`, the path.
 ATTRIBUTES = {"campaign": CAMPAIGN.name, "license": PUBLICATION.license}
 
 
@@ -41,9 +41,9 @@ pathvars:
     results=RESULTS,
     logs=f"{RESULTS}/logs",
     benchmarks=f"{RESULTS}/benchmarks",
-    # One surface pressed against one material.
+    # One surface against one material.
     contact="{surface}/seed{seed}/slope{slope}/{material}",
-    # The same in a study, by a model.
+    # The same in a study, with a model.
     run="{study}/{surface}/seed{seed}/slope{slope}/{model_folder}{material}",
 
 
@@ -58,31 +58,31 @@ wildcard_constraints:
     material="[A-Za-z0-9_.+-]+",
 
 
-def held(files, pattern, wildcards):
-    """What one of `files` holds, by the wildcards of its path."""
+def labels_of(files, pattern, wildcards):
+    """Return the labels of a file, by the wildcards of its path."""
     return files[f"{RESULTS}/{pattern}".format(**wildcards)]
 
 
 def case_of(wildcards):
-    """The labels of a run."""
-    return held(FILES.runs, results.RUN, wildcards)
+    """Return the labels of a run."""
+    return labels_of(FILES.runs, results.RUN, wildcards)
 
 
 def by_case(value):
-    """What `value` says of the case of a run, as a function of its wildcards.
+    """Return a value of a run as a function of its wildcards.
 
-    Where it is the same for all runs, it itself: Snakemake calls no function for each of ten thousand runs.
+    If it is the same for all runs, return the value: Snakemake would call the function for up to ten thousand runs.
     """
-    found = {value(case) for case in FILES.runs.values()}
-    return found.pop() if len(found) == 1 else lambda wildcards: value(case_of(wildcards))
+    values = {value(case) for case in FILES.runs.values()}
+    return values.pop() if len(values) == 1 else lambda wildcards: value(case_of(wildcards))
 
 
 def as_it_is(value):
-    """A value as a parameter of a rule: what users have written may hold braces, which are no wildcards."""
+    """Return a value as a parameter of a rule; braces in texts of users are not wildcards."""
     return lambda wildcards: value
 
 
 @cache
 def code_of(script, *modules):
-    """Fingerprint of a script of workflow/scripts and of what it imports, as a parameter of its rule."""
+    """Return the fingerprint of a script and of its imports, as a parameter of its rule."""
     return code_fingerprint(Path(ROOT, "workflow/scripts", script), *modules)

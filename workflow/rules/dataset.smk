@@ -1,5 +1,5 @@
-# What was asked for; all runs in one file, a group per study; the runs of every study at common loads; the runs against
-# boundary elements; what every result must satisfy, and whether it does.
+# The configuration as used; all runs in one file, a group per study; the runs of a study at common loads; the error of
+# the model against boundary elements; checks of all results, and the verdict.
 
 from icha.configuration.cases import campaign_sha256
 from icha.deposit.metadata import discovery_attributes
@@ -23,7 +23,7 @@ rule configuration:
         runtime=2,
     params:
         text=as_it_is(CONFIG_TEXT),
-        # Of the files that are copied their content, whatever their time.
+        # Copied files are compared by content, not by time.
         sha256=lambda wildcards: [sha256_of(Path(file)) for file in COPIED.values()],
         code=code_of("write_configuration.py"),
     message:
@@ -141,7 +141,7 @@ rule checks:
         "../scripts/check_results.py"
 
 
-# A failed check stops the campaign here; the report, which shows all checks, is made nevertheless.
+# A failed check stops the campaign here. The report, which shows all checks, is written in any case.
 rule verdict:
     input:
         FILES.checks,

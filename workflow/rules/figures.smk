@@ -1,5 +1,5 @@
-# figures/<name>.png and .pdf. A figure depends on the data, on its options and on its own code: it says itself what it
-# is drawn from, and with what arguments (icha/figures/fig*.py).
+# figures/<name>.png and .pdf. A figure depends on the data, on its options and on its code. Its module declares inputs
+# and arguments (icha/figures/fig*.py).
 
 from icha.datasets.results import ResultFiles
 from icha.figures.registry import DECLARATIONS
@@ -30,7 +30,7 @@ rule figure:
         runtime=10,
     params:
         arguments=lambda wildcards: CAMPAIGN.figures.arguments(wildcards.name, CAMPAIGN),
-        # Of tables of measurements their content, whatever their time.
+        # Tables of measurements are compared by content, not by time.
         sha256=lambda wildcards: [
             sha256_of(Path(table))
             for table in CAMPAIGN.figures.inputs(wildcards.name, CAMPAIGN, RESULT_FILES).get("tables", ())

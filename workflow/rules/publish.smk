@@ -1,8 +1,8 @@
-# publish/<campaign>-<version>/ and its .zip: everything that a reader needs, with checksums. See docs/howto/publish.md.
+# publish/<campaign>-<version>/ and its .zip: results, source and metadata, with checksums. See docs/howto/publish.md.
 
 from publishable import publishable_source
 
-# Looked at once, when the deposit is asked for, and before anything is computed.
+# Evaluated once, if the deposit is requested, before anything is computed.
 SOURCE = cache(lambda: publishable_source(CONFIGURATION, ROOT, RESULTS))
 
 
@@ -25,7 +25,7 @@ rule deposit:
         results=as_it_is(RESULTS),
         named_files=as_it_is(NAMED_FILES),
         project=as_it_is(ROOT),
-        # The source is part of the deposit, comments and all.
+        # The deposit contains the source, including comments.
         revision=lambda wildcards: SOURCE().revision,
     message:
         "Deposit {PUBLICATION.version}"

@@ -1,5 +1,5 @@
-# What runs are compared with: what theories say of a surface, and published points; boundary elements on the topography
-# of a run, one load each or both ways.
+# References for runs: theories and published points; boundary elements at a finite range on the topography of a run, at
+# one load or in a cycle.
 
 from icha.configuration.cases import adhesive_contacts, loop_settings, solution_settings
 from icha.planning.requirements import solver_memory
@@ -47,7 +47,7 @@ rule boundary_elements:
         mem_mb=lambda wildcards: solver_memory(CAMPAIGN, wildcards.surface, CAMPAIGN.finite_range[wildcards.entry]),
         runtime=240,
     params:
-        settings=lambda wildcards: solution_settings(CAMPAIGN, held(FILES.solutions, results.SOLUTION, wildcards)),
+        settings=lambda wildcards: solution_settings(CAMPAIGN, labels_of(FILES.solutions, results.SOLUTION, wildcards)),
         attributes=as_it_is(ATTRIBUTES),
         code=code_of("solve_boundary_elements.py"),
     message:
@@ -74,11 +74,11 @@ rule boundary_element_loop:
         ),
         runtime=480,
     params:
-        settings=lambda wildcards: loop_settings(CAMPAIGN, held(FILES.loops, results.LOOP, wildcards)),
+        settings=lambda wildcards: loop_settings(CAMPAIGN, labels_of(FILES.loops, results.LOOP, wildcards)),
         attributes=as_it_is(ATTRIBUTES),
         code=code_of("follow_boundary_elements.py"),
     message:
-        "Boundary elements both ways {wildcards.entry}: {wildcards.surface}, seed {wildcards.seed}, "
+        "Cycle with boundary elements {wildcards.entry}: {wildcards.surface}, seed {wildcards.seed}, "
         "slope {wildcards.slope}, {wildcards.material}"
     script:
         "../scripts/follow_boundary_elements.py"

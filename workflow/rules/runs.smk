@@ -1,4 +1,4 @@
-# One sweep each, by asperities or by another model of contact, whose runs are in a folder of its name.
+# One run each; runs with another model than the asperity model are in a folder of its name.
 
 from icha.configuration.cases import run_settings
 from icha.contact.models import MODELS
@@ -10,10 +10,10 @@ wildcard_constraints:
     model_folder="|".join(map(model_folder, MODELS)),
 
 
-# Asked for more than once of each of what may be ten thousand runs.
+# Snakemake needs them several times for each of up to ten thousand runs.
 SETTINGS_OF_RUN = cache(lambda case: run_settings(CAMPAIGN, case))
 
-# By model, whose module the script imports by its name.
+# Fingerprint by model: the script imports the module of its model.
 CODE_OF_RUN = {name: code_of("run_sweep.py", model.module) for name, model in MODELS.items()}
 
 
@@ -26,7 +26,7 @@ rule run:
         "<logs>/runs/<run>.log",
     benchmark:
         "<benchmarks>/runs/<run>.jsonl"
-    # The long ones first, or the last of them would keep one core busy at the end.
+    # Long runs start first; otherwise the last of them would occupy one core at the end.
     priority: by_case(lambda case: int(MODELS[case.model].resumable))
     conda:
         "../envs/icha.yaml"
@@ -42,8 +42,8 @@ rule run:
             "config_sha256": SHA256_OF_RUN(case_of(wildcards)),
         },
         code=by_case(lambda case: CODE_OF_RUN[case.model]),
-        # What takes hours can be gone on with.
-        keeps=by_case(lambda case: MODELS[case.model].resumable and surface_threads(CAMPAIGN, case.surface) > 1),
+        # A run of hours can be resumed.
+        resumable=by_case(lambda case: MODELS[case.model].resumable and surface_threads(CAMPAIGN, case.surface) > 1),
     message:
         "Sweep {wildcards.study}: {wildcards.surface}, seed {wildcards.seed}, slope {wildcards.slope}, "
         "{wildcards.model_folder}{wildcards.material}"

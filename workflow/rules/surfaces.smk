@@ -25,7 +25,7 @@ rule surface:
         runtime=30,
     params:
         settings=lambda wildcards: surface_settings(CAMPAIGN, wildcards.surface),
-        # Of a file its content, whatever its time.
+        # Files are compared by content, not by time.
         sha256=lambda wildcards: getattr(CAMPAIGN.topography(wildcards.surface), "sha256", None),
         attributes=as_it_is(ATTRIBUTES),
         code=code_of("make_surface.py"),

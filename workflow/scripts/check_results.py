@@ -1,6 +1,6 @@
 """Check the results of a campaign: identities, residuals, monotonicity, completeness."""
 
-from job import guarded
+from job import job_context
 
 from icha.analysis.checks import check_campaign, check_solution, worst, write_checks
 from icha.datasets.files import read_campaign, read_dataset
@@ -8,10 +8,15 @@ from icha.datasets.labels import SolutionLabels
 
 
 def check_results(dataset, solutions, output, *, labels, solution_labels):
-    """Write all checks of a campaign to `output`.
+    """Write all checks of a campaign.
 
-    The dataset should hold the runs of the given labels; `solutions` are files of boundary elements, labelled in their
-    order.
+    Parameters
+    ----------
+    dataset : file of the campaign dataset.
+    solutions : files of boundary elements at a finite range.
+    output : file to write.
+    labels : labels of the runs that the dataset should contain.
+    solution_labels : labels of the solutions, in their order.
     """
     checks = list(check_campaign(read_campaign(dataset), labels))
     for label, path in zip(solution_labels, solutions, strict=True):
@@ -22,7 +27,7 @@ def check_results(dataset, solutions, output, *, labels, solution_labels):
 
 
 if "snakemake" in globals():
-    with guarded(snakemake):
+    with job_context(snakemake):
         check_results(
             snakemake.input.dataset,
             snakemake.input.solutions,

@@ -1,16 +1,16 @@
 """Compare the runs of every study at common loads."""
 
-from job import attributes, guarded
+from job import attributes, job_context
 
 from icha.analysis.common_loads import compare_campaign
 from icha.datasets.files import read_campaign, write_dataset
 
 
 def compare_runs(dataset, output, *, attributes):
-    """Write the comparison of the campaign dataset to `output`."""
+    """Write the comparison of a campaign dataset."""
     write_dataset(compare_campaign(read_campaign(dataset), attrs=attributes), output)
 
 
 if "snakemake" in globals():
-    with guarded(snakemake):
+    with job_context(snakemake):
         compare_runs(snakemake.input[0], snakemake.output[0], attributes=attributes(snakemake))

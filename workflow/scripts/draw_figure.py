@@ -1,11 +1,11 @@
 """Draw one figure."""
 
-from job import guarded
+from job import job_context
 
 from icha.figures.registry import draw_figure
 
 if "snakemake" in globals():
-    with guarded(snakemake):
+    with job_context(snakemake):
         draw_figure(
             snakemake.wildcards.name,
             snakemake.output.png,

@@ -1,6 +1,6 @@
-"""Press one surface against one material and pull it off again, by boundary elements."""
+"""Load one surface against one material and unload it, with boundary elements at a finite range."""
 
-from job import attributes, guarded
+from job import attributes, job_context
 
 from icha.asperity.material import Material
 from icha.datasets.files import write_dataset
@@ -9,13 +9,13 @@ from icha.references.finite_range_loops import finite_range_loop
 
 
 def follow_boundary_elements(surface, output, *, rms_slope, material, attributes, **settings):
-    """Solve for the surface of the file `surface`, scaled to `rms_slope`, both ways, and write it to `output`."""
+    """Compute the cycle of a surface file, scaled to an rms slope, and write it."""
     scaled = read_surface(surface).scaled_to_rms_slope(rms_slope)
     write_dataset(finite_range_loop(scaled, Material(**material), **settings).assign_attrs(attributes), output)
 
 
 if "snakemake" in globals():
-    with guarded(snakemake):
+    with job_context(snakemake):
         follow_boundary_elements(
             snakemake.input.surface,
             snakemake.output[0],

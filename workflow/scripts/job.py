@@ -1,4 +1,4 @@
-"""What the scripts of all jobs share: where they say what they have to say, how they fail, checksums of results."""
+"""Shared by the scripts of all jobs: output to the log, errors, checksums of results, end with Snakemake."""
 
 import contextlib
 import os
@@ -14,12 +14,12 @@ from icha.support.atomic_files import move_only_while_owned
 from icha.support.formatting import printable_lines
 from icha.support.program import beginning_of, end_with_parent
 
-# Set by the Snakefile: number and beginning of the process that wants the job.
+# Environment variable, set by the Snakefile: number and start time of Snakemake's process.
 SNAKEMAKE = "ICHA_SNAKEMAKE"
 
 
-def _failures_of_solvers():
-    """How solvers say that they did not converge. Most jobs do without them, so nothing is imported for this."""
+def _solver_errors() -> list[type[Exception]]:
+    """Return the errors of solvers that did not converge, of modules that this job has imported."""
     names = {
         "icha.simulation": "ConvergenceError",
         "icha.contact.model": "NotConverged",
@@ -29,13 +29,16 @@ def _failures_of_solvers():
 
 
 @contextmanager
-def guarded(snakemake):
-    """Surround the work of a job: its inputs must be what was written, its outputs get checksums, its errors are told.
+def job_context(snakemake):
+    """Verify the inputs of a job, write checksums of its outputs, and report its errors.
 
-    Its context gives what was asked of the job (`checksums.asked_of`), and checksums of inputs that are results.
+    All output goes to the log of the job. An error ends the job with its message there. The message of an expected
+    error is sufficient for users; the traceback of another error is written beside the log for the developers.
 
-    All output goes to the job's log; an error ends the job with its message there. The errors that users can mend say
-    all in their message. The traceback of any other one is for the developers and is kept beside the log.
+    Yields
+    ------
+    asked : checksum of the parameters of the job (`checksums.asked_of`).
+    inputs : checksums of inputs that are results.
     """
     _end_with_snakemake()
     move_only_while_owned()
@@ -51,75 +54,78 @@ def guarded(snakemake):
         for path in outputs:
             checksums.begin(results, path)
         inputs = _checksums_of(results, snakemake.input)
-        # Before the work, which could change what it is given.
+        # Computed first, since the script may change its parameters.
         asked = checksums.asked_of(map(repr, snakemake.params))
         yield asked, inputs
         for path in outputs:
             checksums.write_checksum(results, path, asked=asked, inputs=inputs)
         sys.stdout.flush()
     except Exception as error:
-        expected = (ValueError, OSError, *_failures_of_solvers())
-        if isinstance(error, expected):
-            _say(f"Error: {error}", terminal)
+        if isinstance(error, (ValueError, OSError, *_solver_errors())):
+            _print(f"Error: {error}", terminal)
         else:
-            _say(f"Error: {error!r}, which was not expected", terminal)
+            _print(f"Error: unexpected {error!r}", terminal)
             with contextlib.suppress(OSError), open(f"{log}.traceback", "w", encoding="utf-8") as details:
                 traceback.print_exc(file=details)
-                _say(f"Details for the developers: {log}.traceback", terminal)
+                _print(f"Details for the developers: {log}.traceback", terminal)
         sys.exit(1)
 
 
 def refuse_changed(file, sha256, name=None):
-    """Refuse a file that was read, or copied from the file `name`, unless its content is what was asked for.
+    """Refuse a file whose content has changed, since results would be attributed to the old content.
+
+    Parameters
+    ----------
+    file : the file.
+    sha256 : its expected checksum.
+    name : original name of a copied file.
 
     Raises
     ------
     ValueError
-        If it has another SHA-256: results would be known as those of what was there before.
+        If the checksum differs.
     """
     if checksums.sha256_of(Path(file)) != sha256:
-        raise ValueError(f"{name or file} has changed since the campaign was begun; give the same command again")
+        raise ValueError(f"{name or file} has changed since the campaign started; repeat the command")
 
 
 def attributes(snakemake):
-    """Attributes of the dataset that a job writes: those of the rule, and `id`, the same wherever it is computed."""
-    own = snakemake.params.attributes
+    """Return the attributes of the dataset of a job: those of its rule, and `id`, the same on every machine."""
+    attributes = snakemake.params.attributes
     path = Path(snakemake.output[0]).relative_to(_results(snakemake)).with_suffix("")
-    return {"id": f"{own['campaign']}/{path.as_posix()}"} | own
+    return {"id": f"{attributes['campaign']}/{path.as_posix()}"} | attributes
 
 
 def _results(snakemake):
-    """The campaign's folder of results."""
+    """Return the campaign's folder of results."""
     return snakemake.log[0].partition("/logs/")[0]
 
 
 def _result(results, path):
-    """What has the checksum of an output: itself, but the folder whose files it lists if it is a list of checksums."""
+    """Return the name of an output for checksums: that of its folder if it is the list of checksums of a folder."""
     file = Path(path).relative_to(results)
     return str(file.parent if file.name == "SHA256SUMS" else file)
 
 
 def _checksums_of(results, inputs):
-    """Checksums of those inputs that are results; an error names all that are not what was written.
-
-    The next call will find these, too.
-    """
+    """Return checksums of the inputs that are results; raise an error that names all damaged ones."""
     paths = [os.path.relpath(path, results) for path in inputs if path.startswith(f"{results}/")]
-    wrong = [path for path in paths if not checksums.is_whole(results, path, thorough=True)]
-    for path in wrong:
+    damaged = [path for path in paths if not checksums.is_whole(results, path, thorough=True)]
+    for path in damaged:
+        # The next call finds them, too.
         with contextlib.suppress(OSError):
             checksums.distrust(results, path)
-    if wrong:
-        names = ", ".join(f"{results}/{path}" for path in wrong)
+    if damaged:
+        names = ", ".join(f"{results}/{path}" for path in damaged)
         raise ValueError(
-            f"{names}: not what was written, by its checksum; give the same command again, which sets it aside as "
-            f"*.damaged and makes it again"
+            f"{names}: does not match its checksum; repeat the command, which renames the file to *.damaged and "
+            "computes it again"
         )
     return {path: checksums.sha256_as_written(results, path) for path in paths}
 
 
-def _say(text, terminal):
-    """Print to the log; to the terminal if that cannot be written, on a full disk for one."""
+def _print(text, terminal):
+    """Print to the log, or to the terminal if the log cannot be written, for example on a full disk."""
     line = f"{printable_lines(text)}\n".encode()
     try:
         sys.stdout.flush()
@@ -130,31 +136,31 @@ def _say(text, terminal):
     os.dup2(terminal, 1)
     os.dup2(terminal, 2)
     with contextlib.suppress(OSError):
-        sys.stdout.flush()  # what had been kept back
+        sys.stdout.flush()  # the rest of earlier output
         os.write(terminal, line)
 
 
 def _end_with_snakemake():
-    """End this process when Snakemake ends, or now if it has: nobody would know of the results of an orphan.
+    """End this process when Snakemake ends, or now if it has ended.
 
-    Worse, it could replace those of the next call, which computes them, too, and maybe of other values.
+    Nobody would use the results of an orphaned job, and it could replace those of the next call.
     """
     number, _, began = os.environ.get(SNAKEMAKE, "").partition(" ")
     if not number:
-        return  # no job of Snakemake, or not on Linux
+        return  # not a job of Snakemake, or not on Linux
 
-    def is_gone():
+    def has_ended():
         try:
-            return beginning_of(int(number)) != began  # another process may have the number by now
+            return beginning_of(int(number)) != began  # another process may have the number now
         except (ProcessLookupError, FileNotFoundError):
             return True
 
     def wait():
-        while not is_gone():
+        while not has_ended():
             time.sleep(0.2)
         os._exit(1)
 
-    if is_gone():
+    if has_ended():
         os._exit(1)
     if os.getppid() == int(number):
         end_with_parent(int(number))

@@ -1,18 +1,23 @@
-"""Say whether every check of the results passed; fail if one did not that is not known to fail."""
+"""Write the verdict on the checks; fail if a check failed that is not a known failure."""
 
-from job import guarded
+from job import job_context
 
 from icha.analysis.checks import read_checks, refuse_unknown_failures
 from icha.support.atomic_files import whole_file
 
 
 def judge_results(checks, output, *, known):
-    """Write the verdict on the file of checks to `output`; `known` are reasons of runs that are known to fail.
+    """Write the verdict on a file of checks.
+
+    Parameters
+    ----------
+    checks, output : files to read and to write.
+    known : reasons of known failures, by run.
 
     Raises
     ------
     ValueError
-        Listing the checks that failed.
+        With the list of failed checks.
     """
     found = read_checks(checks)
     failed = sum(not check.passed for check in found)
@@ -29,5 +34,5 @@ def judge_results(checks, output, *, known):
 
 
 if "snakemake" in globals():
-    with guarded(snakemake):
+    with job_context(snakemake):
         judge_results(snakemake.input[0], snakemake.output[0], known=snakemake.params.known)

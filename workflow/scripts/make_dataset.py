@@ -1,18 +1,18 @@
 """Put all runs of a campaign into one file."""
 
-from job import attributes, guarded
+from job import attributes, job_context
 
 from icha.datasets.campaign_file import write_campaign
 
 
 def make_dataset(runs, output, *, labels, settings, attributes):
-    """Write the campaign dataset of the files `runs`, with their labels and checksums of settings, to `output`."""
+    """Write the campaign dataset of run files, with their labels and checksums of settings."""
     settings = dict(zip(labels, settings, strict=True))
     write_campaign(zip(labels, runs, strict=True), output, design=labels, settings=settings, attrs=attributes)
 
 
 if "snakemake" in globals():
-    with guarded(snakemake):
+    with job_context(snakemake):
         make_dataset(
             snakemake.input,
             snakemake.output[0],

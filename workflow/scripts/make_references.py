@@ -1,6 +1,6 @@
-"""Write what theories say of a surface, and published points."""
+"""Write predictions of theories for a surface, and published points."""
 
-from job import attributes, guarded
+from job import attributes, job_context
 
 from icha.asperity.material import Material
 from icha.datasets.files import write_dataset
@@ -10,10 +10,16 @@ from icha.surfaces.spectrum import SelfAffineSpectrum
 
 
 def make_references(surface, output, *, settings, adhesive, attributes):
-    """Write the references for the surface file `surface` to `output`.
+    """Write the references for a surface.
 
-    `settings` are those of the surface and `adhesive` tells the contacts with adhesion, both in SI units.
-    Theories of separate summits are left out where they hold for no such surface or material.
+    Theories of separate summits are omitted if they do not apply to the surface or the materials.
+
+    Parameters
+    ----------
+    surface, output : surface file to read, and file to write.
+    settings : settings of the surface, in SI units.
+    adhesive : contacts with adhesion, in SI units.
+    attributes : attributes of the dataset.
     """
     keys = ("period", "rolloff_wavelength", "short_wavelength", "hurst")
     known = settings["kind"] == "self_affine"
@@ -23,13 +29,13 @@ def make_references(surface, output, *, settings, adhesive, attributes):
     try:
         dataset = reference_dataset(spectrum, moments, materials, attrs=attributes)
     except ValueError as error:
-        print(f"No theories of separate summits of this surface: {error}")
+        print(f"Theories of separate summits do not apply to this surface: {error}")
         dataset = reference_dataset(spectrum, attrs=attributes)
     write_dataset(dataset, output)
 
 
 if "snakemake" in globals():
-    with guarded(snakemake):
+    with job_context(snakemake):
         make_references(
             snakemake.input.surface,
             snakemake.output[0],

@@ -1,8 +1,8 @@
-"""Write the report of a campaign, and what its jobs took."""
+"""Write the report of a campaign, and the times of its jobs."""
 
 from pathlib import Path
 
-from job import guarded
+from job import job_context
 
 from icha.analysis.checks import read_checks
 from icha.datasets.files import read_campaign
@@ -12,9 +12,9 @@ from icha.report.run_times import write_times
 from icha.report.sections import read_surface_statistics
 
 if "snakemake" in globals():
-    with guarded(snakemake):
+    with job_context(snakemake):
         files, params, page = snakemake.input, snakemake.params, snakemake.output.page
-        model_error = "".join(files.model_error)  # none without boundary elements
+        model_error = "".join(files.model_error)  # empty without boundary elements
         times_page = Path(params.benchmarks, "index.html")
         linked = {"Configuration": files.configuration, "Comparison": files.comparison, "Checks": files.checks}
         write_report(

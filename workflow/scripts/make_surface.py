@@ -1,6 +1,6 @@
-"""Make a topography, by spectral synthesis or from a file, and write it at rms slope 1."""
+"""Generate a random topography or read a file, and write it at rms slope 1."""
 
-from job import attributes, guarded, refuse_changed
+from job import attributes, job_context, refuse_changed
 
 from icha.datasets.surface_file import write_surface
 from icha.surfaces.measured.array_files import read_height_map
@@ -12,9 +12,16 @@ SPECTRUM = ("period", "rolloff_wavelength", "short_wavelength", "hurst")
 
 
 def make_surface(output, *, name, seed, settings, height_map=None, sha256=None, attributes):
-    """Write the surface `name` to `output`; `settings` are those of the configuration, in SI units.
+    """Write a surface.
 
-    `height_map` is the file of a surface that is not made at random, and `sha256` its checksum as it was asked for.
+    Parameters
+    ----------
+    output : file to write.
+    name, seed : labels of the surface.
+    settings : its section of the configuration, in SI units.
+    height_map : file of the heights; None for a random surface.
+    sha256 : expected checksum of this file.
+    attributes : attributes of the dataset.
     """
     spectrum = measured = None
     if settings["kind"] == "self_affine":
@@ -32,7 +39,7 @@ def make_surface(output, *, name, seed, settings, height_map=None, sha256=None, 
 
 
 if "snakemake" in globals():
-    with guarded(snakemake):
+    with job_context(snakemake):
         make_surface(
             snakemake.output[0],
             name=snakemake.wildcards.surface,

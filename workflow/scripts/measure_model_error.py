@@ -1,6 +1,6 @@
-"""Compare the runs of a campaign by asperities with boundary elements: other runs, and solutions beside them."""
+"""Compare the runs with the asperity model to boundary elements: other runs, and solutions at finite ranges."""
 
-from job import attributes, guarded
+from job import attributes, job_context
 
 from icha.analysis.model_error import model_error
 from icha.datasets.files import read_campaign, read_dataset, read_run, write_dataset
@@ -8,14 +8,14 @@ from icha.datasets.labels import RunLabels, SolutionLabels
 
 
 def measure_model_error(campaign, runs, solutions, output, *, run_labels, labels, attributes):
-    """Write the error of the file `campaign` against the files `runs` and `solutions`, labelled in their order."""
+    """Write the error of a campaign against runs and solutions with boundary elements, with labels in their order."""
     others = zip((RunLabels(*label) for label in run_labels), map(read_run, runs), strict=True)
     pairs = zip((SolutionLabels(*label) for label in labels), map(read_dataset, solutions), strict=True)
     write_dataset(model_error(read_campaign(campaign), pairs, runs=others, attrs=attributes), output)
 
 
 if "snakemake" in globals():
-    with guarded(snakemake):
+    with job_context(snakemake):
         measure_model_error(
             snakemake.input.campaign,
             snakemake.input.runs,

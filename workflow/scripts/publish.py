@@ -3,22 +3,28 @@
 import sys
 from pathlib import Path
 
-from job import guarded
+from job import job_context
 
 
 def publish(archive, *, results, files, named_files, project):
-    """Write the deposit of `files` below the folder `results` to `archive`, and to the folder of that name beside it.
+    """Write the deposit as a zip, and as a folder beside it.
 
-    `named_files` are the files that the configuration names, by their places beside the configuration as used.
+    Parameters
+    ----------
+    archive : the zip.
+    results : folder of the results.
+    files : its files to include.
+    named_files : files that the configuration names, by their paths relative to the configuration as used.
+    project : folder of the workflow.
     """
-    # What is imported at the top is imported for every job of a campaign.
+    # The fork server imports modules at the top for every campaign.
     from icha.configuration.load import load_configuration
     from icha.deposit.make import make_deposit, refuse_mixed
     from icha.deposit.program import program_source, refuse_other_environment
     from icha.planning.plan import whole_cost
     from icha.support.checksums import asked_of
 
-    # Beside the rules, which they belong to, and not beside the scripts.
+    # `provenance` is a module of the rules, one folder above the scripts.
     sys.path.insert(0, str(Path(project, "workflow")))
     from provenance import recorded_jobs, recorded_parameters
 
@@ -45,7 +51,7 @@ def publish(archive, *, results, files, named_files, project):
 
 
 if "snakemake" in globals():
-    with guarded(snakemake):
+    with job_context(snakemake):
         publish(
             snakemake.output.archive,
             results=snakemake.params.results,

@@ -1,4 +1,4 @@
-"""Press one surface against one material along a loading path."""
+"""Load one surface against one material along a path."""
 
 import pathlib
 import shutil
@@ -6,7 +6,7 @@ import traceback
 
 import numpy as np
 import scipy
-from job import attributes, guarded
+from job import attributes, job_context
 
 from icha.asperity.material import Material
 from icha.contact.checkpoints import prepare_checkpoints
@@ -14,59 +14,67 @@ from icha.contact.models import DEFAULT_MODEL
 from icha.datasets.files import write_dataset
 from icha.datasets.surface_file import read_surface
 from icha.path.targets import Path
-from icha.simulation import ConvergenceError, simulate, empty_run
+from icha.simulation import ConvergenceError, empty_run, simulate
 
-# What this machine lacks says nothing of the run: its job fails, and the next call tries again.
-OF_THE_MACHINE = (OSError, MemoryError, ImportError)
+# Errors of the machine, not of the run: the job fails, and the next call repeats it.
+MACHINE_ERRORS = (OSError, MemoryError, ImportError)
 
 
 def run_sweep(
     surface, output, *, rms_slope, seed, material, path, attributes, progress, model=DEFAULT_MODEL, kept=None
 ):
-    """Load the surface of the file `surface`, scaled to `rms_slope`, and write the run dataset to `output`.
+    """Compute a run and write its dataset.
 
-    Of a run that fails the file holds the stops that were reached, and says why there are no more: the campaign goes
-    on, and its verdict lists the run. So do errors of any other kind, for surface, material and path are all that they
-    can come from.
+    The file of a failed run contains the stops that were reached, and the reason; the campaign continues, and its
+    verdict lists the run. Unexpected errors are treated in the same way, since they can only come from surface,
+    material and path.
+
+    Parameters
+    ----------
+    surface : the surface file, which is scaled to `rms_slope`.
+    output : file to write.
+    rms_slope, seed, material, path, model : settings of the run, in SI units.
+    attributes : attributes of the dataset.
+    progress : function that takes lines of progress.
+    kept : folder of checkpoints; None for none.
     """
-    pressed = read_surface(surface).scaled_to_rms_slope(rms_slope), Material(**material), Path(**path)
+    contact = read_surface(surface).scaled_to_rms_slope(rms_slope), Material(**material), Path(**path)
     try:
-        dataset = simulate(*pressed, model=model, seed=seed, progress=progress, kept=kept)
+        dataset = simulate(*contact, model=model, seed=seed, progress=progress, kept=kept)
     except ConvergenceError as error:
         dataset = error.dataset
-    except OF_THE_MACHINE:
+    except MACHINE_ERRORS:
         raise
     except Exception as error:
-        if type(error) is RuntimeError:  # of Python itself, which could start no thread
+        if type(error) is RuntimeError:  # Python could not start a thread
             raise
         reason = f"nothing was computed: {error}"
         if not isinstance(error, ValueError):
-            reason = f"{type(error).__name__}, which was not expected: {error}"
+            reason = f"{type(error).__name__}, unexpected: {error}"
             progress(traceback.format_exc())
-        dataset = empty_run(*pressed, reason, model=model, seed=seed)
+        dataset = empty_run(*contact, reason, model=model, seed=seed)
     if "incomplete" in dataset.attrs:
         progress(f"Failed: {dataset.attrs['incomplete']}")
     write_dataset(dataset.assign_attrs(attributes), output)
 
 
-def _kept(output, asked, inputs):
-    """The folder in which equilibria are kept, with nothing in it from another surface, path or code."""
-    return prepare_checkpoints(
-        pathlib.Path(output).with_suffix(".kept"), f"{asked} {inputs} {np.__version__} {scipy.__version__}"
-    )
+def _checkpoints(output, asked, inputs):
+    """Return the folder of checkpoints, without those of another surface, path or code."""
+    versions = f"{np.__version__} {scipy.__version__}"
+    return prepare_checkpoints(pathlib.Path(output).with_suffix(".kept"), f"{asked} {inputs} {versions}")
 
 
 if "snakemake" in globals():
-    with guarded(snakemake) as (asked, inputs):
-        kept = _kept(snakemake.output[0], asked, inputs) if snakemake.params.keeps else None
+    with job_context(snakemake) as (asked, inputs):
+        folder = _checkpoints(snakemake.output[0], asked, inputs) if snakemake.params.resumable else None
         run_sweep(
             snakemake.input.surface,
             snakemake.output[0],
             **snakemake.params.settings,
             attributes=attributes(snakemake),
             progress=lambda line: print(line, flush=True),
-            kept=kept,
+            kept=folder,
         )
-        if kept is not None:
-            # The run is there. What cannot be removed, of a file system in a network for one, is no reason to lose it.
-            shutil.rmtree(kept, ignore_errors=True)
+        if folder is not None:
+            # The run is complete, even if a network file system does not remove the folder.
+            shutil.rmtree(folder, ignore_errors=True)

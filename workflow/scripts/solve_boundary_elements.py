@@ -1,6 +1,6 @@
-"""Press one surface against one material at one load, by boundary elements."""
+"""Solve one surface against one material at one load, with boundary elements at a finite range."""
 
-from job import attributes, guarded
+from job import attributes, job_context
 
 from icha.asperity.material import Material
 from icha.datasets.files import write_dataset
@@ -9,14 +9,14 @@ from icha.references.finite_range import finite_range_solution
 
 
 def solve_boundary_elements(surface, output, *, rms_slope, material, attributes, **settings):
-    """Solve for the surface of the file `surface`, scaled to `rms_slope`, and write the solution to `output`."""
+    """Compute the solution of a surface file, scaled to an rms slope, and write it."""
     scaled = read_surface(surface).scaled_to_rms_slope(rms_slope)
     solution = finite_range_solution(scaled, Material(**material), **settings)
     write_dataset(solution.assign_attrs(attributes), output)
 
 
 if "snakemake" in globals():
-    with guarded(snakemake):
+    with job_context(snakemake):
         solve_boundary_elements(
             snakemake.input.surface,
             snakemake.output[0],

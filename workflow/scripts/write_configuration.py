@@ -1,14 +1,14 @@
-"""Write the configuration of a campaign as it was used: defaults of the file with the command line's values."""
+"""Write the configuration of a campaign as used: its file with the values of the command line."""
 
 import shutil
 
-from job import guarded, refuse_changed
+from job import job_context, refuse_changed
 
 from icha.support.atomic_files import whole_file
 
 
 def write_configuration(output, *, text, copies, sha256):
-    """Write `text` to the file `output`, and files to the paths of their copies; `sha256` are their checksums."""
+    """Write the configuration, and copy the files that it names; `copies` maps copies to files with these checksums."""
     for (copy, file), expected in zip(copies.items(), sha256, strict=True):
         with whole_file(copy) as temporary:
             shutil.copyfile(file, temporary)
@@ -18,7 +18,7 @@ def write_configuration(output, *, text, copies, sha256):
 
 
 if "snakemake" in globals():
-    with guarded(snakemake):
+    with job_context(snakemake):
         output, *copies = snakemake.output
         write_configuration(
             output,

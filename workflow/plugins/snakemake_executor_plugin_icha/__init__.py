@@ -1,11 +1,11 @@
 """Executor of Snakemake whose jobs are forks of one process that has imported what they need.
 
-A job's script needs some seconds to import NumPy, SciPy, xarray and the package, often longer than its work. So the
-first job starts a process that has done so, the fork server of `multiprocessing`, and every job of one thread is a fork
-of it that runs the script. Other jobs, and all jobs where libraries do not survive a fork (elsewhere than on Linux) or
-that process cannot be started, run by themselves, as with Snakemake's executor `local`.
+Importing NumPy, SciPy, xarray and the package takes seconds, often longer than the work of a job. So the first job
+starts the fork server of `multiprocessing`, a process that has imported them, and every job of one thread is a fork of
+it. Other jobs run in their own process, as with Snakemake's executor `local`. So do all jobs if the fork server cannot
+be started, or if libraries do not survive a fork (on other systems than Linux).
 
-However one of these processes ends, those that it started end with it: Snakemake, the fork server, its forks.
+When one of these processes ends, the processes that it started end, too: Snakemake, the fork server, its forks.
 """
 
 import json
@@ -34,49 +34,51 @@ __all__ = ["Executor", "common_settings"]
 
 
 class Executor(LocalExecutor):
-    """Runs jobs on this machine, the scripts of one thread in forks."""
+    """Executor for this machine that runs scripts of one thread in forks."""
 
     def __post_init__(self):
-        """Say what the fork server is to import, and with how many threads."""
+        """Set the imports of the fork server, and its number of threads."""
         super().__post_init__()
         self._processes = multiprocessing.get_context("forkserver")
         self._processes.set_forkserver_preload([f"{__name__}.preload"])
-        # Libraries read it when they are loaded; jobs that run by themselves are told their own number.
+        # Libraries read it when they are loaded; Snakemake sets it for jobs in their own process.
         os.environ.update(dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1"))
-        # Or forks would import Snakemake's whole command line, which is the main program.
+        # Without a spec, forks would import the main program: the whole command line of Snakemake.
         program = sys.modules["__main__"]
         program.__spec__ = program.__spec__ or find_spec("snakemake.__main__")
         self._turn = threading.Lock()
         self._without_server = sys.platform != "linux"
 
     def run_single_job(self, job):
-        """Start a job; the future ends with it."""
+        """Start a job."""
         script = job.rule.script
         deployed = self.workflow.deployment_settings.deployment_method
         if not script or job.threads != 1 or deployed or not self._server_runs():
             return super().run_single_job(job)
         rule, input_, output, params, wildcards, threads, resources, log, benchmark, *_ = self.job_args_and_prepare(job)
         file = Path(os.path.normpath(Path(str(job.rule.basedir)) / script))
-        told = Snakemake(
+        context = Snakemake(
             input_, output, params, wildcards, threads, resources, log, {}, rule.name, None, str(file.parent)
         )
-        return self.pool.submit(self._run_forked, str(file), told, benchmark)
+        return self.pool.submit(self._run_forked, str(file), context, benchmark)
 
     def _server_runs(self) -> bool:
-        """Start the fork server if it does not run; False where that cannot be."""
+        """Start the fork server if it does not run; return False if this fails."""
         if not self._without_server:
             try:
-                # From the thread that lasts as long as the process: the fork server ends with it.
+                # The fork server ends with the thread that starts it, so this must be the main thread.
                 forkserver.ensure_running()
-            except OSError as error:  # for one, the path of temporary files is too long for a socket
+            except OSError as error:  # such as a path of temporary files that is too long for a socket
                 self._without_server = True
-                self.logger.warning(f"Every job takes some seconds more, for no process can be prepared: {error}.")
+                self.logger.warning(
+                    f"Every job takes some seconds more, since the fork server cannot be started: {error}."
+                )
         return not self._without_server
 
     def _run_forked(self, *job):
         process = self._processes.Process(target=run_script, args=job, daemon=True)
         try:
-            # One at a time, for each of these looks at the ends of all processes.
+            # One at a time, since each call checks all processes for their end.
             with self._turn:
                 process.start()
             wait([process.sentinel])
@@ -91,8 +93,8 @@ class Executor(LocalExecutor):
             raise SpawnedJobError
 
 
-def run_script(script: str, told: Snakemake, benchmark: str | None) -> None:
-    """Be a job: run its script, which finds what it is told as `snakemake`, and write what it took."""
+def run_script(script: str, context: Snakemake, benchmark: str | None) -> None:
+    """Run the script of a job with its context as the global variable `snakemake`, and write its benchmark."""
     from . import preload
 
     end_with_parent(preload.SERVER)
@@ -100,19 +102,19 @@ def run_script(script: str, told: Snakemake, benchmark: str | None) -> None:
     started = time.monotonic()
     sys.argv = [script]
     sys.path.insert(0, os.path.dirname(script))
-    runpy.run_path(script, {"snakemake": told}, "__main__")
+    runpy.run_path(script, {"snakemake": context}, "__main__")
     if benchmark:
-        took = resource.getrusage(resource.RUSAGE_SELF)
+        usage = resource.getrusage(resource.RUSAGE_SELF)
         record = {
             "s": round(time.monotonic() - started, 4),
-            "max_rss": round(took.ru_maxrss / 1024, 2),
-            "max_uss": round(took.ru_maxrss / 1024 - _shared_megabytes(), 2),
-            "cpu_time": round(took.ru_utime + took.ru_stime, 2),
+            "max_rss": round(usage.ru_maxrss / 1024, 2),
+            "max_uss": round(usage.ru_maxrss / 1024 - _shared_megabytes(), 2),
+            "cpu_time": round(usage.ru_utime + usage.ru_stime, 2),
         }
         Path(benchmark).write_text(json.dumps(record) + "\n", encoding="ascii")
 
 
 def _shared_megabytes() -> float:
-    """What this process has in memory together with others: nearly all that it was forked with."""
-    here = psutil.Process().memory_full_info()
-    return (here.rss - here.uss) / 2**20
+    """Return the memory that this process shares with others: nearly all that it had after the fork."""
+    memory = psutil.Process().memory_full_info()
+    return (memory.rss - memory.uss) / 2**20

@@ -1,4 +1,4 @@
-"""Imports of the fork server, before its first fork: the whole package, as far as jobs may need it."""
+"""Imports of the fork server before its first fork: all modules that jobs may need."""
 
 import contextlib
 import os
@@ -9,20 +9,20 @@ import icha
 from icha.support.program import end_with_parent
 
 SERVER = os.getpid()
-# The command line, and what only a deposit needs.
-_BESIDES = ("cli", "publication")
-# What libraries import when it is first used.
+# The command line, and modules that only a deposit needs.
+_EXCLUDED = ("cli", "deposit")
+# Modules that libraries import at their first use.
 _LATE = ("pint", "PIL.PngImagePlugin", "matplotlib.style", "matplotlib.backends.backend_pdf", "fontTools.subset")
 
 
 def _modules():
     top = Path(icha.__file__).parent
     files = [file.relative_to(top) for file in sorted(top.rglob("*.py")) if file.stem != "__init__"]
-    return [".".join(("icha", *file.with_suffix("").parts)) for file in files if file.parts[0] not in _BESIDES]
+    return [".".join(("icha", *file.with_suffix("").parts)) for file in files if file.parts[0] not in _EXCLUDED]
 
 
 end_with_parent(os.getppid())
 for _name in [*_modules(), *_LATE]:
-    # What is missing here, a job will say.
+    # A job reports a missing module.
     with contextlib.suppress(Exception):
         import_module(_name)

@@ -1,7 +1,7 @@
-"""What Snakemake does, as lines of JSON for `icha run`, which alone puts this folder where Snakemake looks.
+"""Logger plugin that writes events of Snakemake for `icha run`, as lines of JSON.
 
-They are written to the file descriptor that the environment variable ICHA_EVENTS names; every line has the name of an
-event of Snakemake's and some of its fields.
+The environment variable ICHA_EVENTS contains the file descriptor. Every line has the name of an event and some of its
+fields. Only `icha run` makes this plugin available to Snakemake.
 """
 
 import json
@@ -19,28 +19,28 @@ _FIELDS = {
 
 
 class LogHandler(LogHandlerBase):
-    """Writes the events that the live view needs, and nothing for people to read."""
+    """Log handler that writes the events for the live view."""
 
     writes_to_stream = False
     writes_to_file = False
-    has_filter = True  # none: every event is wanted
+    has_filter = True  # there is no filter: `emit` selects the events
     has_formatter = True
     needs_rulegraph = False
 
     def __post_init__(self):
-        """Open the other end's pipe."""
+        """Open the pipe to `icha run`."""
         self._events = os.fdopen(int(os.environ["ICHA_EVENTS"]), "w", encoding="utf-8", buffering=1)
 
     def emit(self, record):
-        """Write one line, if the record is of an event that is wanted."""
+        """Write one line if the record is a selected event."""
         name = str(getattr(record, "event", None) or "")
         if name in _FIELDS:
             event = {"event": name} | {field: getattr(record, field, None) for field in _FIELDS[name]}
-        elif text := getattr(record, "remark", None):  # the Snakefile's own, for people
+        elif text := getattr(record, "remark", None):  # a warning of the Snakefile
             event = {"event": "remark", "text": text}
         else:
             return
         try:
             self._events.write(json.dumps(event, default=str) + "\n")
         except OSError:
-            pass  # nobody looks any more
+            pass  # `icha run` has ended
