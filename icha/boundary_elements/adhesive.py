@@ -118,14 +118,15 @@ def solve_adhesive_contact(
     tried, rounds, stage = np.zeros(space.size, dtype=bool), 0, first
     while True:
         residual, distance = stages[stage]
-        contact = relax_front(problem, contact, residual, close=close, relax_locally=relax_locally)
-        if np.sum(contact.fraction) > _NEARLY_FULL * space.size:
+        solved = relax_front(problem, contact, residual, close=close, relax_locally=relax_locally)
+        if np.sum(solved.fraction) > _NEARLY_FULL * space.size:
             raise FullContact("the contact runs over the whole surface")
-        formed, new, within = summits.new_contact(contact, distance, tried)
+        formed, new, within = summits.new_contact(solved, distance, tried)
         if not len(new):
             stage += 1
             if stage == len(stages):
-                return contact, within
+                return solved, within
+            contact = solved
             continue
         stage = first
         # Contact that is clearly within reach of new contact forms before the whole front is relaxed.
@@ -134,16 +135,17 @@ def solve_adhesive_contact(
             if rounds > _MAX_ROUNDS:
                 raise NotConverged(f"no equilibrium after {_MAX_ROUNDS} rounds of new contacts")
             tried[new] = True
-            contact, relaxed = _form_contact(problem, contact, formed)
-            if not relaxed:
+            contact = _form_contact(problem, solved, formed)
+            if not isinstance(contact, AdhesiveContact):
                 break
-            formed, new, _ = summits.new_contact(contact, margin, tried)
+            solved = contact
+            formed, new, _ = summits.new_contact(solved, margin, tried)
 
 
 def _form_contact(problem, contact, formed):
-    """Close cells (m,), and relax the fronts around them in windows; returns the contact, and whether this pays."""
+    """Close cells (m,); relax the fronts around them in windows and solve the elastic contact if windows pay."""
     closed = contact.with_closed(formed)
     relaxed = relax_in_windows(problem.space, problem.front, problem.separation, closed, contact.gap, formed)
     if relaxed is None:
-        return closed, False
-    return problem.solve_elastic(relaxed, _ROUND_ACCURACY), True
+        return closed
+    return problem.solve_elastic(relaxed, _ROUND_ACCURACY)

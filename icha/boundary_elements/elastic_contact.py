@@ -161,7 +161,8 @@ def solve_active_set(
         changed = _next_active_set(contact, keep, joining, least)
         if changed is None:
             if left <= tolerance:
-                return ElasticContact(*_arrays(contact), gap, separation, misfit, tolerance)
+                cells, fraction, pressure = contact.cells, contact.fraction, contact.pressure
+                return ElasticContact(cells, fraction, pressure, gap, separation, misfit, tolerance)
             if not left <= LEAST_GAIN * before:
                 raise NotConverged(f"the pressures in contact did not converge (displacement error {left:.1e} cells)")
             before, changing = left, False
@@ -193,10 +194,6 @@ def _next_active_set(contact, keep, joining, least):
         (keep[staying], False),
     )
     return Contact(cells, *values), keep
-
-
-def _arrays(contact):
-    return contact.cells, contact.fraction, contact.pressure
 
 
 def _gap(space, topography, contact, separation, load, dtype, out=None):
@@ -280,9 +277,11 @@ def solve_nonadhesive_contact(
     if not len(contact.cells):
         cells = np.flatnonzero(topography.double > separation)
         contact = Contact(cells, np.ones(len(cells)), np.zeros(len(cells)))
-    given = {"separation": separation, "load": load, "sticky": False}
-    coarse = solve_active_set(space, topography, contact, 2 * topography.rounding, **given)
-    return solve_active_set(space, topography, coarse, 2e-6 * topography.rounding, **given)
+
+    def solve(start, tolerance):
+        return solve_active_set(space, topography, start, tolerance, separation=separation, load=load, sticky=False)
+
+    return solve(solve(contact, 2 * topography.rounding), 2e-6 * topography.rounding)
 
 
 @dataclass(frozen=True, eq=False)
@@ -329,5 +328,6 @@ def solve_adhesive_fractions(
         around += background
     rim = rim_of(state.cells, space.shape)
     around = around.ravel().astype(float)
-    fields = (state.gap, state.separation, state.misfit, tolerance, energy, error)
-    return AdhesiveContact(*_arrays(state), *fields, around[state.cells], rim, around[rim])
+    return AdhesiveContact(
+        **vars(state), energy=energy, energy_error=error, around=around[state.cells], rim=rim, around_rim=around[rim]
+    )

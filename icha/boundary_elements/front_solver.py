@@ -109,7 +109,7 @@ class ActiveCells(Contact):
         if np.count_nonzero(uneasy) <= few:
             return uneasy, True
         far = self.residuals > TOLERANCES.local
-        return far, np.count_nonzero(far) <= few
+        return far, bool(np.count_nonzero(far) <= few)
 
 
 def find_active_cells(front: Front, state: AdhesiveContact) -> ActiveCells:
@@ -238,8 +238,9 @@ class FrontRelaxation:
         self.problem, self.damping, self.local_relaxations, self.steps = problem, 0.0, 0, 0
         self.start = TOLERANCES.certain_displacement if close else TOLERANCES.moving_displacement
         self.coarsest = self.start
-        given = isinstance(contact, AdhesiveContact)
-        self.state = contact if given else problem.solve_elastic(contact, self.start)
+        if not isinstance(contact, AdhesiveContact):
+            contact = problem.solve_elastic(contact, self.start)
+        self.state = contact
 
     @property
     def is_accurate(self) -> bool:
@@ -371,7 +372,7 @@ class LinearisedFront:
         norm = error = np.linalg.norm(right)
         solution, residual = np.zeros_like(right), right
         while not error <= accuracy * norm:
-            part = max(accuracy * norm / error, self.operator.error)
+            part = max(accuracy * float(norm / error), self.operator.error)
             solution = solution + gmres(self._displacement, self._approximate_inverse, residual, part)
             if accuracy >= 10 * self.operator.error:
                 break
@@ -416,7 +417,8 @@ def gmres(matrix: Callable, preconditioner: Callable, right: np.ndarray, accurac
         return np.zeros_like(right)
     basis, triangle = np.zeros((_MAX_KRYLOV + 1, len(right)), right.dtype), np.zeros((_MAX_KRYLOV, _MAX_KRYLOV))
     basis[0] = right / norm
-    rotations, goal = [], [norm]
+    rotations: list[tuple[float, float]] = []
+    goal = [norm]
     for count in range(1, _MAX_KRYLOV + 1):
         vector, known = matrix(preconditioner(basis[count - 1])), basis[:count]
         shares = known @ vector

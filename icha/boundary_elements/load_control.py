@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from icha.boundary_elements.front_solver import TOLERANCES
 from icha.boundary_elements.patches import CellState
-from icha.contact.model import AREA_FRACTION, PRESSURE, ContactModel, Control, Events, NotConverged
+from icha.contact.model import AREA_FRACTION, PRESSURE, Control, Events, NotConverged
 from icha.contact.models import AREA_TOLERANCE_CELLS, AREA_TOLERANCE_PART
+
+if TYPE_CHECKING:
+    from icha.boundary_elements.contact import BoundaryElements
 
 # Relative error of a load or area that is met: below that at which a path recognises a stop, 1e-9.
 _MET = 5e-10
@@ -37,7 +41,7 @@ class ControlProblem:
     events : finds the events between two states.
     """
 
-    contact: ContactModel[CellState]
+    contact: BoundaryElements
     control: Control
     solve: Callable[..., CellState]
     events: Callable[[CellState, CellState], Events]

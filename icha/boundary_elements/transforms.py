@@ -73,7 +73,7 @@ _fields = threading.local()
 
 def reusable_field(shape: tuple[int, int], dtype: np.dtype) -> np.ndarray:
     """Return a field that a thread reuses, zeros at first: new memory can take longer than the work in it."""
-    fields = _fields.__dict__
+    fields: dict = vars(_fields)
     if (shape, dtype) not in fields:
         fields[shape, dtype] = np.zeros(shape, dtype)
     return fields[shape, dtype]
