@@ -61,10 +61,10 @@ def _print_scans(campaign, plot: Path | None) -> None:
         if plot is not None:
             raise UserError("--plot: draws measured surfaces; the studies of this campaign use none")
         return
-    from icha.surfaces.measured.resolution import scan_resolution
+    from icha.surfaces.measured.resolution import examine_scan
 
     sections = {name: campaign.surfaces[name] for name in models}
-    scans = {name: scan_resolution(section.path, section.preparation) for name, section in sections.items()}
+    scans = {name: examine_scan(section.path, section.preparation) for name, section in sections.items()}
     echo("")
     for name, scan in scans.items():
         for line in about_scan(name, scan, models=models[name]):

@@ -105,9 +105,9 @@ def surface_facts(campaign: Campaign, name: str) -> dict[str, float]:
 def _read(section):
     # SciPy, for which campaigns without such a surface do not wait.
     if isinstance(section, MeasuredSurface):
-        from icha.surfaces.measured.topography import prepared_topography
+        from icha.surfaces.measured.topography import prepare_topography
 
-        return prepared_topography(section.path, section.preparation).surface
+        return prepare_topography(section.path, section.preparation).surface
     from icha.surfaces.measured.array_files import read_height_map
     from icha.surfaces.surface import Surface
 
