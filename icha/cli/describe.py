@@ -91,9 +91,9 @@ def print_plan(path: Path, campaign, workflow: Path, home: Path, cores: int, *, 
     from rich.console import Console
 
     from icha.deposit.metadata import licence_problem
-    from icha.planning.ownership import belongs_to_another
+    from icha.planning.ownership import find_conflict
     from icha.planning.plan import plan
-    from icha.planning.requirements import missing_software, wanting
+    from icha.planning.requirements import find_shortages, missing_software
     from icha.planning.validity import expected_validity
     from icha.support.checksums import damaged
 
@@ -119,14 +119,14 @@ def print_plan(path: Path, campaign, workflow: Path, home: Path, cores: int, *, 
         print_line("bold", statement.about, statement.text)
     problem = licence_problem(campaign)
     obstacles = {
-        "cannot be run": belongs_to_another(shown(results), campaign.name, path, workflow),
+        "cannot be run": find_conflict(shown(results), campaign.name, path, workflow),
         "cannot be published": problem and f"{shown(path)}: {': '.join(problem)}",
         "missing": missing_software(campaign),
     }
     for name, reason in obstacles.items():
         if reason:
             print_line("red", name, reason)
-    for shortage in wanting(items, cores, results, profile_settings(profile or workflow / "profiles/default")):
+    for shortage in find_shortages(items, cores, results, profile_settings(profile or workflow / "profiles/default")):
         print_line("red", "too small", shortage)
 
 

@@ -201,7 +201,7 @@ def _load(path: Path, data: str | None):
     scan : the scan.
     assumed : guessed values of missing keys, in SI units.
     missing : reason for each missing key.
-    sides : sides in the coordinates of the file; None if their unit is known, or there are none.
+    sides : sides in the coordinates of the file; None if their unit is known, or without coordinates.
     """
     from icha.surfaces.measured.scan import load_scan
     from icha.surfaces.measured.settings import Preparation, UnfitTopography

@@ -140,23 +140,6 @@ def test_a_single_spot_is_hertz_or_jkr_exactly(energy, place):
 
 
 @pytest.mark.parametrize("energy", WEAK)
-@pytest.mark.parametrize(("first", "second"), [([0.0, 0.0], [0.06, 0.08]), ([0.1, 0.5], [0.99, 0.5])])
-def test_two_equal_spots_at_a_distance(energy, first, second):
-    """delta(a) + w(d; a) = h - u by bracketing, with w the displacement by one spot alone."""
-    contact = contact_of([first, second], [0.0, 0.0], [1.0, 1.0], energy)
-    state = pressed(contact, -1.5e-3)
-    distance = np.hypot(*np.subtract(first, second))
-
-    def error(a):
-        w = displacement_by_quadrature(distance, a, 1.0, MODULUS, energy)
-        return jkr_approach(a, 1.0, MODULUS, energy) + w - 1.5e-3
-
-    lowest = (9 * np.pi * energy / (8 * MODULUS)) ** (1 / 3) if energy else 1e-6
-    exact = scipy.optimize.brentq(error, lowest, 0.2, xtol=1e-16)
-    np.testing.assert_allclose(state.spots.contact_radius, exact, rtol=1e-7)
-
-
-@pytest.mark.parametrize("energy", WEAK)
 def test_unlike_spots_in_equilibrium(energy):
     position, height = [[0.0, 0.1], [0.15, 0.0], [0.7, 0.99]], np.array([0.0, -4e-4, -1e-4])
     R, u = np.array([1.0, 0.5, 1.5]), -2e-3
