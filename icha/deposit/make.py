@@ -145,7 +145,7 @@ def refuse_mixed(results: Path, campaign: Campaign, recorded: Mapping[str, str])
 def _describe(part: Path, files: Sequence[str], campaign: Campaign, revision: str, cost: Cost) -> None:
     """Write licence, citation, metadata, data dictionary and page of the deposit."""
     publication, dictionary = campaign.published(), data_dictionary(part, files)
-    _write(part / "LICENSE.txt", known_licence(publication.license).page(SOURCE))
+    _write(part / "LICENSE.txt", known_licence(publication.license).page())
     _write(part / "CITATION.cff", citation_cff(publication, revision))
     for name, metadata in ((ZENODO, zenodo_metadata(publication)), ("datacite.json", datacite_metadata(publication))):
         _write(part / name, json.dumps(metadata, indent=1, ensure_ascii=False, allow_nan=False) + "\n")

@@ -20,6 +20,7 @@ import xarray as xr
 import yaml
 from bare_campaign import CAMPAIGN as BARE
 from conftest import REPOSITORY, copy_project, snakemake_command
+from outside_validators import problems_with
 from traces import traces
 from typer.testing import CliRunner
 
@@ -35,7 +36,7 @@ from icha.deposit.crate import Job
 from icha.deposit.make import make_deposit, refuse_mixed
 from icha.deposit.program import Source
 from icha.deposit.readme import data_dictionary, file_pattern
-from icha.deposit.verify import COMPUTED, verify_deposit
+from icha.deposit.verify import COMPUTED
 from icha.planning.costs import Cost
 from icha.planning.results import campaign_files
 from icha.support.checksums import asked_of, sha256_as_written, write_checksum
@@ -301,7 +302,7 @@ def published_as(folder, campaign, results):
 
 def test_the_same_results_give_the_same_bytes_and_what_fails_leaves_them(campaign, tmp_path, monkeypatch):
     first = published_as(tmp_path / "out/small-1.0.0", *campaign)
-    assert verify_deposit(first) == verify_deposit(f"{first}.zip") == []
+    assert problems_with(first) == problems_with(f"{first}.zip") == []
     for path in campaign[1].rglob("*"):
         os.utime(path, (1e9, 1e9))
     before = os.umask(0o077)
@@ -323,7 +324,7 @@ def test_the_same_results_give_the_same_bytes_and_what_fails_leaves_them(campaig
         published_as(first, *campaign)
     published_as(first, *campaign)
     assert sorted(path.name for path in first.parent.iterdir()) == ["small-1.0.0", "small-1.0.0.zip"]
-    assert verify_deposit(first) == [] and Path(f"{first}.zip").read_bytes() == content
+    assert problems_with(first) == [] and Path(f"{first}.zip").read_bytes() == content
 
 
 def test_results_that_are_not_what_was_written_are_refused(campaign, tmp_path):
