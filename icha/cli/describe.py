@@ -147,10 +147,10 @@ def _print_sums(console, items) -> None:
     """Print a table with a row for each kind of result."""
     from rich.table import Table
 
-    from icha.planning.plan import around_jobs, total
+    from icha.planning.plan import overhead, total
 
     table = Table(box=None, pad_edge=False, header_style="dim", show_footer=True)
-    every, around = total(items), around_jobs(items)
+    every, around = total(items), overhead(items)
     footers = {"": "all", "files": str(every.count), "done": str(every.done), "failed": str(every.failed or "")}
     footers |= {"to do": str(every.to_do), "each": "", "core time": formatting.duration(every.work + around)}
     footers |= {"memory": formatting.size(every.memory), "disk": formatting.size(every.disk)}
