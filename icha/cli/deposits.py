@@ -31,8 +31,8 @@ def verify(deposit: Deposit, large: Large = False) -> None:
     Names that lead outside the deposit, links, devices and zips that unpack to far more than their size are problems
     too. A zip is unpacked into a temporary folder. Nothing in the deposit is executed.
 
-    Exit status: 0 if it is intact, 1 if not (the first hundred problems are printed), 2 if there is no such file or
-    folder.
+    Exit status: 0 if it is intact, 1 if not (the first hundred problems are printed), 2 if the file or folder does
+    not exist.
     """
     from icha.deposit.verify import Damaged
 

@@ -49,6 +49,8 @@ class Damaged(ValueError):
 def whole_deposit(path: str | os.PathLike, *, large: bool = False) -> Iterator[Path]:
     """Verify a deposit and provide its folder; a zip is extracted into a temporary one.
 
+    Folders without files do not count, as in git and in the list of checksums.
+
     Parameters
     ----------
     path : its folder or its zip.
@@ -70,18 +72,6 @@ def whole_deposit(path: str | os.PathLike, *, large: bool = False) -> Iterator[P
         if problems := list(_problems(folder, large)):
             raise Damaged(*problems)
         yield folder
-
-
-def verify_deposit(path: str | os.PathLike, *, large: bool = False) -> list[str]:
-    """List the problems of a deposit, one line each; empty if it is whole. Parameters as of `whole_deposit`.
-
-    Folders without files do not count, as in git and in the list of checksums.
-    """
-    try:
-        with whole_deposit(path, large=large):
-            return []
-    except Damaged as damaged:
-        return list(damaged.args)
 
 
 def files_of(folder: Path) -> list[str]:

@@ -159,14 +159,9 @@ class AsperityObservables:
     def of_snapshot(self, state: ContactState) -> dict:
         """Return the distributions of gap and pressure, and the spots."""
         law, spots = self.contact.law, state.spots
-        gaps = gap_distribution(law, self.surface, state)
-        pressures = pressure_distribution(law, self.surface, spots)
         return {
-            "overlap_fraction": gaps.overlap_fraction,
-            "area_beyond_edges": gaps.beyond_edges,
-            "gap_density": gaps.density,
-            "pressure_density": pressures.density,
-            "pressure_bin_mean": pressures.mean,
+            **gap_distribution(law, self.surface, state),
+            **pressure_distribution(law, self.surface, spots),
             "spot_x": spots.position[:, 0],
             "spot_y": spots.position[:, 1],
             "spot_radius": spots.contact_radius,

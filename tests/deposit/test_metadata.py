@@ -123,10 +123,10 @@ def test_texts_are_html_only_where_html_is_asked_for():
 def test_licences_are_those_of_spdx():
     for identifier in ("CC-BY-4.0", "CC-BY-SA-4.0", "CC0-1.0", "ODbL-1.0"):
         licence = known_licence(identifier)
-        page = licence.page("source")
+        page = licence.page()
         assert licence.name in page and licence.address in page and len(licence.text) > 1000
         assert page.endswith(licence.text)
-    assert "PDDL-1.0" in known_licence("PDDL-1.0").page("source") and known_licence("PDDL-1.0").text == ""
+    assert "PDDL-1.0" in known_licence("PDDL-1.0").page() and known_licence("PDDL-1.0").text == ""
     assert "license" not in yaml.safe_load(citation_cff(NEWER, COMMIT))
     for wrong in ("CC-BY", "my own", "MIT OR CC0-1.0", "LicenseRef-mine", "CC-BY-4.0+", ""):
         with pytest.raises(ValueError, match="expected one identifier"):
