@@ -11,7 +11,7 @@ from half_space import displacement_by_quadrature, jkr_approach, jkr_force
 
 import icha
 from icha.asperity.jkr import JKR
-from icha.contact.model import Control
+from icha.contact.model import Control, gap_bins
 from icha.equilibrium.distributions import contact_cover, gap_distribution
 from icha.equilibrium.interacting_asperities import InteractingAsperities
 from icha.half_space.ewald import PointHalfSpace
@@ -356,9 +356,9 @@ def test_distributions_and_fields_of_a_free_square():
 
     found = gap_distribution(contact.law, surface, state)
     area = np.pi * np.sum(spots.contact_radius**2)
-    assert found.beyond_edges == pytest.approx(area - within.mean(), rel=0.01) and found.beyond_edges > 0
-    total = np.sum(found.density * np.diff(found.edges)) + area + found.overlap_fraction - found.beyond_edges
-    assert total == pytest.approx(1.0, abs=1e-12)
+    assert 0 < found["area_beyond_edges"] == pytest.approx(area - within.mean(), rel=0.01)
+    total = np.sum(found["gap_density"] * np.diff(gap_bins(surface))) + area + found["overlap_fraction"]
+    assert total == pytest.approx(1.0 + found["area_beyond_edges"], abs=1e-12)
 
     w = displacement(contact.law, surface, state)
     nodes = np.array([[3, 59], [0, 0], [31, 2]])
