@@ -50,7 +50,7 @@ from icha.surfaces.surface import Surface
 
 # Largest relative excess of a contact area over its limit that is within the tolerance of the equilibria.
 _AREA_TOLERANCE = 1e-6
-# Largest mean separation of a snapshot, in h_rms; there is no contact far below it.
+# Largest mean separation of a snapshot, in h_rms; contact is far below it.
 _HIGHEST_SNAPSHOT = 20.0
 # Kind of the snapshot of the largest tension on unloading.
 PULL_OFF = "pull_off"
@@ -113,7 +113,7 @@ def simulate(
     Raises
     ------
     ValueError
-        If an argument has the wrong type, there is no such model, a target is out of range on this surface, the surface
+        If an argument has the wrong type, the model is unknown, a target is out of range on this surface, the surface
         has no summits, or the model does not cover it.
     ConvergenceError
         If an equilibrium is not found or a target cannot be reached; its `dataset` holds the targets before.
@@ -162,7 +162,7 @@ def empty_run(
 
     The arguments are those of `simulate`.
     """
-    record, summits = _Record(reason), locate_summits(surface)
+    record, summits = _PathRecord(reason), locate_summits(surface)
     coverage = SummitCoverage.of(surface, summits)
     reasons = coverage.reasons_against([surface.rms_height]) if MODELS[model].by_summits else []
     return _dataset(surface, material, path, model, seed, record, count_summits(summits), reasons)
@@ -243,7 +243,7 @@ def _check_arguments(surface, material, path):
 
 
 @dataclass
-class _Record:
+class _PathRecord:
     """Record of a path.
 
     Attributes
@@ -263,7 +263,7 @@ class _Record:
     pressed: State | None = None
 
 
-def _count_uphill_jumps_in(record: _Record) -> int:
+def _count_uphill_jumps_in(record: _PathRecord) -> int:
     """Count the jumps into contact that take energy, by the law of the spot alone or by the energy balance."""
     gained = np.diff([step["dissipated_by_jump_in"] for step in record.steps], prepend=0.0) < 0
     return sum(
@@ -272,9 +272,9 @@ def _count_uphill_jumps_in(record: _Record) -> int:
     )
 
 
-def _record_path(contact, observables, path, progress) -> _Record:
+def _record_path(contact, observables, path, progress) -> _PathRecord:
     """Follow a path and record its steps, snapshots and events."""
-    record, before, weakest, largest = _Record(), None, None, 0.0
+    record, before, weakest, largest = _PathRecord(), None, None, 0.0
 
     def record_snapshot(target, state, step):
         row = {"snapshot_step": step, "snapshot_kind": target.kind, "snapshot_target": target.value}
@@ -338,7 +338,7 @@ def _step_values(contact: ContactModel, waypoint: Waypoint) -> dict:
     return row | {f"dissipated_by_{kind}": getattr(balance, kind) for kind in kinds}
 
 
-def _path_values(table: Table, path: Path, record: _Record, grid: int) -> dict:
+def _path_values(table: Table, path: Path, record: _PathRecord, grid: int) -> dict:
     """Return the values of all steps, snapshots, spots and events as arrays."""
     sizes = {"gap_bin": len(GAP_BINS) - 1, "pressure_bin": len(PRESSURE_BINS) - 1, "row": grid, "column": grid}
     values = {"control": path.control}

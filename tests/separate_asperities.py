@@ -10,8 +10,11 @@ import xarray as xr
 
 import icha
 from icha.asperity.jkr import JKR
+from icha.datasets.build import get_values
 from icha.datasets.campaign import campaign_tree
 from icha.datasets.labels import RunLabels
+from icha.datasets.variables.terms import MATERIAL
+from icha.path.energy_balance import summarise_loop
 
 PERIOD, GRID, RMS_HEIGHT, RADIUS = 100e-6, 32, 0.5e-6, 4e-6
 COUNT = 30
@@ -47,10 +50,8 @@ class Asperities:
 
     def energy(self, approach):
         """Elastic and adhesive energy of a contact, J: the integral of JKR's force along its curve from a = 0."""
-        a, R = self.law.contact_radius(approach, self.radius_of_curvature), self.radius_of_curvature
-        E, gamma = self.material.contact_modulus, self.material.surface_energy
-        neck = np.sqrt(2 * np.pi * gamma * E)
-        return 8 / 15 * E * a**5 / R**2 - 4 / 3 * neck * a**3.5 / R + np.pi * gamma * a**2
+        R = self.radius_of_curvature
+        return self.law.energy(self.law.contact_radius(approach, R), R)
 
     def state(self, separation, touching):
         """Pressure (Pa), area fraction and stored energy (J/m^2) of some of the asperities in contact."""
@@ -92,11 +93,6 @@ class Asperities:
         jump_in, jump_off = np.cumsum(released, axis=1)
         work = stored + jump_in + jump_off
         unit = self.material.contact_modulus * self.rms_slope
-        gamma = self.material.surface_energy
-        back = np.flatnonzero(leg == 1)
-        weakest = back[np.argmin(pressure[back])]
-        tension = max(-pressure[weakest], 0.0)
-        last = np.flatnonzero(event >= 0)[-1] - 1
         found = np.flatnonzero(event >= 0)
         per_step = {
             "mean_separation": u,
@@ -126,10 +122,11 @@ class Asperities:
             "event_y": self.position[event[found], 1],
             "event_members": np.ones(len(found), int),
         }
+        rows = [{name: values[k] for name, values in per_step.items()} for k in range(len(steps))]
+        pull_off = int(np.argmin(np.where(leg == 1, pressure, np.inf)))
+        largest = 1.5 * np.pi * self.material.surface_energy * COUNT * self.radius_of_curvature / PERIOD**2
         per_run = {
-            "contact_modulus": self.material.contact_modulus,
-            "surface_energy": gamma,
-            "interaction_range": self.material.interaction_range,
+            **get_values(self.material, *MATERIAL),
             "rms_slope": self.rms_slope,
             "rms_height": self.rms_height,
             "boundary": "periodic",
@@ -137,23 +134,7 @@ class Asperities:
             "grid": GRID,
             "seed": seed,
             "control": "separation",
-            "pull_off_pressure": tension,
-            "pull_off_separation": u[weakest],
-            "pull_off_over_strength": tension / (16 * gamma / (9 * np.sqrt(3) * 20e-9)) if gamma else 0.0,
-            "pull_off_over_summits": tension / (1.5 * np.pi * gamma * COUNT * self.radius_of_curvature / PERIOD**2)
-            if gamma
-            else 0.0,
-            "detachment_pressure": pressure[last],
-            "detachment_separation": u[last],
-            "hysteresis_loss": work[-1],
-            "hysteresis_loss_over_surface_energy": work[-1] / gamma if gamma else 0.0,
-            "loss_by_jump_in": jump_in[-1],
-            "loss_by_jump_off": jump_off[-1],
-            "loss_by_coalescence": 0.0,
-            "loss_by_load_jump": 0.0,
-            "loss_unattributed": 0.0,
-            "largest_contact_area_fraction": area.max(),
-            "largest_reduced_pressure": pressure.max() / unit,
+            **summarise_loop(rows, pull_off, self.material, largest, 0.0),
         }
         described = {"units": "1", "long_name": "test"}
         flags = {"flag_values": np.arange(4, dtype=np.int8), "flag_meanings": " ".join(EVENTS)}

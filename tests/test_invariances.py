@@ -88,16 +88,20 @@ def digest(run, without=()):
     return total.hexdigest()
 
 
+def scaled(surface, material, length, stress):
+    """The same contact with all lengths by one factor, the modulus by another, the energy by both."""
+    energy = material.surface_energy * stress * length
+    return Surface(surface.heights * length, PERIOD * length), Material(
+        MODULUS * stress, energy, material.interaction_range * length
+    )
+
+
 @BOTH
 @some(OFTEN)
 @given(st.data(), st.floats(-4, 4), st.floats(-3, 3))
 def test_units_drop_out(model, data, lengths, pressures):
-    """All lengths by one factor, the modulus by another, the energy by both."""
-    surface, material = data.draw(contacts(model))
-    length, stress = 10**lengths, 10**pressures
-    larger = Surface(surface.heights * length, PERIOD * length)
-    scaled = Material(MODULUS * stress, material.surface_energy * stress * length, material.interaction_range * length)
-    one, other = (pressed(*contact, model) for contact in ((surface, material), (larger, scaled)))
+    contact, length, stress = data.draw(contacts(model)), 10**lengths, 10**pressures
+    one, other = (pressed(*each, model) for each in (contact, scaled(*contact, length, stress)))
     assert_same(one, other, SAME[model])
     np.testing.assert_allclose(
         other["contact_stiffness"], stress / length * one["contact_stiffness"], rtol=100 * SAME[model]
@@ -108,12 +112,9 @@ def test_units_drop_out(model, data, lengths, pressures):
 @settings(max_examples=2)
 @given(contacts(DEFAULT_MODEL, ADHERING), st.floats(-4, 4), st.floats(-3, 3))
 def test_units_drop_out_of_a_loop(contact, lengths, pressures):
-    surface, material = contact
     length, stress = 10**lengths, 10**pressures
-    larger = Surface(surface.heights * length, PERIOD * length)
-    scaled = Material(MODULUS * stress, material.surface_energy * stress * length, material.interaction_range * length)
-    way = {"reduced_pressures": [3e-3], "unload": True, "max_step": 0.5}
-    one, other = (pressed(*each, DEFAULT_MODEL, **way) for each in ((surface, material), (larger, scaled)))
+    path = {"reduced_pressures": [3e-3], "unload": True, "max_step": 0.5}
+    one, other = (pressed(*each, DEFAULT_MODEL, **path) for each in (contact, scaled(*contact, length, stress)))
     assert ("hysteresis_loss" in one) == ("hysteresis_loss" in other)
     assume("hysteresis_loss" in one)
     jumps = int(one["jump_in_count"][-1] + one["jump_off_count"][-1])

@@ -10,7 +10,7 @@ from icha.asperity.coalescence import covering_spot
 from icha.asperity.jkr import JKR
 from icha.contact.model import NotConverged
 from icha.equilibrium.distributions import contact_cover
-from icha.half_space.ewald import HalfSpace
+from icha.half_space.ewald import PointHalfSpace
 from icha.half_space.interaction import Interaction, displacement_at
 from icha.surfaces.summits import Asperities
 from icha.surfaces.surface import Surface
@@ -96,7 +96,7 @@ def discs_apart(
     for iteration in range(_MAX_ROUNDS):
         position = summits.position[sites]
         if half_space is None:
-            half_space = HalfSpace.at(position, summits.period, law.material.contact_modulus)
+            half_space = PointHalfSpace.at(position, summits.period, law.material.contact_modulus)
         height = (summits.height + lift)[sites]
         # Constant windows for the largest possible radii, because the equations must be continuous.
         largest = law.contact_radius(height - separation + _FALL * rms_height, R[sites])
@@ -140,7 +140,7 @@ class _Apart:
     """delta_i + w_i(a(delta)) = h_i - u with a given load: Newton's method in approaches and separation."""
 
     law: JKR
-    half_space: HalfSpace
+    half_space: PointHalfSpace
     height: np.ndarray
     R: np.ndarray
     pressure: float

@@ -100,7 +100,7 @@ def _module_file(name: str, missing_ok: bool = False) -> Path | None:
             return file
     if missing_ok:
         return None
-    raise ValueError(f"there is no module {name!r} in {_package_folder()}")
+    raise ValueError(f"expected a module {name!r} in {_package_folder()}")
 
 
 @cache

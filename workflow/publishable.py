@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from icha.configuration.load import Configuration
-from icha.configuration.publication import needed
+from icha.configuration.publication import missing_metadata
 from icha.deposit.metadata import licence_problem
 from icha.deposit.program import Source, program_source, refuse_other_environment
 
@@ -18,7 +18,7 @@ def publishable_source(configuration: Configuration, project: str, results: str)
         any of the results was made.
     """
     campaign = configuration.campaign
-    problems = [f"{configuration.origin}: {line}" for line in needed(campaign.published())]
+    problems = [f"{configuration.origin}: {line}" for line in missing_metadata(campaign.deposit_metadata())]
     if problem := licence_problem(campaign):
         problems.append(": ".join([configuration.origin, *problem]))
     try:

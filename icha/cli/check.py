@@ -32,7 +32,7 @@ def check(
             status = WRONG
             continue
         if kind not in (RUN, SURFACE, CAMPAIGN, SOLUTION):
-            echo(f"{file}: {kind}; readable, there are no checks for it")
+            echo(f"{file}: {kind}; readable, without checks")
             continue
         try:
             problems, count = _problems(kind, data)

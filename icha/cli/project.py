@@ -22,7 +22,7 @@ PICTURES = (".png", ".pdf", ".svg")
 
 
 def option(help_text: str, *names: str, **settings):
-    """Declare an option without a printed default; `help_text` says what happens without the option."""
+    """Declare an option without a printed default; `help_text` includes its default."""
     return typer.Option(*names, help=help_text, show_default=False, **settings)
 
 
@@ -93,7 +93,7 @@ def confirm(question: str) -> bool:
 
 
 class UserError(Exception):
-    """A command that cannot be carried out as given; the message says why, and what to do."""
+    """A command that cannot be carried out; the message gives the reason and a remedy."""
 
 
 def reports_errors(command: Callable) -> Callable:
@@ -173,7 +173,7 @@ def configuration_path(config: str | None) -> Path:
     Raises
     ------
     UserError
-        If there is no such file.
+        If the file does not exist.
     """
     files = campaigns()
     listed = f"expected a YAML file or a campaign: {', '.join(sorted(files))}. `icha new NAME` writes a new campaign"

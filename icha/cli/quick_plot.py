@@ -1,4 +1,4 @@
-"""A quick plot of a file, to look at and not to print."""
+"""Plots of a file or of scans for `icha show`, `icha describe` and `icha new`."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -7,10 +7,11 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
+from icha.cli.project import echo, shown
 from icha.datasets.campaign import reduced_gap
 from icha.datasets.format import RUN, SURFACE
 from icha.datasets.labels import LABELS
-from icha.datasets.surface_file import as_measured
+from icha.datasets.surface_file import measured_scale
 from icha.figures.curves import AREA_LABEL, PRESSURE_LABEL, gap_label
 from icha.figures.style import (
     COLOURS,
@@ -27,65 +28,73 @@ from icha.figures.style import (
 from icha.support.atomic_files import whole_file
 from icha.surfaces.moments import radial_power_spectrum
 
-# By model, in their order.
-_LINES = ("-", "--")
+LINE_STYLES = ("-", "--")  # of the models, in their order
+LEAST_POWER = 1e-3  # of a filtered spectrum, over the least power of the scan; less is a rounding error
 
 
 def draw(kind: str, data: xr.Dataset | xr.DataTree, path: Path) -> None:
-    """Draw what `icha.datasets.format.identify_file` gave into a file, whose ending says the format."""
-    drawing = _run if kind == RUN else _surface if kind == SURFACE else _campaign
+    """Draw the result of `icha.datasets.format.identify_file` into a file."""
+    _save((_run if kind == RUN else _surface if kind == SURFACE else _campaign)(data), path)
+
+
+def draw_scans(scans: Mapping, path: Path) -> None:
+    """Draw each `icha.surfaces.measured.resolution.ScanResolution`: a map, and the spectrum with noise and cut-off."""
+    _save(_scans(scans), path)
+
+
+def _save(figure: Figure, path: Path) -> None:
     with whole_file(path) as temporary:
-        drawing(data).savefig(temporary, format=path.suffix[1:], dpi=150)
+        figure.savefig(temporary, format=path.suffix[1:], dpi=150)
+    echo(f"plot: {shown(path)}")
 
 
 @in_style
 def _run(run: xr.Dataset) -> Figure:
     figure = new_figure(TWO_COLUMNS, 3.2)
     axes = figure.subplots(1, 2)
-    _curves(axes, run, COLOURS[0])
-    _label(axes, run)
+    _draw_curves(axes, run, COLOURS[0])
+    _label_axes(axes, run)
     return figure
 
 
 @in_style
 def _campaign(tree: xr.DataTree) -> Figure:
-    names = list(tree.children)
-    figure = new_figure(TWO_COLUMNS, 3.2 * len(names))
-    rows = figure.subplots(len(names), 2, squeeze=False)
-    for axes, name in zip(rows, names, strict=True):
-        study = tree[name].to_dataset()
-        # What has neither runs nor steps is not drawn, and xarray cannot stack snapshots of which there are none.
+    figure = new_figure(TWO_COLUMNS, 3.2 * len(tree.children))
+    rows = figure.subplots(len(tree.children), 2, squeeze=False)
+    for axes, (name, node) in zip(rows, tree.children.items(), strict=True):
+        study = node.to_dataset()
+        # xarray cannot stack empty dimensions, such as snapshots of a study without any.
         study = study.drop_dims([dim for dim in study.dims if dim not in (*LABELS, "step")])
         runs = study.stack(run=LABELS, create_index=False)
         materials, models = list(study["material"].values), study["model"].values.tolist()
         for k in range(runs.sizes["run"]):
             run = runs.isel(run=k)
             colour = COLOURS[materials.index(str(run["material"].values)) % len(COLOURS)]
-            _curves(axes, run, colour, lw=0.7, ls=_LINES[models.index(str(run["model"].values))])
+            _draw_curves(axes, run, colour, lw=0.7, ls=LINE_STYLES[models.index(str(run["model"].values))])
         for material, colour in zip(materials, COLOURS, strict=False):
             axes[0].plot([], [], color=colour, label=material)
-        for model, ls in zip(models, _LINES, strict=False) if len(models) > 1 else ():
+        for model, ls in zip(models, LINE_STYLES, strict=False) if len(models) > 1 else ():
             axes[0].plot([], [], color="black", ls=ls, label=model.replace("_", " "))
         axes[0].legend()
         axes[0].set_title(name)
-        _label(axes, study)
+        _label_axes(axes, study)
     return figure
 
 
-def _curves(axes, run, colour, lw=1.0, ls="-"):
+def _draw_curves(axes, run: xr.Dataset, colour: str, lw: float = 1.0, ls: str = "-") -> None:
+    """Draw contact area and mean gap over pressure."""
     pressure = run["reduced_pressure"].values
     for ax, values in zip(axes, (run["contact_area_fraction"], reduced_gap(run)), strict=True):
         ax.plot(pressure, values, color=colour, marker=".", ms=3, lw=lw, ls=ls)
 
 
-def _label(axes, data):
-    loops = "work" in data
+def _label_axes(axes, data: xr.Dataset) -> None:
+    scale = "linear" if "work" in data else "log"  # loads of unloading may be tensile
     for ax, label in zip(axes, (AREA_LABEL, gap_label(data)), strict=True):
-        # Loads on the way back may be tensile.
-        ax.set_xscale("linear" if loops else "log")
+        ax.set_xscale(scale)
         ax.set_xlabel(PRESSURE_LABEL)
         ax.set_ylabel(label)
-    axes[0].set_yscale("linear" if loops else "log")
+    axes[0].set_yscale(scale)
 
 
 @in_style
@@ -93,36 +102,26 @@ def _surface(surface: xr.Dataset) -> Figure:
     spectrum = "power_spectrum" in surface
     figure = new_figure(TWO_COLUMNS if spectrum else ONE_COLUMN, 3.2)
     axes = figure.subplots(1, 2) if spectrum else [figure.subplots()]
-    how = "as measured" if "measured_rms_slope" in surface else "as stored"
-    _map(axes[0], surface["height"].values, as_measured(surface), float(surface["period"]), f"height {how}")
+    state = "as measured" if "measured_rms_slope" in surface else "as stored"
+    _draw_map(axes[0], surface["height"].values * measured_scale(surface), float(surface["period"]), f"height {state}")
     if spectrum:
-        _spectrum(axes[1], surface["psd_wavevector"].values, surface["power_spectrum"].values)
+        _draw_spectrum(axes[1], surface["psd_wavevector"].values, surface["power_spectrum"].values)
     return figure
-
-
-def draw_scans(scans: Mapping, path: Path) -> None:
-    """Draw every scan, by its name, as a map beside its spectrum with the noise floor and the cut-off.
-
-    Each is a `icha.surfaces.measured.resolution.ScanResolution`.
-    """
-    with whole_file(path) as temporary:
-        _scans(scans).savefig(temporary, format=path.suffix[1:], dpi=150)
 
 
 @in_style
 def _scans(scans: Mapping) -> Figure:
     figure = new_figure(TWO_COLUMNS, 3.0 * len(scans))
     for (left, right), (name, scan) in zip(figure.subplots(len(scans), 2, squeeze=False), scans.items(), strict=True):
-        _map(left, scan.used.heights, 1.0, scan.used.period, "height")
+        _draw_map(left, scan.used.heights, scan.used.period, "height")
         left.set_title(name)
         q, power = radial_power_spectrum(scan.measured)
-        _spectrum(right, q, power, label="scan")
+        _draw_spectrum(right, q, power, label="scan")
         if scan.cutoff is not None:
             k, used = radial_power_spectrum(scan.used)
-            # What is left of the shortest waves after the filter is rounding.
-            shown = used > 1e-3 * power[power > 0].min()
-            cut = f"as used, cut off at {format_quantity(scan.cutoff, 'm')}"
-            right.loglog(k[shown], used[shown], color=GREEN, ls="--", label=cut)
+            visible = used > LEAST_POWER * power[power > 0].min()
+            label = f"as used, cut off at {format_quantity(scan.cutoff, 'm')}"
+            right.loglog(k[visible], used[visible], color=GREEN, ls="--", label=label)
         if (noise := scan.noise) is not None:
             rms, wavelength = (format_quantity(float(f"{length:.2g}"), "m") for length in (noise.rms, noise.wavelength))
             right.axhline(noise.power, color=VERMILLION, lw=0.8, ls=":", label=f"noise floor, {rms} rms")
@@ -132,18 +131,19 @@ def _scans(scans: Mapping) -> Figure:
     return figure
 
 
-def _map(ax, heights, scale, side, label):
-    """Heights (n, n), multiplied with a scale, in m, on a square of a side, m."""
-    every = max(1, len(heights) // 1024)
-    shown = heights[::every, ::every] * scale
-    (factor, unit), (along, lateral) = (choose_unit(value, "m") for value in (np.abs(shown).max(), side))
-    image = ax.imshow(shown * factor, extent=np.array([0, side, 0, side]) * along, origin="lower")
+def _draw_map(ax, heights: np.ndarray, side: float, label: str) -> None:
+    """Draw heights (n, n), in m, on a square with this side, in m."""
+    step = max(1, len(heights) // 1024)
+    visible = heights[::step, ::step]
+    (factor, unit), (lateral_factor, lateral) = (choose_unit(value, "m") for value in (np.abs(visible).max(), side))
+    extent = np.array([0, side, 0, side]) * lateral_factor
+    image = ax.imshow(visible * factor, extent=extent, origin="lower")
     ax.figure.colorbar(image, ax=ax, label=f"{label} ({unit})")
     ax.set_xlabel(f"x ({lateral})")
     ax.set_ylabel(f"y ({lateral})")
 
 
-def _spectrum(ax, q, power, label=None):
+def _draw_spectrum(ax, q: np.ndarray, power: np.ndarray, label: str | None = None) -> None:
     ax.loglog(q[power > 0], power[power > 0], color=COLOURS[0], label=label)
     ax.set_xlabel(r"wave number $q$ (rad/m)")
     ax.set_ylabel(r"power spectrum $C(q)$ (m$^4$)")

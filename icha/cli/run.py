@@ -34,7 +34,7 @@ from icha.cli.project import (
     workflow_folder,
 )
 from icha.support import formatting
-from icha.support.atomic_files import in_the_way
+from icha.support.atomic_files import find_obstacle
 from icha.support.formatting import format_count
 
 TARGETS = ("all", "surfaces", "runs", "references", "figures", "dataset", "report", "publish")
@@ -50,7 +50,7 @@ def run(
         list[str] | None,
         typer.Argument(
             metavar="[TARGET]...",
-            help=f"What to make: {', '.join(TARGETS)}, or a file. Default: all. After `--`: options of Snakemake.",
+            help=f"Targets: {', '.join(TARGETS)}, or a file. Default: all. After `--`: options of Snakemake.",
             show_default=False,
         ),
     ] = None,
@@ -134,15 +134,15 @@ def run(
     if not set(targets) - {"all", "report", "publish"}:
         _print_checks(campaign, results)
     if "publish" in targets:
-        echo(f"deposit: {shown(results / 'publish' / f'{campaign.name}-{campaign.published().version}.zip')}")
+        echo(f"deposit: {shown(results / 'publish' / f'{campaign.name}-{campaign.deposit_metadata().version}.zip')}")
 
 
 def _refuse_obstacles(folder: Path, results: Path, name: str, path: Path, workflow: Path) -> None:
-    from icha.planning.ownership import belongs_to_another
+    from icha.planning.ownership import find_conflict
 
-    if reason := belongs_to_another(shown(results), name, path, workflow):
+    if reason := find_conflict(shown(results), name, path, workflow):
         raise UserError(f"{reason} Nothing was started")
-    if obstacle := in_the_way(shown(folder / ".snakemake")):
+    if obstacle := find_obstacle(shown(folder / ".snakemake")):
         raise UserError(f"{obstacle}: Snakemake needs this folder for its records. Remove it or repair it")
 
 
@@ -161,9 +161,9 @@ def _confirm_if_too_large(items, targets: list[str], cores: int, results: Path, 
     Raises
     ------
     UserError
-        If the answer is no, or there is no terminal to ask at.
+        If the answer is no, or without a terminal.
     """
-    from icha.planning.requirements import wanting
+    from icha.planning.requirements import find_shortages
 
     if "surfaces" in targets:
         items = [item for item in items if item.part == "surfaces"]
@@ -171,7 +171,7 @@ def _confirm_if_too_large(items, targets: list[str], cores: int, results: Path, 
         return  # the cost of single files is unknown
     # Resources of the command line precede those of the profile.
     resources = [each for each in targets if "=" in each] + profile.get("resources", [])
-    shortages = wanting(items, cores, results, profile | {"resources": resources})
+    shortages = find_shortages(items, cores, results, profile | {"resources": resources})
     if not shortages:
         return
     message = "\n".join(["this machine is probably too small:", *(f"  {shortage}" for shortage in shortages)])
@@ -212,7 +212,7 @@ def _planned_jobs(output: str) -> str:
 
 
 def _refuse_unknown_targets(output: str, targets: list[str], campaign) -> None:
-    """Raise `UserError` if Snakemake ended because there is no such target."""
+    """Raise `UserError` if Snakemake ended because of an unknown target."""
     unknown = re.findall(r"^No rule to produce (.+) \(if you use", output, re.MULTILINE)
     if "\nInputFunctionException" in output:  # a file that a rule could make, but not of this campaign
         unknown = [name for name in targets if name not in TARGETS and not name.startswith("-")]
@@ -327,7 +327,7 @@ def _print_outcome(status: int, stopped: bool, progress, campaign, folder: Path,
     log : output of Snakemake; removed if all went well, since Snakemake keeps it too.
     expected : estimated duration of the call in s; None if unknown.
     """
-    from icha.support.atomic_files import why_not_writable
+    from icha.support.atomic_files import probe_folder
 
     results = folder / "results" / campaign.name
     ended = len(progress.done) + len(progress.failed)
@@ -342,7 +342,7 @@ def _print_outcome(status: int, stopped: bool, progress, campaign, folder: Path,
             text += f"; expected about {formatting.duration(expected)}"
         echo(text)
     _print_failures(status, stopped, progress, campaign, folder, log)
-    if status and results.is_dir() and (reason := why_not_writable(results)):
+    if status and results.is_dir() and (reason := probe_folder(results)):
         # Logs are in this folder, so jobs may have been unable to report it.
         echo(
             f"cannot write to {shown(results)}: {reason.strerror}. Repeat the command when this is repaired.", fg="red"
@@ -408,7 +408,7 @@ def _print_checks(campaign, results: Path) -> None:
     checks = read_checks(results / files.checks)
     passed = sum(check.passed for check in checks)
     echo(f"checks:  {passed if passed < len(checks) else 'all'} of {len(checks)} passed: the equations are solved")
-    echo("Whether the models are applicable is a separate question:")
+    echo("Applicability of the models, which is a separate question:")
     _print_validity(found_validity(results / files.dataset))
 
 

@@ -1,4 +1,4 @@
-"""Sections of boundary elements at a finite range: beside runs, and in loading and unloading."""
+"""Sections `finite_range` and `boundary_element_loops`: boundary elements beside the runs of a study."""
 
 from collections.abc import Iterator
 from typing import Annotated, Any
@@ -29,64 +29,62 @@ from icha.support.values import (
     unknown,
 )
 
-_Labels = list_of_names("Some of the study's.", Label)
+_Labels = list_of_names("Labels of the study.", Label)
 
 
 class BesideStudy(Section):
     """Boundary elements on the topographies of a study."""
 
-    study: Name = Field(description="Name of the study on whose topographies they are solved.")
-    surfaces: _Labels | None = Field(default=None, description="Surfaces, from those of the study. Left out: all.")
-    seeds: Seeds | None = Field(default=None, description="Seeds, from those of the study. Left out: all.")
+    study: Name = Field(description="Name of the study with the topographies.")
+    surfaces: _Labels | None = Field(default=None, description="Surfaces of the study. Default: all.")
+    seeds: Seeds | None = Field(default=None, description="Seeds of the study. Default: all.")
     rms_slopes: Annotated[list[Positive], Field(min_length=1), AfterValidator(distinct)] | None = Field(
-        default=None, description="Rms slopes, from those of the study. Left out: all."
+        default=None, description="Rms slopes of the study. Default: all."
     )
     materials: _Labels | None = Field(
         default=None,
-        description="Materials, from those of the study. Left out: all. With adhesion the grid must resolve their "
+        description="Materials of the study. Default: all. With adhesion the grid must resolve their "
         "`interaction_range`.",
     )
-    tolerance: number(TOLERANCE) = Field(default=1e-8, description="Relative error at which the solver may stop.")
+    tolerance: number(TOLERANCE) = Field(default=1e-8, description="Relative error at which the solver stops.")
 
     def problems(self, campaign: Any) -> Iterator[Problem]:
-        """What of the study is not there, or cannot be solved; of an `icha.configuration.campaign.Campaign`."""
+        """Report entries that its `icha.configuration.campaign.Campaign` does not have or that cannot be solved."""
         yield from unknown(("study",), self.study, campaign.studies)
         if self.study in campaign.studies:
             yield from self._study_problems(campaign, campaign.studies[self.study])
 
     def _study_problems(self, campaign, study):
         if DEFAULT_MODEL not in study.models:
-            reason = f"has no runs to compare with; allowed: a study with {DEFAULT_MODEL!r} among its `models`"
+            reason = f"has no runs to compare with; expected a study with {DEFAULT_MODEL!r} among its `models`"
             yield ("study",), self.study, reason
         for key in ("surfaces", "seeds", "rms_slopes", "materials"):
-            there = getattr(study, key)
-            known = set(there)
+            known = set(getattr(study, key))
             for index, value in enumerate(getattr(self, key) or []):
                 if value not in known:
-                    yield (key, index), value, f"is not in study {self.study!r}; allowed: {listed(there)}"
-        contacts = campaign.solved(self)
+                    expected = listed(getattr(study, key))
+                    yield (key, index), value, f"is not in study {self.study!r}; expected one of {expected}"
+        contacts = campaign.contacts_beside(self)
         if not contacts and MEASURED not in study.rms_slopes:
-            yield (), self.study, "has none of the chosen combinations; allowed: combinations that the study has"
+            yield (), self.study, "has none of the chosen combinations; expected combinations of the study"
         materials: dict[str, dict[str, None]] = {}
         for each in contacts:
             materials.setdefault(each.surface, {})[each.material] = None
         for name in materials:
             if campaign.is_free(name):
-                reason = (
-                    "has a surface without periods; allowed: studies of periodic surfaces, as boundary elements are"
-                )
-                yield ("study",), self.study, f"{reason} ({name!r} is not)"
+                reason = f"has the surface {name!r} with free edges; expected a study of periodic surfaces"
+                yield ("study",), self.study, reason
                 continue
             if campaign.grid(name) is None:
                 continue
             yield from self._unresolved(campaign, name, materials[name])
             nodes = campaign.grid(name) * self.refinement
             if nodes > GRID.most:
-                reason = f"gives {nodes} nodes a side on {name!r}; allowed: {GRID.most} at most"
+                reason = f"gives {nodes} nodes a side on {name!r}; expected at most {GRID.most}"
                 yield ("refinement",), self.refinement, reason
 
     def _unresolved(self, campaign, surface, materials):
-        """Those of some materials whose attraction the grid of a surface does not resolve."""
+        """Report materials whose attraction the grid of a surface does not resolve."""
         spacing = campaign.period(surface) / (campaign.grid(surface) * self.refinement)
         for label in materials:
             material = Material(**campaign.materials[label].model_dump())
@@ -100,7 +98,7 @@ Loads = Annotated[
 ]
 Refinement = Annotated[
     integer(REFINEMENT),
-    Field(description="Cells per cell of the surface's grid, along a side; heights are interpolated."),
+    Field(description="Cells per cell of the grid of the surface, along a side; heights are interpolated."),
 ]
 
 
@@ -112,7 +110,7 @@ class BoundaryElements(BesideStudy):
 
 
 class BoundaryElementLoops(BesideStudy):
-    """Boundary elements at a finite range of attraction, loaded to the largest load of a study's runs and unloaded."""
+    """Boundary elements at a finite range of attraction, loaded to the largest load of a study and unloaded."""
 
     refinement: Refinement = 1
     separation_step: number(STEP) = Field(
@@ -120,11 +118,11 @@ class BoundaryElementLoops(BesideStudy):
     )
 
     def _study_problems(self, campaign, study):
-        """What the way back needs of the study, too."""
+        """Report also why a study does not suit unloading."""
         if not study.unload or study.turning_points:
-            reason = "does not unload after its targets; allowed: a study with `unload: true` and no turning points"
+            reason = "does not unload after its targets; expected a study with `unload: true` and no turning points"
             yield ("study",), self.study, reason
         if study.targets.last[0] != "reduced_pressure":
-            reason = "has no reduced pressures as targets; allowed: a study with them; unloading begins at the last one"
+            reason = "has no reduced pressures as targets; expected them, since unloading begins at the last one"
             yield ("study",), self.study, reason
         yield from super()._study_problems(campaign, study)

@@ -1,7 +1,7 @@
-"""What a campaign is: surfaces, materials, and the studies that press one against the other.
+"""A campaign: surfaces, materials, and studies that press the surfaces into half-spaces of the materials.
 
-Values are kept in SI units. The text of a configuration file becomes these objects in `icha.configuration.load`; what
-is wrong with it is worded in `icha.configuration.errors`; the JSON schema is generated from them.
+Values are in SI units. `icha.configuration.load` makes these objects from the text of a configuration file,
+`icha.configuration.errors` words its errors, and `icha.configuration.schema` generates the JSON schema from them.
 """
 
 from __future__ import annotations
@@ -20,16 +20,16 @@ from icha.configuration.surfaces import AnySurface, MaterialSection
 from icha.contact.models import MODELS, Model
 from icha.support.values import ROUNDING, Name, Problem, Section, Text, distinct
 
-# Sections of entries that belong to a study.
+# Sections whose entries belong to a study.
 BESIDE_STUDIES = ("finite_range", "boundary_element_loops")
-# Each of these looks at all runs of its study.
+# Each of these entries goes through all runs of its study.
 _FEW = Field(max_length=100)
-# Cells per shortest wavelength: with fewer, boundary elements are refused and asperities warned of; those to recommend.
+# Cells per shortest wavelength: the fewest without a warning, and those to recommend.
 _LEAST_CELLS, _ADVISABLE_CELLS = 4, 8
 
 
 class Contact(NamedTuple):
-    """What is pressed against what in one run of a study; the slope is `measured` until that is known."""
+    """Surface, seed, slope and material of a run; the slope is `measured` until the file is read."""
 
     surface: str
     seed: int
@@ -38,87 +38,94 @@ class Contact(NamedTuple):
 
 
 class Topography(NamedTuple):
-    """What the plan of a campaign needs to know of a topography from a file."""
+    """Facts of a topography from a file.
+
+    Attributes
+    ----------
+    grid : nodes along a side.
+    period : side, m.
+    rms_slope : None if no study asks for it.
+    sha256 : checksum of the file.
+    full_contact_energy : U_full/E* at rms slope 1, m; NaN without adhesion.
+    """
 
     grid: int
-    period: float  # m
-    rms_slope: float | None  # None where no study asks for it
+    period: float
+    rms_slope: float | None
     sha256: str
-    full_contact_energy: float  # U_full/E* at rms slope 1, m; NaN where nothing may adhere
+    full_contact_energy: float
 
 
 class Defaults(Section):
-    """Values for every entry of a section that does not give its own."""
+    """Default values for the entries of a section."""
 
     surfaces: dict[str, Any] = Field(
-        default={}, description="Keys of surfaces; every surface takes those that its kind has."
+        default={}, description="Keys of surfaces; every surface takes the keys of its kind."
     )
     materials: dict[str, Any] = Field(default={}, description="Keys of materials.")
     studies: dict[str, Any] = Field(default={}, description="Keys of studies.")
 
 
 class Campaign(Section):
-    """A campaign: everything that one configuration file describes."""
+    """A campaign, the content of one configuration file."""
 
     name: Name = Field(description="Name of the campaign; results go to `results/<name>/`.")
-    title: Text = Field(description="One line that says what the campaign is.")
-    summary: Text = Field(description="A few sentences for readers of the datasets and of the report.")
+    title: Text = Field(description="Title of the campaign, one line.")
+    summary: Text = Field(description="A few sentences for readers of datasets and report.")
     license: Text = Field(description="Licence of the data, as an SPDX identifier such as `CC-BY-4.0`.")
     confirmed: Annotated[list[Text], AfterValidator(distinct)] = Field(
         default=[],
-        description="Keys of values that are unusual and meant, such as `materials.soft.contact_modulus`; all entries "
-        "of a list by the key of the list. Others that are unusual are refused.",
+        description="Keys of unusual values that are intended, such as `materials.soft.contact_modulus`; for entries "
+        "of a list the key of the list. Other unusual values are refused.",
     )
-    defaults: Defaults = Field(
-        default=Defaults(), description="Values for all surfaces, materials or studies that do not give their own."
-    )
+    defaults: Defaults = Field(default=Defaults(), description="Default values for all surfaces, materials or studies.")
     surfaces: Annotated[dict[Name, AnySurface], Field(min_length=1)] = Field(
         description="Surfaces by name: `kind: self_affine`, `kind: measured` or `kind: file`."
     )
     materials: Annotated[dict[Name, MaterialSection], Field(min_length=1)] = Field(description="Materials by name.")
     studies: Annotated[dict[Name, Study], Field(min_length=1)] = Field(description="Studies by name.")
     finite_range: Annotated[dict[Name, BoundaryElements], _FEW] = Field(
-        default={}, description="Boundary-element solutions by name, compared with the runs of a study."
+        default={},
+        description="Boundary elements at a finite range of attraction by name, to compare with the runs of a study.",
     )
     boundary_element_loops: Annotated[dict[Name, BoundaryElementLoops], _FEW] = Field(
         default={},
-        description="Boundary elements in loading and unloading by name, to compare with the runs of a "
-        "study that unloads.",
+        description="The same in loading and unloading by name, to compare with the runs of a study that unloads.",
     )
     measurements: Annotated[dict[Name, Measurement], _FEW] = Field(
-        default={}, description="Measurements by name, drawn over figure 5. None come with ICHA."
+        default={}, description="Measurements by name, drawn over figure 5. ICHA has none."
     )
-    figures: Figures = Field(default=Figures(), description="Figures and what they show.")
+    figures: Figures = Field(default=Figures(), description="Figures and their options.")
     publication: Publication = Field(
-        default=Publication(), description="Metadata of a deposit; nothing else depends on them."
+        default=Publication(), description="Metadata of a deposit; results do not depend on them."
     )
 
     _contacts: dict[str, tuple[Contact, ...]] = PrivateAttr(default={})
     _topographies: dict[str, Topography] = PrivateAttr(default={})
     _origins: dict[tuple[str, str], str] = PrivateAttr(default={})
 
-    def published(self) -> Publication:
-        """What a deposit says of itself; title, summary and licence are the campaign's where it has none of its own."""
-        own = self.publication
-        return own.model_copy(
-            update={key: getattr(own, key) or getattr(self, key) for key in ("title", "summary", "license")}
+    def deposit_metadata(self) -> Publication:
+        """Return the metadata of a deposit; title, summary and licence default to those of the campaign."""
+        given = self.publication
+        return given.model_copy(
+            update={key: getattr(given, key) or getattr(self, key) for key in ("title", "summary", "license")}
         )
 
     def compares_models(self, study: str) -> bool:
-        """Whether the runs of a study by asperities have others by boundary elements beside them at given loads."""
-        asked = self.studies[study]
-        return set(asked.models) == set(MODELS) and bool(asked.targets.reduced_pressures)
+        """Tell whether a study has runs with both models at given loads."""
+        section = self.studies[study]
+        return set(section.models) == set(MODELS) and bool(section.targets.reduced_pressures)
 
     def loop_load(self, entry: BoundaryElementLoops) -> float:
-        """The reduced pressure at which boundary elements both ways turn: the last one of their study."""
+        """Return the reduced pressure at which boundary elements begin to unload: the last one of their study."""
         return self.studies[entry.study].targets.last[1]
 
     def contacts(self, study: str) -> list[Contact]:
-        """What is pressed in a study, run by run."""
+        """Return the contacts of a study, run by run."""
         return list(self._contacts[study])
 
     def with_contacts(self, contacts: Mapping[str, Iterable[Contact]]) -> Campaign:
-        """The same campaign with the runs of its studies written out, and the lists of the studies to match."""
+        """Return the campaign with the runs of its studies, and the lists of the studies to match."""
         contacts = {study: tuple(dict.fromkeys(runs)) for study, runs in contacts.items()}
 
         def lists(runs):
@@ -131,7 +138,7 @@ class Campaign(Section):
         return campaign
 
     def with_topographies(self, topographies: Mapping[str, Topography]) -> Campaign:
-        """The same campaign with what was read of its topographies, whose slopes stand in the place of `measured`."""
+        """Return the campaign with the facts of its topographies, whose slopes replace `measured`."""
         contacts = {
             study: [
                 each._replace(rms_slope=topographies[each.surface].rms_slope) if each.rms_slope == MEASURED else each
@@ -144,62 +151,62 @@ class Campaign(Section):
         return campaign
 
     def topography(self, surface: str) -> Topography | None:
-        """What was read of a topography from a file; None of a random one."""
+        """Return the facts of a topography from a file; None for a random one."""
         return self._topographies.get(surface)
 
     def origin(self, section: str, name: str) -> str:
-        """The entry of a section (surfaces, materials) of which `name` is a variant, or itself."""
+        """Return the entry of a section (surfaces, materials) of which `name` is a variant, or `name` itself."""
         return self._origins.get((section, name), name)
 
     def is_free(self, surface: str) -> bool:
-        """Whether a surface is a square with free edges; all others are periodic."""
+        """Tell whether a surface is a square with free edges; all others are periodic."""
         return getattr(self.surfaces[surface], "boundary", None) == "free"
 
     def grid(self, surface: str) -> int | None:
-        """Nodes along a side of a surface; None of one from a file that was not inspected."""
+        """Return the nodes along a side of a surface; None for a file that was not inspected."""
         return getattr(self.topography(surface) or self.surfaces[surface], "grid", None)
 
     def period(self, surface: str) -> float:
-        """Side of a surface whose grid is known, m."""
+        """Return the side of a surface whose grid is known, m."""
         return (self.topography(surface) or self.surfaces[surface]).period
 
     def snapshots_of(self, study: str) -> list[tuple[str, float]] | None:
-        """Kind and value of all states that the runs of a study keep; None where they keep their last one.
+        """Return kind and value of all states that the runs of a study save; None if they save their last one.
 
-        The loads of the study's boundary elements are among them.
+        The loads of the boundary elements beside the study are among them.
         """
         loads = sorted({p for e in self.finite_range.values() if e.study == study for p in e.reduced_pressures})
         if self.studies[study].snapshots is None and not loads:
             return None
-        own = self.studies[study].own_snapshots
-        kept = set(own)
-        return own + [("reduced_pressure", p) for p in loads if ("reduced_pressure", p) not in kept]
+        snapshots = self.studies[study].own_snapshots
+        known = set(snapshots)
+        return snapshots + [state for p in loads if (state := ("reduced_pressure", p)) not in known]
 
-    def solved(self, entry: BesideStudy) -> list[Contact]:
-        """The contacts for which an entry beside a study asks."""
+    def contacts_beside(self, entry: BesideStudy) -> list[Contact]:
+        """Return the contacts of a study for which an entry beside it asks."""
         lists = (entry.surfaces, entry.seeds, entry.rms_slopes, entry.materials)
         asked = [None if values is None else set(values) for values in lists]
 
         def is_asked_for(contact):
-            seedless = not self.surfaces[contact.surface].random
+            has_seed = self.surfaces[contact.surface].random
             return all(
-                values is None or value in values or (seedless and name == "seed")
+                values is None or value in values or (name == "seed" and not has_seed)
                 for name, value, values in zip(Contact._fields, contact, asked, strict=True)
             )
 
         return list(filter(is_asked_for, self._contacts[entry.study]))
 
     def problems(self) -> Iterator[Problem]:
-        """What keeps it from being run although each of its values is allowed by itself.
+        """Report why the campaign cannot be run although each value is valid.
 
-        What depends on measured slopes and on grids of files is left out until these are known.
+        Problems that depend on measured slopes or on grids of files are left out until these are known.
         """
         unknown_slopes = any(MEASURED in study.rms_slopes for study in self.studies.values())
-        for place, value, reason in self._problems():
-            if not (unknown_slopes and any(str(part).startswith("rms_slope") for part in place)):
-                yield place, value, reason
+        for location, value, reason in self._problems():
+            if not (unknown_slopes and any(str(key).startswith("rms_slope") for key in location)):
+                yield location, value, reason
         if not unknown_slopes:
-            # Runs are called by their slopes.
+            # Slopes are part of the names of runs.
             yield from _within(("publication",), self.publication.problems(self))
 
     def _problems(self):
@@ -211,41 +218,41 @@ class Campaign(Section):
                 yield from _within((section, label), entry.problems(self))
         for label in self.finite_range:
             if label in self.studies and self.compares_models(label):
-                reason = "is the name of a study that has boundary elements of its own; allowed: another name"
+                reason = "is the name of a study that has boundary elements itself; expected another name"
                 yield ("finite_range", label), label, reason
-        for label, figure in self.figures.drawn().items():
+        for label, figure in self.figures.by_name().items():
             yield from _within(("figures", label), figure.problems(self))
 
     def measurement_problems(self) -> Iterator[Problem]:
-        """Tables of measurements that cannot be read."""
+        """Report tables of measurements that cannot be read."""
         for label, entry in self.measurements.items():
             yield from _within(("measurements", label), entry.table_problems())
 
     def _model_problems(self, study: Study) -> Iterator[Problem]:
-        """Surfaces of a study that its models cannot press."""
+        """Report surfaces of a study that its models do not support."""
         for index, model in enumerate(study.models):
             for name in study.surfaces:
                 for reason in self._reasons_against(MODELS[model], name):
                     yield ("models", index), model, reason
 
     def _reasons_against(self, model: Model, name: str) -> Iterator[str]:
-        """Reasons why a model cannot press a surface."""
+        """Return the reasons why a model does not support a surface."""
         surface, least = self.surfaces[name], model.least_cells
         if model.periodic_only and self.is_free(name):
             yield (
-                f"need a periodic surface, and {name!r} is a square with free edges; allowed: asperities, or another "
-                "`boundary`, which makes a surface periodic"
+                f"need a periodic surface, and {name!r} is a square with free edges; expected asperities, or another "
+                "`boundary`, which makes the surface periodic"
             )
         if surface.cells_per_short_wave < least * (1 - ROUNDING):
             yield (
                 f"need at least {least} grid cells per shortest wavelength, and {name!r} has "
-                f"{surface.cells_per_short_wave:.3g}; allowed: asperities, or a `grid` of "
-                f"{surface.grid_of_cells(least)} or more for {name!r} (recommended: "
+                f"{surface.cells_per_short_wave:.3g}; expected asperities, or a `grid` of "
+                f"{surface.grid_of_cells(least)} or more for {name!r} (better "
                 f"{surface.grid_of_cells(_ADVISABLE_CELLS)})"
             )
 
     def warnings(self) -> list[str]:
-        """What is allowed but not advisable."""
+        """Return warnings about valid but coarse grids."""
         found = []
         studies = self.studies.values()
         by_cells = {
@@ -261,31 +268,31 @@ class Campaign(Section):
             if cells < _LEAST_CELLS * (1 - ROUNDING):
                 found.append(
                     f"surfaces.{origin}.grid: {surface.grid!r} gives {cells:.3g} grid cells per shortest wavelength"
-                    f"{variant}; recommended: {_ADVISABLE_CELLS}, at least {_LEAST_CELLS}"
+                    f"{variant}; expected at least {_LEAST_CELLS}, better {_ADVISABLE_CELLS}"
                 )
             elif cells < _ADVISABLE_CELLS * (1 - ROUNDING) and name in by_cells:
                 found.append(
                     f"surfaces.{origin}.grid: {surface.grid!r} gives boundary elements {cells:.3g} cells per shortest "
-                    f"wavelength{variant}, with which areas are off by a few per cent; recommended: "
+                    f"wavelength{variant}, with which areas have errors of a few per cent; expected a grid of "
                     f"{surface.grid_of_cells(_ADVISABLE_CELLS)} or more"
                 )
         return found
 
-    def with_files_beside(self, folder: FilePath) -> Campaign:
-        """The same campaign with the paths of its files taken relative to `folder`."""
+    def resolve_paths(self, folder: FilePath) -> Campaign:
+        """Return the campaign with the paths of its files relative to `folder`."""
 
-        def placed(section):
+        def in_folder(section):
             return section.model_copy(update={"path": str(folder / section.path)})
 
         return self.model_copy(
             update={
-                "surfaces": {n: s if s.random else placed(s) for n, s in self.surfaces.items()},
-                "measurements": {name: placed(m) for name, m in self.measurements.items()},
+                "surfaces": {n: s if s.random else in_folder(s) for n, s in self.surfaces.items()},
+                "measurements": {name: in_folder(m) for name, m in self.measurements.items()},
             }
         )
 
 
 def _within(location: tuple, problems: Iterable[Problem]) -> Iterator[Problem]:
-    """The problems of a section at their places in the whole."""
-    for place, value, reason in problems:
-        yield (*location, *place), value, reason
+    """Prefix the locations of the problems of a section with its own."""
+    for inner, value, reason in problems:
+        yield (*location, *inner), value, reason

@@ -1,8 +1,7 @@
-"""The design of a campaign: which surface is pressed against which material in which study.
+"""The design of a campaign: the runs of each study, as combinations of surfaces, seeds, slopes and materials.
 
-A study's lists are multiplied with each other, but for those that go along together (`zip`), or an explicit list
-(`cases`) stands in their place. A surface or a material of which a parameter is varied becomes an entry of its own,
-named after it: `rough-hurst0.6`.
+All lists of a study are combined, except for groups that are combined one by one (`zip`); an explicit list (`cases`)
+replaces them. Every varied parameter makes a new entry of its surface or material with a name such as `rough-hurst0.6`.
 """
 
 import hashlib
@@ -16,80 +15,75 @@ from typing import Any
 from pydantic import ValidationError
 
 from icha.configuration.campaign import BESIDE_STUDIES, Campaign, Contact
-from icha.configuration.errors import MOST_TOLD
+from icha.configuration.errors import MOST_PROBLEMS
 from icha.configuration.studies import MEASURED, SCALARS, Study
 from icha.configuration.surfaces import SURFACE_KINDS, MaterialSection
 from icha.datasets.labels import number_label
 from icha.support.values import LONGEST_LABEL, NOTHING, Problem, Unit, listed
 
 MAX_RUNS = 100_000
-# Stops of the paths of all runs together.
-_MAX_STOPS = 5_000_000
-# Lists of a study, and what one of their entries is called in a case.
+# Largest number of targets of all runs together.
+_MAX_TARGETS = 5_000_000
+# Lists of a study, and the key of one of their entries in a case.
 _LISTS = {"surfaces": "surface", "seeds": "seed", "rms_slopes": "rms_slope", "materials": "material"}
 _SYMBOLS = {"m": "m", "Pa": "Pa", "J/m^2": "J"}
 _PREFIXES = {-15: "f", -12: "p", -9: "n", -6: "u", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 
-# Where a value of a point of the design stands in the configuration, and the value.
-_Placed = tuple[tuple, Any]
+# A value of a point of the design, after its location in the configuration.
+_Located = tuple[tuple, Any]
 
 
-def designed(campaign: Campaign, content: Mapping) -> tuple[Campaign, list[Problem]]:
-    """The campaign with the runs of every study written out, and what is wrong with its studies' lists.
+def expand_design(campaign: Campaign, content: Mapping) -> tuple[Campaign, list[Problem]]:
+    """Expand the runs of every study.
 
     Parameters
     ----------
     campaign : as written.
-    content : the text that it was read from, as nested mappings: varied parameters are read like those in it.
+    content : the configuration as nested mappings, from which varied sections are validated.
 
     Returns
     -------
-    The campaign and an empty list; or the campaign as it was and all problems. Slopes that are `measured` remain to be
-    replaced (`Campaign.with_topographies`).
+    The expanded campaign and an empty list; or the campaign as it was and all problems. `Campaign.with_topographies`
+    replaces slopes that are `measured`.
     """
-    found = (
-        problem for label, study in campaign.studies.items() for problem in _study_problems(campaign, label, study)
+    problems = itertools.chain.from_iterable(
+        _study_problems(campaign, label, study) for label, study in campaign.studies.items()
     )
-    found = list(itertools.islice(found, MOST_TOLD + 1)) or list(_too_many(campaign))
-    if found:
-        return campaign, found
+    problems = list(itertools.islice(problems, MOST_PROBLEMS + 1)) or list(_too_many(campaign))
+    if problems:
+        return campaign, problems
     variants = _Variants(campaign, content)
     contacts = {
         label: [variants.contact(point) for point in _points(label, study)] for label, study in campaign.studies.items()
     }
     if variants.problems:
         return campaign, list(variants.problems.values())
-    grown = campaign.model_copy(
-        update={
-            "surfaces": dict(campaign.surfaces) | variants.derived["surfaces"],
-            "materials": dict(campaign.materials) | variants.derived["materials"],
-        }
-    )
-    grown = grown.with_contacts(contacts)
-    grown._origins = variants.origin
-    grown = _with_variants_for_their_origin(grown, variants.origin)
-    found = list(_too_many_beside(grown))
-    return (campaign, found) if found else (grown, [])
+    sections = {name: getattr(campaign, name) | derived for name, derived in variants.derived.items()}
+    expanded = campaign.model_copy(update=sections).with_contacts(contacts)
+    expanded._origins = variants.origin
+    expanded = _replace_varied_names(expanded, variants.origin)
+    problems = list(_too_many_beside(expanded))
+    return (campaign, problems) if problems else (expanded, [])
 
 
-def _lists(label: str, study: Study) -> dict[str, list[_Placed]]:
-    """What is multiplied in a study: lists and varied parameters, surfaces first."""
-    at = ("studies", label)
+def _lists(label: str, study: Study) -> dict[str, list[_Located]]:
+    """Return the lists and varied parameters to combine, surfaces first."""
+    prefix = ("studies", label)
     lists = {
-        one: [((*at, many, index), value) for index, value in enumerate(getattr(study, many))]
+        one: [((*prefix, many, index), value) for index, value in enumerate(getattr(study, many))]
         for many, one in _LISTS.items()
     }
     varied = study.vary.model_dump(exclude_none=True) if study.vary else {}
     for name, values in varied.items():
-        lists[name] = [((*at, "vary", name, index), value) for index, value in enumerate(values)]
+        lists[name] = [((*prefix, "vary", name, index), value) for index, value in enumerate(values)]
     of_material = MaterialSection.model_fields
     of_surface = (name for name in SCALARS if name not in of_material)
     names = ["surface", *of_surface, "seed", "rms_slope", "material", *of_material]
     return {name: lists[name] for name in names if name in lists}
 
 
-def _points(label: str, study: Study) -> Iterator[dict[str, _Placed]]:
-    """Everything that is named for one run, run by run."""
+def _points(label: str, study: Study) -> Iterator[dict[str, _Located]]:
+    """Return the values of each run, with their locations."""
     lists = _lists(label, study)
     for index, given in enumerate(_cases(study)):
         fixed = {name: (("studies", label, "cases", index, name), value) for name, value in given.items()}
@@ -97,17 +91,17 @@ def _points(label: str, study: Study) -> Iterator[dict[str, _Placed]]:
             [dict(zip(group, values, strict=True)) for values in zip(*(lists[name] for name in group), strict=True)]
             for group in _axes(study, lists, fixed)
         ]
-        for parts in itertools.product(*axes):
-            yield fixed | {name: placed for part in parts for name, placed in part.items()}
+        for chosen in itertools.product(*axes):
+            yield fixed | {name: located for values in chosen for name, located in values.items()}
 
 
 def _cases(study: Study) -> list[dict[str, Any]]:
-    """Values that each case of a study fixes; one that fixes none where the study has no cases."""
+    """Return the values that each case of a study fixes; a study without cases has one that fixes none."""
     return [{}] if study.cases is None else [case.model_dump(exclude_none=True) for case in study.cases]
 
 
 def _axes(study: Study, lists: Mapping, fixed: Mapping) -> Iterator[list[str]]:
-    """Names of the lists that are multiplied with each other, those that go along together in one group."""
+    """Return the groups of lists to combine; the lists of a group are combined one by one."""
     groups = [[_LISTS.get(name, name) for name in group] for group in study.zip]
     done = set(fixed)
     for name in lists:
@@ -119,21 +113,21 @@ def _axes(study: Study, lists: Mapping, fixed: Mapping) -> Iterator[list[str]]:
 
 
 def _too_many(campaign: Campaign) -> Iterator[Problem]:
-    """More runs, or stops of their paths, than can be planned; they are counted before any is written out."""
+    """Report too many runs or targets, before they are expanded."""
     runs = {label: _run_count(label, study) for label, study in campaign.studies.items()}
-    stops = {}
+    targets = {}
     for label, study in campaign.studies.items():
         states = {*study.targets.states, *(campaign.snapshots_of(label) or ())}
-        stops[label] = runs[label] * (len(states) + len(study.turning_points))
+        targets[label] = runs[label] * (len(states) + len(study.turning_points))
     yield from _excess("studies", runs, "runs", MAX_RUNS)
-    yield from _excess("studies", stops, "stops of all its runs", _MAX_STOPS)
+    yield from _excess("studies", targets, "targets of all its runs", _MAX_TARGETS)
 
 
 def _too_many_beside(campaign: Campaign) -> Iterator[Problem]:
-    """More solutions beside the runs, which are written out, than can be planned."""
+    """Report too many solutions beside the expanded runs."""
     for section in BESIDE_STUDIES:
         counts = {
-            label: len(campaign.solved(entry)) * len(getattr(entry, "reduced_pressures", [0]))
+            label: len(campaign.contacts_beside(entry)) * len(getattr(entry, "reduced_pressures", [0]))
             for label, entry in getattr(campaign, section).items()
             if entry.study in campaign.studies
         }
@@ -141,81 +135,80 @@ def _too_many_beside(campaign: Campaign) -> Iterator[Problem]:
 
 
 def _excess(section: str, counts: Mapping[str, int], what: str, most: int) -> Iterator[Problem]:
-    """That entries of a section ask for more than `most`, each by itself or all of them together."""
+    """Report entries of a section that ask for more than `most`, each by itself or all of them together."""
     large = {label: count for label, count in counts.items() if count > most}
     for label, count in large.items():
-        yield (section, label), NOTHING, f"asks for {count} {what}; allowed: {most} at most"
+        yield (section, label), NOTHING, f"asks for {count} {what}; expected at most {most}"
     if not large and sum(counts.values()) > most:
-        yield (section,), NOTHING, f"ask for {sum(counts.values())} {what} together; allowed: {most} at most"
+        yield (section,), NOTHING, f"ask for {sum(counts.values())} {what} together; expected at most {most}"
 
 
 def _run_count(label: str, study: Study) -> int:
-    """Number of runs of a study by all its models; those that turn out to be the same are counted each."""
+    """Count the runs of a study with all its models, equal ones included."""
     lists = _lists(label, study)
     counts = (math.prod(len(lists[group[0]]) for group in _axes(study, lists, given)) for given in _cases(study))
     return len(study.models) * sum(counts)
 
 
 def _study_problems(campaign: Campaign, label: str, study: Study) -> Iterator[Problem]:
-    at = ("studies", label)
+    prefix = ("studies", label)
     lists, cases = _lists(label, study), study.cases or []
 
     def values(one):
-        """Places and values of a list, and of what cases have in the place of its entries."""
-        placed = (((*at, "cases", index, one), getattr(case, one)) for index, case in enumerate(cases))
-        return [*lists[one], *((place, value) for place, value in placed if value is not None)]
+        """Return the located values of a list, and of the cases that replace its entries."""
+        located = (((*prefix, "cases", index, one), getattr(case, one)) for index, case in enumerate(cases))
+        return [*lists[one], *((location, value) for location, value in located if value is not None)]
 
     for many, one in _LISTS.items():
         if not lists[one] and (not cases or any(getattr(case, one) is None for case in cases)):
-            yield (*at, many), NOTHING, f"the key is missing; needed: {Study.model_fields[many].description}"
+            yield (*prefix, many), NOTHING, f"the key is missing; expected: {Study.model_fields[many].description}"
     for one, names in (("surface", campaign.surfaces), ("material", campaign.materials)):
-        for place, name in values(one):
+        for location, name in values(one):
             if name not in names:
-                yield place, name, f"is not defined; allowed: {listed(names)}"
-    yield from _zip_problems(at, study, lists)
-    for place, slope in values("rms_slope"):
+                yield location, name, f"is not defined; expected one of {listed(names)}"
+    yield from _zip_problems(prefix, study, lists)
+    for location, slope in values("rms_slope"):
         if slope != MEASURED:
             continue
-        own = cases[place[3]].surface if place[2] == "cases" else None
-        for name in [own] if own else study.surfaces:
+        surface = cases[location[3]].surface if location[2] == "cases" else None
+        for name in [surface] if surface else study.surfaces:
             if name in campaign.surfaces and campaign.surfaces[name].random:
-                reason = f"surface {name!r} is made at random and has no slope of its own; allowed: numbers"
-                yield place, slope, reason
+                yield location, slope, f"surface {name!r} is random and has no measured slope; expected numbers"
 
 
-def _zip_problems(at, study, lists) -> Iterator[Problem]:
+def _zip_problems(prefix, study, lists) -> Iterator[Problem]:
     seen = set()
     plural = {one: many for many, one in _LISTS.items()}
-    allowed = ", ".join(plural.get(each, each) for each in lists)
+    expected = ", ".join(plural.get(each, each) for each in lists)
     for index, group in enumerate(study.zip):
         lengths = {}
         for position, name in enumerate(group):
-            place, one = (*at, "zip", index, position), _LISTS.get(name, name)
+            location, one = (*prefix, "zip", index, position), _LISTS.get(name, name)
             if name in plural or one not in lists:
-                yield place, name, f"is no list of this study; allowed: {allowed}"
+                yield location, name, f"is not a list of this study; expected one of {expected}"
                 continue
             if one in seen:
-                yield place, name, "is in two groups; allowed: every list in one group only"
+                yield location, name, "is in two groups; expected every list in one group only"
             seen.add(one)
             lengths[name] = len(lists[one])
         if len(set(lengths.values())) > 1:
-            said = ", ".join(f"{name} has {length}" for name, length in lengths.items())
-            yield (*at, "zip", index), group, f"{said} entries; allowed: lists of the same length"
+            counts = ", ".join(f"{name} has {length}" for name, length in lengths.items())
+            yield (*prefix, "zip", index), group, f"{counts} entries; expected lists of the same length"
 
 
 class _Variants:
-    """Surfaces and materials of which a parameter is varied: made once each, whatever asks for them."""
+    """Surfaces and materials with varied parameters, each made once."""
 
     def __init__(self, campaign: Campaign, content: Mapping):
         self._campaign, self._content = campaign, content
         self._names: dict[tuple, str] = {}
         self.derived: dict[str, dict[str, Any]] = {"surfaces": {}, "materials": {}}
         self.origin: dict[tuple[str, str], str] = {}
-        # By what was tried, so that a value that is wrong is named once.
+        # By location, so that each wrong value is reported once.
         self.problems: dict[tuple, Problem] = {}
 
-    def contact(self, point: Mapping[str, _Placed]) -> Contact:
-        """The contact of a point of the design, its surface and material made if need be."""
+    def contact(self, point: Mapping[str, _Located]) -> Contact:
+        """Return the contact of a point of the design, after making its surface and material."""
         surface, material = point["surface"][1], point["material"][1]
         kind = type(self._campaign.surfaces[surface])
         varied = {name: point[name] for name in point if name in SCALARS}
@@ -224,7 +217,7 @@ class _Variants:
         for name, (location, value) in varied.items():
             if name not in of_surface and name not in of_material:
                 kinds = ", ".join(k for k, section in SURFACE_KINDS.items() if name in section.model_fields)
-                reason = f"surface {surface!r} is of another kind; allowed: kind {kinds}, or separate studies"
+                reason = f"surface {surface!r} is of another kind; expected kind {kinds}, or separate studies"
                 self.problems[location[:4]] = (location[:4], value, reason)
         seed = point["seed"][1] if self._campaign.surfaces[surface].random else 0
         return Contact(
@@ -234,15 +227,15 @@ class _Variants:
             self._variant("materials", material, of_material),
         )
 
-    def _variant(self, section: str, base: str, changes: Mapping[str, _Placed]) -> str:
+    def _variant(self, section: str, base: str, changes: Mapping[str, _Located]) -> str:
         if not changes:
             return base
         key = (section, base, *((name, repr(value)) for name, (_, value) in changes.items()))
         if key not in self._names:
-            self._names[key] = self._made(section, base, changes)
+            self._names[key] = self._make(section, base, changes)
         return self._names[key]
 
-    def _made(self, section: str, base: str, changes: Mapping[str, _Placed]) -> str:
+    def _make(self, section: str, base: str, changes: Mapping[str, _Located]) -> str:
         entries = getattr(self._campaign, section)
         values = {name: value for name, (_, value) in changes.items()}
         try:
@@ -256,11 +249,11 @@ class _Variants:
         name = "-".join([base, *(f"{key}{value_label(made, key)}" for key in changes)])
         location, value = next(iter(changes.values()))
         if name in entries:
-            reason = f"gives {base!r} a variant named {name!r}, but this name is taken; allowed: rename that entry"
+            reason = f"gives {base!r} a variant named {name!r}, but this name is taken. Rename that entry"
             self.problems[(section, name)] = (location, value, reason)
         if len(name) > LONGEST_LABEL:
-            reason = f"gives {base!r} a variant with a name of {len(name)} letters, which files cannot have"
-            self.problems[(section, name)] = (location, value, f"{reason}; allowed: {LONGEST_LABEL} at most")
+            reason = f"gives {base!r} a variant with a name of {len(name)} letters, too long for a file"
+            self.problems[(section, name)] = (location, value, f"{reason}; expected at most {LONGEST_LABEL}")
         self.derived[section][name] = made
         self.origin[section, name] = base
         return name
@@ -268,21 +261,21 @@ class _Variants:
     def _add_problem(self, base, changes, details):
         key = str(details["loc"][0]) if details["loc"] else ""
         context = details.get("ctx", {})
-        reason = str(context.get("error") or f"{details['msg']}; allowed: {context.get('expected', 'see its key')}")
+        reason = str(context.get("error") or f"{details['msg']}; expected {context.get('expected', 'see its key')}")
         location, value = changes.get(key) or next(iter(changes.values()))
-        if key not in changes:  # a parameter of the surface that does not go with the one that is varied
+        if key not in changes:  # the varied parameter contradicts another parameter of the surface
             reason = f"{key} of {base!r}: {details['input']!r} {reason}"
         self.problems.setdefault(location, (location, value, reason))
 
 
 def value_label(section, name: str) -> str:
-    """How the value of a parameter is written in names of files: `hurst0.6`, `interaction_range40nm`."""
+    """Format the value of a parameter for names of files: `hurst0.6`, `interaction_range40nm`."""
     value = getattr(section, name)
     if isinstance(value, bool):
         return str(value).lower()
     if not isinstance(value, float):
         text = str(value)
-        # Text of all kinds, the name of a channel for one, is no name of a file.
+        # Some texts, such as names of channels, cannot be part of a file name.
         return text if re.fullmatch(r"[A-Za-z0-9_.+-]{1,40}", text) else hashlib.sha256(text.encode()).hexdigest()[:8]
     unit = next((each.si for each in type(section).model_fields[name].metadata if isinstance(each, Unit)), None)
     if unit is None:
@@ -294,13 +287,12 @@ def value_label(section, name: str) -> str:
     return f"{digits}{_PREFIXES[power]}{_SYMBOLS[unit]}"
 
 
-def _with_variants_for_their_origin(campaign: Campaign, origin: Mapping[tuple[str, str], str]) -> Campaign:
-    """The campaign in which whatever names a surface or material that is varied means its variants."""
+def _replace_varied_names(campaign: Campaign, origin: Mapping[tuple[str, str], str]) -> Campaign:
+    """Replace names of varied surfaces and materials, in sections beside studies and figures, by their variants."""
 
     def variants(section, study, name):
-        there = getattr(campaign.studies[study], section) if study in campaign.studies else []
-        found = [each for each in there if origin.get((section, each)) == name] if name not in there else []
-        return found or [name]
+        names = getattr(campaign.studies[study], section) if study in campaign.studies else []
+        return [name] if name in names else [each for each in names if origin.get((section, each)) == name] or [name]
 
     def entry_with_variants(entry):
         named = {section: getattr(entry, section) for section in ("surfaces", "materials")}
@@ -320,5 +312,5 @@ def _with_variants_for_their_origin(campaign: Campaign, origin: Mapping[tuple[st
         section: {label: entry_with_variants(entry) for label, entry in getattr(campaign, section).items()}
         for section in BESIDE_STUDIES
     }
-    figures = {name: figure_with_variant(figure) for name, figure in campaign.figures.drawn().items()}
+    figures = {name: figure_with_variant(figure) for name, figure in campaign.figures.by_name().items()}
     return campaign.model_copy(update=update | {"figures": campaign.figures.model_copy(update=figures)})

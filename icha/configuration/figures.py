@@ -1,4 +1,4 @@
-"""Section `figures`, one key for every figure, and `measurements`, contact areas of others that are drawn over them."""
+"""Section `figures`, one key for every figure, and `measurements`, measured contact areas to draw over them."""
 
 from collections.abc import Iterator
 from typing import Annotated, Any
@@ -13,25 +13,25 @@ from icha.support.values import File, Name, Positive, Problem, Section, Text, co
 
 
 def _drawable(value: str) -> str:
-    """Refuse formulas in a label that no figure can draw."""
+    """Refuse labels with formulas that matplotlib cannot draw."""
     if "$" not in value:
         return value
-    # Imports matplotlib, for which no other label waits.
+    # Imports matplotlib, which other labels do not need.
     from matplotlib.cbook import is_math_text
     from matplotlib.mathtext import MathTextParser
 
     try:
         if is_math_text(value):
             MathTextParser("path").parse(value)
-    except Exception as error:  # of its parser, of Python for a thousand braces
+    except Exception as error:  # from its parser, or from Python for a thousand braces
         last = (str(error).strip().splitlines() or [type(error).__name__])[-1]
-        allowed = r"allowed: formulas between two $ as matplotlib reads them, or \$ for the sign"
-        raise ValueError(f"holds a formula that cannot be drawn ({last}); {allowed}") from None
+        expected = r"expected formulas between two $ as matplotlib reads them, or \$ for the sign"
+        raise ValueError(f"holds a formula that cannot be drawn ({last}); {expected}") from None
     return value
 
 
 def _factor(unit: str, si_unit: str) -> float | None:
-    """Factor from a unit to an SI unit; None if it is no such unit."""
+    """Return the factor from a unit to an SI unit; None for other units."""
     try:
         return float(conversion_factor(unit, si_unit))
     except ValueError:
@@ -43,26 +43,26 @@ class Column(Section):
 
     column: Text = Field(description="Heading of the column.")
     unit: Annotated[str, Field(strict=True)] = Field(
-        description="Unit of its numbers: `1` or `percent` for ratios, a unit of pressure for nominal pressures."
+        description="Unit of the numbers: `1` or `percent` for ratios, a unit of pressure for nominal pressures."
     )
 
 
 class Measurement(Section):
-    """Measured contact areas, drawn over the figure of the study that they belong to."""
+    """Measured contact areas, drawn over the figure of a study."""
 
-    path: File = Field(description="CSV file with a line of headings. Relative to the configuration file.")
+    path: File = Field(description="CSV file with a line of headings, relative to the configuration file.")
     label: Annotated[Text, Field(max_length=200), AfterValidator(_drawable)] = Field(
-        description="Its name in the legend; formulas stand between two `$`."
+        description="Name in the legend; formulas stand between two `$`."
     )
-    citation: Text = Field(description="Where the numbers come from; printed in the report.")
-    study: Name = Field(description="Name of the study that it is compared with.")
+    citation: Text = Field(description="Source of the numbers; printed in the report.")
+    study: Name = Field(description="Name of the study to compare with.")
     load: Column = Field(
         description="Load: reduced pressures p/(E* h'rms) (unit `1`) or nominal pressures (unit `kPa`, …), which need "
         "material and rms_slope."
     )
     area: Column = Field(description="Contact area fraction A/A0 (unit `1` or `percent`).")
-    material: Name | None = Field(default=None, description="Material that was measured; a load in Pa needs it.")
-    rms_slope: Positive | None = Field(default=None, description="Rms slope that was measured; a load in Pa needs it.")
+    material: Name | None = Field(default=None, description="The measured material; a load in Pa needs it.")
+    rms_slope: Positive | None = Field(default=None, description="The measured rms slope; a load in Pa needs it.")
 
     @property
     def load_is_pressure(self) -> bool:
@@ -76,28 +76,26 @@ class Measurement(Section):
         return {self.load.column: load, self.area.column: _factor(self.area.unit, "1")}
 
     @model_validator(mode="after")
-    def _columns_can_be_reduced(self):
+    def _check_units(self):
         load, area = self.load.unit, self.area.unit
         if self.load_is_pressure and _factor(load, "Pa") is None:
-            raise ValueError(f"load: unit {load!r}; allowed: '1' or a unit of pressure, such as 'kPa'")
+            raise ValueError(f"load: unit {load!r}; expected '1' or a unit of pressure, such as 'kPa'")
         if _factor(area, "1") is None:
-            raise ValueError(f"area: unit {area!r}; allowed: '1' or 'percent'")
+            raise ValueError(f"area: unit {area!r}; expected '1' or 'percent'")
         if self.load.column == self.area.column:
-            raise ValueError(f"area: column {self.area.column!r} is that of the load; allowed: another one")
+            raise ValueError(f"area: column {self.area.column!r} is that of the load; expected another one")
         if self.load_is_pressure and (self.material is None or self.rms_slope is None):
-            raise ValueError(
-                f"load in {load!r} without material and rms_slope; allowed: both given, or loads of unit '1'"
-            )
+            raise ValueError(f"load in {load!r} without material and rms_slope; expected both, or loads of unit '1'")
         return self
 
     def problems(self, campaign: Any) -> Iterator[Problem]:
-        """Names that lead nowhere in its `icha.configuration.campaign.Campaign`."""
+        """Report names that its `icha.configuration.campaign.Campaign` does not define."""
         yield from unknown(("study",), self.study, campaign.studies)
         if self.material is not None:
             yield from unknown(("material",), self.material, campaign.materials)
 
     def table_problems(self) -> Iterator[Problem]:
-        """A table that cannot be read."""
+        """Report a table that cannot be read."""
         try:
             read_columns(self.path, self.columns)
         except ValueError as error:
@@ -105,28 +103,28 @@ class Measurement(Section):
 
 
 class _Drawn(Section):
-    def drawn(self) -> dict[str, FigureOptions]:
-        """The figures that are drawn, by name."""
+    def by_name(self) -> dict[str, FigureOptions]:
+        """Return the figures to draw, by name."""
         return {name: getattr(self, name) for name in type(self).model_fields if getattr(self, name) is not None}
 
     def inputs(self, name: str, campaign: Campaign, files: ResultFiles) -> Inputs:
-        """The files that a figure is drawn from, by the arguments of the function that draws it."""
+        """Return the input files of a figure, by the arguments of the function that draws it."""
         return DECLARATIONS[name].inputs(campaign, getattr(self, name), files)
 
     def arguments(self, name: str, campaign: Campaign) -> dict[str, Any]:
-        """The other arguments of the function that draws a figure."""
+        """Return the other arguments of the function that draws a figure."""
         options = getattr(self, name)
         return options.arguments() | DECLARATIONS[name].arguments(campaign, options)
 
     def studies_of(self, name: str, campaign: Campaign) -> tuple[str, ...]:
-        """The studies whose runs a figure shows."""
+        """Return the studies whose runs a figure shows."""
         return getattr(self, name).studies_of(campaign)
 
 
 Figures = create_model(
     "Figures",
     __base__=_Drawn,
-    __doc__="The figures of the campaign; those that are left out are not drawn.",
+    __doc__="The figures of the campaign; a figure without its key is not drawn.",
     __module__=__name__,
     **{
         name: (declaration.options | None, Field(default=None, description=declaration.description))

@@ -1,13 +1,13 @@
-"""From the text of a configuration file to a campaign, or to a list of everything that is wrong with it.
+"""Load a configuration file: its text becomes a campaign, or a list of all problems.
 
-`parse_configuration` reads the text alone, so that mistakes in it are found at once; `load_configuration` also inspects
-the files that it names.
+`parse_configuration` reads the text alone, which finds most errors at once; `load_configuration` also inspects the
+files that the text names.
 """
 
 import itertools
 import os
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path, PurePosixPath
 from typing import Any
 
@@ -15,8 +15,8 @@ import yaml
 from pydantic import ValidationError
 
 from icha.configuration.campaign import Campaign
-from icha.configuration.design import designed
-from icha.configuration.errors import MOST_TOLD, ConfigurationError, line, problem_of
+from icha.configuration.design import expand_design
+from icha.configuration.errors import MOST_PROBLEMS, ConfigurationError, format_problem, problem_of
 from icha.configuration.plausibility import (
     CONFIRMED,
     Unusual,
@@ -28,26 +28,26 @@ from icha.configuration.plausibility import (
 )
 from icha.configuration.topographies import inspect_topographies
 from icha.configuration.yaml_files import (
-    dumped,
+    apply_defaults,
+    dump_yaml,
     excessive_defaults,
-    merged,
-    place_in_defaults,
+    location_in_defaults,
+    merge,
     read_yaml,
-    with_defaults,
 )
 from icha.support.values import Problem
 
 
 @dataclass(frozen=True)
 class Configuration:
-    """A valid campaign and where it came from.
+    """A valid campaign and its source.
 
     Parameters
     ----------
-    campaign : what the text means, in SI units and with the paths of its files resolved.
+    campaign : in SI units, with the resolved paths of its files.
     text : the merged configuration as its author wrote it, units included.
-    origin : its file.
-    warnings : what is allowed but not advisable, or unusual.
+    origin : path of its file.
+    warnings : warnings about coarse grids and unusual values.
     """
 
     campaign: Campaign
@@ -58,15 +58,15 @@ class Configuration:
 
 @dataclass(frozen=True)
 class Draft:
-    """A configuration of which only the text is known.
+    """The text of a configuration, before the files that it names are read.
 
     Parameters
     ----------
-    path : its file.
+    path : the file.
     from_file : content of the file.
     overrides : values that replace those of the file.
     written : both together, without defaults.
-    campaign : what the text means; None until it is known.
+    campaign : the campaign; None until it is valid.
     """
 
     path: Path
@@ -77,33 +77,30 @@ class Draft:
 
     @property
     def confirmed(self) -> Any:
-        """Keys of unusual values that are meant, as they are written."""
+        """Keys of unusual values that are intended, as they are written."""
         return self.written.get(CONFIRMED)
 
-    def worded(self, location: tuple, *what: Any) -> str:
-        """A problem, or something unusual, as a line that says who gave the value: the file or the command line."""
-        given = bool(location) and _holds(self.overrides, location)
-        by_option = given or not _holds(self.from_file, location[:-1])
-        return line("--config" if by_option else str(self.path), location, *what)
+    def format(self, location: tuple, value: Any, reason: str) -> str:
+        """Format a problem, or an unusual value, with its source: the file or the command line."""
+        overridden = bool(location) and _has(self.overrides, location)
+        by_option = overridden or not _has(self.from_file, location[:-1])
+        return format_problem("--config" if by_option else str(self.path), location, value, reason)
 
     def fail(self, problems: Iterable[Problem], unusual: Iterable[Unusual] = ()) -> None:
-        """Raise ConfigurationError if there are problems.
-
-        Unusual values are told with them, since they may be their cause.
-        """
-        found = list(itertools.islice(problems, MOST_TOLD + 1))
+        """Raise ConfigurationError if there are problems; list unusual values, which may be their cause, with them."""
+        found = list(itertools.islice(problems, MOST_PROBLEMS + 1))
         if not found:
             return
-        found = [(place_in_defaults(location, self.written), value, reason) for location, value, reason in found]
-        slips = itertools.islice(plausibility_problems(unusual, self.confirmed), MOST_TOLD + 1)
-        lines = list(dict.fromkeys(self.worded(*problem) for problem in [*found, *slips]))
-        if len(lines) > MOST_TOLD:
-            lines[MOST_TOLD:] = [f"{self.path}: more is wrong, which is told once this is right"]
+        found = [(location_in_defaults(location, self.written), value, reason) for location, value, reason in found]
+        implausible = itertools.islice(plausibility_problems(unusual, self.confirmed), MOST_PROBLEMS + 1)
+        lines = list(dict.fromkeys(self.format(*problem) for problem in [*found, *implausible]))
+        if len(lines) > MOST_PROBLEMS:
+            lines[MOST_PROBLEMS:] = [f"{self.path}: there are more problems; correct these first"]
         raise ConfigurationError("\n".join(lines))
 
 
-def _holds(content: Any, keys: tuple) -> bool:
-    """Whether nested mappings have a value at some keys, or anything else in the place of one of the mappings."""
+def _has(content: Any, keys: tuple) -> bool:
+    """Tell whether nested mappings have a value at some keys, or another value in place of a mapping."""
     for key in keys:
         if not isinstance(content, Mapping):
             return True
@@ -114,25 +111,22 @@ def _holds(content: Any, keys: tuple) -> bool:
 
 
 def parse_configuration(path: str | os.PathLike, overrides: Mapping[str, Any] | None = None) -> Draft:
-    """Read the text of a configuration and check all that can be checked without the files that it names.
-
-    Parameters and errors as in `load_configuration`.
-    """
+    """Read and check the text of a configuration; parameters and errors as in `load_configuration`."""
     path = Path(path)
     from_file = read_yaml(path)
-    written = merged(from_file, overrides or {})
+    written = merge(from_file, overrides or {})
     draft = Draft(path, from_file, overrides or {}, written)
     unusual = unusual_values(written)
     draft.fail(excessive_defaults(written), unusual)
-    content = with_defaults(written)
+    content = apply_defaults(written)
     try:
         campaign = Campaign.model_validate(content)
     except ValidationError as error:
         draft.fail((problem_of(details, content) for details in error.errors()), unusual)
-    campaign, design_problems = designed(campaign.with_files_beside(path.parent), content)
+    campaign, design_problems = expand_design(campaign.resolve_paths(path.parent), content)
     draft.fail(design_problems, unusual)
     draft.fail(itertools.chain(campaign.problems(), plausibility_problems(unusual, draft.confirmed)))
-    return Draft(path, from_file, overrides or {}, written, campaign)
+    return replace(draft, campaign=campaign)
 
 
 def load_configuration(
@@ -144,15 +138,15 @@ def load_configuration(
     ----------
     path : YAML file.
     overrides : values that replace those of the file, key by key, as given by `snakemake --config`.
-    within : folder in which all files that it names must lie, as those of a stranger must; anywhere if left out.
+    within : folder that must contain all files that it names, for files of strangers; None for any folder.
 
     Raises
     ------
     ConfigurationError
-        Naming every key that is wrong.
+        If any key or file is wrong; the message has a line for each.
     """
     draft = parse_configuration(path, overrides)
-    text, campaign = dumped(draft.written, str(draft.path)), draft.campaign
+    text, campaign = dump_yaml(draft.written, str(draft.path)), draft.campaign
     draft.fail(_files_outside(campaign, within) if within is not None else ())
     topographies, unread = inspect_topographies(campaign)
     draft.fail(itertools.chain(unread, campaign.measurement_problems()))
@@ -162,44 +156,43 @@ def load_configuration(
         location = "surfaces", campaign.origin("surfaces", name)
         unusual += unusual_topography(location, campaign.surfaces[name], each.period, each.rms_slope)
     sticky, confirmed = list(sticky_runs(campaign)), draft.confirmed
-    # A slip may be why a contact is sticky.
-    slips = list(plausibility_problems(unusual, confirmed)) or plausibility_problems(sticky, confirmed)
+    # A contact may be sticky because of another unusual value.
+    implausible = list(plausibility_problems(unusual, confirmed)) or plausibility_problems(sticky, confirmed)
     unusual += sticky
-    draft.fail(itertools.chain(campaign.problems(), slips, needless_confirmations(unusual, confirmed)))
-    meant = [
-        draft.worded(each.location, each.value, f"is unusual{each.how}, but confirmed; usual: {each.usual}")
+    draft.fail(itertools.chain(campaign.problems(), implausible, needless_confirmations(unusual, confirmed)))
+    accepted = [
+        draft.format(each.location, each.value, f"is unusual{each.source}, but confirmed; expected {each.usual}")
         for each in unusual
     ]
-    return Configuration(campaign, text, str(draft.path), (*campaign.warnings(), *meant))
+    return Configuration(campaign, text, str(draft.path), (*campaign.warnings(), *accepted))
 
 
 def _named_files(campaign: Campaign) -> dict[tuple[str, str], str]:
-    """The files that a campaign names, by section and entry."""
+    """Return the files that a campaign names, by section and entry."""
     files = {("surfaces", name): each.path for name, each in campaign.surfaces.items() if not each.random}
     return files | {("measurements", name): each.path for name, each in campaign.measurements.items()}
 
 
 def _files_outside(campaign: Campaign, folder: str | os.PathLike) -> list[Problem]:
-    """Files that a campaign names and that do not lie in a folder, links followed."""
+    """Report files of a campaign that are not in a folder, after resolving links."""
     return [
-        ((section, campaign.origin(section, name), "path"), path, "lies elsewhere; allowed: files beside it")
+        ((section, campaign.origin(section, name), "path"), path, "is in another folder; expected files beside it")
         for (section, name), path in _named_files(campaign).items()
         if not Path(path).resolve().is_relative_to(Path(folder).resolve())
     ]
 
 
-# Folder of the files that a configuration names, beside that configuration as it is kept with its results.
+# Folder, beside the copy of a configuration with its results, of the files that it names.
 INPUTS = "inputs"
 
 
-def with_files_beside_it(configuration: Configuration) -> tuple[str, dict[str, str]]:
-    """The text of a configuration as used, and the files that belong beside it.
+def collect_inputs(configuration: Configuration) -> tuple[str, dict[str, str]]:
+    """Return the text of a configuration as used, and the files to store beside it.
 
     Returns
     -------
-    text : the configuration, whose files lie in `inputs/<section>/<entry>/`, with their own names.
-    files : where these files are now, by their paths from the folder of the text. A surface that no study presses has
-        a path, too, but no file: nobody has read it.
+    text : the configuration with the paths `inputs/<section>/<entry>/<name>` of its files.
+    files : present paths of these files, by their paths in the text; without surfaces that no study uses.
     """
     campaign = configuration.campaign
     # Variants of a surface have its file.
@@ -207,14 +200,14 @@ def with_files_beside_it(configuration: Configuration) -> tuple[str, dict[str, s
     if not named:
         return configuration.text, {}
     content = yaml.safe_load(configuration.text)
-    pressed = {each.surface for study in campaign.studies for each in campaign.contacts(study)}
-    used = {("surfaces", campaign.origin("surfaces", name)) for name in pressed}
+    surfaces = {each.surface for study in campaign.studies for each in campaign.contacts(study)}
+    used = {("surfaces", campaign.origin("surfaces", name)) for name in surfaces}
     files = {}
     for (section, name), path in named.items():
-        place = str(PurePosixPath(INPUTS, section, name, Path(path).name))
-        content[section][name] = (content[section][name] or {}) | {"path": place}
+        stored = str(PurePosixPath(INPUTS, section, name, Path(path).name))
+        content[section][name] = (content[section][name] or {}) | {"path": stored}
         if section == "measurements" or (section, name) in used:
-            files[place] = path
-    # All surfaces have a path of their own now.
+            files[stored] = path
+    # Every surface has its own path now.
     (content.get("defaults") or {}).get("surfaces", {}).pop("path", None)
-    return dumped(content, configuration.origin), files
+    return dump_yaml(content, configuration.origin), files

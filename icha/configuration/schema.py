@@ -16,22 +16,22 @@ MARK = "<!-- generated from the model: make schema -->\n"
 
 
 def json_schema() -> str:
-    """The schema, as editors use it to check and complete a configuration."""
+    """Return the schema, with which editors check and complete a configuration."""
     schema = _schema()
     for name in _WITH_DEFAULTS:
-        # What is needed may stand among the defaults.
+        # Required keys may stand among the defaults.
         schema["$defs"][name].pop("required", None)
     schema["$schema"] = "https://json-schema.org/draft/2020-12/schema"
     return json.dumps(schema, indent=2, ensure_ascii=False) + "\n"
 
 
 def _schema() -> dict:
-    # Sections are called there as in the configuration.
+    # Sections have the names of the configuration.
     return json.loads(json.dumps(Campaign.model_json_schema()).replace("MaterialSection", "Material"))
 
 
 def key_tables() -> str:
-    """Every key with its description and default, one Markdown table a section."""
+    """Return every key with its description and default, a Markdown table for each section."""
     schema = _schema()
     sections = {"Campaign": schema} | schema["$defs"]
     return "\n".join(_table(_HEADINGS[name], sections[name]) for name in _HEADINGS)
@@ -41,7 +41,7 @@ _WITH_DEFAULTS = (*(kind.__name__ for kind in SURFACE_KINDS.values()), "Material
 
 
 def _figure_headings() -> dict[str, str]:
-    """The options of figures, which several may share."""
+    """Return the headings of the options of figures, which several figures may share."""
     sharing: dict[str, list[str]] = {}
     for name, declaration in DECLARATIONS.items():
         sharing.setdefault(declaration.options.__name__, []).append(f"`figures.{name}`")
@@ -85,7 +85,7 @@ def _table(heading: str, section: dict) -> str:
         elif value.get("default") is None:
             default = "none"
         elif isinstance(value["default"], dict):
-            default = "none"  # a section of its own
+            default = "none"  # a section
         else:
             default = f"`{json.dumps(value['default'])}`"
         lines.append(f"| `{key}` | {default} | {value['description']} |")
@@ -93,7 +93,7 @@ def _table(heading: str, section: dict) -> str:
 
 
 def readme_with_tables(text: str) -> str:
-    """`text` with all that follows the mark replaced by the tables."""
+    """Return `text` with the tables after the mark."""
     return text.split(MARK)[0] + MARK + "\n" + key_tables()
 
 

@@ -1,4 +1,4 @@
-"""Section `studies`: surfaces, materials, and the path along which one is pressed against the other."""
+"""Section `studies`: surfaces, materials, and the loading path."""
 
 import math
 from collections.abc import Callable, Iterator
@@ -38,7 +38,7 @@ from icha.support.values import (
     to_number,
 )
 
-# The slope of a topography as it was measured.
+# Word for the measured slope of a topography.
 MEASURED = "measured"
 
 
@@ -48,9 +48,9 @@ def _slope(value: Any) -> float | str:
     except ValueError as error:
         if value == MEASURED:
             return value
-        raise ValueError(f"{error}; allowed: {SLOPE.expected}, or {MEASURED}") from None
+        raise ValueError(f"{error}; expected {SLOPE.expected}, or {MEASURED}") from None
     if not SLOPE.contains(slope):
-        raise ValueError(f"is out of range; allowed: {SLOPE.expected}, or {MEASURED}")
+        raise ValueError(f"is out of range; expected {SLOPE.expected}, or {MEASURED}")
     return slope
 
 
@@ -67,9 +67,9 @@ SCALAR_SCHEMA = {"type": ["string", "number", "boolean"]}
 
 
 def scalar(value: Any) -> Any:
-    """Refuse what is no single value."""
+    """Refuse lists and mappings."""
     if not isinstance(value, str | int | float):
-        raise ValueError("is no single value; allowed: a number, a text, true or false")
+        raise ValueError("is not a single value; expected a number, a text, true or false")
     return value
 
 
@@ -83,7 +83,7 @@ Values = Annotated[
 
 
 class Targets(Section):
-    """The stops of the loading path: exactly one of the three lists."""
+    """The targets of the loading path: exactly one of the three lists."""
 
     reduced_pressures: stops(ReducedPressure, increasing) | None = Field(
         default=None, description=f"Reduced pressures p/(E* h'rms), increasing, up to {MAX_REDUCED_PRESSURE}."
@@ -99,13 +99,13 @@ class Targets(Section):
 
     @property
     def states(self) -> list[tuple[str, float]]:
-        """Kind and value (SI units) of every stop."""
+        """Kind and value (SI units) of every target."""
         ((kinds, values),) = self.model_dump(exclude_none=True).items()
         return [(kinds.removesuffix("s"), value) for value in values]
 
     @property
     def last(self) -> tuple[str, float]:
-        """Kind and value (SI units) of the last stop."""
+        """Kind and value (SI units) of the last target."""
         return self.states[-1]
 
 
@@ -113,17 +113,17 @@ EVERY_STOP = "every_stop"
 
 
 def _list_or_word(value: Any, read_list: Callable[[Any], Any]) -> Any:
-    """A list of snapshots, or the word for all stops."""
+    """Read a list of snapshots, or the word for all targets."""
     if isinstance(value, str) and value != EVERY_STOP:
-        raise ValueError(f"is not a choice; allowed: a list of snapshots, or {EVERY_STOP!r}")
+        raise ValueError(f"is not a choice; expected a list of snapshots, or {EVERY_STOP!r}")
     return value if value == EVERY_STOP else read_list(value)
 
 
 class _OrEveryStop:
-    """Annotation of a list in whose place the word may stand, for the JSON schema."""
+    """Annotation for the JSON schema of a list that the word may replace."""
 
     def __get_pydantic_json_schema__(self, core_schema: Any, handler: Callable[[Any], dict]) -> dict:
-        """The schema of either."""
+        """Return the schema of list or word."""
         return {"anyOf": [handler(core_schema), {"const": EVERY_STOP}]}
 
 
@@ -147,13 +147,13 @@ class TurningPoint(Section):
 
 
 def _scalars(*sections: type[Section]) -> dict[str, str]:
-    """Names of the parameters of some kinds of sections that a study may vary, and what they mean."""
+    """Return the names and descriptions of the parameters that a study may vary."""
     found: dict[str, str] = {}
     for section in sections:
         for name, field in section.model_fields.items():
             kinds = get_args(field.annotation) or (field.annotation,)
-            whole = any(get_origin(kind) is tuple or isinstance(kind, type(Section)) for kind in kinds)
-            if name not in ("kind", "path") and not whole:
+            composite = any(get_origin(kind) is tuple or isinstance(kind, type(Section)) for kind in kinds)
+            if name not in ("kind", "path") and not composite:
                 found.setdefault(name, field.description)
     return found
 
@@ -161,23 +161,23 @@ def _scalars(*sections: type[Section]) -> dict[str, str]:
 SCALARS = _scalars(*SURFACE_KINDS.values(), MaterialSection)
 
 
-def _of_scalars(name, kind, doc, fields=None):
-    """A section with a key, of type `kind`, for every parameter that can be varied."""
+def _section_of_scalars(name, kind, doc, fields=None):
+    """Make a section with a key of type `kind` for every parameter that can be varied."""
     scalars = {key: (kind | None, Field(default=None, description=text)) for key, text in SCALARS.items()}
     return create_model(name, __base__=Section, __doc__=doc, __module__=__name__, **(fields or {}), **scalars)
 
 
-Vary = _of_scalars(
-    "Vary", Values, "Parameters of surfaces and materials that a study varies: one value each, or a list."
+Vary = _section_of_scalars(
+    "Vary", Values, "Parameters of surfaces and materials that a study varies: one value or a list each."
 )
 Scalar = Annotated[Any, AfterValidator(scalar), WithJsonSchema(SCALAR_SCHEMA)]
-Case = _of_scalars(
+Case = _section_of_scalars(
     "Case",
     Scalar,
-    "One entry of an explicit list of runs; what it does not name is taken from the lists of its study.",
+    "An entry of an explicit list of runs. Keys that it lacks take the values of the lists of its study.",
     {
         "surface": (Name | None, Field(default=None, description="Name of a surface.")),
-        "seed": (Seed | None, Field(default=None, description="Seed.")),
+        "seed": (Seed | None, Field(default=None, description="Seed of the random phases.")),
         "rms_slope": (Slope | None, Field(default=None, description="Rms slope, or `measured`.")),
         "material": (Name | None, Field(default=None, description="Name of a material.")),
     },
@@ -185,69 +185,68 @@ Case = _of_scalars(
 
 
 class Study(Section):
-    """All combinations of the surfaces, seeds, slopes and materials of the lists, along one path."""
+    """All combinations of surfaces, seeds, slopes and materials, along one loading path."""
 
     surfaces: list_of_names("Names of surfaces.") = Field(default=[], description="Names of surfaces.")
     seeds: Seeds = Field(
         default=[1],
-        description="Seeds of the random phases: a list, or a range such as `1..50`. Surfaces read from a file have "
-        "none and are used once.",
+        description="Seeds of the random phases: a list, or a range such as `1..50`. Surfaces from a file have no "
+        "seeds and are used once.",
     )
     rms_slopes: Slopes = Field(
         default=[],
-        description="Rms slopes h'rms to which each topography's heights are scaled; `measured` is the slope that a "
-        "topography read from a file has.",
+        description="Rms slopes h'rms to which the heights of each topography are scaled; `measured` is the slope of a "
+        "topography from a file.",
     )
     materials: list_of_names("Names of materials.") = Field(default=[], description="Names of materials.")
     vary: Vary | None = Field(
         default=None,
-        description="Parameters of the surfaces and materials that take other values in this study, in all "
-        "combinations.",
+        description="Other values of parameters of the surfaces and materials in this study, in all combinations.",
     )
     zip: list[Annotated[list[Text], Field(min_length=2)]] = Field(
         default=[],
-        description="Groups of lists that are combined first with first and second with second, instead of in all "
-        "combinations: `[[rms_slopes, surface_energy]]`.",
+        description="Groups of lists whose entries are combined one by one (first with first, second with second), "
+        "instead of in all combinations: `[[rms_slopes, surface_energy]]`.",
     )
     cases: Annotated[list[Case], Field(min_length=1)] | None = Field(
         default=None,
-        description="An explicit list of runs instead of all combinations. What a case does not name is taken from the "
-        "lists of the study.",
+        description="An explicit list of runs instead of all combinations. Keys that a case lacks take the values of "
+        "the lists of the study.",
     )
     models: Annotated[list[Literal[tuple(MODELS)]], Field(min_length=1), AfterValidator(distinct)] = Field(
         default=[DEFAULT_MODEL],
-        description="Contact models by which every run is computed: `asperities`, which are quick, and "
-        "`boundary_elements` in the limit of a short range of attraction, which need a periodic surface "
-        "and a grid of at least 4 cells (better 8) per shortest wavelength.",
+        description="Contact models of every run: `asperities`, which are fast, and `boundary_elements` in the limit "
+        "of a short range of attraction, which need a periodic surface and a grid of at least 4 cells (better "
+        "8) per shortest wavelength.",
     )
-    targets: Targets = Field(description="Stops of the loading path.")
+    targets: Targets = Field(description="Targets of the loading path.")
     snapshots: (
         Annotated[list[Snapshot], AfterValidator(distinct), WrapValidator(_list_or_word), _OrEveryStop()] | None
     ) = Field(
         default=None,
-        description="States whose spots and distributions are kept; each is met exactly. `every_stop`: all targets. "
-        "Left out: the last target.",
+        description="States whose spots and distributions are saved; each is reached exactly. `every_stop`: all "
+        "targets. Default: the last target.",
     )
     unload: Flag = Field(
-        default=False, description="Whether the surfaces are pulled apart again, until nothing touches any more."
+        default=False, description="Whether to unload after loading, until the surfaces no longer touch."
     )
     turning_points: list[TurningPoint] = Field(
         default=[],
-        description="States at which the path turns after its last target: the first ends unloading, the second "
-        "loading again, and so on.",
+        description="States at which the path turns after its last target: the first ends unloading, the second ends "
+        "the next loading, and so on.",
     )
     control: Literal["separation", "load"] = Field(
         default="separation",
-        description="What is imposed: the mean separation or the load. Under load control the state jumps where the "
+        description="Imposed quantity: the mean separation or the load. Under load control the state jumps where the "
         "curve turns back, and all targets and turning points must be loads.",
     )
     max_step: number(STEP) = Field(
-        default=DEFAULT_STEP, description="Longest change of mean separation between two equilibria, in units of h_rms."
+        default=DEFAULT_STEP, description="Largest change of mean separation between two equilibria, in units of h_rms."
     )
 
     @property
     def own_snapshots(self) -> list[tuple[str, float]]:
-        """Kind and value of the states that the study asks its runs to keep."""
+        """Kind and value of the states that the runs of the study save."""
         if self.snapshots is None:
             return [self.targets.last]
         if self.snapshots == EVERY_STOP:
@@ -255,7 +254,7 @@ class Study(Section):
         return [snapshot.target for snapshot in self.snapshots]
 
     def path_settings(self, snapshots: list[tuple[str, float]] | None) -> dict:
-        """Arguments of the path of the runs (`icha.Path`) but for those that are left at their defaults."""
+        """Return the arguments of the path of the runs (`icha.Path`), without unused ones."""
         settings = self.targets.model_dump(exclude_none=True) | {"snapshots": snapshots, "max_step": self.max_step}
         if self.unload or self.turning_points:
             settings |= {
@@ -268,29 +267,29 @@ class Study(Section):
         return settings
 
     def problems(self, snapshots: list[tuple[str, float]] | None) -> Iterator[Problem]:
-        """What keeps it from being run with these snapshots (`Campaign.snapshots_of`)."""
+        """Report why the study cannot be run with these snapshots (`Campaign.snapshots_of`)."""
         # The smallest slope makes the largest reduced pressure.
         slope = min((slope for slope in self.rms_slopes if slope != MEASURED), default=math.inf)
         most = MAX_REDUCED_PRESSURE * slope
-        kept = [] if self.snapshots == EVERY_STOP else self.snapshots
-        for key, states in (("snapshots", kept), ("turning_points", self.turning_points)):
+        snapshots_of_study = [] if self.snapshots == EVERY_STOP else self.snapshots
+        for key, states in (("snapshots", snapshots_of_study), ("turning_points", self.turning_points)):
             for index, state in enumerate(states or []):
                 load = state.relative_load or 0
                 if load > most:
                     reason = f"at rms slope {slope:g} is a reduced pressure of {load / slope:g}"
-                    yield (key, index, "relative_load"), load, f"{reason}; allowed: relative loads up to {most:g}"
+                    yield (key, index, "relative_load"), load, f"{reason}; expected relative loads up to {most:g}"
         if self.unload or self.turning_points or self.control != "separation":
             yield from self._path_problems(snapshots)
 
     def _path_problems(self, snapshots):
-        """What keeps the way back from being a path."""
+        """Report why the settings make no path."""
         try:
             Path(**self.path_settings(snapshots))
         except ValueError as error:
             key, _, reason = str(error).partition(": ")
             name, _, index = key.partition("[")
-            place, value = (name,), getattr(self, name)
+            location, value = (name,), getattr(self, name)
             if index:
                 kind, value = value[int(index.rstrip("]"))].target
-                place = (name, int(index.rstrip("]")), kind)
-            yield place, value, reason.removeprefix(f"{value!r} ")
+                location = (name, int(index.rstrip("]")), kind)
+            yield location, value, reason.removeprefix(f"{value!r} ")

@@ -1,4 +1,4 @@
-"""Sections `surfaces` and `materials`: what is pressed against what."""
+"""Sections `surfaces` and `materials`: rough surfaces and elastic half-spaces."""
 
 import math
 from typing import Annotated, Any, ClassVar, Literal
@@ -16,7 +16,6 @@ from icha.support.values import (
     Section,
     SurfaceEnergy,
     Text,
-    conversion_factor,
     integer,
     number,
     quantity,
@@ -25,30 +24,43 @@ from icha.support.values import (
 
 
 class MaterialSection(Section):
-    """Elastic half-space and interface."""
+    """An elastic half-space and its interface with a rough surface."""
 
     model_config = ConfigDict(title="Material")
 
     contact_modulus: Modulus = Field(description="Composite elastic modulus E*.")
     surface_energy: SurfaceEnergy = Field(description="Energy of adhesion Δγ per area; `0 J/m^2` is adhesionless.")
     interaction_range: Length = Field(
-        description="Range ε of the attraction, which sets the separation at which asperities jump into contact. It "
-        "gives a surface of rms curvature 1/R the Tabor parameter μ = (RΔγ²/E*²)^(1/3)/ε."
+        description="Range ε of the attraction, which sets the separation at which asperities jump into contact. The "
+        "Tabor parameter of a surface with rms curvature 1/R is μ = (RΔγ²/E*²)^(1/3)/ε."
     )
 
 
 def _unit_of_length(value: Any) -> float:
-    """Metres of a unit such as `um`, or of a multiple of one such as `0.1 mm`."""
-    allowed = "allowed: a unit of length, such as 'um', or a multiple of one, such as '0.1 mm'"
+    """Read a unit such as `um`, or a multiple of one such as `0.1 mm`, in metres."""
+    expected = "expected a unit of length, such as 'um', or a multiple of one, such as '0.1 mm'"
     if not isinstance(value, str):
-        raise ValueError(f"is not a unit; {allowed}")
+        raise ValueError(f"is not a unit; {expected}")
     is_multiple = value.strip()[:1] in tuple("+-.0123456789")
+    return _length(value, expected) if is_multiple else _length(f"1 {value}", expected)
+
+
+def _sides(value: Any) -> tuple[float, float]:
+    """Read the sides of a scan along x and y, m: one length, or a list of two."""
+    sides = value if isinstance(value, list | tuple) else [value, value]
+    expected = "expected one length, such as '90 um', or a list of two: along x and y"
+    if len(sides) != 2:
+        raise ValueError(f"has {len(sides)} entries; {expected}")
+    return _length(sides[0], expected), _length(sides[1], expected)
+
+
+def _length(value: Any, expected: str) -> float:
     try:
-        metres = to_si(value, "m") if is_multiple else float(conversion_factor(value, "m"))
+        metres = to_si(value, "m")
     except ValueError as error:
-        raise ValueError(f"{error}; {allowed}") from None
+        raise ValueError(f"{error}; {expected}") from None
     if not LENGTH.contains(metres):
-        raise ValueError(f"is not in {LENGTH.interval} m; {allowed}")
+        raise ValueError(f"is not in {LENGTH.interval} m; {expected}")
     return metres
 
 
@@ -56,157 +68,131 @@ UnitOfLength = Annotated[
     float, BeforeValidator(_unit_of_length), WithJsonSchema({"type": "string", "examples": ["um", "0.1 mm"]})
 ]
 Position = quantity(FloatRange("m", least=0), "20 um")
-
-
-def _sides(value: Any) -> tuple[float, float]:
-    """The sides of a scan along x and y, m: one length, or a list of two."""
-    sides = value if isinstance(value, list | tuple) else [value, value]
-    allowed = "allowed: one length, such as '90 um', or a list of two: along x and y"
-    if len(sides) != 2:
-        raise ValueError(f"has {len(sides)} entries; {allowed}")
-    try:
-        metres = tuple(to_si(side, "m") for side in sides)
-    except ValueError as error:
-        raise ValueError(f"{error}; {allowed}") from None
-    if not all(map(LENGTH.contains, metres)):
-        raise ValueError(f"is not in {LENGTH.interval} m; {allowed}")
-    return metres
-
-
 _LENGTH_SCHEMA = {"type": "string", "pattern": PATTERN, "examples": ["90 um"]}
-Sides = Annotated[
-    tuple[float, float],
-    BeforeValidator(_sides),
-    WithJsonSchema(
-        {"anyOf": [_LENGTH_SCHEMA, {"type": "array", "items": _LENGTH_SCHEMA, "minItems": 2, "maxItems": 2}]}
-    ),
-]
+_SIDES_SCHEMA = {"anyOf": [_LENGTH_SCHEMA, {"type": "array", "items": _LENGTH_SCHEMA, "minItems": 2, "maxItems": 2}]}
+Sides = Annotated[tuple[float, float], BeforeValidator(_sides), WithJsonSchema(_SIDES_SCHEMA)]
 
 
 class Crop(Section):
-    """The square that is cut out of a scan."""
+    """The square to cut out of a scan."""
 
-    x: Position = Field(description="Distance of its left edge from that of the scan.")
-    y: Position = Field(description="Distance of its first row from that of the scan.")
-    side: Length = Field(description="Its side.")
+    x: Position = Field(description="Distance of the left edge of the square from that of the scan.")
+    y: Position = Field(description="Distance of the first row of the square from that of the scan.")
+    side: Length = Field(description="Side of the square.")
 
     def __repr__(self):
-        """How messages call it."""
+        """Describe the square for messages."""
         side, x, y = map(formatting.length, (self.side, self.x, self.y))
         return f"a square of {side} at x = {x}, y = {y}"
 
 
 class MeasuredSurface(Section):
-    """A measured topography, prepared as the keys say. The mean height is always removed."""
+    """A measured topography and its preparation. The mean height is always removed."""
 
     random: ClassVar[bool] = False
-    # Nothing is known of the waves of a file.
+    # The waves of a file are not known.
     cells_per_short_wave: ClassVar[float] = math.inf
 
-    kind: Literal["measured"] = Field(description="Topography from a measurement.")
-    path: File = Field(description="File of the topography. Relative to the configuration file.")
+    kind: Literal["measured"] = Field(description="A topography from a measurement.")
+    path: File = Field(description="File of the topography, relative to the configuration file.")
     format: Literal["auto", "npy", "netcdf", "matrix", "xyz", "hdf5", "fourier", "instrument"] = Field(
         default="auto",
         description="Format of the file: `npy`; `netcdf`; `matrix` (text, a row of heights per line); `xyz` (text, x y "
         "z per line in any order); `hdf5`; `fourier` (text, qx qy Re Im per line); `instrument` (a format "
-        "of a microscope that SurfaceTopography can read). `auto` decides by the ending of the file's name "
+        "of a microscope that SurfaceTopography can read). `auto` chooses by the ending of the file name "
         "and, for text, by the number of columns.",
     )
     columns: Annotated[list[integer(IntegerRange(1))], Field(min_length=3, max_length=3)] | None = Field(
         default=None,
-        description="Which columns of a text are x, y and z, counted from 1, such as `[1, 2, 3]`. Needed if a line has "
-        "more than three numbers.",
+        description="Columns of a text with x, y and z, counted from 1, such as `[1, 2, 3]`. Needed if a line has more "
+        "than three numbers.",
     )
     data: Text | None = Field(
         default=None,
-        description="Which data to use, if the file has several: name of the variable (netcdf), path of the dataset "
-        "(hdf5), name of the channel (instrument). Left out: the only one, or the default of the file.",
+        description="Data to use if the file has several: name of the variable (netcdf), path of the dataset (hdf5), "
+        "name of the channel (instrument). Default: the only one, or the default of the file.",
     )
     first_axis: Literal["y", "x"] = Field(
         default="y",
-        description="First axis of the array in npy, netcdf, hdf5 and matrix files: `y`, so that a row is a line along "
-        "x, or `x`. Not used where the dimensions in the file are named x and y.",
+        description="First axis of the array in npy, netcdf, hdf5 and matrix files: `y` if a row is a line along x, "
+        "else `x`. Not used if the dimensions in the file are named x and y.",
     )
     height_unit: UnitOfLength | None = Field(
         default=None,
-        description="Unit of the heights, such as `nm` or `0.1 mm`. Needed unless the file has it; replaces what the "
-        "file says.",
+        description="Unit of the heights, such as `nm` or `0.1 mm`. Needed unless the file has it; replaces that of "
+        "the file.",
     )
     lateral_unit: UnitOfLength | None = Field(
         default=None,
-        description="Unit of the coordinates x and y; for fourier, of 1/q. Left out: what the file says, or the unit "
-        "of the heights.",
+        description="Unit of the coordinates x and y; for fourier, of 1/q. Default: that of the file, else the unit of "
+        "the heights.",
     )
     size: Sides | None = Field(
         default=None,
         description="Size of the whole scan: one length, or two, along x and y. The size of a pixel is this divided by "
-        "the number of pixels. Needed unless the file has it; replaces what the file says.",
+        "the number of pixels. Needed unless the file has it; replaces that of the file.",
     )
     touches_first: Literal["high", "low"] = Field(
         default="high",
-        description="Which points touch first: those with the largest numbers in the file (`high`), or with the "
+        description="Points that touch first: those with the largest numbers in the file (`high`), or with the "
         "smallest (`low`).",
     )
     missing: Literal["refuse", "fill"] = Field(
         default="refuse",
-        description="What to do with points without a height: `refuse` the file, or `fill` them by the solution of "
+        description="Treatment of points without a height: `refuse` the file, or `fill` them with the solution of "
         "Laplace's equation.",
     )
-    crop: Crop | None = Field(
-        default=None, description="The square that is used. Left out: the largest one, in the middle."
-    )
+    crop: Crop | None = Field(default=None, description="The square to use. Default: the largest one, in the middle.")
     detrend: Literal["none", "tilt", "curvature"] | None = Field(
         default=None,
-        description="What is removed besides the mean height: `none`, the mean plane (`tilt`), or the best paraboloid "
-        "(`curvature`). Left out: `tilt`, or `none` for a periodic topography.",
+        description="Trend to remove besides the mean height: `none`, the mean plane (`tilt`), or the best paraboloid "
+        "(`curvature`). Default: `tilt`, or `none` for a periodic topography.",
     )
     cutoff: Length | None = Field(
         default=None,
-        description="Cut-off wavelength: shorter waves are taken out, before the edges are treated, by a Gaussian "
-        "S-filter (ISO 25178-3, areal filter of ISO 16610-61) with this nesting index, which halves waves of this "
-        "length. At least 4 pixels. Left out: nothing is filtered.",
+        description="Cut-off wavelength: nesting index of a Gaussian S-filter (ISO 25178-3, areal filter of ISO "
+        "16610-61), which removes shorter waves before the edges are treated and halves waves of this length. At least "
+        "4 pixels. Default: no filter.",
     )
     boundary: Literal["periodic", "window", "mirror", "free"] = Field(
-        description="What lies beyond the edges: `periodic`: the topography repeats as it is; `window`: its heights "
-        "fall smoothly to their mean towards the edges, and it repeats; `mirror`: the topography and its "
-        "mirror images form a periodic cell of twice the side; `free`: nothing, that is, one square on a "
-        "half-space that extends beyond it."
+        description="Treatment of the edges. `periodic`: the topography repeats as it is. `window`: its heights fall "
+        "smoothly to their mean towards the edges, and it repeats. `mirror`: the topography and its mirror images form "
+        "a periodic cell of twice the side. `free`: one square on a half-space that extends beyond it."
     )
     taper: number(FloatRange(above=0, most=0.5)) | None = Field(
         default=None,
-        description="With `window`: the part of the side, at each edge, over which heights fall. Left out: 0.1.",
+        description="With `window`: fraction of the side, at each edge, over which heights fall. Default: 0.1.",
     )
     grid: integer(GRID) | None = Field(
         default=None,
         description="Nodes along a side of the prepared surface, which is resampled by Fourier interpolation; a "
-        "coarser grid loses the shortest waves. Left out: as many as the scan has (`mirror`: twice as "
-        "many).",
+        "coarser grid loses the shortest waves. Default: as many as the scan has (`mirror`: twice as many).",
     )
 
     @model_validator(mode="after")
-    def _keys_fit_the_boundary(self):
+    def _check_boundary(self):
         if self.boundary == "periodic" and self.detrend not in (None, "none"):
             raise ValueError(
-                f"detrend: {self.detrend!r} would break the periodicity; allowed: detrend none, or another boundary"
+                f"detrend: {self.detrend!r} would break the periodicity; expected none, or another boundary"
             )
         if self.boundary == "periodic" and self.crop is not None:
-            raise ValueError("crop: a part of a periodic topography is not periodic; allowed: another boundary")
+            raise ValueError("crop: a square of a periodic topography is not periodic; expected another boundary")
         if self.taper is not None and self.boundary != "window":
-            raise ValueError(f"taper: is for boundary window, this one is {self.boundary}; allowed: leave it out")
+            raise ValueError(f"taper: applies only to boundary window, not to {self.boundary}. Remove it")
         if self.format == "fourier" and self.boundary != "periodic":
-            raise ValueError(f"boundary: {self.boundary!r} for a Fourier series, which is periodic; allowed: periodic")
+            raise ValueError(f"boundary: {self.boundary!r} for a Fourier series; expected periodic")
         if self.format == "fourier" and self.missing == "fill":
-            raise ValueError("missing: a Fourier series has no missing points; allowed: leave it out")
+            raise ValueError("missing: a Fourier series has no missing points. Remove it")
         return self
 
     @property
     def preparation(self) -> dict:
-        """What `icha.surfaces.measured.settings.Preparation` takes: everything but kind and path, in SI units."""
+        """Arguments of `icha.surfaces.measured.settings.Preparation`: all keys but kind and path, in SI units."""
         settings = self.model_dump(exclude={"kind", "path"})
         settings["detrend"] = self.detrend or ("none" if self.boundary == "periodic" else "tilt")
         settings["taper"] = (self.taper or 0.1) if self.boundary == "window" else None
         if self.cutoff is None:
-            # Known by its absence, so that results without it stay valid.
+            # Results of earlier versions, which had no such key, stay valid.
             del settings["cutoff"]
         if self.columns is None:
             del settings["columns"]
@@ -218,17 +204,17 @@ class SelfAffineSurface(Section):
 
     random: ClassVar[bool] = True
 
-    kind: Literal["self_affine"] = Field(description="Surface made from a self-affine spectrum.")
+    kind: Literal["self_affine"] = Field(description="A random surface with a self-affine spectrum.")
     period: Length = Field(description="Side L of the periodic cell.")
     rolloff_wavelength: Length = Field(
         description="Roll-off wavelength 2π/q0: the spectrum is flat at longer wavelengths. At most the period."
     )
     short_wavelength: Length = Field(
-        description="Short cut-off 2π/q1: there are no shorter waves. Less than the roll-off wavelength; at least 2 "
-        "grid cells (an error below), better 4 (a warning below) or 8."
+        description="Short cut-off 2π/q1: the shortest wavelength. Less than the roll-off wavelength; at least 2 grid "
+        "cells (fewer are an error), better 4 (fewer give a warning) or 8."
     )
     hurst: number(HURST) = Field(description="Hurst exponent H, in (0, 1].")
-    grid: integer(GRID) = Field(description="Grid points along a side.")
+    grid: integer(GRID) = Field(description="Grid points along a side of the cell.")
     amplitudes: Literal["fixed", "gaussian"] = Field(
         default="fixed",
         description="Amplitudes of the waves: `fixed` by the spectrum, so that all seeds have the same rms height and "
@@ -246,53 +232,48 @@ class SelfAffineSurface(Section):
         return self.grid * self.short_wavelength / self.period
 
     def grid_of_cells(self, cells: int) -> int:
-        """The least grid with so many cells per shortest wavelength."""
+        """Return the smallest grid with a number of cells per shortest wavelength."""
         return math.ceil(cells * self.period / self.short_wavelength * (1 - ROUNDING))
 
     @field_validator("rolloff_wavelength", "short_wavelength", "grid")
     @classmethod
-    def _waves_fit_into_one_another(cls, value, info):
-        """Order of the wave vectors qL <= q0 < q1, and a grid that holds them."""
+    def _check_wavelengths(cls, value, info):
+        """Check the order of the wave vectors qL <= q0 < q1, and that the grid resolves them."""
         period, rolloff, short = map(info.data.get, ("period", "rolloff_wavelength", "short_wavelength"))
         if info.field_name == "rolloff_wavelength":
             if period is not None and value > period * (1 + ROUNDING):
-                raise ValueError(f"is longer than the period (q0 < qL); allowed: at most {period:g} m")
+                raise ValueError(f"is longer than the period (q0 < qL); expected at most {period:g} m")
         elif info.field_name == "short_wavelength":
             if rolloff is not None and value >= rolloff * (1 - ROUNDING):
                 reason = "is not shorter than the roll-off wavelength (q1 <= q0)"
-                raise ValueError(f"{reason}; allowed: less than {rolloff:g} m")
+                raise ValueError(f"{reason}; expected less than {rolloff:g} m")
         elif None not in (period, short) and value * short / period < 2 * (1 - ROUNDING):
             least = math.ceil(2 * period / short * (1 - ROUNDING))
             raise ValueError(
                 f"gives {value * short / period:.3g} grid cells per shortest wavelength, but at least 2 are needed; "
-                f"allowed: at least {least}, advisable: {2 * least} or more"
+                f"expected at least {least}, better {2 * least} or more"
             )
         return value
 
 
 class FileSurface(Section):
-    """A periodic height map from a file, for example a surface that others have published."""
+    """A periodic height map from a file, for example a published surface."""
 
     random: ClassVar[bool] = False
-    # Nothing is known of the waves of a file.
+    # The waves of a file are not known.
     cells_per_short_wave: ClassVar[float] = math.inf
 
-    kind: Literal["file"] = Field(description="Surface read from a file.")
+    kind: Literal["file"] = Field(description="A height map from a file.")
     path: File = Field(
         description="File of a square array of heights, first axis y: `.npy`, or netCDF (`.nc`) with a "
-        "variable `height`. Relative to the configuration file. Heights point towards the elastic body."
+        "variable `height`; relative to the configuration file. Heights are positive towards the elastic body."
     )
     height_unit: UnitOfLength = Field(
         description="Unit of the heights in the file, such as `um`. All studies scale the heights to their rms slopes."
     )
     period: Length = Field(description="Side L of the periodic cell.")
 
-    @property
-    def metres_per_unit(self) -> float:
-        """The unit of the heights, in m."""
-        return self.height_unit
 
-
-# By the value of their key `kind`.
+# Models of surfaces by their key `kind`.
 SURFACE_KINDS = {"self_affine": SelfAffineSurface, "file": FileSurface, "measured": MeasuredSurface}
 AnySurface = Annotated[SelfAffineSurface | FileSurface | MeasuredSurface, Field(discriminator="kind")]

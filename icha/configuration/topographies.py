@@ -1,4 +1,4 @@
-"""Topographies from files: their facts, for a campaign that presses them, and themselves, for scripts."""
+"""Topographies from files: their facts, for a campaign, and `icha.read_scan`, for scripts."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from pydantic import ValidationError
 
 from icha.configuration.campaign import Campaign, Topography
-from icha.configuration.errors import ConfigurationError, line, problem_of
+from icha.configuration.errors import ConfigurationError, format_problem, problem_of
 from icha.configuration.studies import MEASURED
 from icha.configuration.surfaces import FileSurface, MeasuredSurface
 from icha.support.checksums import sha256_of
@@ -25,27 +25,27 @@ if TYPE_CHECKING:
 
 
 def inspect_topographies(campaign: Campaign) -> tuple[dict[str, Topography], list[Problem]]:
-    """Facts of every topography that is pressed and comes from a file; what is wrong with these files."""
+    """Return facts of every topography from a file that a study uses, and the problems with these files."""
     contacts = [each for study in campaign.studies for each in campaign.contacts(study)]
-    asking = {each.surface for each in contacts if each.rms_slope == MEASURED}
-    adhering = {each.surface for each in contacts if campaign.materials[each.material].surface_energy > 0}
-    found, wrong = {}, []
+    of_measured_slope = {each.surface for each in contacts if each.rms_slope == MEASURED}
+    adhesive = {each.surface for each in contacts if campaign.materials[each.material].surface_energy > 0}
+    facts, problems = {}, []
     for name in dict.fromkeys(each.surface for each in contacts):
         surface = campaign.surfaces[name]
         if surface.random:
             continue
         try:
             if isinstance(surface, MeasuredSurface):
-                found[name] = inspect_scan(surface, with_slope=name in asking)
+                facts[name] = inspect_scan(surface, with_slope=name in of_measured_slope)
             else:
-                found[name] = _mapped(surface, with_slope=name in asking, with_energy=name in adhering)
+                facts[name] = _inspect_map(surface, with_slope=name in of_measured_slope, with_energy=name in adhesive)
         except (ValueError, MemoryError) as error:
             key, origin = getattr(error, "key", "path"), campaign.origin("surfaces", name)
             variant = "" if origin == name else f"of variant {name!r}: "
             if isinstance(error, MemoryError):
-                error = f"does not fit into the memory of this machine ({error}); allowed: a smaller topography"
-            wrong.append((("surfaces", origin, key), getattr(surface, key, NOTHING), f"{variant}{error}"))
-    return found, wrong
+                error = f"does not fit into the memory of this machine ({error}); expected a smaller topography"
+            problems.append((("surfaces", origin, key), getattr(surface, key, NOTHING), f"{variant}{error}"))
+    return facts, problems
 
 
 def inspect_scan(surface: MeasuredSurface, *, with_slope: bool = True) -> Topography:
@@ -63,21 +63,21 @@ def inspect_scan(surface: MeasuredSurface, *, with_slope: bool = True) -> Topogr
 def _facts(path: str, version: tuple[int, int] | None, preparation: str) -> Topography:
     """Facts of a prepared topography, which are kept until the file has another version (time and size)."""
     # Slow to import, and not needed for every campaign.
-    from icha.surfaces.measured.topography import prepared_topography
+    from icha.surfaces.measured.topography import prepare_topography
 
-    prepared = prepared_topography(path, json.loads(preparation))
+    prepared = prepare_topography(path, json.loads(preparation))
     surface = prepared.surface
     energy = surface.full_contact_energy / surface.rms_slope**2
     return Topography(surface.grid, surface.period, _rounded(surface.rms_slope), prepared.source_sha256, energy)
 
 
-def _mapped(surface: FileSurface, *, with_slope: bool, with_energy: bool) -> Topography:
+def _inspect_map(surface: FileSurface, *, with_slope: bool, with_energy: bool) -> Topography:
     from icha.surfaces.measured.array_files import read_height_map
 
-    heights = read_height_map(surface.path, surface.metres_per_unit)
+    heights = read_height_map(surface.path, surface.height_unit)
     slope, energy = None, math.nan
     if with_slope or with_energy:
-        # Imports SciPy's transforms, for which no other call should wait.
+        # Imports SciPy's transforms, which other calls do not need.
         from icha.surfaces.surface import Surface
 
         topography = Surface(heights, surface.period)
@@ -87,7 +87,7 @@ def _mapped(surface: FileSurface, *, with_slope: bool, with_energy: bool) -> Top
 
 
 def _rounded(slope: float) -> float:
-    """Six digits, which name files and are more than any instrument has."""
+    """Round to six digits, which are part of file names and more than any instrument has."""
     return float(f"{slope:.6g}")
 
 
@@ -97,10 +97,10 @@ def read_scan(path: str | os.PathLike, *, confirmed: Collection[str] = (), **key
     Parameters
     ----------
     path : file of the topography.
-    confirmed : names of keywords whose values are meant though they are unusual; "height_unit" also confirms the slope.
-    keywords : keys of a measured surface in a configuration, with values as they are written there, such as
-        `size="32 um"`, `height_unit="nm"` and `boundary="window"`. `boundary` is needed; `size` and `height_unit` are
-        needed unless the file has them.
+    confirmed : names of keywords with unusual values that are intended; "height_unit" also confirms the slope.
+    keywords : keys of a measured surface in a configuration, with values in the same form, such as `size="32 um"`,
+        `height_unit="nm"` and `boundary="window"`. `boundary` is needed; `size` and `height_unit` are needed unless the
+        file has them.
 
     Raises
     ------
@@ -111,7 +111,7 @@ def read_scan(path: str | os.PathLike, *, confirmed: Collection[str] = (), **key
     section = {"kind": "measured", "path": os.fspath(path), **keywords}
     from icha.configuration.plausibility import unusual_topography, unusual_values
     from icha.surfaces.measured.settings import UnfitTopography
-    from icha.surfaces.measured.topography import prepared_topography
+    from icha.surfaces.measured.topography import prepare_topography
     from icha.surfaces.surface import MISFIT_OF_EDGES, EdgeWarning, edges_fit
 
     try:
@@ -122,15 +122,15 @@ def read_scan(path: str | os.PathLike, *, confirmed: Collection[str] = (), **key
             problem_of({**details, "loc": ("surfaces", "scan", *details["loc"])}, content)
             for details in error.errors(include_url=False)
         ]
-        lines = [line("read_scan", location[2:], value, reason) for location, value, reason in problems]
+        lines = [format_problem("read_scan", location[2:], value, reason) for location, value, reason in problems]
         raise ConfigurationError("\n".join(lines)) from None
     _refuse_unusual(unusual_values({"surfaces": {"scan": section}}), confirmed)
     try:
-        surface = prepared_topography(path, measured.preparation).surface
+        surface = prepare_topography(path, measured.preparation).surface
     except UnfitTopography as error:
         value = section.get(error.key)
         raise ConfigurationError(
-            line("read_scan", (error.key,), NOTHING if value is None else value, str(error))
+            format_problem("read_scan", (error.key,), NOTHING if value is None else value, str(error))
         ) from None
     _refuse_unusual(unusual_topography(("surfaces", "scan"), measured, surface.period, surface.rms_slope), confirmed)
     if not surface.free and not edges_fit(surface.heights):
@@ -140,9 +140,9 @@ def read_scan(path: str | os.PathLike, *, confirmed: Collection[str] = (), **key
 
 def _refuse_unusual(found, confirmed):
     """Raise ConfigurationError if unusual values of a scan are not confirmed."""
-    reason = "is unusual{}; usual: {}; allowed: another value, or, if it is meant, this one with `confirmed=[{!r}]`"
+    reason = "is unusual{}; expected {}. Correct it, or add `confirmed=[{!r}]` if it is intended"
     lines = [
-        line("read_scan", (key,), each.value, reason.format(each.how, each.usual, key))
+        format_problem("read_scan", (key,), each.value, reason.format(each.source, each.usual, key))
         for each in found
         if (key := each.location[2]) not in confirmed
     ]

@@ -26,7 +26,7 @@ _OF = "of.txt"
 
 @dataclass(frozen=True, eq=False)
 class CheckpointedContact(Generic[S]):
-    """Contact model that solves for an equilibrium only if there is no checkpoint of it.
+    """Contact model that solves for an equilibrium only without a checkpoint of it.
 
     Attributes
     ----------

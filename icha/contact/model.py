@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 import numpy as np
 
 if TYPE_CHECKING:
+    from icha.contact.models import PathAccuracy
     from icha.surfaces.summits import Asperities
     from icha.surfaces.surface import Surface
 
@@ -93,7 +94,7 @@ class ContactModel(Protocol[S]):
 
     @property
     def adhesive(self) -> bool:
-        """Whether contact forms and breaks in jumps."""
+        """True if contact forms and breaks in jumps."""
 
     @property
     def contact_modulus(self) -> float:
@@ -114,6 +115,10 @@ class ContactModel(Protocol[S]):
     @property
     def largest_area_fraction(self) -> float:
         """Contact area over nominal area above which the model is not valid."""
+
+    @property
+    def path_accuracy(self) -> PathAccuracy:
+        """Accuracy to which a path resolves its events."""
 
     def untouched(self) -> S:
         """State in which contact is about to form first."""
@@ -157,7 +162,7 @@ class ContactModel(Protocol[S]):
         """Elastic energy less that of adhesion over nominal area, J/m^2; zero out of contact."""
 
     def is_unstable(self, state: S) -> bool:
-        """Whether a spot would approach as the surfaces part, which happens on an unstable branch only."""
+        """True if a spot would approach as the surfaces part, which happens on an unstable branch only."""
 
     def events_between(self, before: S, after: S) -> Events:
         """The events on the path from one state to a later one."""

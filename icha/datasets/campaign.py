@@ -156,7 +156,7 @@ def find_snapshot(run: xr.Dataset, kind: str | None = None, target: float | None
     Raises
     ------
     ValueError
-        If there is none; the message lists the run's snapshots.
+        If the run has no such snapshot; the message lists those that it has.
     """
     snapshots = list(zip(run["snapshot_kind"].values.astype(str), run["snapshot_target"].values, strict=True))
     for k, (found, value) in enumerate(snapshots):

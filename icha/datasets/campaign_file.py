@@ -1,8 +1,8 @@
-"""The campaign dataset, written run by run: memory does not grow with the runs, but for a few numbers of each.
+"""The campaign dataset, written run by run: memory grows with the runs only by a few numbers of each.
 
-The runs are taken one after the other. What is needed of all before the first can be written (how many steps and spots
-there are, which snapshots, how long the texts) is noted; their values go to a temporary file, from which they are taken
-in the order of the dataset, a block of neighbouring runs at a time.
+The runs are read one after the other. Facts that are needed of all runs before the first can be written (numbers of
+steps and spots, snapshots, widths of texts) are noted; their values go to a temporary file, from which they are read in
+the order of the dataset, one block of neighbouring runs at a time.
 """
 
 import itertools
@@ -35,7 +35,7 @@ from icha.datasets.variables.campaign import CAMPAIGN, RAGGED, index_variable
 from icha.datasets.variables.run import FURTHER
 from icha.support.atomic_files import whole_file
 
-# A block holds at most so many runs, and of each variable so many values: some megabytes of all together.
+# Largest number of runs in a block, and of values of each variable: a block takes some megabytes.
 _RUNS_IN_BLOCK = 256
 VALUES_IN_BLOCK = 2**18
 _VALUES_IN_CHUNK = 2**16
@@ -47,7 +47,7 @@ _LAYOUT = (
 )
 _OWN_SLOPES = {"comment": "each surface has slopes of its own, along the dimension rms_slope in ascending order"}
 _STUDIES = "The runs of every study, a group for each."
-# Who opens the root of the file alone sees nothing else.
+# Attribute of the root of the file, which has no variables.
 _ACCESS = (
     "The data are in the groups, one for each study: {0}. With Python's xarray: "
     "xarray.open_datatree(FILE)['{1}'].to_dataset(), or xarray.open_dataset(FILE, group='{1}')"
@@ -263,28 +263,23 @@ def write_campaign(
 ) -> None:
     """Write all runs of a campaign to one netCDF-4 file: a group per study, full arrays along the labels of the runs.
 
-    The groups have the dimensions model, surface, seed, rms_slope and material, and those of the run dataset but for
-    those of the maps of boundary elements, which stay in the files of the runs. A run has `step_count` steps; beyond
-    them, along `step`, numbers are missing and texts empty. Spots and events of all runs stand one after the other
-    along `spot` and `event`; `spot_model`, `spot_surface`, `spot_seed`, `spot_rms_slope` and `spot_material`,
-    `event_model` and so on, and `spot_snapshot`, are positions along these dimensions, from 0. `status(model, surface,
-    seed, rms_slope, material)` says of every combination whether its run is complete, incomplete,
-    missing, not in the design or no result because its checks failed; `failure` says why it is incomplete or which
-    checks failed, `applicability` why its model is not applicable. What is not known of an incomplete run, and
-    everything of those that are not there, is missing; so is what only runs of another model have.
+    The groups have the dimensions model, surface, seed, rms_slope and material, and those of the run dataset; the maps
+    of boundary elements stay in the files of the runs. Beyond the `step_count` steps of a run, numbers are missing and
+    texts empty. Spots and events of all runs stand one after the other along `spot` and `event`; `spot_snapshot`,
+    `spot_model`, `event_model` and so on are positions along these dimensions, from 0. For every combination of labels,
+    `status` is complete, incomplete, missing, not in the design or failed checks; `failure` is why a run is incomplete
+    or which checks failed, `applicability` why its model is not applicable. Values that an incomplete run, a missing
+    run or a run of another model does not have are missing.
 
     Parameters
     ----------
-    runs : pairs of labels (study, model, surface, seed, rms_slope, material) and run dataset, or its file. Studies,
-        models, surfaces and materials keep the order in which they first come in the design, seeds and slopes are
-        sorted. A run that failed has the reason in its attribute `incomplete`; one that did not converge or lacks
-        snapshots that others
-        of its study have is incomplete, too.
+    runs : pairs of labels (study, model, surface, seed, rms_slope, material) and run dataset, or its file. Names keep
+        the order in which they appear in the design, seeds and slopes are sorted. A run is incomplete if it has an
+        attribute `incomplete`, with the reason, if it did not converge, or if it lacks snapshots of its study.
     path : the file, which appears whole or not at all. The same runs give the same bytes.
-    design : labels of the runs that were asked for; those given, if left out. Other combinations of their labels are
-        not in the design.
-    settings : checksums of the settings that runs are to have been computed with (their attribute `config_sha256`), by
-        their labels.
+    design : labels of the runs of the campaign; those of `runs` if left out. Other combinations of their labels are not
+        in the design.
+    settings : expected checksums of the settings of runs (their attribute `config_sha256`), by their labels.
     attrs : global attributes of the file (title, summary, campaign, license, …).
 
     Raises

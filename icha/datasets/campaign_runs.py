@@ -78,7 +78,7 @@ def _read(file: h5py.File, name: str) -> np.ndarray:
 
 
 class Entry(NamedTuple):
-    """What is kept in memory of one run.
+    """Facts of one run that stay in memory.
 
     Attributes
     ----------
@@ -132,7 +132,7 @@ def spool_runs(
     ------
     ValueError
         Naming the run: if it is given twice, has other labels than its dataset, was computed with other settings than
-        it should, or holds a value that is not finite; if there is none.
+        it should, or holds a value that is not finite; if no run is given.
     """
     studies: dict[str, Members] = {}
     # Most runs have the same variables, sizes and snapshots, which are then kept once.
@@ -240,7 +240,7 @@ class Arrangement:
     snapshots : position of every snapshot, by kind and target.
     entries : the computed runs, in the order of the axes.
     positions : (n, 5) int, positions of the entries along the labels.
-    failures : why each entry is no result; an empty text if it is one.
+    failures : why each entry is not a result; an empty text if it is one.
     status, step_count : int arrays along `LABELS`.
     """
 

@@ -113,7 +113,7 @@ def read_dataset(path: str | os.PathLike) -> xr.Dataset:
     Raises
     ------
     ValueError
-        If there is no such file or it cannot be read.
+        If the file does not exist or cannot be read.
     """
     with readable(path):
         return xr.load_dataset(path, engine="netcdf4")

@@ -19,14 +19,14 @@ from icha.datasets.labels import LABELS
 from icha.support.input_files import bounded_memory, most_memory, problem_with_path, refuse_traps, require_room
 
 RUN, SURFACE, CAMPAIGN = "run dataset", "surface file", "campaign dataset"
-SOLUTION = "solution by boundary elements at a finite range"
+SOLUTION = "boundary-element solution at a finite range"
 # Kinds whose format is not promised, with a variable that no other kind has.
 _OTHERS = {
     "comparison of runs at common loads": "seed_count",
     "error of the model": "area_error",
     "theories and published points": "bush_gibson_thomas_area_fraction",
     SOLUTION: "target_reduced_pressure",
-    "boundary elements both ways at a finite range": "dissipated",
+    "boundary-element loop at a finite range": "dissipated",
 }
 
 # Largest relative difference by rounding between values that must be equal.
@@ -124,7 +124,7 @@ def identify_file(path: str | os.PathLike) -> tuple[str, xr.Dataset | xr.DataTre
 
 
 def problems_with_file(kind: str, data: xr.Dataset | xr.DataTree) -> list[str]:
-    """List the differences between a file and its documented format, one line each; empty if there are none.
+    """List the differences between a file and its documented format, one line each; empty if it keeps to it.
 
     Parameters
     ----------
@@ -149,7 +149,7 @@ def _problems_with_run(run: xr.Dataset) -> Iterator[str]:
     by_cells = model in MODELS and MODELS[model].by_cells
     conditions = {
         "snapshots": snapshots > 0,
-        "a way back to separation": "hysteresis_loss" in run,
+        "unloading to separation": "hysteresis_loss" in run,
         "boundary elements": by_cells,
         "snapshots of boundary elements": by_cells and snapshots > 0,
     }

@@ -12,7 +12,7 @@ from packaging.licenses import InvalidLicenseExpression, canonicalize_license_ex
 from icha.configuration.campaign import Campaign
 from icha.configuration.publication import Author, Funding, Publication, RelatedIdentifier
 from icha.contact.models import MODEL_PAPER
-from icha.deposit.verify import ZENODO, read_text
+from icha.deposit.verify import SOURCE, ZENODO, read_text
 
 _FOLDER = Path(__file__).parent
 TABLES = yaml.safe_load((_FOLDER / "tables.yaml").read_text(encoding="utf-8"))
@@ -34,17 +34,17 @@ class Licence(NamedTuple):
     address: str
     text: str
 
-    def page(self, source: str) -> str:
-        """Write LICENSE.txt of a deposit whose data have this licence; `source` is the folder of the program."""
+    def page(self) -> str:
+        """Write LICENSE.txt of a deposit whose data have this licence."""
         name = self.identifier if self.name == self.identifier else f"{self.name} ({self.identifier})"
         statement = (
             f"Data, figures and texts of this deposit: {name}\n{self.address}\n\n"
-            f"The program in {source}/ has a licence of its own: {source}/LICENSE\n"
+            f"The program in {SOURCE}/ has a licence of its own: {SOURCE}/LICENSE\n"
         )
         return f"{statement}\n{'-' * 72}\n\n{self.text}" if self.text else statement
 
 
-def known_licence(identifier: str) -> Licence:
+def find_licence(identifier: str) -> Licence:
     """Return the licence with an SPDX identifier.
 
     Raises
@@ -71,9 +71,9 @@ def known_licence(identifier: str) -> Licence:
 
 def licence_problem(campaign: Campaign) -> tuple[str, str] | None:
     """Return key and text of a problem with the licence of a campaign's data; None if a deposit can have it."""
-    licence = campaign.published().license
+    licence = campaign.deposit_metadata().license
     try:
-        known_licence(licence)
+        find_licence(licence)
     except ValueError as error:
         return "publication.license" if campaign.publication.license else "license", f"{licence!r} {error}"
     return None
@@ -117,10 +117,17 @@ def citation_cff(publication: Publication, revision: str) -> str:
 
     Parameters
     ----------
-    publication : complete metadata (`icha.configuration.publication.needed`).
+    publication : complete metadata (`icha.configuration.publication.missing_metadata`).
     revision : that of the program that made the data.
     """
-    licence = known_licence(publication.license)
+    licence = find_licence(publication.license)
+    paper = {
+        "type": "article",
+        "title": MODEL_PAPER.title,
+        "authors": [{"family-names": family, "given-names": given} for given, family in MODEL_PAPER.authors],
+        "year": MODEL_PAPER.year,
+        "url": MODEL_PAPER.address,
+    }
     content = {
         "cff-version": "1.2.0",
         "message": "If you use these data, please cite them as below, and the paper of their model (in references).",
@@ -136,24 +143,16 @@ def citation_cff(publication: Publication, revision: str) -> str:
         "commit": revision,
         "doi": publication.doi,
         "keywords": publication.keywords,
-        "references": [
-            {
-                "type": "article",
-                "title": MODEL_PAPER.title,
-                "authors": [{"family-names": family, "given-names": given} for given, family in MODEL_PAPER.authors],
-                "year": MODEL_PAPER.year,
-                "url": MODEL_PAPER.address,
-            }
-        ],
+        "references": [paper],
     }
-    return yaml.safe_dump(_given(content), sort_keys=False, allow_unicode=True, width=100)
+    return yaml.safe_dump(_without_empty(content), sort_keys=False, allow_unicode=True, width=100)
 
 
-def _cff_author(author: Author) -> dict[str, str]:
+def _cff_author(author: Author) -> dict[str, str | None]:
     if not author.is_person:
-        return _given({"name": author.name, "website": author.ror})
+        return {"name": author.name, "website": author.ror}
     names = {"family-names": author.family_names, "given-names": author.given_names}
-    return _given(names | {"orcid": author.orcid_address, "affiliation": author.affiliation})
+    return names | {"orcid": author.orcid_address, "affiliation": author.affiliation}
 
 
 def zenodo_metadata(publication: Publication) -> dict[str, Any]:
@@ -164,42 +163,42 @@ def zenodo_metadata(publication: Publication) -> dict[str, Any]:
     """
     notes = [f"{acknowledgement(funding)}." for funding in publication.funding]
     notes += [f"Published with a failed check: {each.run}. {each.reason}" for each in publication.known_failures]
-    return _given(
+    creators = [
+        {"name": author.sorted_name, "affiliation": author.affiliation, "orcid": author.orcid}
+        for author in publication.authors
+    ]
+    related = [
         {
-            "upload_type": "dataset",
-            "title": publication.title,
-            "description": _html(paragraphs(publication.summary)),
-            "publication_date": publication.date,
-            "version": publication.version,
-            "creators": [
-                _given({"name": author.sorted_name, "affiliation": author.affiliation, "orcid": author.orcid})
-                for author in publication.authors
-            ],
-            "access_right": "open",
-            "license": known_licence(publication.license).identifier.lower(),
-            "language": "eng",
-            "doi": publication.doi,
-            "keywords": publication.keywords,
-            "related_identifiers": [
-                _given(
-                    {
-                        "identifier": related.identifier,
-                        "relation": related.relation[0].lower() + related.relation[1:],
-                        "resource_type": related.resource and TABLES["zenodo_types"][related.resource],
-                    }
-                )
-                for related in publication.related_identifiers
-            ],
-            "references": [MODEL_PAPER.line],
-            "grants": [
-                {"id": f"{funding.funder_id}::{funding.award_number}"}
-                for funding in publication.funding
-                if funding.funder_id in TABLES["zenodo_funders"] and funding.award_number
-            ],
-            "communities": [{"identifier": community} for community in publication.communities],
-            "notes": _html(notes),
+            "identifier": each.identifier,
+            "relation": each.relation[0].lower() + each.relation[1:],
+            "resource_type": each.resource and TABLES["zenodo_types"][each.resource],
         }
-    )
+        for each in publication.related_identifiers
+    ]
+    grants = [
+        {"id": f"{funding.funder_id}::{funding.award_number}"}
+        for funding in publication.funding
+        if funding.funder_id in TABLES["zenodo_funders"] and funding.award_number
+    ]
+    content = {
+        "upload_type": "dataset",
+        "title": publication.title,
+        "description": _html(paragraphs(publication.summary)),
+        "publication_date": publication.date,
+        "version": publication.version,
+        "creators": creators,
+        "access_right": "open",
+        "license": find_licence(publication.license).identifier.lower(),
+        "language": "eng",
+        "doi": publication.doi,
+        "keywords": publication.keywords,
+        "related_identifiers": related,
+        "references": [MODEL_PAPER.line],
+        "grants": grants,
+        "communities": [{"identifier": community} for community in publication.communities],
+        "notes": _html(notes),
+    }
+    return _without_empty(content)
 
 
 def read_zenodo_metadata(folder: Path) -> dict[str, Any]:
@@ -230,46 +229,42 @@ def datacite_metadata(publication: Publication) -> dict[str, Any]:
 
     Without a DOI the publisher is unknown, and `:tba`, DataCite's word for values that will be known later.
     """
-    licence = known_licence(publication.license)
+    licence = find_licence(publication.license)
     paper = RelatedIdentifier(identifier=f"arXiv:{MODEL_PAPER.arxiv}", relation="Cites", resource="Preprint")
-    published = publication.doi is not None and publication.doi.startswith(_ZENODO_DOI)
-    return _given(
+    rights = {
+        "rights": licence.name,
+        "rightsUri": licence.address,
+        "rightsIdentifier": licence.identifier,
+        "rightsIdentifierScheme": "SPDX",
+        "schemeUri": "https://spdx.org/licenses/",
+    }
+    related = [
         {
-            "schemaVersion": "http://datacite.org/schema/kernel-4",
-            "doi": publication.doi,
-            "types": {"resourceTypeGeneral": "Dataset", "resourceType": "Simulation results"},
-            "creators": [_datacite_creator(author) for author in publication.authors],
-            "titles": [{"title": publication.title}],
-            "publisher": {"name": "Zenodo" if published else ":tba"},
-            "publicationYear": publication.date[:4],
-            "dates": [{"date": publication.date, "dateType": "Issued"}],
-            "version": publication.version,
-            "language": "en",
-            "descriptions": [{"description": publication.summary, "descriptionType": "Abstract"}],
-            "subjects": [{"subject": keyword} for keyword in publication.keywords],
-            "rightsList": [
-                {
-                    "rights": licence.name,
-                    "rightsUri": licence.address,
-                    "rightsIdentifier": licence.identifier,
-                    "rightsIdentifierScheme": "SPDX",
-                    "schemeUri": "https://spdx.org/licenses/",
-                }
-            ],
-            "relatedIdentifiers": [
-                _given(
-                    {
-                        "relatedIdentifier": related.identifier,
-                        "relatedIdentifierType": _datacite_type(related.identifier),
-                        "relationType": related.relation,
-                        "resourceTypeGeneral": related.resource,
-                    }
-                )
-                for related in (*publication.related_identifiers, paper)
-            ],
-            "fundingReferences": [_datacite_funding(funding) for funding in publication.funding],
+            "relatedIdentifier": each.identifier,
+            "relatedIdentifierType": _datacite_type(each.identifier),
+            "relationType": each.relation,
+            "resourceTypeGeneral": each.resource,
         }
-    )
+        for each in (*publication.related_identifiers, paper)
+    ]
+    content = {
+        "schemaVersion": "http://datacite.org/schema/kernel-4",
+        "doi": publication.doi,
+        "types": {"resourceTypeGeneral": "Dataset", "resourceType": "Simulation results"},
+        "creators": [_datacite_creator(author) for author in publication.authors],
+        "titles": [{"title": publication.title}],
+        "publisher": {"name": "Zenodo" if (publication.doi or "").startswith(_ZENODO_DOI) else ":tba"},
+        "publicationYear": publication.date[:4],
+        "dates": [{"date": publication.date, "dateType": "Issued"}],
+        "version": publication.version,
+        "language": "en",
+        "descriptions": [{"description": publication.summary, "descriptionType": "Abstract"}],
+        "subjects": [{"subject": keyword} for keyword in publication.keywords],
+        "rightsList": [rights],
+        "relatedIdentifiers": related,
+        "fundingReferences": [_datacite_funding(funding) for funding in publication.funding],
+    }
+    return _without_empty(content)
 
 
 def _datacite_creator(author: Author) -> dict[str, Any]:
@@ -278,17 +273,14 @@ def _datacite_creator(author: Author) -> dict[str, Any]:
     affiliation = {"name": author.affiliation}
     if author.ror:
         affiliation |= {"affiliationIdentifier": author.ror, "affiliationIdentifierScheme": "ROR", "schemeUri": _ROR}
-    identifiers = [orcid] if author.orcid else [organisation] if author.ror and not author.is_person else []
-    return _given(
-        {
-            "name": author.sorted_name,
-            "nameType": "Personal" if author.is_person else "Organizational",
-            "givenName": author.given_names,
-            "familyName": author.family_names,
-            "nameIdentifiers": identifiers,
-            "affiliation": [affiliation] if author.affiliation else [],
-        }
-    )
+    return {
+        "name": author.sorted_name,
+        "nameType": "Personal" if author.is_person else "Organizational",
+        "givenName": author.given_names,
+        "familyName": author.family_names,
+        "nameIdentifiers": [orcid] if author.orcid else [organisation] if author.ror and not author.is_person else [],
+        "affiliation": [affiliation] if author.affiliation else [],
+    }
 
 
 def _datacite_type(identifier: str) -> str:
@@ -296,18 +288,16 @@ def _datacite_type(identifier: str) -> str:
 
 
 def _datacite_funding(funding: Funding) -> dict[str, Any]:
-    registries = {None: None, _ROR: "ROR", _FUNDER_REGISTRY: "Crossref Funder ID"}
-    start = funding.funder_id and next((each for each in (_ROR, _FUNDER_REGISTRY) if each in funding.funder_id), "")
-    return _given(
-        {
-            "funderName": funding.funder,
-            "funderIdentifier": funding.funder_id and web_address(funding.funder_id),
-            "funderIdentifierType": registries.get(start, "Other"),
-            "awardNumber": funding.award_number,
-            "awardTitle": funding.award_title,
-            "awardUri": funding.award_url and web_address(funding.award_url),
-        }
-    )
+    registries = {_ROR: "ROR", _FUNDER_REGISTRY: "Crossref Funder ID"}
+    known = [name for start, name in registries.items() if start in (funding.funder_id or "")]
+    return {
+        "funderName": funding.funder,
+        "funderIdentifier": funding.funder_id and web_address(funding.funder_id),
+        "funderIdentifierType": funding.funder_id and (*known, "Other")[0],
+        "awardNumber": funding.award_number,
+        "awardTitle": funding.award_title,
+        "awardUri": funding.award_url and web_address(funding.award_url),
+    }
 
 
 def paragraphs(text: str) -> list[str]:
@@ -320,6 +310,9 @@ def _html(texts: list[str]) -> str:
     return "".join(f"<p>{escape(text, quote=False)}</p>" for text in texts)
 
 
-def _given(content: dict[str, Any]) -> dict[str, Any]:
-    """Remove empty entries."""
-    return {key: value for key, value in content.items() if value not in (None, [], "")}
+def _without_empty(content: Any) -> Any:
+    """Remove empty entries of mappings, at all depths."""
+    if isinstance(content, dict):
+        pruned = {key: _without_empty(value) for key, value in content.items()}
+        return {key: value for key, value in pruned.items() if value not in (None, [], "")}
+    return [_without_empty(each) for each in content] if isinstance(content, list) else content

@@ -165,7 +165,7 @@ class Zenodo:
         return Draft(number, page, bucket.removeprefix(self.address).rstrip("/"), doi, files)
 
     def _call(self, method: str, path: str, **content) -> dict:
-        """Send a request; return its JSON, or {} where there is none."""
+        """Send a request; return its JSON, or {} if the answer is empty."""
         try:
             answer = self._session.request(
                 method, f"{self.address}{path}", timeout=_TIMEOUT, allow_redirects=False, **content
@@ -205,7 +205,7 @@ class Zenodo:
 
 
 def _text(content: Any, *keys: str) -> str:
-    """Return a text or number in nested mappings of an answer, as text; empty if there is none."""
+    """Return a text or number in nested mappings of an answer, as text; empty if it is missing."""
     for key in keys:
         content = content.get(key) if isinstance(content, dict) else None
     return str(content) if isinstance(content, str | int) else ""

@@ -1,4 +1,4 @@
-"""Equations of equilibrium, eq. (4), their error at given approaches, and the load or area that a solve holds.
+"""Equations of equilibrium, eq. (4), their error at given approaches, and the load or area under control.
 
 The unknowns are the local approaches delta_i of the spots in contact:
 
@@ -21,11 +21,12 @@ from icha.contact.models import RESIDUAL_TOLERANCE, SMALLEST_LOAD
 from icha.equilibrium.sites import Problem, Sites
 from icha.half_space.interaction import Interaction
 
-# Largest relative error of a load or an area that is held.
+# Largest relative error of a load or an area under control.
 TARGET_TOLERANCE = 1e-11
-# Weight that makes the largest errors of the held quantity and of the equilibrium equal.
+# Weight of this error relative to the error of the equilibrium, which makes both tolerances equal.
 _TARGET_WEIGHT = RESIDUAL_TOLERANCE / TARGET_TOLERANCE
-# The exact near field covers the radii of approaches that are larger by this part of h_rms, times this factor.
+# The interaction is set up for larger contact radii, so that it serves several evaluations: those of approaches that
+# are larger by this part of h_rms, times this factor.
 _APPROACH_AHEAD = 0.02
 _RADIUS_AHEAD = 1.2
 
@@ -63,7 +64,7 @@ class Point:
     a : (n,) float, contact radii, m.
     level : (n,) float, heights with which the sites would be in equilibrium, m.
     error : (n,) float, left side minus right side of the equations, m.
-    miss : held quantity minus its target, in its unit.
+    miss : load or area minus its target, in Pa or as a fraction; 0 without a control.
     repulsion : nominal pressure by the repulsive parts of the forces alone, Pa.
     interaction : interaction of the spots.
     """
@@ -120,7 +121,7 @@ class Equations:
         return Point(approach, separation, a, level, error, miss, repulsion, interaction)
 
     def error_size(self, point: Point, target_weight: float = _TARGET_WEIGHT) -> float:
-        """Return the largest error, in h_rms; the relative error of the held quantity counts with a weight."""
+        """Return the largest error, in h_rms; the relative error of the load or area counts with a weight."""
         size = float(np.max(np.abs(point.error), initial=0.0)) / self.problem.rms_height
         if self.control is None:
             return size

@@ -69,7 +69,7 @@ class IterationState:
 
     @property
     def free(self) -> np.ndarray:
-        """Whether an asperity is neither a site nor merged into one, (asperities,) bool."""
+        """True where an asperity is neither a site nor merged into one, (asperities,) bool."""
         free = self.site_of_asperity < 0
         single = (self.sites.asperity >= 0) & self.sites.present
         free[self.sites.asperity[single]] = False

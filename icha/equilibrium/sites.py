@@ -9,7 +9,7 @@ import numpy as np
 
 from icha.asperity.jkr import JKR
 from icha.contact.model import Events
-from icha.half_space.ewald import HalfSpace
+from icha.half_space.ewald import PointHalfSpace
 from icha.surfaces.summits import Asperities
 
 
@@ -43,7 +43,7 @@ class Problem:
 
     @property
     def adhesive(self) -> bool:
-        """Whether contact forms and breaks in jumps."""
+        """True if contact forms and breaks in jumps."""
         return self.law.material.surface_energy > 0
 
     @property
@@ -122,7 +122,7 @@ class Sites:
     approach: np.ndarray
     response: np.ndarray
     was_in_contact: np.ndarray
-    half_space: HalfSpace
+    half_space: PointHalfSpace
     arranged: int
 
     # Columns that a union records of its spots.
@@ -139,12 +139,12 @@ class Sites:
         kinds |= {"was_in_contact": bool}
         arrays: dict = {name: np.empty(0, kinds.get(name, float)) for name in _ARRAYS} | {"position": np.empty((0, 2))}
         modulus = law.material.contact_modulus
-        half_space = HalfSpace.at(arrays["position"], asperities.period, modulus, asperities.free)
+        half_space = PointHalfSpace.at(arrays["position"], asperities.period, modulus, asperities.free)
         return cls(**arrays, half_space=half_space, arranged=0)
 
     @property
     def present(self) -> np.ndarray:
-        """Whether each site is in contact or a candidate, (n,) bool."""
+        """True where a site is in contact or a candidate, (n,) bool."""
         return self.status != REMOVED
 
     def append(self, law: JKR, *, status, was_in_contact, split_number=-1, **more) -> Sites:
@@ -184,7 +184,7 @@ class Sites:
     def _arrange(self, arrays):
         """Return a table with these arrays and a new half-space, whose near field suits the number of sites."""
         ewald = self.half_space.ewald
-        half_space = HalfSpace.at(arrays["position"], ewald.side, ewald.contact_modulus, ewald.free)
+        half_space = PointHalfSpace.at(arrays["position"], ewald.side, ewald.contact_modulus, ewald.free)
         return Sites(**arrays, half_space=half_space, arranged=len(arrays["height"]))
 
 

@@ -45,25 +45,22 @@ def find_equilibrium(
 ) -> ContactState:
     """Find the equilibrium at another mean separation, load or contact area, starting from an equilibrium.
 
-    Until nothing changes, all these events happen at once where they are due: spots past jump-off break contact, free
-    asperities beyond jump-in make contact, asperities under a spot are taken into it, and overlapping spots coalesce.
-    This ends. Without adhesion spots are only added or united (a spot of radius zero does no harm and is removed at the
-    end). With adhesion an asperity that has broken contact may not make contact again at this separation; `pending`
-    counts those that would.
+    Newton steps solve the equations for the present spots. Whenever they are nearly solved, all events that are due
+    happen at once: spots past jump-off break contact, free asperities beyond jump-in make contact, asperities under a
+    spot are taken into it, and overlapping spots coalesce. The equilibrium is found when the equations are solved and
+    no event is due.
+
+    The search always ends. Without adhesion spots are only added or united (a spot of radius zero does no harm and is
+    removed at the end). With adhesion an asperity that has broken contact may not make contact again at this
+    separation; `pending` counts those that would.
 
     Parameters
     ----------
-    start : equilibrium to start from.
     separation : mean separation, or its first guess if there is a control, m.
     control : load or area to hold instead of the separation.
     break_first : number of spots that break contact first, those closest to jump-off.
 
-    Raises
-    ------
-    NotConverged
-        If the equilibrium is not found.
-    FullContact
-        If the contact spreads over the whole surface.
+    Raises `NotConverged` or `FullContact`, as `icha.contact.model.ContactModel.equilibrium` does.
     """
     state = IterationState.towards(problem, start, separation)
     if not problem.adhesive:
@@ -71,13 +68,13 @@ def find_equilibrium(
     if break_first:
         state = break_weakest(state, separation, break_first)
     point = Equations(problem, state.sites, control).evaluate(state.sites.approach, separation)
-    steps, exact_steps, rounds, wait = 0, 0, 0, False
+    steps, exact_steps, wait = 0, 0, False
     visited: Counter = Counter()
     while True:
         state, point = _absorb_and_evaluate(state, point, control)
         equations = Equations(problem, state.sites, control)
         size = equations.error_size(point)
-        # A relative error of the load corresponds to an error of the separation of about the same part of h_rms.
+        # Here a relative error of the load weighs as much as the same error of the separation in h_rms.
         closeness = equations.error_size(point, 1.0)
         margin = _EVENT_MARGIN * closeness * problem.rms_height
         changed = False
@@ -101,11 +98,8 @@ def find_equilibrium(
         equations = Equations(problem, state.sites, control)
         point = equations.evaluate(state.sites.approach, point.separation, point.interaction)
         state, point = set_union_heights(state, point)
-        steps, wait, rounds = 0, False, rounds + 1
-        places = _hash_places(state)
-        visited[places] += 1
-        if rounds > _MAX_ROUNDS or visited[places] > _MAX_RETURNS:
-            raise NotConverged(f"no equilibrium after {rounds} rounds of jumps and unions")
+        _count_round(state, visited)
+        steps, wait = 0, False
 
 
 def apply_events(state: IterationState, point: Point, margin: float) -> tuple[IterationState, bool]:
@@ -128,11 +122,15 @@ def apply_events(state: IterationState, point: Point, margin: float) -> tuple[It
     return state, changed or state is not before
 
 
-def _hash_places(state):
-    """Return a checksum of the positions of the spots, which tells whether they are the same as before."""
+def _count_round(state, visited):
+    """Count a round of events by the positions of its spots; raise `NotConverged` if the rounds do not end."""
     sites = state.sites
     places = np.rint(sites.position[sites.status == CONTACT] / (_SAME_PLACE * state.problem.asperities.period))
-    return hashlib.sha256(np.sort(places @ (1.0, 2 / _SAME_PLACE)).tobytes()).digest()
+    checksum = hashlib.sha256(np.sort(places @ (1.0, 2 / _SAME_PLACE)).tobytes()).digest()
+    visited[checksum] += 1
+    rounds = visited.total()
+    if rounds > _MAX_ROUNDS or visited[checksum] > _MAX_RETURNS:
+        raise NotConverged(f"no equilibrium after {rounds} rounds of jumps and unions")
 
 
 def _absorb_and_evaluate(state, point, control):

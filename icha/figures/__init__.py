@@ -1,1 +1,1 @@
-"""The figures: every module turns datasets into one matplotlib figure and carries its caption."""
+"""Figures, one module each, and what they share."""

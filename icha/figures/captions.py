@@ -69,7 +69,7 @@ def _runs_not_applicable(study: xr.Dataset, suffix: str) -> Iterator[str]:
     """Count by reason the complete runs to which the asperity model is not applicable."""
     from icha.datasets.variables.campaign import COMPLETE
 
-    if "applicability" not in study:  # as in campaigns of earlier versions
+    if "applicability" not in study:  # in campaigns of earlier versions
         return
     complete = study["status"].transpose(*LABELS).values == COMPLETE
     reasons = study["applicability"].transpose(*LABELS).values[complete].tolist()

@@ -7,17 +7,17 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from icha.contact.models import MODELS
+from icha.contact.models import MODELS, REFERENCE_MODEL
 from icha.datasets.variables.model_error import SHORT_RANGE
 from icha.figures.ensembles import draw_members, lines_handles, mark_fewer
 from icha.figures.hysteresis import mean_legs
 from icha.figures.legends import legend_below, model_handle, named_handles, words_handle
 from icha.figures.looks import (
     ASPERITIES_NAME,
-    BESIDE_LINE,
     BRANCH_DASHES,
     FEW_LINES,
     MODEL_MARKERS,
+    TRUTH_LINE,
     Contact,
     Looks,
 )
@@ -27,7 +27,6 @@ from icha.figures.select import (
     group_by_contact,
     name_of_place,
     path_steps,
-    runs_by_boundary_elements,
     shown_model,
     snapshot_label,
     study_runs,
@@ -67,29 +66,29 @@ class Curve(NamedTuple):
 
 
 class Curves(NamedTuple):
-    """The lines of a study.
+    """The curves of a study.
 
     Attributes
     ----------
-    lines : the lines of the study's `shown_model`.
-    beside : if those are asperities, the lines of the same contacts by boundary elements, crosses.
+    lines : the curves of the study's `shown_model`.
+    crosses : if that is the asperity model, the curves of the same contacts with boundary elements.
     looks : colours and markers of the lines.
     handles : what the legend names of them: materials, surfaces and slopes as far as there are several, and models.
     """
 
     lines: list[Curve]
-    beside: list[Curve]
+    crosses: list[Curve]
     looks: Looks
     handles: dict[str, Line2D]
 
     @property
     def unloaded(self) -> bool:
-        """Whether any run is unloaded."""
+        """True if any run is unloaded."""
         return any(unloading_legs(run) for line in self.lines for run in line.runs.runs.values())
 
 
 def study_curves(campaign: xr.DataTree, study: str, boundary_elements: str | None = None) -> Curves:
-    """Return all runs of a study, and beside asperities the runs by boundary elements of this or another study."""
+    """Return the curves of a study, with crosses of boundary elements of this study or another."""
     groups = group_by_contact(campaign, study_runs(campaign, study, ragged=False))
     dataset = campaign[study].to_dataset()
     materials = dataset["material"].values.tolist()
@@ -102,18 +101,18 @@ def study_curves(campaign: xr.DataTree, study: str, boundary_elements: str | Non
             look |= {"marker": MODEL_MARKERS[name], "ms": look["ms"] + 2}
         lines.append(Curve(group, look))
     other = boundary_elements or (study if name == ASPERITIES_NAME else None)
-    truths = group_by_contact(campaign, runs_by_boundary_elements(campaign, other)) if other else []
-    beside = [Curve(truth, cross_look(looks, truth.contact)) for truth in truths]
+    truths = study_runs(campaign, other, ragged=False, model=REFERENCE_MODEL) if other else []
+    crosses = [Curve(truth, cross_look(looks, truth.contact)) for truth in group_by_contact(campaign, truths)]
     changed = {"ls": "-" if looks.scale or any(len(group.runs) > 1 for group in groups) else "none"}
     changed |= {} if looks.many_places else {"marker": MODEL_MARKERS[name]}
     handles = looks.handles(**changed) | {name: model_handle(name, mfc="white")}
-    return Curves(lines, beside, looks, handles | ({SHORT_RANGE: model_handle(SHORT_RANGE)} if beside else {}))
+    return Curves(lines, crosses, looks, handles | ({SHORT_RANGE: model_handle(SHORT_RANGE)} if crosses else {}))
 
 
 def cross_look(looks: Looks, contact: Contact, model: str = SHORT_RANGE) -> dict:
-    """Return the look of boundary elements among curves: crosses in the colour of the contact or of its material."""
+    """Return the look of boundary elements: crosses in the colour of the contact, or else of its material."""
     colour, adhesive = looks.colour(contact), looks.adhesive(contact[0])
-    # The larger ones show behind the others if the results agree, as the markers of asperities do.
+    # If the results agree, the larger ones show behind the others, as the markers of asperities do.
     size = (8 if adhesive else 11) * (1 if len(looks.contacts) <= FEW_LINES else 0.7)
     look = {"color": colour, "mec": colour, "ms": size, "zorder": 6 + adhesive}
     return look | {"ls": "none", "marker": MODEL_MARKERS[model], "mew": 1.0}
@@ -125,7 +124,7 @@ def model_name(dataset: xr.Dataset) -> str:
 
 
 def snapshot_looks(campaign: xr.DataTree, study: str, lines: Sequence[Snapshots]) -> tuple[list[dict], Looks]:
-    """Return the looks of the lines of a figure of one line for every material."""
+    """Return the looks of lines of snapshots, one for every material."""
     dataset = campaign[study].to_dataset()
     groups = [line.runs for line in lines]
     looks = Looks(campaign, dataset, [group.contact for group in groups])
@@ -139,27 +138,27 @@ def add_snapshot_legend(
     dataset: xr.Dataset,
     lines: Sequence[Snapshots],
     looks: Looks,
-    beside: Iterable[str],
+    truths: Iterable[str],
 ) -> None:
-    """Add titles and legend of a figure of one snapshot of a study; `beside` names the boundary elements in it."""
+    """Add titles and legend of a figure of one snapshot of a study; `truths` names the boundary elements in it."""
     shown, model = lines[0].runs.labels, model_name(dataset)
     titles = (snapshot_label(*lines[-1].members[0]), name_of_place(dataset, shown.surface, shown.rms_slope))
     for axes, title in zip(panels, titles, strict=True):
         axes.set_title(title, loc="right")
     handles = looks.handles(ls="-", marker=MODEL_MARKERS[model])
     handles |= {model: model_handle(model, ls="-", lw=0.8, mfc="white")}
-    handles |= {name: model_handle(name, **BESIDE_LINE) for name in beside}
+    handles |= {name: model_handle(name, **TRUTH_LINE) for name in truths}
     handles |= lines_handles(len(line.members) for line in lines) | named_handles(panels[1:])
     legend_below(figure, handles, scale=looks.scale, panels=panels)
 
 
-def whose_theories(dataset: xr.Dataset) -> dict[str, Line2D]:
-    """What the legend says of the surface that theories are drawn for, the first of a study where it has several."""
+def theories_handle(dataset: xr.Dataset) -> dict[str, Line2D]:
+    """Return a legend entry with the surface of the theories, the first of a study, if the study has several."""
     names = dataset["surface"].values.tolist()
     return words_handle(f"theories: {names[0]}") if len(names) > 1 else {}
 
 
-# Load and value of the steps of a run.
+# Return load and value of the steps of a run.
 Points = Callable[["xr.Dataset"], tuple[np.ndarray, np.ndarray]]
 
 
@@ -194,16 +193,16 @@ def draw_curves(
             drawn[axes].append(_draw_line(axes, line, points, lines=len(curves.lines)))
         if unloading:
             _draw_unloading(panels, line)
-    for line in curves.beside:
+    for line in curves.crosses:
         for axes, points in panels.items():
             drawn[axes].append(_draw_crosses(axes, line, points))
     for axes in panels:
         logarithmic_axes(axes)
-    return [tuple(map(np.concatenate, zip(*own, strict=True))) for own in drawn.values()]
+    return [tuple(map(np.concatenate, zip(*points, strict=True))) for points in drawn.values()]
 
 
 def _draw_line(axes, line, points, *, lines):
-    """Draw a run by markers; of several seeds their mean at common loads by a line, and their scatter."""
+    """Draw a run by markers, or the mean of several seeds at common loads by a line, with their scatter."""
     from icha.analysis.common_loads import at_common_loads
 
     members, asked = [points(run) for run in line.stops.values()], line.runs.asked
@@ -221,7 +220,7 @@ def _draw_line(axes, line, points, *, lines):
 
 
 def _draw_crosses(axes, line, points):
-    """Draw a line by boundary elements; of several seeds their means at common loads."""
+    """Draw a curve with boundary elements by crosses, of several seeds at their means at common loads."""
     from icha.analysis.common_loads import at_common_loads
 
     load, values = at_common_loads([points(run) for run in line.stops.values()], logarithmic=True)
@@ -250,15 +249,16 @@ def _draw_unloading(panels, line):
 
 
 def add_legend(figure: Figure, panels: Sequence[Axes], curves: Curves, further: Mapping[str, object] = {}) -> None:
-    """Add the legend of the curves and of what else is named in the panels, and their scale of colours, if any."""
+    """Add a legend of the curves and of everything named in the panels, and their scale of colours, if any."""
     seeds = lines_handles(len(line.runs.runs) for line in curves.lines)
     handles = curves.handles | dict(further) | seeds | named_handles(panels)
     legend_below(figure, handles, scale=curves.looks.scale, panels=panels)
 
 
-def plausible(values: np.ndarray) -> np.ndarray:
-    """The positive ones of some values that are no rounding errors beside the largest, for logarithmic axes."""
+def drop_rounding_errors(values: np.ndarray) -> np.ndarray:
+    """Return those values that a logarithmic axis can show: larger than rounding errors of the largest."""
     return values[values > _ROUNDING * values.max(initial=0.0)]
 
 
+# Rounding errors over the largest value.
 _ROUNDING = 1e-7

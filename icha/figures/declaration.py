@@ -52,7 +52,7 @@ def dataset_only(campaign: Campaign, options: FigureOptions, files: results.Resu
 
 @dataclass(frozen=True)
 class Declaration:
-    """What a figure is, apart from its drawing.
+    """Everything about a figure except its drawing.
 
     Parameters
     ----------
@@ -102,12 +102,12 @@ class StudyFigure(FigureOptions):
 
 
 class TruthFigure(StudyFigure):
-    """A figure of all runs of a study, with those by boundary elements."""
+    """A figure of all runs of a study, with boundary elements."""
 
     boundary_elements: Name | None = Field(
         default=None,
-        description="Name of a study whose runs by boundary elements are also drawn. Left out: the study itself, if it "
-        "has such runs.",
+        description="Name of a study whose runs with boundary elements are also drawn. Left out: the study itself, if "
+        "it has such runs.",
     )
 
     def studies_of(self, campaign: Campaign) -> tuple[str, ...]:
@@ -115,7 +115,7 @@ class TruthFigure(StudyFigure):
         return tuple(dict.fromkeys(filter(None, (self.study, self.boundary_elements))))
 
     def problems(self, campaign: Campaign) -> Iterator[Problem]:
-        """Yield the problem of a study beside it that is unknown, or has no runs by boundary elements."""
+        """Yield the problem of a study beside it that is unknown, or has no runs with boundary elements."""
         yield from super().problems(campaign)
         if self.boundary_elements is None:
             return
@@ -123,7 +123,7 @@ class TruthFigure(StudyFigure):
         yield from unknown(location, name, campaign.studies)
         if name in campaign.studies and REFERENCE_MODEL not in campaign.studies[name].models:
             expected = f"expected a study with {REFERENCE_MODEL!r} among its `models`"
-            yield location, name, f"has no runs by boundary elements; {expected}"
+            yield location, name, f"has no runs with boundary elements; {expected}"
 
 
 class SnapshotFigure(StudyFigure):
@@ -140,7 +140,7 @@ class SnapshotFigure(StudyFigure):
         if snapshots == []:
             yield ("study",), self.study, "keeps no snapshot to draw; expected a study with `snapshots`"
         elif self.snapshot is not None and self.snapshot.target not in (snapshots or []):
-            kept = listed(f"{kind} {value:g}" for kind, value in snapshots or []) or "none, since it names none"
+            kept = listed(f"{kind} {value:g}" for kind, value in snapshots or []) or "none, because it names none"
             kind, value = self.snapshot.target
             yield ("snapshot",), f"{kind} {value:g}", f"is not kept by study {self.study!r}; expected one of: {kept}"
 
@@ -199,7 +199,7 @@ class ComparedFigure(StudyFigure):
 
 
 def is_solved_at_finite_range(campaign: Campaign, study: str) -> bool:
-    """Whether there are boundary elements at a finite range beside the runs of a study."""
+    """Return whether there are boundary elements at a finite range beside the runs of a study."""
     return any(entry.study == study for entry in campaign.finite_range.values())
 
 

@@ -18,15 +18,15 @@ if TYPE_CHECKING:
     from matplotlib.container import ErrorbarContainer
     from matplotlib.lines import Line2D
 
-# A mean has about so many markers.
+# Approximate number of markers of a mean.
 _MEAN_MARKERS = 8
 _SEED_LINE = {"ls": "-", "lw": 0.5, "alpha": 0.5, "zorder": 1.6}
 _SEED_DOT = {"ls": "none", "marker": ".", "ms": 5, "mew": 0, "alpha": 0.5, "zorder": 2.5}
 _BARS = {"elinewidth": 0.6, "capsize": 1.5}
 _CROSS = {"ls": "none", "marker": "x", "mew": 0.7, "label": FEWER_SEEDS}
-# Marks of means over fewer seeds are this far in front of points with bars, which lie in front of their own zorder.
+# Distance in zorder of marks of means over fewer seeds from their curve; points with bars lie 0.1 in front of it.
 _BEFORE_POINTS = 0.101
-# Opacity of the bands of up to so many lines in a panel; of more they are paler.
+# Opacity of bands, and the largest number of lines in a panel for which it holds; of more lines they are paler.
 _SHADE, _FEW_BANDS = 0.22, 3
 
 
@@ -67,7 +67,7 @@ def draw_members(
 
 
 def _changes(known):
-    """Positions of the points (members, k) that other members have than the point before."""
+    """Return the positions of the points (members, k) whose members differ from those of the point before."""
     return 1 + np.flatnonzero((known[:, 1:] != known[:, :-1]).any(axis=0))
 
 
@@ -89,37 +89,38 @@ def mark_fewer(
     known : (members, k) bool, which members each mean is over.
     look : look of the marks, arguments of `Axes.plot`.
     asked : number of members asked for, of all points or of each.
-    every : one in so many points has a mark.
+    every : distance between marked points, in points.
     """
     counts = known.sum(axis=0)
     fewer = (counts > 0) & (counts < asked) & np.isfinite(y)
     if not fewer.any():
         return
-    stretches = [own[fewer[own]] for own in np.split(np.arange(len(counts)), _changes(known)) if fewer[own].any()]
-    marks = np.unique(np.concatenate([[*own[own % every == 0], own[0], own[-1]] for own in stretches]))
+    stretches = [points[fewer[points]] for points in np.split(np.arange(len(counts)), _changes(known))]
+    stretches = [points for points in stretches if len(points)]
+    marks = np.unique(np.concatenate([[*at[at % every == 0], at[0], at[-1]] for at in stretches]))
     look = {name: look[name] for name in ("color", "mec", "mew", "ms", "marker", "zorder") if name in look}
     colour, order = look.get("color", look.get("mec")), look.get("zorder", 2) + _BEFORE_POINTS
     if look.get("marker") not in (None, "none", "+", "x", "1", "2", "3", "4"):
         axes.plot(x[marks], y[marks], **look | {"ls": "none", "mfc": "white", "zorder": order})
     cross = {"color": colour, "ms": look.get("ms", _SEED_DOT["ms"]), "zorder": order + 0.001}
     axes.plot(x[marks], y[marks], **cross | _CROSS)
-    for own in stretches:
-        write_seed_count(axes, counts[own[-1]], x[own[-1]], y[own[-1]], color=colour, zorder=order + 1)
+    for *_, last in stretches:
+        write_seed_count(axes, counts[last], x[last], y[last], color=colour, zorder=order + 1)
 
 
 def draw_scatter(
     axes: Axes, x: np.ndarray, members: np.ndarray, colour: str, *, positive: bool, lines: int = 1, **dashes: object
 ) -> None:
-    """Draw how an ensemble scatters: a band, which does not widen the panel, or every member where they are few.
+    """Draw the scatter of an ensemble: a band, which does not widen the panel, or every member if they are few.
 
-    The members (members, k) have one x (k,), or each its own. Their lines are solid unless `dashes` says otherwise.
+    The members (members, k) have one x (k,), or one each. Their lines are solid unless `dashes` are given.
     """
     x, over = np.broadcast_to(x, members.shape), ensemble(members)
     if over.count.min(initial=len(members)) < ENOUGH:
         # A single point has no line.
         look = _SEED_LINE | (_SEED_DOT if members.shape[1] == 1 else dashes)
-        for own, member in zip(x, members, strict=True):
-            axes.plot(own, np.where(member > 0, member, np.nan) if positive else member, color=colour, **look)
+        for along, member in zip(x, members, strict=True):
+            axes.plot(along, np.where(member > 0, member, np.nan) if positive else member, color=colour, **look)
         return
     limits = axes.dataLim.frozen()
     band = _break_lines(_changes(np.isfinite(members)), x.mean(axis=0), *over.band(positive=positive))
@@ -136,7 +137,7 @@ def draw_points(
     positive: bool,
     asked: int | np.ndarray = 0,
 ) -> ErrorbarContainer:
-    """Draw the means of an ensemble with bars where there are enough members, and else with the members.
+    """Draw the means of an ensemble with bars, or with its members if these are few.
 
     A line joins neighbouring points only if they are means over the same members.
 
@@ -170,9 +171,9 @@ def draw_points(
 
 
 class Points:
-    """States of a line of points, each a mean over its seeds, in the order of x.
+    """A line of points, each a mean over its seeds, in the order of x.
 
-    Means are over the seeds that all points have, or over each point's own if they share none.
+    Means are over the seeds that all points have, or over all seeds of each point if they share none.
 
     Parameters
     ----------
@@ -216,13 +217,13 @@ class Points:
 
 
 def lines_handles(counts: Iterable[int]) -> dict[str, Line2D]:
-    """Return what the legend says of lines of so many seeds; nothing of single ones."""
+    """Return legend entries of lines that are means over these numbers of seeds."""
     band = legend_handle(color=GREY, alpha=0.35, lw=6, solid_capstyle="butt")
     return _handles(counts, ("mean and 95 % band", band), legend_handle(color=GREY, **_SEED_LINE))
 
 
 def points_handles(counts: Iterable[int]) -> dict[str, Line2D]:
-    """Return what the legend says of points of so many seeds; nothing of single ones."""
+    """Return legend entries of points that are means over these numbers of seeds."""
     bars = legend_handle(color=GREY, marker="|", ls="none", ms=8)
     return _handles(counts, ("means, bars 95 %", bars), legend_handle(color=GREY, **_SEED_DOT))
 
@@ -230,11 +231,11 @@ def points_handles(counts: Iterable[int]) -> dict[str, Line2D]:
 def _handles(counts, enough, seeds):
     counts = sorted({int(count) for count in counts if count > 1})
     found = {}
-    for (words, handle), own in (
+    for (words, handle), sizes in (
         (enough, [count for count in counts if count >= ENOUGH]),
         (("single seeds beside their mean", seeds), [count for count in counts if count < ENOUGH]),
     ):
-        if own:
-            span = f"{own[0]}" if len(own) == 1 else f"{own[0]}–{own[-1]}"
+        if sizes:
+            span = f"{sizes[0]}" if len(sizes) == 1 else f"{sizes[0]}–{sizes[-1]}"
             found[f"{words}, n = {span}"] = handle
     return found

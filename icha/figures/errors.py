@@ -1,4 +1,4 @@
-"""Differences between the model and boundary elements against load: what figures 10 and 11 draw."""
+"""Error of the asperity model against load, which figures 10 and 11 draw."""
 
 from __future__ import annotations
 
@@ -30,28 +30,28 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-# More surfaces than this, and every material has panels of its own.
+# Largest number of surfaces and slopes for which all materials share their panels.
 _MOST_LINES = 2
-# Points of one load stand this far apart, as a factor, so that their bars do not hide each other.
+# Ratio of the positions of points at one load, so that their bars do not hide each other.
 _APART = 1.025
-# Where loads span less than this factor, it is one load, and the axis shows as much to both sides.
+# Ratio of loads below which they count as one load; the axis then extends by this ratio to both sides.
 _ONE_LOAD = 1.3
 # Errors against another quantity of the boundary elements.
 _OTHER = {"ls": ":", "lw": 0.9, "marker": ".", "ms": 3}
 _OTHER_NAME = "relative to the energetic area (energy of adhesion / that of full contact)"
 
 
-class Quantity(NamedTuple):
-    """A variable of the model error, as a panel shows it.
+class ErrorPanel(NamedTuple):
+    """A panel that shows a variable of the model error.
 
     Parameters
     ----------
     name : name of the variable.
     label : label of the axis.
-    factor : unit of the axis, by which values are multiplied.
-    limits : of the axis; None: as they come.
-    other : variable that is a dotted line where boundary elements with adhesion have a finite range, if any.
-    positive : whether it cannot be negative.
+    factor : factor from values to the unit of the axis.
+    limits : limits of the axis; None where the data set them.
+    other : variable drawn as a dotted line if boundary elements with adhesion have a finite range.
+    positive : whether values cannot be negative.
     words : explanation in the legend.
     """
 
@@ -82,18 +82,18 @@ class _Curve(NamedTuple):
 
     @property
     def truth(self) -> str:
-        """Which boundary elements the model is compared with."""
+        """Name of the boundary elements that the model is compared with."""
         return self.errors.attrs["truth"]
 
     @property
     def has_cohesive_zone(self) -> bool:
-        """Whether boundary elements attract out of contact, so that they have a second area."""
+        """True if boundary elements attract outside of contact, so that they have a second area."""
         return self.truth == FINITE_RANGE and float(self.errors["surface_energy"]) > 0
 
 
 @in_style
 def draw_errors(
-    campaign: xr.DataTree, model_error: xr.DataTree, *, study: str, quantities: tuple[Quantity, ...]
+    campaign: xr.DataTree, model_error: xr.DataTree, *, study: str, quantities: tuple[ErrorPanel, ...]
 ) -> Figure:
     """Draw quantities of the model error against load, a panel for each, for every surface, slope and material.
 
@@ -121,12 +121,12 @@ def draw_errors(
     named: dict[str, object] = {}
     counts: set[int] = set()
     for row, shown in zip(panels, rows, strict=True):
-        own = [curve for curve in curves if curve.contact[0] in shown]
-        for k, curve in enumerate(own):
-            same = [each for each in own if each[2:] == curve[2:]]
+        shown_curves = [curve for curve in curves if curve.contact[0] in shown]
+        for k, curve in enumerate(shown_curves):
+            same = [each for each in shown_curves if each[2:] == curve[2:]]
             name, dashes = _words(curve, same, looks, own_rows=own_rows)
             look = looks.look(curve.contact, applicable=curve.applicable) | {"ls": dashes}
-            handle = _draw_curve(row, curve, quantities, look, _APART ** (k - (len(own) - 1) / 2), counts)
+            handle = _draw_curve(row, curve, quantities, look, _APART ** (k - (len(shown_curves) - 1) / 2), counts)
             if curve.applicable:
                 named.setdefault(name, handle)
         if own_rows:
@@ -154,12 +154,12 @@ def _curves(model_error, study, quantities):
     for (name, errors), applicable in itertools.product(entries.items(), (True, False)):
         for material, (surface, slope) in itertools.product(errors["material"].values, surfaces_and_slopes(errors)):
             labels = {"surface": surface, "rms_slope": slope, "material": material}
-            own = errors.isel(place_of(errors, labels))
-            runs = (own["applicability"] == "") == applicable if "applicability" in own else applicable
-            own = own.assign({variable: own[variable].where(runs) for variable in variables})
-            # Not all combinations of an entry are asked for.
-            if any(np.isfinite(own[each.name].values).any() for each in quantities):
-                found.append(_Curve(name, own, (material, surface, slope), applicable))
+            values = errors.isel(place_of(errors, labels))
+            runs = (values["applicability"] == "") == applicable if "applicability" in values else applicable
+            values = values.assign({variable: values[variable].where(runs) for variable in variables})
+            # A campaign need not request all combinations of the labels of an entry.
+            if any(np.isfinite(values[each.name].values).any() for each in quantities):
+                found.append(_Curve(name, values, (material, surface, slope), applicable))
     if not found:
         raise NothingToDraw(f"study {study}: no run beside boundary elements is complete, so there is nothing to draw")
     return found
@@ -170,12 +170,12 @@ def _words(curve, same, looks, *, own_rows):
 
     Those are solutions of the same states at a finite range, or on another grid.
     """
-    again, truths = same.index(curve), [each.truth for each in same]
+    repetition, truths = same.index(curve), [each.truth for each in same]
     name = looks.place_name(curve.contact[1:]) if own_rows else looks.name(curve.contact)
     words = [] if looks.scale else [name] if name else []
     words += ["at finite range"] if len(set(truths)) > 1 and curve.truth == FINITE_RANGE else []
-    words += [curve.name] if truths.index(curve.truth) < again else []
-    return ", ".join(words), DASHES[again % len(DASHES)]
+    words += [curve.name] if truths.index(curve.truth) < repetition else []
+    return ", ".join(words), DASHES[repetition % len(DASHES)]
 
 
 def _draw_curve(row, curve, quantities, look, apart, counts):
@@ -192,7 +192,7 @@ def _draw_curve(row, curve, quantities, look, apart, counts):
 
 
 def _finish(panels, quantities):
-    """Axes and labels of all panels."""
+    """Set axes and labels of all panels."""
     for ax, quantity in zip(panels.ravel(), itertools.cycle(quantities), strict=False):
         logarithmic_axes(ax, "x")
         ax.axhline(0, color="0.6", lw=0.7, zorder=0)

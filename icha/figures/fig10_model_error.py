@@ -1,11 +1,11 @@
-"""Fig. 10: how far contact area and mean separation are from boundary elements, against load."""
+"""Fig. 10: error of contact area and mean separation against load."""
 
 from __future__ import annotations
 
 from functools import partial
 
 from icha.figures.declaration import ComparedFigure, Declaration, campaign_and_model_error
-from icha.figures.errors import Quantity, draw_errors
+from icha.figures.errors import ErrorPanel, draw_errors
 
 DECLARATION = Declaration(
     description=(
@@ -17,8 +17,8 @@ DECLARATION = Declaration(
 )
 
 QUANTITIES = (
-    Quantity("area_error", r"error of $A/A_0$ (%)", 100, other="energetic_area_error"),
-    Quantity("separation_error", r"error of $\bar{u}$ (%)", 100),
+    ErrorPanel("area_error", r"error of $A/A_0$ (%)", 100, other="energetic_area_error"),
+    ErrorPanel("separation_error", r"error of $\bar{u}$ (%)", 100),
 )
 
 figure = partial(draw_errors, quantities=QUANTITIES)

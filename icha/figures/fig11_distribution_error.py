@@ -1,11 +1,11 @@
-"""Fig. 11: how far distributions of pressure and gap, and the contact map, are from boundary elements."""
+"""Fig. 11: error of distributions of pressure and gap, and of the contact map, against load."""
 
 from __future__ import annotations
 
 from functools import partial
 
 from icha.figures.declaration import ComparedFigure, Declaration, campaign_and_model_error
-from icha.figures.errors import Quantity, draw_errors
+from icha.figures.errors import ErrorPanel, draw_errors
 
 DECLARATION = Declaration(
     description=(
@@ -17,15 +17,15 @@ DECLARATION = Declaration(
 )
 
 QUANTITIES = (
-    Quantity("pressure_distribution_distance", r"distance of $P(p)$,  $W_1/p$", limits=(0, None), positive=True),
-    Quantity(
+    ErrorPanel("pressure_distribution_distance", r"distance of $P(p)$,  $W_1/p$", limits=(0, None), positive=True),
+    ErrorPanel(
         "gap_distribution_distance",
         r"distance of $P(u)$,  $W_1/h_{\mathrm{rms}}$",
         limits=(0, None),
         positive=True,
         words="$W_1$: area between the cumulative distributions",
     ),
-    Quantity(
+    ErrorPanel(
         "jaccard",
         "overlap of the contact maps",
         limits=(0, 1),

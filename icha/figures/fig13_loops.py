@@ -1,4 +1,4 @@
-"""Fig. 13: load and contact area on the way in and on the way back."""
+"""Fig. 13: load and contact area in loading and unloading."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from icha.figures.select import (
     branches,
     group_by_contact,
     pick,
-    runs_by_boundary_elements,
+    study_runs,
     unloading_legs,
 )
 from icha.figures.style import GREY, in_style, legend_handle, new_panels, slope_label
@@ -35,24 +35,24 @@ if TYPE_CHECKING:
 
 
 class LoopsFigure(TruthFigure):
-    """A figure of the runs of a study in loading and unloading, for one topography."""
+    """A figure of the runs of a study in loading and unloading, on one topography."""
 
     surface: Label | None = Field(default=None, description="Surface that is shown. Left out: the study's first.")
     seed: Seed | None = Field(default=None, description="Seed that is shown. Left out: the study's first.")
 
     def problems(self, campaign: Campaign) -> Iterator[Problem]:
-        """A study that does not come back is one more."""
+        """Yield in addition the problem of a study that does not unload."""
         yield from super().problems(campaign)
         yield from not_unloaded(campaign, ("study",), self.study, partly=True)
 
 
 def inputs(campaign: Campaign, options: LoopsFigure, files: results.ResultFiles) -> Inputs:
-    """The runs, and boundary elements both ways at a finite range beside them, if there are any."""
+    """Return the runs, and loading and unloading with boundary elements at a finite range, if there are any."""
     loops = [
         files.path(results.LOOP, ContactLabels(label, *contact))
         for label, entry in campaign.boundary_element_loops.items()
         if entry.study == options.study
-        for contact in campaign.solved(entry)
+        for contact in campaign.contacts_beside(entry)
     ]
     return {"campaign": files.path(results.DATASET)} | ({"loops": loops} if loops else {})
 
@@ -63,12 +63,12 @@ DECLARATION = Declaration(
     inputs=inputs,
 )
 
-# More loops than this in one panel, and every slope has panels of its own.
+# Largest number of loops for which all slopes share their panels.
 _MOST_LOOPS = 4
-# Tension below this part of the largest pressure is enlarged in an inset, up to so many times the largest tension.
+# Tension over the largest pressure, below which an inset enlarges it, and range of the inset over the tension.
 _SMALL_TENSION = 0.25
 _REACH = 1.4
-# The panel of areas is so much higher than its curves where it has an inset above them.
+# Height of the panel of areas over that of its curves, if it has an inset above them.
 _HEADROOM = 1.8
 # Distance between marks of boundary elements, in diagonals of the panel.
 _APART = 0.025
@@ -95,32 +95,32 @@ def figure(
     surface: str | None = None,
     seed: int | None = None,
 ) -> Figure:
-    """Draw the runs of all slopes and materials of a study, for one surface, and one seed or the mean over the seeds.
+    """Draw the runs of all slopes and materials of a study on one surface, and one seed or the mean over the seeds.
 
     Parameters
     ----------
     campaign : the campaign dataset.
-    loops : boundary elements both ways of runs of the study at finite ranges, if there are any; those of other surfaces
-        or seeds than the one drawn are left out.
+    loops : loading and unloading of runs of the study with boundary elements at finite ranges, if there are any.
+        Only those of the surface and seed that are drawn are shown.
     seed : left out, the first that has boundary elements, or else the mean over all.
     """
     drawn, surface, seed = _loops(campaign, study, boundary_elements or study, loops or (), surface, seed)
     slopes = sorted({loop.runs.labels.rms_slope for loop in drawn}, reverse=True)
     contacts = {loop.runs.contact for loop in drawn}
     own_rows = len(contacts) > _MOST_LOOPS and 1 < len(slopes) < len(contacts)
-    # If every slope has its panels, they need not tell them apart in another way.
+    # Slopes that have panels of their own need no other distinction.
     contacts = [(*loop.runs.contact[:2], None if own_rows else loop.runs.labels.rms_slope) for loop in drawn]
     looks = looks_of_studies(campaign, [study], contacts)
 
     rows = [[slope] for slope in slopes] if own_rows else [slopes]
     fig, panels = new_panels(2.7 * len(rows), len(rows))
     for row, shown in zip(panels, rows, strict=True):
-        own = [
+        shown_loops = [
             (loop, looks.look(contact, applicable=loop.runs.applicable))
             for loop, contact in zip(drawn, contacts, strict=True)
             if loop.runs.labels.rms_slope in shown
         ]
-        _draw_row(row, own, turn=len(shown) > 1)
+        _draw_row(row, shown_loops, turn=len(shown) > 1)
         if own_rows:
             row[-1].set_title(slope_label(shown[0]), loc="right")
     for ax, axis in zip(panels[-1], (_LOADS, _AREAS), strict=True):
@@ -132,12 +132,12 @@ def figure(
     return fig
 
 
-def _loops(campaign, study, beside, loops, surface, seed):
+def _loops(campaign, study, other_study, loops, surface, seed):
     """Return the loops of a surface and seed, and which surface and seed (None: all) these are."""
     runs = unloaded_runs(campaign, study)
     surface = pick("surface", surface, [labels.surface for labels, _ in runs])
-    others = [run for _, run in runs_by_boundary_elements(campaign, beside) if unloading_legs(run)]
-    truths = _truths(study, runs, [*others, *loops])
+    others = study_runs(campaign, other_study, ragged=False, model=REFERENCE_MODEL)
+    truths = _truths(study, runs, [*(run for _, run in others if unloading_legs(run)), *loops])
     runs = [(labels, run) for labels, run in runs if labels.surface == surface]
     if seed is None:
         seed = next((labels.seed for labels, _ in runs if labels in truths), None)
@@ -164,7 +164,7 @@ def _draw_row(row, loops, *, turn):
 
 
 def _others(dataset, seed):
-    """What the legend says of surfaces and seeds that are not drawn."""
+    """Return legend entries about surfaces and seeds that are not drawn."""
     drawn = {"surface": 1, "seed": dataset.sizes["seed"] if seed is None else 1}
     words = [
         f"{drawn[label]} of {dataset.sizes[label]} {label}s; choose with `{label}:`"
@@ -186,7 +186,7 @@ _AREAS = _Axis("reduced_pressure", "contact_area_fraction", PRESSURE_LABEL, AREA
 
 
 def _draw(ax, loop, look, axis, *, turn, lines):
-    """Draw a loop and a mark at its pull-off, and one at its first turn if that is wanted or the loop lacks seeds."""
+    """Draw a loop and a mark at its pull-off; mark its first turn if `turn` or if the loop lacks seeds."""
     colour = look["color"]
     for leg in loop.legs:
         x, y = leg.values[axis.x], leg.values[axis.y]
@@ -215,7 +215,7 @@ def _draw(ax, loop, look, axis, *, turn, lines):
 
 
 def _enlarge(left, right, loops):
-    """Insets around zero load, if the tension is there but small."""
+    """Add insets around zero load, if there is tension but it is small."""
     from matplotlib.ticker import MaxNLocator
 
     legs = [leg.values for loop, _ in loops for leg in loop.legs]
@@ -249,7 +249,7 @@ def _enlarge(left, right, loops):
 
 
 def _handles(looks, loops, *, marked):
-    """What the legend shows, by name; loops are `marked` where slopes share a panel."""
+    """Return what the legend shows, by name; loops are `marked` if slopes share a panel."""
     handles = looks.handles(**_LOOP, **({} if marked else {"marker": "none"}))
     for branch, dashes in BRANCH_DASHES.items():
         handles[branch] = legend_handle(color=GREY, ls=dashes, **_LOOP)
@@ -266,12 +266,12 @@ _CROSSES = {"loading": MODEL_MARKERS, "unloading": UNLOADING_MARKERS}
 
 
 def _truth_name(truth):
-    """Which boundary elements these are: a run says by which model it is, a solution at a finite range does not."""
+    """Return the name of boundary elements; only runs of a campaign have the attribute `contact_model`."""
     return SHORT_RANGE if truth.attrs.get("contact_model") == REFERENCE_MODEL else FINITE_RANGE
 
 
 def _truths(study, runs, loops):
-    """The boundary elements of every run of a study that has some, by its labels."""
+    """Return the boundary elements of the runs of a study that have some, by the labels of the runs."""
     from icha.analysis.model_error import run_of_same_contact
 
     found = {}

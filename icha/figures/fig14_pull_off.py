@@ -1,4 +1,4 @@
-"""Fig. 14: how hard one has to pull, against the rms slope and against how hard it was pressed."""
+"""Fig. 14: pull-off against the rms slope and against the largest load."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from pydantic import Field
 
-from icha.figures.curves import plausible
+from icha.figures.curves import drop_rounding_errors
 from icha.figures.declaration import Campaign, Declaration, StudyFigure, not_unloaded, studies_problems
 from icha.figures.ensembles import Points, points_handles
 from icha.figures.hysteresis import detached_lines, name_model
@@ -45,11 +45,11 @@ class PullOffFigure(StudyFigure):
     )
 
     def studies_of(self, campaign: Campaign) -> tuple[str, ...]:
-        """Those of both panels."""
+        """Return the studies of both panels."""
         return tuple(dict.fromkeys([self.study, *(self.load_studies or ())]))
 
     def problems(self, campaign: Campaign) -> Iterator[Problem]:
-        """Studies of the second panel that are not there, and studies that do not come back, are more."""
+        """Yield in addition the problems of studies that are unknown or do not unload completely."""
         yield from studies_problems(campaign, "load_studies", self.load_studies or ())
         yield from super().problems(campaign)
         yield from not_unloaded(campaign, ("study",), self.study, partly=False)
@@ -64,7 +64,7 @@ _QUANTITIES = {
     "pull_off_over_strength": "pull-off / strength of the interface",
     "pull_off_over_summits": "pull-off / all summits at their most",
 }
-# Values that span more than this are drawn on a logarithmic axis.
+# Ratio of values above which their axis is logarithmic.
 _SPAN = 30.0
 _LINE = {"lw": 0.9}
 
@@ -79,7 +79,7 @@ def figure(
     by_load = detached_lines(campaign, load_studies)
     loaded_slopes = {slope for (*_, slope), _ in by_load}
     if len(loaded_slopes) == 1:
-        # The panel's title names it, and the lines look like those of (a).
+        # The title of the panel names the slope, and lines have the looks of those in (a).
         by_load = detached_lines(campaign, load_studies, along_slopes=True)
     looks = looks_of_studies(campaign, [study, *load_studies], [contact for contact, _ in (*by_slope, *by_load)])
     points = itertools.chain(*by_slope.values(), *by_load.values())
@@ -107,7 +107,7 @@ def figure(
 
 
 def _label_slopes(ax, slopes):
-    """Label the axis of slopes by those that there are."""
+    """Label the axis of slopes by the slopes that are drawn."""
     ax.set_xlabel(r"rms slope  $h_{\mathrm{rms}}^{\prime}$")
     ax.set_xscale("log" if slopes[-1] > 3 * slopes[0] else "linear")
     ax.set_xticks(slopes, [f"{slope:g}" for slope in slopes])
@@ -129,8 +129,8 @@ def _label_loads(ax, loads):
 
 
 def _scale(ax, values):
-    """An axis on which all values have a place, logarithmic where they span decades."""
-    positive = plausible(values)
+    """Scale an axis so that it shows all values: logarithmic if they span decades, linear around zero."""
+    positive = drop_rounding_errors(values)
     if len(positive) and positive.max() > _SPAN * positive.min():
         least = 10.0 ** np.floor(np.log10(positive.min()))
         ax.set_yscale("symlog", linthresh=least, linscale=0.4)

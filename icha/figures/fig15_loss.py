@@ -1,4 +1,4 @@
-"""Fig. 15: the energy that a cycle costs, against the contact area reached, and what it consists of."""
+"""Fig. 15: energy lost in a cycle against the largest contact area, and its parts."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from pydantic import Field
 
-from icha.figures.curves import plausible
+from icha.figures.curves import drop_rounding_errors
 from icha.figures.declaration import Campaign, Declaration, FigureOptions, studies_problems
 from icha.figures.ensembles import Points, points_handles
 from icha.figures.hysteresis import detached_lines, name_model
@@ -33,17 +33,17 @@ class LossFigure(FigureOptions):
     )
 
     def studies_of(self, campaign: Campaign) -> tuple[str, ...]:
-        """All of them."""
+        """Return all studies."""
         return tuple(dict.fromkeys(self.studies))
 
     def problems(self, campaign: Campaign) -> Iterator[Problem]:
-        """Studies that are not there, or do not come back."""
+        """Yield the problems of studies that are unknown or do not unload completely."""
         yield from studies_problems(campaign, "studies", self.studies)
 
 
 DECLARATION = Declaration(description="Energy lost in a loop against contact area, and its parts.", options=LossFigure)
 
-# Parts of the loss, with the look of their bars: none has the colour of a material.
+# Parts of the loss with names and looks of their bars, none of which has the colour of a material.
 PARTS = {
     "loss_by_jump_in": ("jump into contact", {"fc": "0.25"}),
     "loss_by_jump_off": ("jump off", {"fc": "0.65"}),
@@ -54,9 +54,9 @@ PARTS = {
 # A straight line passes through any two points.
 _LEAST_POINTS = 3
 _FIT_POINTS = 100
-# Areas and losses that both span more than this are drawn on logarithmic axes.
+# Ratio of areas, and of losses, above which both axes are logarithmic.
 _SPAN = 30.0
-# Parts that are smaller than this everywhere are not in the legend.
+# Largest share of a part that is left out of the legend.
 _LEAST_SHARE = 1e-6
 # Opacity of the bars of runs to which the asperity model is not applicable.
 _PALE = 0.35
@@ -80,7 +80,7 @@ class LinearFit(NamedTuple):
 
 @in_style
 def figure(campaign: xr.DataTree, *, studies: Sequence[str], over_surface_energy: bool = True) -> Figure:
-    """Draw the loss of all runs of the studies, averaged over the seeds, and its parts where there is adhesion."""
+    """Draw the loss of all runs of the studies, averaged over the seeds, and its parts if there is adhesion."""
     from matplotlib.patches import Patch
 
     studies = list(dict.fromkeys(studies))
@@ -102,7 +102,7 @@ def figure(campaign: xr.DataTree, *, studies: Sequence[str], over_surface_energy
 
 
 def _draw_losses(ax, campaign, runs, looks, over_surface_energy):
-    """Draw the losses of all lines with their fits; returns what the legend shows, and numbers of seeds."""
+    """Draw the losses of all lines with their fits; return what the legend shows, and numbers of seeds."""
     quantity = "hysteresis_loss_over_surface_energy" if over_surface_energy else "hysteresis_loss"
     area = "largest_contact_area_fraction"
     largest = max(np.abs(Points(line, quantity).means).max() for line in runs.values())
@@ -121,7 +121,9 @@ def _draw_losses(ax, campaign, runs, looks, over_surface_energy):
         if not looks.scale:
             handles[looks.name(contact) + _words(fit)] = handle
     means = np.concatenate([line.means for line in drawn.values()], axis=1)
-    if all(len(plausible(values)) == len(values) and values.max() > _SPAN * values.min() for values in means):
+    if all(
+        len(drop_rounding_errors(values)) == len(values) and values.max() > _SPAN * values.min() for values in means
+    ):
         logarithmic_axes(ax)
     ax.axhline(0, color=GREY, lw=0.6, zorder=1)
     ax.set_xlabel(r"contact area at the largest load  $A/A_0$")
@@ -130,7 +132,7 @@ def _draw_losses(ax, campaign, runs, looks, over_surface_energy):
 
 
 def linear_fit(x: np.ndarray, y: np.ndarray) -> LinearFit | None:
-    """Least squares through points; None of fewer than three different x."""
+    """Fit a straight line by least squares; return None if there are fewer than three different x."""
     from scipy.stats import linregress
 
     if len(np.unique(x)) < _LEAST_POINTS:
@@ -146,7 +148,7 @@ def linear_fit(x: np.ndarray, y: np.ndarray) -> LinearFit | None:
 
 
 def _words(fit):
-    """What the legend says of a fit."""
+    """Return the result of a fit in words, for the legend."""
     if fit is None:
         return ""
     words = [] if fit.r_squared is None else [f"$r^2$ = {fit.r_squared:.4f}"]
@@ -167,18 +169,18 @@ def shares(line: Sequence[ContactRuns]) -> dict[str, float]:
 
 
 def _draw_parts(ax, runs, looks):
-    """Draw a bar for every line; the parts that are there."""
+    """Draw a bar for every line; return the parts that it consists of."""
     bars = {key: shares(line) for key, line in runs.items()}
     shown = [name for name in PARTS if any(abs(bar[name]) >= _LEAST_SHARE for bar in bars.values())]
-    for place, ((contact, applicable), bar) in enumerate(bars.items()):
+    for position, ((contact, applicable), bar) in enumerate(bars.items()):
         above, below = 0.0, 0.0
         for name in shown:
             share = 100 * bar[name]
             bar_look = {"ec": "black", "lw": 0.4, "alpha": None if applicable else _PALE} | PARTS[name][1]
-            ax.bar(place, share, 0.8, bottom=above if share > 0 else below, **bar_look)
+            ax.bar(position, share, 0.8, bottom=above if share > 0 else below, **bar_look)
             above, below = above + max(share, 0), below + min(share, 0)
         look = looks.look(contact, applicable=applicable)
-        ax.plot(place, -0.055, transform=ax.get_xaxis_transform(), clip_on=False, **look | {"ls": "none"})
+        ax.plot(position, -0.055, transform=ax.get_xaxis_transform(), clip_on=False, **look | {"ls": "none"})
     ax.axhline(0, color="black", lw=0.6)
     ax.set_xlim(-0.7, len(bars) - 0.3)
     ax.set_xticks([])

@@ -71,7 +71,7 @@ class _Kind(NamedTuple):
     width: float
 
 
-# Black is what forms, red what breaks; the colours of the palette are those of materials.
+# Events that form a spot are black, those that break one red; other colours are those of materials.
 _RED = (0.9, 0.0, 0.05)
 _KINDS = {
     "jump_in": _Kind(
@@ -92,7 +92,7 @@ def figure(campaign: xr.DataTree, surface: xr.Dataset, *, study: str, **which: o
     """Draw the events of one run over its topography, which `surface` must be, and against the separation."""
     labels, run = run_on_topography(campaign, study, surface, **which)
     if not unloading_legs(run):
-        raise NothingToDraw(f"study {study}: no run was unloaded, so there is no unloading to draw")
+        raise NothingToDraw(f"study {study}: no run was unloaded, so unloading cannot be drawn")
     events = _events(run)
     fig, [(where, when)] = new_panels(3.1, width_ratios=(1.3, 1))
     handles = _draw_places(where, run, surface, events)
@@ -122,7 +122,7 @@ def _draw_places(ax, run, surface, events):
     handles = {}
     for name, kind in _KINDS.items():
         shown = marks[name]
-        # A ring around a dot and a square around a cross: what formed and broke at the same place.
+        # Marks of a spot that formed and broke at the same place: a ring around a dot, a square around a cross.
         ring = 1.6 if name in ("jump_off", "coalescence") else 1.0
         look = {"ls": "none", "ms": ring * size, "mew": 0.9} | kind.look
         (points,) = ax.plot(events["x"][shown] * length, events["y"][shown] * length, **look)
@@ -159,19 +159,19 @@ def _draw_counts(ax, events):
 
 
 def _events(run):
-    """Kind, branch, place (m) and separation (h_rms) of the events of the first loading and of the last way back."""
+    """Return the events of the first loading and the last unloading: kind, branch, x and y in m, u/h_rms."""
     kind = run["event_kind"]
     names = dict(
         zip(np.atleast_1d(kind.attrs["flag_values"]).tolist(), kind.attrs["flag_meanings"].split(), strict=True)
     )
     steps = run["event_step"].values.astype(int)
     leg = run["leg"].sel(step=steps).values
-    back = unloading_legs(run)[-1]["leg"].values[-1]
-    own = (leg == 0) | (leg == back)
+    last = unloading_legs(run)[-1]["leg"].values[-1]
+    shown = (leg == 0) | (leg == last)
     return {
-        "kind": np.array([names[int(value)] for value in kind.values], dtype=object)[own],
-        "branch": run["branch"].sel(step=steps).values.astype(object)[own],
-        "x": run["event_x"].values[own],
-        "y": run["event_y"].values[own],
-        "separation": run["event_separation"].values[own] / float(run["rms_height"]),
+        "kind": np.array([names[int(value)] for value in kind.values], dtype=object)[shown],
+        "branch": run["branch"].sel(step=steps).values.astype(object)[shown],
+        "x": run["event_x"].values[shown],
+        "y": run["event_y"].values[shown],
+        "separation": run["event_separation"].values[shown] / float(run["rms_height"]),
     }

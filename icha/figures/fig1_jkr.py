@@ -1,4 +1,4 @@
-"""Fig. 1: force and contact radius of one asperity against its approach, with jump into and out of contact."""
+"""Fig. 1: force and contact radius of one asperity against its approach."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class JKRFigure(FigureOptions):
 
 
 def no_inputs(campaign: Campaign, options: JKRFigure, files: ResultFiles) -> Inputs:
-    """Nothing: the law is drawn for one asperity."""
+    """Return nothing, because the figure shows the law of one asperity."""
     return {}
 
 
@@ -85,7 +85,7 @@ def figure(*, tabor_parameter: float = 3.0) -> Figure:
 
 
 def _arrow(ax, x0, y0, x1, y1, colour):
-    """An arrow head half way along a jump."""
+    """Draw an arrow head in the middle of a jump."""
     middle = (x0 + 0.55 * (x1 - x0), y0 + 0.55 * (y1 - y0))
     start = (x0 + 0.45 * (x1 - x0), y0 + 0.45 * (y1 - y0))
     ax.annotate("", middle, start, arrowprops={"arrowstyle": "-|>", "color": colour, "shrinkA": 0, "shrinkB": 0})

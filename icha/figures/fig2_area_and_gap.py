@@ -19,11 +19,11 @@ from icha.figures.curves import (
     area_points,
     cross_look,
     draw_curves,
+    drop_rounding_errors,
     gap_label,
     gap_points,
-    plausible,
     study_curves,
-    whose_theories,
+    theories_handle,
 )
 from icha.figures.declaration import Campaign, Declaration, Inputs, StudyFigure, finite_range_error
 from icha.figures.ensembles import draw_members, mark_fewer
@@ -78,7 +78,7 @@ def figure(
     if curves.unloaded:
         left.plot([], [], color=GREY, label="unloading", **UNLOADING)
     states = [(p, areas, gaps), *_draw_solutions([left, right], curves.looks, entries)]
-    pressures, areas, gaps = (plausible(np.concatenate(values)) for values in zip(*states, strict=True))
+    pressures, areas, gaps = (drop_rounding_errors(np.concatenate(values)) for values in zip(*states, strict=True))
     x = (pressures.min() / 1.6, pressures.max() * 1.6)
     if references is not None:
         if "gfmd_reduced_pressure" in references:
@@ -99,7 +99,7 @@ def figure(
         lowest = letter in mosaic.split(";")[1]
         ax.tick_params(labelbottom=lowest)
         ax.set_xlabel(PRESSURE_LABEL if lowest else "")
-    add_legend(fig, [left, right], curves, whose_theories(dataset) if references is not None else {})
+    add_legend(fig, [left, right], curves, theories_handle(dataset) if references is not None else {})
     return fig
 
 
@@ -131,8 +131,8 @@ def _differences(curves, entries, references):
     """Return the differences of contact area and separation from boundary elements or else from theories."""
     from icha.references.persson import persson_area
 
-    # The limit of a short range comes first: the other one with adhesion only bounds it.
-    truths = {truth.runs.contact: truth for truth in curves.beside}
+    # The limit of a short range comes first: with adhesion, finite ranges only bound it.
+    truths = {truth.runs.contact: truth for truth in curves.crosses}
     areas, separations = [], []
     for line in curves.lines:
         if truth := truths.get(line.runs.contact):
@@ -144,9 +144,9 @@ def _differences(curves, entries, references):
             if np.isfinite(errors["area_error"].values).any():
                 errors = errors.dropna("reduced_pressure", how="all", subset=["area_error"])
                 load, asked = errors["reduced_pressure"].values, asked_of_entry(errors)
-                own = errors.sel(seed=[seed for seed in line.runs.runs if seed in errors["seed"].values])
-                areas.append((line, load, _per_cent(own["area_error"]), asked))
-                separations.append((line, load, _per_cent(own["separation_error"]), asked))
+                of_seeds = errors.sel(seed=[seed for seed in line.runs.runs if seed in errors["seed"].values])
+                areas.append((line, load, _per_cent(of_seeds["area_error"]), asked))
+                separations.append((line, load, _per_cent(of_seeds["separation_error"]), asked))
                 break
     if areas:
         return [
@@ -162,11 +162,11 @@ def _differences(curves, entries, references):
 
 
 def _from_runs(line, truth, points, *, logarithmic):
-    """Return loads, and differences (seeds, loads) of runs from those by boundary elements with the same seed.
+    """Return loads, and differences (seeds, loads) of runs from boundary elements with the same seed, in per cent.
 
-    They are at the runs' own loads as far as boundary elements reach, between whose stops values are interpolated.
+    The loads are those of the runs, as far as boundary elements reach. Their values are interpolated.
     """
-    from icha.analysis.common_loads import at_common_loads, interpolated
+    from icha.analysis.common_loads import at_common_loads, interpolate
 
     members, runs, truths = [], line.stops, truth.stops
     for seed in [seed for seed in runs if seed in truths]:
@@ -176,7 +176,7 @@ def _from_runs(line, truth, points, *, logarithmic):
             true_load, true_values = true_load[pressed], true_values[pressed]
             at = np.clip(load, true_load.min(), true_load.max())
             reached = np.isclose(at, load, rtol=_SAME_LOAD, atol=0)
-            true_values = interpolated(true_load, true_values, at[reached], logarithmic=logarithmic)
+            true_values = interpolate(true_load, true_values, at[reached], logarithmic=logarithmic)
             members.append((load[reached], 100 * (values[reached] / true_values - 1)))
     return at_common_loads(members, logarithmic=False) if members else (np.empty(0), np.empty((0, 0)))
 
@@ -202,7 +202,7 @@ def _from_theory(lines, points, theory):
 
 
 def _draw_difference(ax, difference, lines):
-    """Draw the differences of all lines."""
+    """Draw the differences of all lines in a lower panel."""
     for line, load, members, asked in difference.drawn:
         if members.size:
             look = line.look | {"ls": "-", "lw": 0.6}
@@ -218,11 +218,11 @@ def _draw_solutions(panels, looks, entries):
     for errors in entries:
         for (surface, slope), material in itertools.product(surfaces_and_slopes(errors), errors["material"].values):
             labels = {"material": material, "surface": surface, "rms_slope": slope}
-            own = errors.isel(place_of(errors, labels)).transpose("seed", ...)
-            members = [own[f"{name}_boundary_elements"].values for name in quantities]
+            solutions = errors.isel(place_of(errors, labels)).transpose("seed", ...)
+            members = [solutions[f"{name}_boundary_elements"].values for name in quantities]
             # A surface has no states at the slopes of others.
             known = np.isfinite(members[0])
-            p = own["reduced_pressure"].values
+            p = solutions["reduced_pressure"].values
             if not known.any():
                 continue
             means = [ensemble(values).mean for values in members]
@@ -231,7 +231,7 @@ def _draw_solutions(panels, looks, entries):
             look = cross_look(looks, (material, surface, slope), FINITE_RANGE)
             for ax, values in zip(panels, states[-1][1:], strict=True):
                 ax.plot(states[-1][0], values, **look)
-                mark_fewer(ax, states[-1][0], values, known[:, solved], look, int(asked_of_entry(own)))
+                mark_fewer(ax, states[-1][0], values, known[:, solved], look, int(asked_of_entry(solutions)))
     if states:
         for ax in panels:
             ax.plot([], [], **look | {"color": GREY, "mec": GREY, "ms": 8}, label=FINITE_RANGE)
@@ -260,10 +260,10 @@ def _draw_separate_summits(left, right, references, dataset, colours):
     if "greenwood_williamson_reduced_pressure" in references:
         curves.append(("Greenwood & Williamson", (0, (5, 2, 1, 2)), GREY, "greenwood_williamson", references))
     for k in range(references.sizes.get("fuller_tabor_curve", 0)):
-        own = references.isel(fuller_tabor_curve=k)
-        material, slope = str(own["fuller_tabor_material"].values), float(own["fuller_tabor_rms_slope"])
+        theory = references.isel(fuller_tabor_curve=k)
+        material, slope = str(theory["fuller_tabor_material"].values), float(theory["fuller_tabor_rms_slope"])
         if material in colours and np.isclose(slope, dataset["rms_slope"].values, rtol=1e-9).any():
-            curves.append(("Fuller & Tabor", (0, (1, 1.5)), colours[material], "fuller_tabor", own))
+            curves.append(("Fuller & Tabor", (0, (1, 1.5)), colours[material], "fuller_tabor", theory))
     for label, dashes, colour, name, theory in curves:
         p, separation = (theory[f"{name}_reduced_{quantity}"].values for quantity in ("pressure", "separation"))
         look = {"ls": dashes, "lw": 0.8, "zorder": 1.8}

@@ -1,4 +1,4 @@
-"""Fig. 3: how gaps and contact pressures are distributed at one load, with and without adhesion."""
+"""Fig. 3: distributions of gap and contact pressure at one load, with and without adhesion."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ import numpy as np
 
 from icha.datasets import results
 from icha.datasets.variables.model_error import FINITE_RANGE, SHORT_RANGE
-from icha.figures.curves import add_snapshot_legend, plausible, snapshot_looks
+from icha.figures.curves import add_snapshot_legend, drop_rounding_errors, snapshot_looks
 from icha.figures.declaration import Campaign, Declaration, Inputs, SnapshotFigure, finite_range_error
 from icha.figures.ensembles import draw_members
-from icha.figures.looks import BESIDE_LINE, MODEL_MARKERS
+from icha.figures.looks import MODEL_MARKERS, TRUTH_LINE
 from icha.figures.select import errors_of_run, finite_range_errors, snapshots_of_materials
 from icha.figures.style import BLACK, in_style, logarithmic_axes, new_panels
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 def inputs(campaign: Campaign, options: SnapshotFigure, files: results.ResultFiles) -> Inputs:
-    """The runs, and boundary elements at a finite range beside them, if there are any."""
+    """Return the runs, and boundary elements at a finite range beside them, if there are any."""
     return {"campaign": files.path(results.DATASET)} | finite_range_error(campaign, options.study, files)
 
 
@@ -32,9 +32,9 @@ DECLARATION = Declaration(
     inputs=inputs,
 )
 
-# Sampled gaps per plotted point: bins with less are joined with their neighbours.
+# Least number of sampled gaps in a plotted point; bins with fewer are joined with their neighbours.
 _LEAST_CELLS = 100
-# The same for the nodes in contact, which are few.
+# The same for nodes in contact, which are few.
 _LEAST_NODES = 25
 _MOST_MARKERS, _BESIDE_MARKERS = 40, 14
 
@@ -62,16 +62,16 @@ def figure(
     dataset = campaign[study].to_dataset()
     each_look, looks = snapshot_looks(campaign, study, lines)
     fig, [(left, right)] = new_panels(3.1)
-    lowest, highest, top, beside, floor = -0.3, 0.3, 0.0, [], []
+    lowest, highest, top, names, floor = -0.3, 0.3, 0.0, [], []
     for line, look in zip(lines, each_look, strict=True):
         u, densities = gap_densities(line.members)
         drawn = {"positive": True, "lines": len(lines), "asked": line.runs.asked}
         draw_members(left, u, densities, look, **drawn, markevery=1 + len(u) // _MOST_MARKERS)
-        floor.append(plausible(densities.mean(axis=0)).min())
+        floor.append(drop_rounding_errors(densities.mean(axis=0)).min())
         p, densities = pressure_densities(line.members)
         draw_members(right, p, densities, look, **drawn, markevery=3)
         density = densities.mean(axis=0)
-        shown = p[density > 1e-3 * density.max(initial=0)]  # before first contact there is no pressure
+        shown = p[density > 1e-3 * density.max(initial=0)]
         lowest, highest = shown.min(initial=lowest), shown.max(initial=highest)
         top = density.max(initial=top)
         loads = [float(state_of(run, at)["reduced_pressure"]) for run, at in line.members]
@@ -79,21 +79,21 @@ def figure(
         solutions = _solutions(finite_range_errors(model_error, study), line.runs, loads)
         truth = _boundary_elements(line.truths, solutions)
         if truth:
-            beside.append(truth.name)
+            names.append(truth.name)
             top = max(top, truth.pressures[1].max(initial=0.0))
-            dashed = BESIDE_LINE | {"color": look["color"], "marker": MODEL_MARKERS[truth.name]}
+            dashed = TRUTH_LINE | {"color": look["color"], "marker": MODEL_MARKERS[truth.name]}
             for ax, (at, density) in ((left, truth.gaps), (right, truth.pressures)):
                 ax.plot(at, density, markevery=1 + len(at) // _BESIDE_MARKERS, **dashed)
     logarithmic_axes(left)
     logarithmic_axes(right, "y")
     left.set_ylim(min(floor) / 2)
     _finish(left, right, (lowest, highest), top, load)
-    add_snapshot_legend(fig, [left, right], dataset, lines, looks, dict.fromkeys(beside))
+    add_snapshot_legend(fig, [left, right], dataset, lines, looks, dict.fromkeys(names))
     return fig
 
 
 def _finish(left, right, pressures, highest, load):
-    """Labels of both panels, and of that of the pressure limits and Persson's theory at a reduced pressure."""
+    """Label both panels; draw Persson's theory at a reduced pressure and set the limits of the panel of pressures."""
     from icha.references.persson import persson_pressure_density
 
     if load > 0:
@@ -109,7 +109,7 @@ def _finish(left, right, pressures, highest, load):
     right.set_ylabel(r"$P(p)\; E^{\ast}h_{\mathrm{rms}}^{\prime}$")
 
 
-class _Beside(NamedTuple):
+class _Distributions(NamedTuple):
     """Distributions of boundary elements.
 
     Attributes
@@ -143,11 +143,11 @@ def _boundary_elements(truths, solutions):
         )
     else:
         return None
-    return _Beside(name, *((at, densities.mean(axis=0)) for at, densities in distributions))
+    return _Distributions(name, *((at, densities.mean(axis=0)) for at, densities in distributions))
 
 
 def gap_densities(members: Sequence[tuple[xr.Dataset, int]]) -> tuple[np.ndarray, np.ndarray]:
-    """u/h_rms (k,) and P(u) h_rms (members, k) of snapshots; thinly filled bins are joined until they hold cells.
+    """Return u/h_rms (k,) and P(u) h_rms (members, k) of snapshots; bins with few cells are joined.
 
     Raises
     ------
@@ -161,19 +161,19 @@ def gap_densities(members: Sequence[tuple[xr.Dataset, int]]) -> tuple[np.ndarray
 
 
 def pressure_densities(members: Sequence[tuple[xr.Dataset, int]]) -> tuple[np.ndarray, np.ndarray]:
-    """p/(E* h'_rms) (k,) and P(p) E* h'_rms (members, k) of the bins of snapshots that hold anything."""
+    """Return p/(E* h'_rms) (k,) and P(p) E* h'_rms (members, k) of the bins of snapshots that are not empty."""
     edges, densities = _reduced_pressure_densities(members)
     filled = densities.max(axis=0) > 0
     return (0.5 * (edges[1:] + edges[:-1]))[filled], densities[:, filled]
 
 
 def joined_pressure_densities(members: Sequence[tuple[xr.Dataset, int]]) -> tuple[np.ndarray, np.ndarray]:
-    """As `pressure_densities`, of boundary elements, of which few nodes are in contact: bins are joined."""
+    """Return the same as `pressure_densities` with bins joined, for boundary elements with few nodes in contact."""
     return _pressure_densities(*_reduced_pressure_densities(members), int(members[0][0]["grid"]))
 
 
 def _reduced_pressure_densities(members):
-    """Edges of the bins of p/(E* h'_rms), and P(p) E* h'_rms (members, bins)."""
+    """Return edges of the bins of p/(E* h'_rms), and P(p) E* h'_rms (members, bins)."""
     (first, _), *_ = members
     unit = float(first["contact_modulus"]) * float(first["rms_slope"])
     return first["pressure_bin_edges"].values / unit, np.array(
@@ -182,35 +182,35 @@ def _reduced_pressure_densities(members):
 
 
 def _pressure_densities(edges, densities, grid):
-    """The distributions within their first and last nodes; bins are joined until they hold nodes."""
+    """Return the distributions between their first and last nodes; bins with few nodes are joined."""
     content = densities * np.diff(edges)
-    held = np.flatnonzero(content.any(axis=0))
-    if not len(held):  # before first contact
+    filled = np.flatnonzero(content.any(axis=0))
+    if not len(filled):  # before first contact
         return np.empty(0), np.empty((len(densities), 0))
-    inside = slice(held[0], held[-1] + 1)
-    low, high, joined = _joined(edges[held[0] : held[-1] + 2], content[:, inside], _LEAST_NODES / grid**2)
+    inside = slice(filled[0], filled[-1] + 1)
+    low, high, joined = _join_bins(edges[filled[0] : filled[-1] + 2], content[:, inside], _LEAST_NODES / grid**2)
     return 0.5 * (low + high), joined
 
 
 def _gap_densities(edges, densities, grid):
-    """The distributions without their first bin: from zero, it has no place on a logarithmic axis."""
-    low, high, densities = _joined(edges[1:], densities[:, 1:] * np.diff(edges)[1:], _LEAST_CELLS / grid**2)
+    """Return the distributions without their first bin, which begins at zero, for a logarithmic axis."""
+    low, high, densities = _join_bins(edges[1:], densities[:, 1:] * np.diff(edges)[1:], _LEAST_CELLS / grid**2)
     if not len(low):
         raise ValueError("the gap distribution is empty")
     return np.sqrt(low * high), densities
 
 
-def _joined(edges, contents, least):
-    """Lower and upper edges, and densities of every member, of bins joined until they all together hold so much."""
+def _join_bins(edges, contents, least):
+    """Join bins until all members together have the least content; return lower and upper edges, and densities."""
     bounds, gathered = [0], 0.0
-    for k, part in enumerate(contents.sum(axis=0)):
-        gathered += part
+    for k, content in enumerate(contents.sum(axis=0)):
+        gathered += content
         if gathered >= least:
             bounds.append(k + 1)
             gathered = 0.0
     low, high = edges[bounds[:-1]], edges[bounds[1:]]
-    held = np.concatenate([np.zeros((len(contents), 1)), np.cumsum(contents, axis=1)], axis=1)
-    return low, high, np.diff(held[:, bounds], axis=1) / (high - low)
+    cumulative = np.concatenate([np.zeros((len(contents), 1)), np.cumsum(contents, axis=1)], axis=1)
+    return low, high, np.diff(cumulative[:, bounds], axis=1) / (high - low)
 
 
 def _solutions(entries, runs, loads):

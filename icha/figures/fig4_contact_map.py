@@ -39,17 +39,17 @@ def inputs(campaign: Campaign, options: MapFigure, files: results.ResultFiles) -
 
 
 def finest_solution(campaign: Campaign, options: MapFigure) -> SolutionLabels | None:
-    """Return the finest solution by boundary elements at a finite range of the state that is drawn, if any."""
+    """Return the finest solution at a finite range of attraction of the state that is drawn, if any."""
     targets = campaign.snapshots_of(options.study) or [campaign.studies[options.study].targets.last]
     if options.snapshot is not None:
         targets = [options.snapshot.target]
     if {kind for kind, _ in targets} != {"reduced_pressure"}:
         return None
-    _, value = min(targets)  # the first that is met
+    _, value = min(targets)  # the first one on the path
     _, _, *contact = options.run(campaign)
     for label, entry in sorted(campaign.finite_range.items(), key=lambda each: -each[1].refinement):
         solved = entry.study == options.study and value in entry.reduced_pressures
-        if solved and tuple(contact) in campaign.solved(entry):
+        if solved and tuple(contact) in campaign.contacts_beside(entry):
             return SolutionLabels(label, options.study, *contact, value)
     return None
 
@@ -71,7 +71,7 @@ _OUTLINE = 0.25
 _WIDEST_OUTLINE = 0.35
 _PANEL = 190
 _RED = (0.9, 0.0, 0.05)
-# By what is in contact at a node: nothing, asperities, boundary elements, both.
+# Names and colours of nodes in contact with no model, asperities, boundary elements, and both.
 _STATES = (("", "white"), ("asperities only", _RED), ("boundary elements only", "black"), ("both", "0.72"))
 
 
@@ -94,7 +94,7 @@ def figure(
     campaign : the campaign dataset.
     surface : the surface file's dataset; it must be the topography of the run that is drawn.
     solution : boundary elements at a finite range (`icha.references.finite_range`) of the state that is drawn, if any.
-    truth : the same run by boundary elements in the limit of a short range, with its maps, if there is one.
+    truth : the same run with boundary elements in the limit of a short range, with its maps, if there is one.
     which : which run of the study (`icha.figures.select.run_on_topography`).
     """
     from icha.analysis.model_error import state_of
@@ -127,7 +127,7 @@ def figure(
 
 
 class _Solved(NamedTuple):
-    """Contact by boundary elements.
+    """Contact area of boundary elements.
 
     Attributes
     ----------
@@ -229,45 +229,45 @@ def _view(run, at, surface):
 
 
 def _draw_spots_over_topography(whole, enlarged, view):
-    """Draw the whole map and the enlarged part of it; returns the image of the heights."""
+    """Draw the whole map and the enlarged window; return the image of the heights."""
     n, circles, corner, window = len(view.heights), view.circles, view.corner, view.window
-    near = circles[np.all(np.abs(circles[:, :2] - (corner + window / 2)) < window / 2 + circles[:, 2:], axis=1)]
+    inside = circles[np.all(np.abs(circles[:, :2] - (corner + window / 2)) < window / 2 + circles[:, 2:], axis=1)]
     image = draw_whole(whole, block_means(view.heights) * view.scale, n, view.side, **view.look)
     outlines = np.minimum(_OUTLINE * _PANEL / view.side * circles[:, 2], _WIDEST_OUTLINE)
     many = len(circles) > _MANY_SPOTS
     draw_spots(whole, circles, facecolor=(*_RED, 0.85), edgecolor="black", lw=outlines, rasterized=many)
-    part, borders = _window(view.heights, view.side / n, corner, window)
-    enlarged.imshow(block_means(part) * view.scale, extent=borders, interpolation="nearest", **view.look)
-    draw_spots(enlarged, near, facecolor=(*_RED, 0.4), edgecolor=(0.75, 0, 0), lw=1.0)
+    heights, borders = _window(view.heights, view.side / n, corner, window)
+    enlarged.imshow(block_means(heights) * view.scale, extent=borders, interpolation="nearest", **view.look)
+    draw_spots(enlarged, inside, facecolor=(*_RED, 0.4), edgecolor=(0.75, 0, 0), lw=1.0)
     return image
 
 
 def _draw_solution(panels, view, run, at, solved):
-    """Draw the contact of boundary elements: over the topography, around the enlarged spots, and beside the model's."""
+    """Draw the contact of boundary elements: over the topography, around the enlarged spots, and with asperities."""
     from matplotlib.colors import LinearSegmentedColormap, to_rgb
     from matplotlib.patches import Patch
 
     from icha.analysis.model_error import contact_of_spots, jaccard
 
-    (_, beside), (enlarged, compared) = panels
+    (_, solution), (enlarged, compared) = panels
     contact, fine = solved.contact >= 0.5, len(solved.contact)
     spots_cover = contact_of_spots(run, at, fine)
-    draw_whole(beside, block_means(view.heights) * view.scale, len(view.heights), view.side, **view.look)
+    draw_whole(solution, block_means(view.heights) * view.scale, len(view.heights), view.side, **view.look)
     red = LinearSegmentedColormap.from_list("contact", [(*_RED, 0.0), (*_RED, 0.9)])
     look = {"origin": "lower", "cmap": red, "vmin": 0, "vmax": 1}
-    draw_whole(beside, block_means(solved.contact), fine, view.side, **look)
+    draw_whole(solution, block_means(solved.contact), fine, view.side, **look)
     contour, borders = _window(solved.contact, view.side / fine, view.corner, view.window)
     enlarged.contour(contour, [0.5], extent=borders, origin="lower", colors="black", linewidths=0.9)
     palette = np.array([to_rgb(colour) for _, colour in _STATES])
     draw_whole(compared, block_means(palette[1 * spots_cover + 2 * contact]), fine, view.side, origin="lower")
     keys = [Patch(fc=colour, label=name) for name, colour in _STATES if name]
     compared.legend(handles=keys, loc="upper center", bbox_to_anchor=(0.5, -0.17), ncols=3, columnspacing=1.0)
-    beside.set_title(rf"{solved.name}, $A/A_0$ = {solved.area:.3f}", loc="right")
+    solution.set_title(rf"{solved.name}, $A/A_0$ = {solved.area:.3f}", loc="right")
     compared.set_title(f"overlap (both / at least one) {jaccard(spots_cover, contact):.2f}", loc="right")
 
 
 def _frame(panels, enlarged, view):
-    """Limits and labels of all panels, and where the enlarged part lies in the others."""
+    """Set limits and labels of all panels, and draw the frame of the enlarged window in the others."""
     from matplotlib.patches import Rectangle
 
     for ax in panels.ravel():
@@ -285,7 +285,7 @@ def _frame(panels, enlarged, view):
 
 
 def _window(nodes, cell, corner, window):
-    """The nodes of a periodic map that lie in a square window, and where their cells begin and end in x and in y."""
+    """Return the nodes of a periodic map in a square window, and where their cells begin and end in x and in y."""
     first = np.floor(corner / cell).astype(int)
     columns, rows = (np.arange(start, start + int(np.ceil(window / cell)) + 2) for start in first)
     borders = tuple(float(edge) * cell for at in (columns, rows) for edge in (at[0] - 0.5, at[-1] + 0.5))

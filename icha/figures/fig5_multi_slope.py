@@ -1,4 +1,4 @@
-"""Fig. 5: contact area against load for several rms slopes and materials, with measurements where there are any."""
+"""Fig. 5: contact area against load for several rms slopes and materials, with measurements."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ if TYPE_CHECKING:
 
 
 def inputs(campaign: Campaign, options: TruthFigure, files: results.ResultFiles) -> Inputs:
-    """The runs, and tables of measurements that belong to the study, if there are any."""
+    """Return the runs, and tables of measurements that belong to the study, if there are any."""
     tables = [measurement.path for measurement in _measurements(campaign, options)]
     return {"campaign": files.path(results.DATASET)} | ({"tables": tables} if tables else {})
 
 
 def arguments(campaign: Campaign, options: TruthFigure) -> dict[str, Any]:
-    """What is to be known of each table."""
+    """Return what the figure needs to know about each table."""
     known = [
         {
             "label": measurement.label,
@@ -51,7 +51,7 @@ def _measurements(campaign, options):
 
 
 def _load_unit(campaign, measurement) -> float:
-    """What a measured load is divided by to become p/(E* h'rms)."""
+    """Return the divisor that turns a measured load into p/(E* h'rms)."""
     if not measurement.load_is_pressure:
         return 1.0
     return campaign.materials[measurement.material].contact_modulus * measurement.rms_slope
@@ -79,9 +79,9 @@ def figure(
     Parameters
     ----------
     campaign : the campaign dataset.
-    tables : files of measured curves to lay over; in panel (b) only those whose slope is known.
-    measurements : of each table its `label`, `columns` (headings of load and area, with factors), `load_unit` (what a
-        load is divided by to become p/(E* h'rms)), and `material` and `rms_slope`, None where they are not known.
+    tables : files of measured curves; panel (b) shows only those whose slope is known.
+    measurements : of each table its `label`, `columns` (headings of load and area, with factors), `load_unit` (the
+        divisor that turns a load into p/(E* h'rms)), and `material` and `rms_slope`, None if they are not known.
     """
     curves = study_curves(campaign, study, boundary_elements)
     dataset, colours = campaign[study].to_dataset(), curves.looks.colours

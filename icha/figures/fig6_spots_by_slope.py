@@ -11,8 +11,8 @@ from icha.figures.declaration import Campaign, Declaration, StudyFigure
 from icha.figures.legends import legend_below
 from icha.figures.looks import NOT_APPLICABLE_ALONE, Scale
 from icha.figures.maps import circles_in_cell, draw_spots
-from icha.figures.select import is_applicable, pick, study_runs
-from icha.figures.style import choose_unit, format_number, in_style, new_panels, slope_label
+from icha.figures.select import is_applicable, pick, snapshot_label, study_runs
+from icha.figures.style import choose_unit, in_style, new_panels, slope_label
 from icha.support.values import Label, Problem, Seed
 
 if TYPE_CHECKING:
@@ -28,12 +28,12 @@ class SlopesFigure(StudyFigure):
     material: Label | None = Field(default=None, description="Material that is shown. Left out: the study's first.")
 
     def study_problems(self, campaign: Campaign, study: Any) -> Iterator[Problem]:
-        """A study that does not keep states of both kinds is one more."""
+        """Yield in addition the problem of a study without snapshots of both kinds."""
         yield from super().study_problems(campaign, study)
         kinds = [kind for kind, _ in campaign.snapshots_of(self.study) or []]
         for kind in ("relative_load", "area_fraction"):
             if kind not in kinds:
-                yield ("study",), self.study, f"has no snapshot of kind {kind}; allowed: a study with one"
+                yield ("study",), self.study, f"has no snapshot of kind {kind}; expected a study with one"
 
 
 DECLARATION = Declaration(
@@ -45,7 +45,6 @@ DECLARATION = Declaration(
 )
 
 _KINDS = ("relative_load", "area_fraction")
-_TITLES = {"relative_load": r"$F/(E^{\ast}A_0)$", "area_fraction": "$A/A_0$"}
 
 
 @in_style
@@ -63,31 +62,30 @@ def figure(
     runs = study_runs(campaign, study)
     surface = pick("surface", surface, [labels.surface for labels, _ in runs])
     seed = pick("seed", seed, [labels.seed for labels, _ in runs if labels.surface == surface])
-    own = [(labels, run) for labels, run in runs if (labels.surface, labels.seed) == (surface, seed)]
-    material = pick("material", material, [labels.material for labels, _ in own])
-    own = {labels.rms_slope: run for labels, run in own if labels.material == material}
-    slopes = sorted(own, reverse=True)
+    runs = [(labels, run) for labels, run in runs if (labels.surface, labels.seed) == (surface, seed)]
+    material = pick("material", material, [labels.material for labels, _ in runs])
+    by_slope = {labels.rms_slope: run for labels, run in runs if labels.material == material}
+    slopes = sorted(by_slope, reverse=True)
     # From dark to bright; the colours of the palette are those of materials.
     colours = dict(zip(slopes, Scale([f"{slope:g}" for slope in slopes]).colours, strict=True))
 
     fig, [panels] = new_panels(3.8, sharey=True)
-    length, unit = choose_unit(float(own[slopes[0]]["period"]), "m")
+    length, unit = choose_unit(float(by_slope[slopes[0]]["period"]), "m")
     for ax, kind in zip(panels, _KINDS, strict=True):
-        value = _draw_slopes(ax, own, kind, colours, length)
+        _draw_slopes(ax, by_slope, kind, colours, length)
         ax.set_aspect("equal")
         ax.set_xlabel(f"x ({unit})")
-        ax.set_title(f"{_TITLES[kind]} = {format_number(value)}", loc="right")
     panels[0].set_ylabel(f"y ({unit})")
     names = {
         slope: slope_label(slope) + ("" if is_applicable(run) else f" ({NOT_APPLICABLE_ALONE})")
-        for slope, run in own.items()
+        for slope, run in by_slope.items()
     }
     legend_below(fig, {names[slope]: Patch(facecolor=colours[slope]) for slope in slopes})
     return fig
 
 
 def _draw_slopes(ax, runs, kind, colours, length):
-    """Draw the spots of the runs, by slope, at their first snapshot of a kind; returns the snapshot's load or area."""
+    """Draw the spots of the runs, by slope, at their first snapshot of a kind."""
     from matplotlib.collections import PatchCollection
     from matplotlib.patches import Wedge
 
@@ -99,7 +97,7 @@ def _draw_slopes(ax, runs, kind, colours, length):
         run = runs[slope]
         return float(run["contact_area_fraction"].values[int(run["snapshot_step"].values[at[slope]])])
 
-    # What covers less lies on top.
+    # Spots that cover less lie on top.
     for order, slope in enumerate(sorted(colours, key=area, reverse=True)):
         run, look = runs[slope], {"facecolor": colours[slope], "edgecolor": "black", "lw": 0.25}
         side, spots = float(run["period"]) * length, spots_of(run, at[slope])
@@ -108,10 +106,9 @@ def _draw_slopes(ax, runs, kind, colours, length):
         if kind == "relative_load":
             draw_spots(ax, circles, zorder=2 + order, **look)
         else:
-            # The spots nearly coincide: every slope fills its own sector of the disc, so that all can be seen.
+            # The spots nearly coincide. Every slope fills a sector of the disc, so that all are visible.
             share = 360 / len(runs)
             start = 90 + share * list(colours).index(slope)
             ax.add_collection(PatchCollection([Wedge((x, y), r, start, start + share) for x, y, r in circles], **look))
-    ax.set_xlim(0, side)
-    ax.set_ylim(0, side)
-    return float(run["snapshot_target"].values[at[slope]])
+    ax.set(xlim=(0, side), ylim=(0, side))
+    ax.set_title(snapshot_label(run, at[slope]), loc="right")

@@ -1,4 +1,4 @@
-"""Fig. 7: contact stiffness against load, with the proportional law that theory and computations find."""
+"""Fig. 7: contact stiffness against load."""
 
 from __future__ import annotations
 
@@ -7,7 +7,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from icha.datasets import results
-from icha.figures.curves import PRESSURE_LABEL, add_legend, draw_curves, plausible, study_curves, whose_theories
+from icha.figures.curves import (
+    PRESSURE_LABEL,
+    add_legend,
+    draw_curves,
+    drop_rounding_errors,
+    study_curves,
+    theories_handle,
+)
 from icha.figures.declaration import Campaign, Declaration, Inputs, StudyFigure
 from icha.figures.select import NothingToDraw
 from icha.figures.style import BLACK, in_style, new_panels
@@ -18,7 +25,7 @@ if TYPE_CHECKING:
 
 
 def inputs(campaign: Campaign, options: StudyFigure, files: results.ResultFiles) -> Inputs:
-    """The runs, and theories for their first surface."""
+    """Return the runs, and theories for their first surface."""
     theories = files.path(results.THEORIES, surface=campaign.studies[options.study].surfaces[0])
     return {"campaign": files.path(results.DATASET), "references": theories}
 
@@ -37,7 +44,7 @@ def figure(campaign: xr.DataTree, references: xr.Dataset | None = None, *, study
     right.set_yscale("linear")
     if not len(pressures):
         raise NothingToDraw(f"study {study}: no stop with a positive load and a positive stiffness to draw")
-    x = (plausible(pressures).min() / 1.6, pressures.max() * 1.6)
+    x = (drop_rounding_errors(pressures).min() / 1.6, pressures.max() * 1.6)
     ratio = stiffnesses / pressures
     if references is not None and "persson_reduced_stiffness" in references:
         p = references["reduced_pressure"].values
@@ -50,11 +57,11 @@ def figure(campaign: xr.DataTree, references: xr.Dataset | None = None, *, study
     for ax in (left, right):
         ax.set_xlim(x)
         ax.set_xlabel(PRESSURE_LABEL)
-    left.set_ylim(plausible(stiffnesses).min() / 2, stiffnesses.max() * 2)
+    left.set_ylim(drop_rounding_errors(stiffnesses).min() / 2, stiffnesses.max() * 2)
     right.set_ylim(0, 1.15 * ratio.max())
     left.set_ylabel(r"contact stiffness  $K h_{\mathrm{rms}}/(E^{\ast}h_{\mathrm{rms}}^{\prime})$")
     right.set_ylabel(r"$K h_{\mathrm{rms}}/p$")
-    further = whose_theories(campaign[study].to_dataset()) if references is not None else {}
+    further = theories_handle(campaign[study].to_dataset()) if references is not None else {}
     add_legend(fig, [left, right], curves, further)
     return fig
 
@@ -65,7 +72,7 @@ def _over_pressure(run):
 
 
 def stiffness_points(run: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
-    """Reduced pressures, and K h_rms/(E* h'_rms) = -dp*/d(u/h_rms), of the steps where both are positive."""
+    """Return reduced pressures and K h_rms/(E* h'_rms) = -dp*/d(u/h_rms) of the steps at which both are positive."""
     unit = float(run["contact_modulus"] * run["rms_slope"] / run["rms_height"])
     p, stiffness = run["reduced_pressure"].values, run["contact_stiffness"].values / unit
     positive = (p > 0) & (stiffness > 0)

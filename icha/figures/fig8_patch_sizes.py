@@ -1,4 +1,4 @@
-"""Fig. 8: how large the contact patches are at one load, with and without adhesion."""
+"""Fig. 8: sizes of contact patches at one load, with and without adhesion."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from icha.datasets.variables.model_error import SHORT_RANGE
 from icha.figures.curves import add_snapshot_legend, snapshot_looks
 from icha.figures.declaration import Declaration, SnapshotFigure
 from icha.figures.ensembles import draw_members
-from icha.figures.looks import BESIDE_LINE, MODEL_MARKERS
+from icha.figures.looks import MODEL_MARKERS, TRUTH_LINE
 from icha.figures.select import snapshots_of_materials
 from icha.figures.style import choose_unit, in_style, logarithmic_axes, new_panels
 
@@ -24,10 +24,10 @@ DECLARATION = Declaration(
     description="Sizes of the contact patches of every material, on the study's first surface.", options=SnapshotFigure
 )
 
-# Patches per plotted point of the density: bins with less are joined with their neighbours.
+# Least number of patches in a plotted point of the density; bins with fewer are joined with their neighbours.
 _LEAST_PATCHES = 10
 _BINS_PER_DECADE = 8
-# Points of a cumulative curve; more cannot be told apart.
+# Largest number of points of a cumulative curve that are distinguishable.
 _CURVE_POINTS = 300
 
 
@@ -46,26 +46,26 @@ def figure(campaign: xr.DataTree, *, study: str, kind: str | None = None, target
             [patch_areas(run, at) * factor**2 for run, at in members] for members in (line.members, line.truths)
         )
         smooth = look | {"marker": "none", "lw": 1.4 * look["lw"]}
-        for ax, points, own, marker in (
+        for ax, points, line_look, marker in (
             (left, patch_density, look, MODEL_MARKERS[SHORT_RANGE]),
             (right, patches_above, smooth, "none"),
         ):
-            draw_members(ax, *points(areas, cell), own, positive=True, lines=len(lines), asked=line.runs.asked)
+            draw_members(ax, *points(areas, cell), line_look, positive=True, lines=len(lines), asked=line.runs.asked)
             if line.truths:
                 area, values = points(true_areas, cell)
-                ax.plot(area, values.mean(axis=0), color=look["color"], marker=marker, **BESIDE_LINE)
+                ax.plot(area, values.mean(axis=0), color=look["color"], marker=marker, **TRUTH_LINE)
     for ax in (left, right):
         logarithmic_axes(ax)
         ax.set_xlabel(f"patch area  $A$ ({unit}²)")
     left.set_ylabel(f"number density  $n(A)$ ({unit}$^{{-4}}$)")
     right.set_ylabel(f"patches larger than $A$ ({unit}$^{{-2}}$)")
-    beside = [SHORT_RANGE] if any(line.truths for line in lines) else []
-    add_snapshot_legend(fig, [left, right], dataset, lines, looks, beside)
+    truths = [SHORT_RANGE] if any(line.truths for line in lines) else []
+    add_snapshot_legend(fig, [left, right], dataset, lines, looks, truths)
     return fig
 
 
 def patch_areas(run: xr.Dataset, snapshot: int) -> np.ndarray:
-    """Areas of the contact patches of one snapshot, m², increasing; spots that just touch have none."""
+    """Return the areas of the contact patches of one snapshot, m², increasing; spots of no area are left out."""
     from icha.datasets.campaign import spots_of
 
     area = np.sort(np.pi * spots_of(run, snapshot)["spot_radius"].values ** 2)
@@ -73,7 +73,7 @@ def patch_areas(run: xr.Dataset, snapshot: int) -> np.ndarray:
 
 
 def patch_density(areas: Sequence[np.ndarray], nominal_area: float) -> tuple[np.ndarray, np.ndarray]:
-    """Number of patches per area of a patch and nominal area; thinly filled bins are joined.
+    """Return the number of patches per area of a patch and nominal area; bins with few patches are joined.
 
     Parameters
     ----------
@@ -92,10 +92,10 @@ def patch_density(areas: Sequence[np.ndarray], nominal_area: float) -> tuple[np.
     edges = np.logspace(*decades, count + 1) if count > 1 else np.array([pooled[0], pooled[-1] * (1 + 1e-9)])
     edges[0], edges[-1] = pooled[0], max(pooled[-1], np.nextafter(pooled[0], np.inf))
     number, _ = np.histogram(pooled, edges)
-    # A bin ends where enough patches are gathered; what is left over at the end belongs to the last one.
+    # A bin ends when it has enough patches; the remaining ones belong to the last bin.
     ends, gathered = [], 0
-    for k, here in enumerate(number):
-        gathered += here
+    for k, count_of_bin in enumerate(number):
+        gathered += count_of_bin
         if gathered >= _LEAST_PATCHES:
             ends.append(k + 1)
             gathered = 0
@@ -106,12 +106,12 @@ def patch_density(areas: Sequence[np.ndarray], nominal_area: float) -> tuple[np.
 
 
 def patches_above(areas: Sequence[np.ndarray], nominal_area: float) -> tuple[np.ndarray, np.ndarray]:
-    """Areas (k,), and number of patches at least that large per nominal area (members, k), down to the largest one.
+    """Return areas (k,), and numbers of patches at least that large per nominal area (members, k).
 
     `areas` as for `patch_density`.
     """
     pooled = np.sort(np.concatenate(areas))
-    # Evenly spaced on the logarithmic axis of the number, so that the few largest patches are all there.
-    kept = np.unique(np.rint(np.geomspace(1, len(pooled), _CURVE_POINTS)).astype(int)) if len(pooled) else []
-    at = pooled[len(pooled) - np.asarray(kept, int)[::-1]]
+    # Evenly spaced on the logarithmic axis of the number, so that the few largest patches are all shown.
+    ranks = np.unique(np.rint(np.geomspace(1, len(pooled), _CURVE_POINTS)).astype(int)) if len(pooled) else []
+    at = pooled[len(pooled) - np.asarray(ranks, int)[::-1]]
     return at, np.array([len(area) - np.searchsorted(area, at) for area in areas]) / nominal_area

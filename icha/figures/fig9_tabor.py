@@ -25,9 +25,9 @@ class TaborFigure(SnapshotFigure):
     """A figure of one snapshot of all runs of a study, whose materials differ in their range of attraction."""
 
     def study_problems(self, campaign: Campaign, study: Any) -> Iterator[Problem]:
-        """A study without adhesion is one more."""
+        """Yield in addition the problem of a study without adhesion."""
         if not any(campaign.materials[name].surface_energy > 0 for name in study.materials):
-            reason = "has no material with adhesion, so no Tabor parameter; allowed: a study with one"
+            reason = "has no material with adhesion, so no Tabor parameter; expected a study with one"
             yield ("study",), self.study, reason
         yield from super().study_problems(campaign, study)
 
@@ -41,7 +41,7 @@ DECLARATION = Declaration(
 )
 
 _STATE = ("contact_area_fraction", "reduced_separation")
-# The panels reach at least this part of the mean value up and down.
+# Least half height of a panel, over the value in its middle.
 _LEAST_REACH = 0.05
 
 
@@ -54,7 +54,7 @@ def figure(campaign: xr.DataTree, *, study: str, kind: str | None = None, target
     groups = group_by_contact(campaign, study_runs(campaign, study, ragged=False))
     run = next(iter(groups[-1].runs.values()))
     shown = snapshot_label(run, find_snapshot(run, kind, target))
-    # Materials that differ only in their range are one line, which is called by the first of them.
+    # Materials that differ only in their range are one line, which has the name of the first of them.
     materials: dict[tuple, str] = {}
     curves: dict[tuple, list[ContactRuns]] = {}
     bare: dict[tuple, list[ContactRuns]] = {}
@@ -101,12 +101,12 @@ def _finish(ax, smallest):
     from icha.asperity.material import WU_HOLDS_FROM
 
     low, high = ax.get_xlim()
-    # A range of attraction that was rounded does not leave what was verified.
+    # The tolerance is for a range of attraction that was rounded.
     if smallest < WU_HOLDS_FROM / 1.01:
         ax.axvspan(low, WU_HOLDS_FROM, color="0.93", lw=0, zorder=0)
     ax.set_xlim(low, high)
     ax.set_xlabel(r"Tabor parameter  $\mu$")
     bottom, top = ax.get_ylim()
-    # Differences of a few per mille are not blown up to fill the panel.
+    # Differences of a few per mille do not fill the panel.
     reach = max(0.65 * (top - bottom), _LEAST_REACH * 0.5 * (top + bottom))
     ax.set_ylim(0.5 * (bottom + top) - reach, 0.5 * (bottom + top) + reach)

@@ -44,9 +44,9 @@ class Leg(NamedTuple):
 
 
 def mean_legs(runs: Sequence[Sequence[tuple[str, xr.Dataset]]]) -> list[Leg]:
-    """Return the means over the seeds at common separations of the legs of runs, given by branch and steps.
+    """Return means over the seeds, at common separations, of the legs of runs, given by branch and steps.
 
-    If the runs differ in their number of legs, all legs are returned by themselves.
+    If the runs differ in their number of legs, return all legs.
     """
     from icha.analysis.common_loads import at_common_displacements
 
@@ -76,7 +76,7 @@ def unloaded_runs(campaign: xr.DataTree, study: str) -> list[tuple[RunLabels, xr
     """
     runs = [(labels, run) for labels, run in study_runs(campaign, study, ragged=False) if unloading_legs(run)]
     if not runs:
-        raise NothingToDraw(f"study {study}: no run was unloaded, so there is no unloading to draw")
+        raise NothingToDraw(f"study {study}: no run was unloaded, so unloading cannot be drawn")
     return [
         (labels, run.assign(reduced_separation=run["mean_separation"] / run["rms_height"]))
         if str(run["boundary"].values) == "free"
@@ -122,7 +122,7 @@ def detached_lines(
 
 
 def pull_off_step(run: xr.Dataset) -> int | None:
-    """Return the step of largest tension on the last unloading, or None if there is no tension on it."""
+    """Return the step of largest tension on the last unloading, or None without tension."""
     last = unloading_legs(run)[-1]
     lowest = int(np.argmin(last["nominal_pressure"].values))
     step = np.flatnonzero(run["step"].values == last["step"].values[lowest])[0]
@@ -131,6 +131,6 @@ def pull_off_step(run: xr.Dataset) -> int | None:
 
 
 def name_model(axes: Axes, campaign: xr.DataTree, studies: Iterable[str]) -> None:
-    """Write above a panel by which model the runs of some studies are that it shows."""
+    """Write the model of some studies above a panel."""
     models = dict.fromkeys(shown_model(campaign[study].to_dataset()) for study in studies)
     axes.set_title(", ".join(MODELS[model].words for model in models), loc="right")

@@ -1,4 +1,4 @@
-"""Legends, which stand below the panels, and marks of incomplete ensembles that they explain."""
+"""Legends below the panels, and numbers of seeds beside marks."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 FEWER_SEEDS = "crossed: mean over n seeds, fewer than asked for"
 
-# More names than this are written smaller.
+# Largest number of names in the larger font.
 _MANY_NAMES = 12
 _MOST_COLUMNS = 4
 _PALE_GREY = "0.72"
@@ -29,9 +29,8 @@ def legend_below(
     Parameters
     ----------
     figure : the figure, in which all else is drawn.
-    handles : what the legend shows, by name.
-    scale : a scale of colours, if any, that is added beside the `panels`.
-    panels : the axes beside which the scale stands.
+    handles : handles of the legend, by name.
+    scale : scale of colours that is added beside the `panels`, if any.
     """
     if scale:
         scale.draw(figure, list(panels))
@@ -48,7 +47,7 @@ def legend_below(
 
 
 def _marks(figure):
-    """Return what the legend says of crossed and pale marks, if a panel has some."""
+    """Return handles of crossed and pale marks, if a panel has some."""
     shown = named_handles(figure.axes)
     ring = {"ls": "none", "marker": "o", "ms": 5, "mew": 0.9, "mfc": "white"}
     cross = ring | {"marker": "x", "mew": 0.7}
@@ -60,7 +59,7 @@ def _marks(figure):
 
 
 def named_handles(panels: Iterable[Axes]) -> dict[str, object]:
-    """Return what is named in some panels, each name once."""
+    """Return the handles of all names in some panels."""
     found: dict[str, object] = {}
     for axes in panels:
         for handle, name in zip(*axes.get_legend_handles_labels(), strict=True):
@@ -69,12 +68,12 @@ def named_handles(panels: Iterable[Axes]) -> dict[str, object]:
 
 
 def model_handle(name: str, **look: object) -> Line2D:
-    """Return what a legend shows of a model."""
+    """Return the handle of a model."""
     return legend_handle(**{"ls": "none", "marker": MODEL_MARKERS[name], "color": GREY, "mec": GREY, "ms": 6} | look)
 
 
 def words_handle(text: str) -> dict[str, object]:
-    """Return an explanation in a legend, without a look."""
+    """Return an entry of a legend without a mark."""
     return {text: legend_handle(color=GREY, ls="none")}
 
 

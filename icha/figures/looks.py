@@ -1,7 +1,7 @@
 """Colours and markers of lines, the same in all figures of a campaign.
 
 A colour is a material, a marker a model: closed shapes are asperities, open ones are without adhesion, crosses are
-boundary elements. If a figure has several surfaces and slopes, the shapes of the closed markers tell them apart. If
+boundary elements. If a figure has several surfaces and slopes, the shapes of the closed markers distinguish them. If
 there are many materials, or many surfaces and slopes, they have the colours of a scale instead.
 """
 
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
 
-# Material, surface and rms slope of a line; the slope is None if slopes are not told apart.
+# Material, surface and rms slope of a line; the slope is None if slopes are not distinguished.
 Contact = tuple[str, str, float | None]
 
 # Okabe and Ito's colours without black, which is for theories, and darker ones of the same hues.
@@ -40,16 +40,16 @@ MATERIAL_COLOURS = (*COLOURS[:-1], "#004166", "#803800", "#005A42", "#80436A", "
 PLACE_MARKERS = ("o", "s", "^", "D", "v", "p", "*")
 
 ASPERITIES_NAME = MODELS["asperities"].words
-# By the names of the models in legends. Boundary elements have another cross in unloading.
+# By the names of models in legends.
 MODEL_MARKERS = {ASPERITIES_NAME: "o", SHORT_RANGE: "+", FINITE_RANGE: "1"}
 UNLOADING_MARKERS = {SHORT_RANGE: "x", FINITE_RANGE: "2"}
 BRANCH_DASHES = {"loading": "-", "unloading": (0, (4, 2))}
-# Lines of boundary elements beside those of asperities.
-BESIDE_LINE = {"ls": (0, (3, 2)), "lw": 0.8, "ms": 5, "mew": 0.8, "zorder": 5}
+# Lines of boundary elements, which are drawn beside those of asperities.
+TRUTH_LINE = {"ls": (0, (3, 2)), "lw": 0.8, "ms": 5, "mew": 0.8, "zorder": 5}
 
-# The most that a legend names, with a colour for each; more have a scale.
+# Largest number of materials, or of surfaces and slopes, with a colour in the legend; more have a scale.
 MOST_COLOURS = len(COLOURS)
-# More lines than this are drawn thin.
+# Largest number of lines that are not drawn thin.
 FEW_LINES = 6
 # All of several curves that coincide stay visible: without adhesion they are widest, and of several materials each is
 # narrower than the one before. Sizes of markers in points, width of lines in sizes of markers.
@@ -71,7 +71,7 @@ class Looks:
     campaign : the campaign dataset, from which materials have their colours.
     interfaces : modulus, surface energy and range of the materials.
     contacts : those of the lines.
-    by_place : whether colours tell surfaces and slopes apart however few they are, as lines without markers need it.
+    by_place : whether surfaces and slopes have colours even if they are few, as lines without markers need.
     """
 
     def __init__(
@@ -102,7 +102,7 @@ class Looks:
             self._sizes |= {name: max(largest * _NARROWER**rank, _LEAST_SIZE) for rank, name in enumerate(alike)}
 
     def adhesive(self, material: str) -> bool:
-        """Whether a material has surface energy."""
+        """Return whether a material has surface energy."""
         return float(self.interfaces["surface_energy"].sel(material=material)) > 0
 
     def colour(self, contact: Contact) -> str:
@@ -133,7 +133,7 @@ class Looks:
         return look if applicable else _pale(look)
 
     def handles(self, **changed: object) -> dict[str, Line2D]:
-        """Return what the legend names of the lines, in looks that are `changed`, apart from what the scale names."""
+        """Return the handles of all names that are not on the scale, with looks that are `changed`."""
         first = self.places[0]
         if self.by_place and not self.many_places:
             return {self.name(each): legend_handle(**self.look(each) | changed) for each in self.contacts}
@@ -147,7 +147,7 @@ class Looks:
         if len(self.places) > 1 and not self.many_places:
             grey = {"ls": "none", "color": GREY, "mfc": "white", "mew": 0.9, "ms": 5}
             for place, marker in self._markers.items():
-                if name := self.place_name(place):  # of surfaces and slopes that are told apart
+                if name := self.place_name(place):  # empty if slopes are not distinguished
                     found[name] = legend_handle(**grey | {"marker": marker})
         return found
 
@@ -159,7 +159,7 @@ class Looks:
         return ", ".join([*words, slope_label(slope)] if slope is not None and len(slopes) > 1 else words)
 
     def name(self, contact: Contact) -> str:
-        """Return what tells a line apart from the others of its figure."""
+        """Return the name of a line among those of its figure."""
         material, *place = contact
         place = self.place_name(tuple(place))
         # A single material is not named if surfaces and slopes have the colours.
@@ -183,8 +183,8 @@ def material_colours(campaign: xr.DataTree) -> dict[str, str]:
     studies = [node["material"].values.tolist() for node in campaign.children.values()]
     colours: dict[str, str] = {}
     for material in dict.fromkeys(name for names in studies for name in names):
-        beside = {colours.get(name) for names in studies if material in names for name in names}
-        for taken in (set(colours.values()), beside, set()):
+        of_same_studies = {colours.get(name) for names in studies if material in names for name in names}
+        for taken in (set(colours.values()), of_same_studies, set()):
             free = [colour for colour in MATERIAL_COLOURS if colour not in taken]
             if free:
                 colours[material] = free[0]
@@ -219,25 +219,25 @@ def _pale(look):
     return look | {"color": colour, "mec": colour, "mfc": "white", "label": NOT_APPLICABLE}
 
 
-# --- colours of what is too many to be named one by one, such as the surfaces of a study that varies a parameter ---
+# --- colours of many names, such as the surfaces of a study that varies a parameter ---
 
 _MOST_TICKS = 9
-# The brightest colours of the map do not show on white.
+# Largest fraction of the colour map; brighter colours are invisible on white.
 _BRIGHTEST = 0.9
 
 
 class Scale:
-    """A colour for each of many, in their order, and the bar that shows which is which.
+    """A colour for each of many names, and the bar that shows them.
 
     Parameters
     ----------
-    names : what is told apart; what all names begin with goes into the title.
-    title : what the names are.
-    darkest : the darkest colour, in parts of the map from 0 to 0.9; darker ones do not show on black.
+    names : the names in the order of their colours.
+    title : title of the bar; left out, the common beginning of the names, which they then lose.
+    darkest : fraction of the colour map of the darkest colour, from 0 to 0.9.
     """
 
     def __init__(self, names: Sequence[str], title: str = "", *, darkest: float = 0.0):
-        """Take what is to be told apart."""
+        """Distribute the colours."""
         import matplotlib as mpl
         from matplotlib.colors import to_hex
 
@@ -248,7 +248,7 @@ class Scale:
         self.colours = [to_hex(colour) for colour in mpl.colormaps["viridis"](places)]
 
     def draw(self, figure: Figure, axes: Sequence[Axes]) -> None:
-        """Add the bar beside the panels; of many names only some are written."""
+        """Add the bar beside the panels, with at most `_MOST_TICKS` names."""
         from matplotlib.cm import ScalarMappable
         from matplotlib.colors import BoundaryNorm, ListedColormap
 
@@ -262,7 +262,7 @@ class Scale:
 
 
 def places_scale(places: Sequence[tuple[str, float | None]]) -> Scale:
-    """The scale of surfaces and rms slopes (None: not told apart): what differs is named."""
+    """Return the scale of surfaces and rms slopes."""
     surfaces, slopes = (list(dict.fromkeys(each)) for each in zip(*places, strict=True))
     if len(surfaces) == 1:
         return Scale([f"{slope:g}" for _, slope in places], r"$h_{\mathrm{rms}}^{\prime}$")
@@ -272,19 +272,19 @@ def places_scale(places: Sequence[tuple[str, float | None]]) -> Scale:
 
 
 def materials_scale(interfaces: xr.Dataset, materials: Sequence[str]) -> Scale:
-    """The scale of materials, by the quantity in which they differ if it is one."""
-    own = interfaces.sel(material=list(materials))
-    differing = [name for name in INTERFACE if len(np.unique(own[name].values)) > 1]
+    """Return the scale of materials, labelled by the quantity in which they differ if there is only one."""
+    interfaces = interfaces.sel(material=list(materials))
+    differing = [name for name in INTERFACE if len(np.unique(interfaces[name].values)) > 1]
     if len(differing) != 1:
         return Scale([material_label(interfaces, material) for material in materials])
     (name,) = differing
     symbol, unit = INTERFACE[name]
-    factor, prefixed = choose_unit(float(own[name].max()), unit)
-    return Scale([f"{factor * value:.4g}" for value in own[name].values.tolist()], f"{symbol} ({prefixed})")
+    factor, prefixed = choose_unit(float(interfaces[name].max()), unit)
+    return Scale([f"{factor * value:.4g}" for value in interfaces[name].values.tolist()], f"{symbol} ({prefixed})")
 
 
 def _beginning(names):
-    """What all names begin with, but not a part of a number."""
+    """Return the common beginning of all names, without digits of a number."""
     if len(set(names)) < 2:
         return ""
     first, last = min(names), max(names)

@@ -9,14 +9,14 @@ import numpy as np
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-# More cells a side than this cannot be told apart in a panel.
+# Largest number of cells a side that are distinguishable in a panel.
 _MOST_CELLS = 1024
 
 
 def draw_whole(axes, means: np.ndarray, n: int, side: float, **look):
     """Draw a periodic map of n nodes a side, or `block_means` of it.
 
-    Nodes are the centres of the picture's cells; the first row and column come again at the far border.
+    Nodes are the centres of the cells of the image. The first row and column are repeated at the opposite border.
     """
     drawn = np.pad(means, [(0, 1), (0, 1), (0, 0)][: means.ndim], mode="wrap")
     half = side / n / 2
@@ -25,7 +25,7 @@ def draw_whole(axes, means: np.ndarray, n: int, side: float, **look):
 
 
 def block_means(nodes: np.ndarray, most: int = _MOST_CELLS) -> np.ndarray:
-    """Means over blocks of nodes, as near to equal as can be, where there are more than `most` along a side."""
+    """Return means over blocks of nodes of nearly equal size, if there are more than `most` nodes a side."""
     count = min(len(nodes), most)
     if count == len(nodes):
         return nodes
@@ -36,7 +36,7 @@ def block_means(nodes: np.ndarray, most: int = _MOST_CELLS) -> np.ndarray:
 
 
 def circles_in_cell(x, y, radius, period: float, boundary: str) -> np.ndarray:
-    """Centre and radius, (m, 3), of every circle and, on a periodic surface, of its images that reach into [0, L)²."""
+    """Return centre and radius, (m, 3), of circles and their periodic images that reach into [0, L)²."""
     steps = (-period, 0.0, period) if boundary == "periodic" else (0.0,)
     shifts = np.array([(dx, dy) for dx in steps for dy in steps])
     centres = np.column_stack([x, y])[:, None, :] + shifts

@@ -1,4 +1,4 @@
-"""The figures: modules of this folder whose names begin with `fig` and a number, and how one of them is drawn."""
+"""Find the figures, which are the modules of this folder whose names begin with `fig` and a number, and draw them."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _NUMBERED = re.compile(r"fig(\d+)_")
 
 
 def figure_number(name: str) -> int:
-    """The number of a figure, which it has everywhere: that in its name."""
+    """Return the number of a figure, which is that in its name."""
     return int(_NUMBERED.match(name)[1])
 
 
@@ -32,11 +32,11 @@ def _names() -> list[str]:
 
 
 def figure_module(name: str) -> ModuleType:
-    """The module of a figure: its function `figure` draws it."""
+    """Return the module of a figure."""
     return importlib.import_module(f"icha.figures.{name}")
 
 
-# By name, in the order of their numbers.
+# By name of the figure, in the order of the numbers.
 DECLARATIONS: dict[str, Declaration] = {name: figure_module(name).DECLARATION for name in _names()}
 
 
@@ -50,8 +50,8 @@ def draw_figure(
 ) -> None:
     """Draw a figure and write it to `png` and `pdf`.
 
-    `inputs` and `arguments` are those of its declaration. Where nothing of what it shows is complete, the figure is an
-    empty page that says so.
+    `inputs` and `arguments` are those of its declaration. If no run that it shows is complete, the figure is an empty
+    page with a message.
     """
     from icha.figures.select import NothingToDraw
 
@@ -59,14 +59,13 @@ def draw_figure(
     try:
         figure = figure_module(name).figure(**data, **arguments)
     except NothingToDraw as reason:
-        # The verdict says which runs failed; what can be drawn is drawn.
         print(f"An empty page: {reason}")
         figure = _empty_page(str(reason))
     save(figure, png, pdf)
 
 
 def _read(files):
-    """A dataset or tree of a netCDF file, a list of those of several files; of other files the path."""
+    """Return the dataset or tree of a netCDF file, or a list of those of several files; of other files the path."""
     from icha.datasets.files import has_groups, read_campaign, read_dataset
 
     if not isinstance(files, str | os.PathLike):

@@ -5,6 +5,7 @@ All functions raise ValueError if the campaign has no such study, run or snapsho
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -20,11 +21,11 @@ if TYPE_CHECKING:
 
 
 class NothingToDraw(ValueError):
-    """A study has no complete run of the kind that a figure shows; the message says what is lacking."""
+    """A study has no complete run of the kind that a figure shows; the message names what is missing."""
 
 
 class ContactRuns(NamedTuple):
-    """The complete runs of one contact by one model, one for each seed.
+    """The complete runs of one contact with one model, one for each seed.
 
     Runs to which the asperity model is not applicable are apart from the others.
 
@@ -32,7 +33,7 @@ class ContactRuns(NamedTuple):
     ----------
     labels : labels of the first run.
     runs : the runs, by seed.
-    asked : number of seeds that the study asks for.
+    asked : number of seeds that the study requests.
     applicable : whether the asperity model is applicable to the runs.
     """
 
@@ -62,17 +63,17 @@ def group_by_contact(campaign: xr.DataTree, runs: Iterable[tuple[RunLabels, xr.D
 def study_runs(
     campaign: xr.DataTree, study: str, *, ragged: bool = True, model: str | None = None
 ) -> list[tuple[RunLabels, xr.Dataset]]:
-    """Return all complete runs of a study by a model, at least one.
+    """Return all complete runs of a study with a model.
 
     Parameters
     ----------
     ragged : whether the runs have their spots and events, which take long to select.
-    model : left out, the `shown_model` of the study.
+    model : name of the model; left out, the `shown_model` of the study.
 
     Raises
     ------
     NothingToDraw
-        If no run of the study is complete.
+        If no run of the `shown_model` is complete.
     """
     import xarray as xr
 
@@ -81,30 +82,18 @@ def study_runs(
 
     _check_study(campaign, study)
     dataset = campaign[study].to_dataset()
-    asked = model or shown_model(dataset)
-    found = [labels for labels in runs_of_status(dataset, study, (COMPLETE,)) if labels.model == asked]
-    if not found:
+    wanted = model or shown_model(dataset)
+    found = [labels for labels in runs_of_status(dataset, study, (COMPLETE,)) if labels.model == wanted]
+    if not found and model is None:
         raise NothingToDraw(f"study {study}: no run is complete, so there is nothing to draw")
     if not ragged:
-        campaign = xr.DataTree.from_dict(
-            {f"/{study}": dataset.drop_dims([dim for dim in RAGGED if dim in dataset.dims])}
-        )
+        campaign = xr.DataTree.from_dict({f"/{study}": dataset.drop_dims(RAGGED, errors="ignore")})
     runs = [(labels, select_run(campaign, labels)) for labels in found]
     return [(labels, run.assign(reduced_separation=reduced_gap(run))) for labels, run in runs]
 
 
-def runs_by_boundary_elements(
-    campaign: xr.DataTree, study: str, *, ragged: bool = False
-) -> list[tuple[RunLabels, xr.Dataset]]:
-    """All complete runs of a study by boundary elements, if any, without patches and events if not `ragged`."""
-    try:
-        return study_runs(campaign, study, ragged=ragged, model=REFERENCE_MODEL)
-    except NothingToDraw:
-        return []
-
-
 def asked_seeds(study: xr.Dataset, labels: RunLabels) -> int:
-    """Number of seeds that a study asks for of a run's model, surface, slope and material, whatever became of them."""
+    """Return the number of seeds that a study requests of a run's model, surface, slope and material."""
     from icha.datasets.variables.campaign import COMPUTED_RUNS, MISSING
 
     at = place_of(study, {label: getattr(labels, label) for label in LABELS if label != "seed"})
@@ -112,12 +101,12 @@ def asked_seeds(study: xr.Dataset, labels: RunLabels) -> int:
 
 
 def is_applicable(run: xr.Dataset) -> bool:
-    """Whether nothing is known that makes the asperity model not applicable to a run."""
+    """Return whether the asperity model is applicable to a run, as far as known."""
     return not run.attrs.get("applicability")
 
 
 def shown_model(study: xr.Dataset) -> str:
-    """The model whose runs figures show first of a study: asperities, or else the study's first."""
+    """Return the model that figures show first of a study: asperities, or else the study's first model."""
     return first_model(study["model"].values.tolist())
 
 
@@ -183,13 +172,13 @@ def run_on_topography(
     campaign: xr.DataTree, study: str, topography: xr.Dataset, *, surface_name: str | None = None, **labels: object
 ) -> tuple[RunLabels, xr.Dataset]:
     """Return the run of `pick_run`; raise ValueError unless a surface file's dataset is its topography."""
-    own, run = pick_run(campaign, study, surface=surface_name, **labels)
+    found, run = pick_run(campaign, study, surface=surface_name, **labels)
     same = np.isclose(float(topography["period"]), float(run["period"]), rtol=1e-9)
     if not same or int(topography["grid"]) != int(run["grid"]):
-        raise ValueError(f"{own}: the surface given has another period or grid")
-    if "seed" in topography and int(topography["seed"]) != own.seed:
-        raise ValueError(f"{own}: the surface given has seed {int(topography['seed'])}")
-    return own, run
+        raise ValueError(f"{found}: the surface given has another period or grid")
+    if "seed" in topography and int(topography["seed"]) != found.seed:
+        raise ValueError(f"{found}: the surface given has seed {int(topography['seed'])}")
+    return found, run
 
 
 def path_steps(run: xr.Dataset) -> xr.Dataset:
@@ -222,7 +211,7 @@ class Snapshots(NamedTuple):
     ----------
     runs : the runs.
     members : each run, and the position of its snapshot.
-    truths : the same by boundary elements, of those seeds that have it; none if the runs are by boundary elements.
+    truths : the same with boundary elements, of the seeds that have it; empty if `runs` are boundary elements.
     """
 
     runs: ContactRuns
@@ -237,36 +226,23 @@ def snapshots_of_materials(
     from icha.datasets.campaign import find_snapshot
 
     groups = group_by_contact(campaign, study_runs(campaign, study))
-    first = groups[0].labels
-    truths = {} if first.model == REFERENCE_MODEL else dict(runs_by_boundary_elements(campaign, study, ragged=True))
+    reference = [] if groups[0].labels.model == REFERENCE_MODEL else study_runs(campaign, study, model=REFERENCE_MODEL)
     found = []
     for group in groups:
-        if group.contact[1:] != (first.surface, first.rms_slope):
-            continue
-        members = [(run, find_snapshot(run, kind, target)) for run in group.runs.values()]
-        run, at = members[0]
-        state = str(run["snapshot_kind"].values[at]), float(run["snapshot_target"].values[at])
-        same_contact = (
-            truth
-            for labels, truth in truths.items()
-            if labels._replace(seed=None) == group.labels._replace(seed=None, model=REFERENCE_MODEL)
-        )
-        found.append(Snapshots(group, members, [(run, at) for run in same_contact for at in _positions(run, *state)]))
+        if group.contact[1:] == groups[0].contact[1:]:
+            members = [(run, find_snapshot(run, kind, target)) for run in group.runs.values()]
+            run, at = members[0]
+            state = str(run["snapshot_kind"].values[at]), float(run["snapshot_target"].values[at])
+            found.append(Snapshots(group, members, []))
+            for labels, truth in reference:
+                if labels._replace(model=group.labels.model, seed=group.labels.seed) == group.labels:
+                    with contextlib.suppress(ValueError):  # if the run does not keep the snapshot
+                        found[-1].truths.append((truth, find_snapshot(truth, *state)))
     return found
 
 
-def _positions(run, kind, target):
-    """Position of a snapshot, or nothing if the run does not keep it."""
-    from icha.datasets.campaign import find_snapshot
-
-    try:
-        return [find_snapshot(run, kind, target)]
-    except ValueError:
-        return []
-
-
 def name_of_place(dataset: xr.Dataset, surface: str, rms_slope: float) -> str:
-    """A surface and rms slope in words, as far as their study has several of them."""
+    """Return surface and rms slope in words, as far as their study has several of them."""
     several = {surface: dataset.sizes["surface"] > 1, slope_label(rms_slope): len(slopes_of(dataset)) > 1}
     return ", ".join(text for text, shown in several.items() if shown)
 
@@ -280,7 +256,7 @@ _KIND_LABELS = {
 
 
 def snapshot_label(run: xr.Dataset, snapshot: int) -> str:
-    """At which load, area or separation a snapshot was taken, for figures."""
+    """Return load, area or separation of a snapshot in words."""
     kind, value = str(run["snapshot_kind"].values[snapshot]), float(run["snapshot_target"].values[snapshot])
     if kind == "pull_off":
         return "pull-off"

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 ONE_COLUMN = 3.5
 TWO_COLUMNS = 7.1
 
-# M. Okabe and K. Ito, Color Universal Design (2008): told apart with any colour vision.
+# M. Okabe and K. Ito, Color Universal Design (2008): distinguishable with any colour vision.
 BLUE, VERMILLION, GREEN = "#0072B2", "#D55E00", "#009E73"
 ORANGE, SKY, PURPLE, BLACK = "#E69F00", "#56B4E9", "#CC79A7", "#000000"
 COLOURS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY, BLACK)
@@ -125,7 +125,7 @@ def _few_labels() -> type:
         _MOST = 3
 
         def set_locs(self, locs):
-            """Choose among the ticks."""
+            """Choose the ticks that have a label."""
             low, high = sorted(self.axis.get_view_interval())
             powers = np.floor(np.log10(high)) - np.ceil(np.log10(low)) + 1
             inside = np.array([at for at in locs if low <= at <= high])
@@ -193,18 +193,18 @@ INTERFACE = {
 def material_label(study, material: str) -> str:
     """Return modulus and surface energy of a material, in the same units for a whole study, for legends.
 
-    The range of attraction is added if the others do not tell two materials apart.
+    The range of attraction is added if the others do not distinguish two materials.
     """
-    own = study.sel(material=material)
+    values = study.sel(material=material)
     words, alike = [], True
     for name in ("contact_modulus", "surface_energy"):
         symbol, unit = INTERFACE[name]
-        value = float(own[name])
+        value = float(values[name])
         factor, prefixed = choose_unit(float(study[name].max()), unit)
         words.append(f"{symbol} = {value * factor:.4g} {prefixed}" if value > 0 else f"{symbol} = 0")
-        alike &= study[name] == own[name]
+        alike &= study[name] == values[name]
     if int(alike.sum()) > 1:
-        words.append(f"range {format_quantity(float(own['interaction_range']), 'm')}")
+        words.append(f"range {format_quantity(float(values['interaction_range']), 'm')}")
     return ", ".join(words)
 
 

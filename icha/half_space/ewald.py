@@ -227,7 +227,7 @@ class Ewald:
 
 
 @dataclass(frozen=True, eq=False)
-class HalfSpace:
+class PointHalfSpace:
     """Half-space with forces and moments at n points, and its displacement at the same points.
 
     The displacement at a point leaves out that by the point's own force.
@@ -257,14 +257,14 @@ class HalfSpace:
         return cKDTree(self.points, boxsize=self.ewald.period)
 
     @classmethod
-    def at(cls, points, period, contact_modulus, free=False) -> HalfSpace:
+    def at(cls, points, period, contact_modulus, free=False) -> PointHalfSpace:
         """Return the half-space with points (n, 2), m, in a square of side `period`, m, that is periodic or free."""
         ewald = Ewald.choose(period, contact_modulus, len(points), NEIGHBOURS, free)
         points = np.mod(points, ewald.period)
         found = cKDTree(points, boxsize=ewald.period).query_pairs(ewald.reach, output_type="ndarray")
         return cls._assemble(ewald, points, None, found.max(axis=1), found.min(axis=1))
 
-    def extended(self, points) -> HalfSpace:
+    def extended(self, points) -> PointHalfSpace:
         """Return the half-space with more points (k, 2) after the present ones."""
         known, period = len(self.points), self.ewald.period
         points = np.mod(points, period)

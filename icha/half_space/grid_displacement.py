@@ -142,7 +142,7 @@ class DisplacementField:
 
     @cached_property
     def _smooth_half(self):
-        """How many times finer than the grid, and the Fourier series along x at the rows of that finer grid."""
+        """Factor of the finer grid, and the Fourier series along x at the rows of that finer grid."""
         modes = on_cores(self._modes, self._groups)
         highest = [each.shape[1] - 1 for each in modes]
         finer = -(-(2 * max(highest) + 1) // self._nodes)

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from icha.asperity.jkr import JKR
-from icha.half_space.ewald import NEIGHBOURS_ONCE, Ewald, HalfSpace
+from icha.half_space.ewald import NEIGHBOURS_ONCE, Ewald, PointHalfSpace
 
 # Distances, in radii of a spot, within which its displacement is exact, and beyond which force and second moment
 # suffice. In both cases the remainder is below 1e-6 of the spot's displacement there, and below 1e-7 of its approach.
@@ -63,7 +63,7 @@ class Interaction:
     """
 
     law: JKR
-    half_space: HalfSpace
+    half_space: PointHalfSpace
     radius_of_curvature: np.ndarray
     largest_radius: np.ndarray
     target: np.ndarray
@@ -72,7 +72,7 @@ class Interaction:
     replaced: tuple
 
     @classmethod
-    def between(cls, law: JKR, half_space: HalfSpace, radius_of_curvature, largest_radius) -> Interaction:
+    def between(cls, law: JKR, half_space: PointHalfSpace, radius_of_curvature, largest_radius) -> Interaction:
         """Find the exact pairs for contact radii up to `largest_radius` (n,), m; zero for spots without any."""
         ewald = half_space.ewald
         later, earlier, r = half_space.pairs
@@ -139,7 +139,7 @@ class Tangent:
     by_forces : (k,) float, exact derivative less that of the forces' field.
     """
 
-    half_space: HalfSpace
+    half_space: PointHalfSpace
     moments: tuple
     target: np.ndarray
     source: np.ndarray

@@ -1,8 +1,8 @@
 """Cycles of loading and unloading: all equilibria of a path that continues after the first loading.
 
 On unloading every spot follows its stable branch until it jumps off, up to complete separation or a turning point.
-Unloading visits the separations of the first loading again, so that both curves can be compared. Where an event changes
-the pressure, steps become so short that the work lost in the event is known, whatever the longest step.
+Unloading visits separations of the first loading again, the stations, so that both curves can be compared. Where an
+event changes the pressure, steps become so short that the work lost in the event is known, whatever the longest step.
 """
 
 from __future__ import annotations
@@ -26,23 +26,19 @@ from icha.path.stops import (
     TargetFunction,
     find_first_target,
 )
-from icha.path.targets import LOADS, MEAN_SEPARATION, UNBALANCED_WORK, UNRESOLVED_LOSS, UNRESOLVED_REST, Path
+from icha.path.targets import LOADS, MEAN_SEPARATION, UNRESOLVED_LOSS, Path
 
 # Largest unknown work of a step where jumps have released no energy, relative to the work so far.
 UNRESOLVED_WORK = 2e-4
 # Longest step in which spots may coalesce or split, relative to the longest step of the path.
 UNION_STEP = 1 / 16
 # Largest integration error of a step without events, relative to the work so far, unless work and change of energy
-# agree to UNBALANCED_WORK.
+# agree.
 _CURVED_WORK = 1e-4
-# Smallest scale of the losses in tension, relative to the work so far. The fronts of boundary elements lose such parts
-# when they move from cell to cell, which no short step resolves.
+# Smallest scale of the losses in tension, relative to the work so far.
 _LEAST_LOSS = 1e-2
-# Shortest step of the separation, in h_rms; the first contact is made and the last one broken within it.
-SHARP = 1e-12
-# Largest error of the largest tension, relative to it: at an event, and between two equilibria without an event.
+# Largest error of the largest tension at an event, relative to it.
 _MISSED_TENSION = 1e-3
-_MISSED_SMOOTH_TENSION = 1e-8
 # Without adhesion unloading visits a separation so far above first contact, in h_rms, in case the error of an
 # equilibrium leaves a spot in contact there.
 _ABOVE_CONTACT = 1e-8
@@ -77,7 +73,7 @@ def follow_cycle(
     yield waypoint_between(start, 0)
     cycle = _Cycle(contact, longest, progress, start)
     if contact.adhesive:
-        cycle.step_length = SHARP * contact.rms_height
+        cycle.step_length = cycle.shortest
     else:
         cycle.stations = [start.separation + _ABOVE_CONTACT * contact.rms_height]
     yield from cycle.follow_leg(0, targets)
@@ -111,6 +107,8 @@ class _Cycle:
     leg : number of the leg, even on loading and odd on unloading.
     step_length : length of the next step, m.
     event_at : first known position of an event that is not resolved yet, as direction times separation, m.
+    event_width : length of a step that resolves it, m.
+    smooth_length : length of steps without events, m.
     effort : sum of work and losses so far, without their signs, J/m^2.
     jump_energy : energy released by jumps so far, each as if its spot were alone, J/m^2.
     lowest_pressure : lowest nominal pressure so far, at most zero, Pa.
@@ -124,6 +122,8 @@ class _Cycle:
     leg: int = 0
     step_length: float = np.nan
     event_at: float = np.inf
+    event_width: float = 0.0
+    smooth_length: float = 0.0
     effort: float = 0.0
     jump_energy: float = 0.0
     lowest_pressure: float = 0.0
@@ -135,8 +135,13 @@ class _Cycle:
 
     @property
     def loading(self) -> bool:
-        """Whether the surfaces approach each other."""
+        """True if the surfaces approach each other."""
         return self.leg % 2 == 0
+
+    @property
+    def shortest(self) -> float:
+        """Length of a step that makes the first contact or breaks the last one, m."""
+        return self.contact.path_accuracy.event * self.contact.rms_height
 
     @property
     def direction(self) -> int:
@@ -151,7 +156,7 @@ class _Cycle:
         self, leg: int, targets: list[TargetFunction], until_apart: bool = False
     ) -> Generator[Waypoint, TargetFunction | None, None]:
         """Yield the equilibria of a leg until all targets are met or, with `until_apart`, until nothing touches."""
-        self.leg, self.event_at = leg, np.inf
+        self.leg, self.event_at, self.smooth_length = leg, np.inf, 0.0
         pending, sent = PendingTargets(targets, self.direction), None
         visited, width_limit = [self.state.separation], np.inf
         while pending or until_apart:
@@ -180,14 +185,11 @@ class _Cycle:
                 step = Step.between(self.contact, self.state, met)
             listed = None if target is sent else target
             self.progress.require_validity(self.state, met, listed, pending, self.loading)
-            # The very first step is as short as the first contact is sharp.
+            # The first contact forms in the shortest step; after that the longest one is tried.
             first = leg == 0 and len(visited) == 1
-            self.step_length = self.longest if first else min(self.longest, 2 * self.step_length)
-            self.effort += abs(step.work) + abs(step.loss)
-            self.jump_energy += step.jump_energy(self.contact)
-            self.lowest_pressure = min(self.lowest_pressure, self.contact.pressure(met))
-            self.progress.record_equilibrium(met, self.loading)
-            self.state, width_limit = met, np.inf
+            self.step_length = self.longest if first else self._next_length(step, met)
+            self._accept(met, step)
+            width_limit = np.inf
             if self._is_new_station(met.separation, visited[-1]):
                 visited.append(met.separation)
             if listed is not None:
@@ -202,15 +204,23 @@ class _Cycle:
             new = (separation for separation in [*visited, self.state.separation] if separation < lowest)
             self.stations = sorted({*self.stations, *new})
 
+    def _accept(self, state, step):
+        """Move to the next state, and add the step to the sums over all steps."""
+        self.effort += abs(step.work) + abs(step.loss)
+        self.jump_energy += step.jump_energy(self.contact)
+        self.lowest_pressure = min(self.lowest_pressure, self.contact.pressure(state))
+        self.progress.record_equilibrium(state, self.loading)
+        self.state = state
+
     def find_next(self, width: float) -> tuple[State, Step]:
         """Find the next equilibrium, so close that the work up to it is known, and the step to it.
 
-        On unloading the spots may lose their equilibrium together before any of them has come to its own jump-off: then
-        the one that is closest to it, at the rate at which all of them approach it, breaks contact.
+        The step is halved until an equilibrium is found and the work is known, or until it is the shortest one. A step
+        in which the tension has a new maximum ends at the maximum.
 
         width : length of the step that is tried first, m.
         """
-        start, unit = self.state, self.contact.rms_height
+        start = self.state
         while True:
             try:
                 state = self._find_equilibrium(start.separation + self.direction * width, width)
@@ -219,8 +229,8 @@ class _Cycle:
                 continue
             step = Step.between(self.contact, start, state)
             # Within the error of an equilibrium an event may happen in a long step and not in a short one.
-            passed = step.has_jump and self.direction * start.separation + SHARP * unit >= self.event_at
-            sharp = width <= SHARP * unit or passed
+            passed = step.has_jump and self.direction * start.separation + self.shortest >= self.event_at
+            sharp = width <= self.shortest or passed
             if sharp or (self._is_work_known(state, step) and self._is_tension_known(state, step)):
                 if step.has_jump:
                     self.event_at = np.inf
@@ -231,11 +241,18 @@ class _Cycle:
             else:
                 if step.has_jump:
                     self.event_at = min(self.event_at, self.direction * state.separation)
+                    self.event_width = 0.5 * width * min(1.0, self._unknown_work(step) / (step.unresolved or np.inf))
+                else:
+                    self.smooth_length = min(self.smooth_length, 0.5 * width)
                 width *= 0.5
             self.step_length = min(self.step_length, width)
 
     def _find_equilibrium(self, separation, width):
-        """Find the equilibrium at a separation; in a short step on unloading, spots may break contact for it."""
+        """Find the equilibrium at a separation.
+
+        On unloading all spots may lose their equilibrium together before any of them has reached its own jump-off. Then
+        the spot that would reach it first breaks contact; if that does not help, two, four, … of them.
+        """
         contact, start = self.contact, self.state
         try:
             state = contact.equilibrium(start, separation)
@@ -258,21 +275,47 @@ class _Cycle:
         return width
 
     def _is_work_known(self, state, step):
-        """Return whether the work of a step is known well enough."""
+        """Return whether the work of a step is known well enough.
+
+        It is not if the events of the step, which may happen anywhere in it, leave too much of the work open; if spots
+        unite in a long step; or if the integral of the pressure is inaccurate and does not agree with the change of the
+        stored energy in a step without events.
+        """
         width = abs(step.width)
-        effort = self.effort + abs(step.work) + abs(step.loss)
-        released = UNRESOLVED_LOSS * (self.jump_energy + step.jump_energy(self.contact))
-        if step.unresolved > (max(released, UNRESOLVED_REST * effort) if released else UNRESOLVED_WORK * effort):
+        if step.unresolved > self._unknown_work(step):
             return False
         # The union of two spots depends on how far they overlap when it is found.
         if step.has_union and width > UNION_STEP * self.longest:
             return False
-        scale = effort
+        accuracy = self.contact.path_accuracy
+        scale = effort = self.effort + abs(step.work) + abs(step.loss)
         if step.width > 0 and self.contact.pressure(state) < 0:
-            # In tension there is no loading curve with the same error.
+            # In compression loading and unloading visit the same stations, so that their errors cancel. In tension
+            # they do not: the error is relative to the losses.
             scale = min(effort, max(10 * self.jump_energy, _LEAST_LOSS * effort))
-        unbalanced = step.integration_error > _CURVED_WORK * scale and abs(step.loss) > UNBALANCED_WORK * scale
+        unbalanced = step.integration_error > _CURVED_WORK * scale and abs(step.loss) > accuracy.balance * scale
         return step.has_jump or not unbalanced or width <= self.longest / 256
+
+    def _unknown_work(self, step):
+        """Return the largest work that the events of a step may leave unknown, J/m^2."""
+        effort = self.effort + abs(step.work) + abs(step.loss)
+        released = UNRESOLVED_LOSS * (self.jump_energy + step.jump_energy(self.contact))
+        return max(released, self.contact.path_accuracy.loss * effort) if released else UNRESOLVED_WORK * effort
+
+    def _next_length(self, step, state):
+        """Return the length of the step after one to a state: twice as long, or as far as its errors allow."""
+        longer = min(self.longest, 2 * self.step_length)
+        if not self.contact.path_accuracy.predicts_steps:
+            return longer
+        if step.has_jump:
+            return max(longer, self.smooth_length)
+        distance = self.event_at - self.direction * state.separation
+        if 0 < distance < np.inf:
+            return distance if distance <= self.event_width else 0.5 * distance
+        self.smooth_length = max(self.smooth_length, abs(step.width))
+        # The error of a step grows with the cube of its length.
+        effort = self.effort + abs(step.work) + abs(step.loss)
+        return longer if 8 * step.integration_error <= _CURVED_WORK * effort else self.step_length
 
     def _is_tension_known(self, state, step):
         """Return whether the largest tension of a step is known well enough, as far as its events decide it."""
@@ -299,14 +342,10 @@ class _Cycle:
         # The tangents meet below the curve.
         meet = (q - end_slope * step.width - p) / (slope - end_slope)
         lowest = p + slope * meet
-        if lowest >= self.lowest_pressure or min(p, q) - lowest <= _MISSED_SMOOTH_TENSION * abs(lowest):
+        if lowest >= self.lowest_pressure or min(p, q) - lowest <= contact.path_accuracy.tension * abs(lowest):
             return None
-        # The import takes long, and loading does not need it.
-        from scipy.interpolate import CubicHermiteSpline
-
-        curve = CubicHermiteSpline([0.0, step.width], [p, q], [slope, end_slope])
-        turns = [u for u in curve.derivative().roots(extrapolate=False) if 0 < u < step.width]
-        return start.separation + (min(turns, key=curve) if turns else meet)
+        lowest_at = _minimum_of_cubic(step.width, (p, q), (slope, end_slope))
+        return start.separation + (meet if lowest_at is None else lowest_at)
 
     def _is_apart(self):
         """Return whether nothing touches, at least as far up as where contact was about to be made first."""
@@ -334,3 +373,13 @@ class _Cycle:
             tension = max(0.0, -self.lowest_pressure / target.target.quantity.scale(self.contact))
             reason += f"; the largest tension is {tension:.4g}"
         return NotConverged(reason)
+
+
+def _minimum_of_cubic(width, values, slopes):
+    """Return where the cubic with these values and slopes at 0 and `width` has its lowest turn between; or None."""
+    # The import takes long, and loading does not need it.
+    from scipy.interpolate import CubicHermiteSpline
+
+    curve = CubicHermiteSpline([0.0, width], values, slopes)
+    turns = [u for u in curve.derivative().roots(extrapolate=False) if 0 < u < width]
+    return min(turns, key=curve, default=None)

@@ -84,7 +84,7 @@ class Step:
 
     @property
     def has_union(self) -> bool:
-        """Whether spots have coalesced or split."""
+        """True if spots have coalesced or split."""
         return self.events.count(COALESCENCE) + self.events.count(SPLIT) > 0
 
     @property
@@ -183,7 +183,7 @@ class Waypoint:
 
     @property
     def loading(self) -> bool:
-        """Whether the surfaces approach each other."""
+        """True if the surfaces approach each other."""
         return self.leg % 2 == 0
 
 

@@ -75,7 +75,7 @@ def select_load_control(
         state = waypoint.state
         pressure = contact.pressure(state)
         advances = pressure >= level if waypoint.loading else pressure <= level
-        # Of two targets at the same load the second one may have a slightly smaller load.
+        # The second of two targets at the same load may have a slightly smaller load.
         advances |= waypoint.target.kind != BETWEEN and abs(pressure - level) <= SAME_EXCESS * abs(level)
         landed = landing is not None and waypoint.target is landing.target
         # The first state is always visited; a jump starts from a visited state only.

@@ -47,7 +47,7 @@ class TargetFunction:
 
     @property
     def control(self) -> Control | None:
-        """What the solver holds to meet the target; None for a separation."""
+        """Load or area that the solver holds to meet the target; None for a separation."""
         return self.target.quantity.control(self.contact, self.target.value)
 
     def predict_separation(self, state: State) -> float:
@@ -64,7 +64,7 @@ class TargetFunction:
 
 
 class PendingTargets:
-    """Targets that are still to be met, in order for each kind; false if there are none."""
+    """Targets that are still to be met, in order for each kind; false if empty."""
 
     def __init__(self, targets: Iterable[TargetFunction], direction: int):
         """Sort the targets for a direction of the separation: -1 on loading, 1 on unloading."""

@@ -21,23 +21,19 @@ DEFAULT_STEP = 0.15
 # Largest unknown work of one step, relative to the energy that jumps have released so far. The work is unknown because
 # the events of a step may happen anywhere in it.
 UNRESOLVED_LOSS = 5e-4
-# The same relative to the work so far, where jumps release next to no energy: equilibria are known no better.
-UNRESOLVED_REST = 1e-10
-# Largest difference between work and change of energy in a long step without events, relative to the work so far.
-UNBALANCED_WORK = 3e-6
 
 STEP = FloatRange("h_rms", least=MIN_STEP, most=MAX_STEP)
 
 
 @dataclass(frozen=True)
-class Quantity:
+class TargetQuantity:
     """A quantity that a target prescribes.
 
     Attributes
     ----------
     name : name in targets and in files.
     rule : range of values that a target may have.
-    argument : argument of `Path` that lists such targets; empty if there is none.
+    argument : argument of `Path` that lists such targets; or an empty text.
     controlled : quantity that the solver holds instead of the separation; None if the separation is imposed.
     pressure_unit : attribute of the contact with the pressure that makes the value dimensionless; empty if none.
     """
@@ -70,10 +66,10 @@ _AREAS = FloatRange(least=LEAST_AREA, most=MAX_AREA_FRACTION, model_ends=True)
 QUANTITIES = {
     quantity.name: quantity
     for quantity in (
-        Quantity(REDUCED_PRESSURE, _PRESSURES, "reduced_pressures", PRESSURE, "pressure_unit"),
-        Quantity(RELATIVE_LOAD, POSITIVE, "", PRESSURE, "contact_modulus"),
-        Quantity(AREA_FRACTION, _AREAS, "area_fractions", CONTROLLED_AREA),
-        Quantity(MEAN_SEPARATION, LENGTH, "mean_separations"),
+        TargetQuantity(REDUCED_PRESSURE, _PRESSURES, "reduced_pressures", PRESSURE, "pressure_unit"),
+        TargetQuantity(RELATIVE_LOAD, POSITIVE, "", PRESSURE, "contact_modulus"),
+        TargetQuantity(AREA_FRACTION, _AREAS, "area_fractions", CONTROLLED_AREA),
+        TargetQuantity(MEAN_SEPARATION, LENGTH, "mean_separations"),
     )
 }
 LOADS = (REDUCED_PRESSURE, RELATIVE_LOAD)
@@ -101,7 +97,7 @@ class Target:
     snapshot: bool = False
 
     @property
-    def quantity(self) -> Quantity:
+    def quantity(self) -> TargetQuantity:
         """Prescribed quantity."""
         return QUANTITIES[self.kind]
 
@@ -184,7 +180,7 @@ class Path:
 
     @property
     def cyclic(self) -> bool:
-        """Whether the path continues after the first loading."""
+        """True if the path continues after the first loading."""
         return self.unload or bool(self.turning_points)
 
 

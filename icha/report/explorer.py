@@ -79,7 +79,7 @@ def write_explorer(
     Raises
     ------
     NothingToExplore
-        If there is no campaign dataset, nothing of `only`, or no contact fits.
+        If the campaign dataset or everything in `only` is missing, or no contact fits.
     ValueError
         If a file cannot be read.
     """
@@ -307,7 +307,7 @@ def picture(contact: np.ndarray) -> str:
 
 
 def partners(one: xr.Dataset, other: xr.Dataset) -> list[int]:
-    """Find, for every step of a run, the step of another run at the same state of the path; -1 if there is none.
+    """Find, for every step of a run, the step of another run at the same state of the path; -1 without one.
 
     The partner of a stop is the same stop on the same leg. The partner of another equilibrium is the step on the same
     leg with the nearest mean separation.

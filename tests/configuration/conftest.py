@@ -41,6 +41,6 @@ def refused(load, tmp_path):
             load({key: value} if key else value)
         lines = str(error.value).splitlines()
         assert any(message in line and line.startswith(f"{tmp_path}/campaign.yaml: ") for line in lines), lines
-        assert all(re.search("expected|allowed: |needed: ", line) for line in lines), lines
+        assert all(re.search("expected|allowed|Remove|Use|Correct", line) for line in lines), lines
 
     return refuse

@@ -56,7 +56,9 @@ def test_loads_of_boundary_elements_are_snapshots_of_the_runs(load):
 
 def test_boundary_elements_are_periodic(load):
     changes = {"surfaces.rough": measured_surface(boundary="free"), "finite_range": {"truth": TRUTH}}
-    with pytest.raises(ConfigurationError, match=r"finite_range\.truth\.study: 'one' has a surface without periods"):
+    with pytest.raises(
+        ConfigurationError, match=r"finite_range\.truth\.study: 'one' has the surface 'rough' with free edges"
+    ):
         load({**changes, "materials.soft.surface_energy": "0 J/m^2"})
 
 

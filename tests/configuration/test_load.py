@@ -7,7 +7,7 @@ from demo_configuration import measured_surface
 
 from icha.configuration.errors import ConfigurationError
 from icha.configuration.load import load_configuration
-from icha.configuration.yaml_files import dumped, read_yaml
+from icha.configuration.yaml_files import dump_yaml, read_yaml
 
 
 def test_all_mistakes_are_named_at_once(load):
@@ -38,17 +38,17 @@ def test_overrides_are_part_of_the_configuration_as_used(load, tmp_path):
     [
         (b"", "the file is empty"),
         (b"- 1\n", "the file is a list"),
-        (b"a: [1\n", "allowed: a YAML mapping"),
+        (b"a: [1\n", "expected a YAML mapping"),
         (b"a: 1\nb: 1\na: 2\n", "line 3: key 'a' is given twice"),
         (b"m:\n  x: {k: 1, k: 2}\n", "line 2: key 'k' is given twice"),
-        (b"\xff\xfea\x00", "is text in UTF-16; allowed: a YAML file saved in UTF-8"),
-        (b"\x89PNG\r\n\x1a\n\0\0", "is a binary file; allowed: a YAML file"),
+        (b"\xff\xfea\x00", "is text in UTF-16; expected a YAML file saved in UTF-8"),
+        (b"\x89PNG\r\n\x1a\n\0\0", "is a binary file; expected a YAML file"),
         (
             "a: 1\ntitle: Gerät\n".encode("latin-1"),
             "line 2: byte 0xe4 is not UTF-8, so the text is in another encoding",
         ),
-        (b"a: 1\nb: \x07\n", "line 2: control character 0x07; allowed: text alone"),
-        (b"a: !!python/object:os.system {}\n", "allowed: a YAML mapping"),
+        (b"a: 1\nb: \x07\n", "line 2: control character 0x07; expected text"),
+        (b"a: !!python/object:os.system {}\n", "expected a YAML mapping"),
     ],
 )
 def test_files_that_are_no_configuration(content, message, tmp_path):
@@ -60,9 +60,9 @@ def test_files_that_are_no_configuration(content, message, tmp_path):
 
 
 def test_missing_file(tmp_path):
-    with pytest.raises(ConfigurationError, match="is a folder; allowed: a YAML file"):
+    with pytest.raises(ConfigurationError, match="is a folder; expected a YAML file"):
         load_configuration(tmp_path)
-    with pytest.raises(ConfigurationError, match="no such file; allowed: a YAML file"):
+    with pytest.raises(ConfigurationError, match="no such file; expected a YAML file"):
         load_configuration(tmp_path / "none.yaml")
 
 
@@ -83,7 +83,7 @@ def test_leading_zeros_are_no_octal_numbers_and_colons_no_base_of_60(tmp_path, t
     (tmp_path / "a.yaml").write_text(f"grid: {text}\n")
     content = read_yaml(tmp_path / "a.yaml")
     assert content == {"grid": value}
-    (tmp_path / "b.yaml").write_text(dumped(content, "a"))
+    (tmp_path / "b.yaml").write_text(dump_yaml(content, "a"))
     assert read_yaml(tmp_path / "b.yaml") == content
 
 

@@ -6,7 +6,7 @@ from demo_configuration import measured_surface
 from icha.configuration.cases import run_cases, surface_settings
 from icha.configuration.surfaces import MeasuredSurface
 from icha.surfaces.measured.settings import Preparation
-from icha.surfaces.measured.topography import prepared_topography
+from icha.surfaces.measured.topography import prepare_topography
 
 SECTION = {"kind": "measured", "path": "scan.npy", "boundary": "mirror", "height_unit": "nm", "size": "90 um"}
 
@@ -31,7 +31,7 @@ def test_a_measured_surface_at_its_own_slope(load):
     topography = campaign.topography("rough")
     assert (case.seed, case.rms_slope) == (0, topography.rms_slope)
     assert (topography.grid, topography.period) == (128, 64e-6)
-    assert prepared_topography(
+    assert prepare_topography(
         campaign.surfaces["rough"].path, surface_settings_of_file(campaign, "rough")
     ).rms_slope == pytest.approx(case.rms_slope, rel=1e-5)
 
@@ -43,9 +43,11 @@ def surface_settings_of_file(campaign, name):
 def test_slopes_that_no_surface_has_are_to_be_confirmed(load, refused):
     changes = {"surfaces.rough": measured_surface(height_unit="um"), "studies.one.rms_slopes": "measured"}
     key = "surfaces.rough.height_unit"
-    refused("", changes, f"{key}: 'rms slope 146' is unusual, as units, size, or a number for missing points make it; ")
+    refused(
+        "", changes, f"{key}: 'rms slope 146' is unusual (it depends on units, size and numbers for missing points); "
+    )
     (warning,) = load(changes | {"confirmed": [key]}).warnings
-    assert f"{key}: 'rms slope 146' is unusual" in warning and "but confirmed; usual: 1e-4 to 5" in warning
+    assert f"{key}: 'rms slope 146' is unusual" in warning and "but confirmed; expected 1e-4 to 5" in warning
 
 
 def test_a_surface_without_a_cutoff_has_the_checksum_that_it_had_before_there_was_one(load):

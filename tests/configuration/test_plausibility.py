@@ -6,7 +6,7 @@ from demo_configuration import file_surface, measured_surface
 
 from icha.configuration.errors import ConfigurationError
 
-SLIPS = {
+UNUSUAL = {
     "materials.soft.contact_modulus": ["2 mPa", "999 Pa", "2.1 TPa"],
     "materials.soft.surface_energy": ["5 kJ/m^2", "1e-7 J/m^2"],
     "materials.soft.interaction_range": ["2 km", "2 um", "1e-12 m"],
@@ -15,7 +15,7 @@ SLIPS = {
 }
 # Models to which it does not matter how sticky a contact is.
 ANY_STICKINESS = {"studies.one.models": ["boundary_elements"]}
-USUAL_ONES = {
+USUAL = {
     "materials.soft.contact_modulus": ["1 kPa", "1 TPa"],
     "materials.soft.surface_energy": ["0 J/m^2", "1e-6 J/m^2", "2 J/m^2"],
     "materials.soft.interaction_range": ["0.05 nm", "1 um"],
@@ -27,28 +27,28 @@ def key_of(place):
     return place.rstrip(".01")
 
 
-@pytest.mark.parametrize(("place", "value"), [(place, value) for place, values in SLIPS.items() for value in values])
-def test_slips_are_refused_until_they_are_confirmed(place, value, load, refused, tmp_path):
+@pytest.mark.parametrize(("place", "value"), [(place, value) for place, values in UNUSUAL.items() for value in values])
+def test_unusual_values_are_refused_until_they_are_confirmed(place, value, load, refused, tmp_path):
     key = key_of(place)
-    refused(place, value, f": {value!r} is unusual; usual: ")
-    refused(place, value, f"if it is meant, this one with `confirmed: [{key}]` at the top level")
+    refused(place, value, f": {value!r} is unusual; expected ")
+    refused(place, value, f"Correct it, or add `confirmed: [{key}]` at the top level if it is intended")
     configuration = load({**ANY_STICKINESS, place: value, "confirmed": [key]})
     (warning,) = configuration.warnings
     assert warning.startswith(f"{tmp_path}/campaign.yaml: {key}") and f"{value!r} is unusual, but confirmed" in warning
 
 
-@pytest.mark.parametrize(("place", "value"), [(place, value) for place, all_ in USUAL_ONES.items() for value in all_])
+@pytest.mark.parametrize(("place", "value"), [(place, value) for place, all_ in USUAL.items() for value in all_])
 def test_what_is_usual_needs_no_confirmation(place, value, load):
     assert load({**ANY_STICKINESS, place: value}).warnings == ()
 
 
-def test_slips_are_found_wherever_values_are_written(load, refused, tmp_path):
+def test_unusual_values_are_found_wherever_values_are_written(load, refused, tmp_path):
     refused(
         "studies.one.vary", {"surface_energy": ["1 mJ/m^2", "1 kJ/m^2"]}, "studies.one.vary.surface_energy[1]: '1 kJ"
     )
     refused("studies.one.cases", [{"rms_slope": 80}], "[studies.one.cases.rms_slope]")
     refused("surfaces.rough", measured_surface(size=["72 um", "64 m"]), "surfaces.rough.size[1]: '64 m' is unusual")
-    refused("surfaces.rough.period", "100 m", "surfaces.rough.period: '100 m' is unusual; usual: 1 nm to 1 m (")
+    refused("surfaces.rough.period", "100 m", "surfaces.rough.period: '100 m' is unusual; expected 1 nm to 1 m (")
     moved = {"materials.soft.interaction_range": None, "defaults": {"materials": {"interaction_range": "2 mm"}}}
     refused("", moved, "defaults.materials.interaction_range: '2 mm' is unusual")
     with pytest.raises(ConfigurationError, match=r"^--config: materials\.soft\.contact_modulus: '25 mPa' is unusual"):
@@ -57,10 +57,10 @@ def test_slips_are_found_wherever_values_are_written(load, refused, tmp_path):
 
 @pytest.mark.parametrize("entry", ["materials.soft.contact_modulus", "materials.hard.contact_modulus", "materials"])
 def test_what_is_not_unusual_cannot_be_confirmed(entry, refused):
-    refused("confirmed", [entry], f"confirmed[0]: {entry!r} is the key of no unusual value; allowed: nothing, for all")
+    refused("confirmed", [entry], f"confirmed[0]: {entry!r} is not the key of an unusual value; all values are usual")
 
 
-def test_all_slips_and_other_mistakes_of_the_design_are_named_at_once(load):
+def test_all_unusual_values_and_other_problems_of_the_design_are_named_at_once(load):
     with pytest.raises(ConfigurationError) as error:
         load({"materials.soft.contact_modulus": "2 mPa", "studies.one.rms_slopes": [500, 1e-6]})
     assert len(str(error.value).splitlines()) == 3
@@ -70,14 +70,14 @@ STICKY = {"materials.soft.contact_modulus": "50 kPa"}
 
 
 def test_sticky_runs_of_asperities_are_refused_until_they_are_confirmed(load, refused):
-    said = (
-        "studies.one.models: 'asperities with U_full/dgamma = 0.0275' is unusual, for soft on rough at rms slope 0.2; "
-        "usual: 1 to inf (below, full contact has the lower energy and the asperity model is not applicable: "
+    message = (
+        "studies.one.models: 'asperities with U_full/dgamma = 0.0275' is unusual for soft on rough at rms slope 0.2; "
+        "expected 1 to inf (below, full contact has the lower energy and the asperity model is not applicable: "
     )
-    refused("", STICKY, said)
-    refused("", STICKY, "if it is meant, this one with `confirmed: [studies.one.models]` at the top level")
+    refused("", STICKY, message)
+    refused("", STICKY, "or add `confirmed: [studies.one.models]` at the top level")
     (warning,) = load({**STICKY, "confirmed": ["studies.one.models"]}).warnings
-    assert said.replace("; usual", ", but confirmed; usual") in warning
+    assert message.replace("; expected", ", but confirmed; expected") in warning
     assert load({**STICKY, **ANY_STICKINESS}).warnings == ()
     assert load({**STICKY, "materials.soft.surface_energy": "0 J/m^2"}).warnings == ()
 
@@ -85,7 +85,7 @@ def test_sticky_runs_of_asperities_are_refused_until_they_are_confirmed(load, re
 def test_sticky_runs_on_surfaces_from_files_are_found_too(load, refused, tmp_path):
     scan = {"surfaces.rough": measured_surface()}
     load(scan)
-    refused("", scan | STICKY, "is unusual, for soft on rough at rms slope 0.2; usual: 1 to inf")
+    refused("", scan | STICKY, "is unusual for soft on rough at rms slope 0.2; expected 1 to inf")
     np.save(tmp_path / "heights.npy", np.random.default_rng(1).normal(size=(16, 16)))
     periodic = {"surfaces.rough": file_surface(tmp_path / "heights.npy")}
     load({**periodic, "materials.soft.surface_energy": "0 J/m^2"})

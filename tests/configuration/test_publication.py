@@ -6,30 +6,32 @@ import pytest
 from demo_configuration import CARBERRY, GOOD_RUN, ORCID
 
 from icha.configuration.errors import ConfigurationError
-from icha.configuration.publication import needed
+from icha.configuration.publication import missing_metadata
 
 DOI = "10.1007/s11249-017-0900-2"
 # Key and value that are refused, and the beginning of what is said of them.
 BAD = {
-    "authors[0].orcid: '1' is no ORCID": {"authors": [CARBERRY | {"orcid": "1"}]},
+    "authors[0].orcid: '1' is not an ORCID": {"authors": [CARBERRY | {"orcid": "1"}]},
     "authors[0].orcid: '0000-0002-1825-0098' is no": {"authors": [CARBERRY | {"orcid": "0000-0002-1825-0098"}]},
-    "authors[0]: allowed: orcid of a person": {"authors": [{"name": "A", "orcid": ORCID}]},
+    "authors[0]: expected orcid only for a person": {"authors": [{"name": "A", "orcid": ORCID}]},
     "authors[0]: {'family_names': 'Carberry'} is neither": {"authors": [{"family_names": "Carberry"}]},
-    "authors[0].ror: 'x' is no ROR": {"authors": [CARBERRY | {"ror": "x"}]},
+    "authors[0].ror: 'x' is not a ROR": {"authors": [CARBERRY | {"ror": "x"}]},
     "authors[0].ror: 'https://ror.org/03yrm5c27' is no": {
         "authors": [{"name": "A", "ror": "https://ror.org/03yrm5c27"}]
     },
-    "authors[0]: allowed: orcid of a person; ror of an": {"authors": [CARBERRY | {"ror": "https://ror.org/05gq02987"}]},
+    "authors[0]: expected orcid only for a person, and ror": {
+        "authors": [CARBERRY | {"ror": "https://ror.org/05gq02987"}]
+    },
     '{"name":"The team"} is given twice': {"authors": [{"name": "The team"}, CARBERRY, {"name": "The team"}]},
     "authors[0].affiliation: 'Brown\\x07 University' holds": {
         "authors": [CARBERRY | {"affiliation": "Brown\x07 University"}]
     },
-    "version: 1.1 is no version": {"version": 1.10},
-    "version: '../1' is no version": {"version": "../1"},
-    "date: '2026-02-30' is no date": {"date": "2026-02-30"},
-    "date: '0026-01-31' is no date": {"date": "0026-01-31"},
-    "date: '2200-01-01' is no date": {"date": "2200-01-01"},
-    "date: '2026-01-31 12:00:00' is no date": {"date": "2026-01-31 12:00:00"},
+    "version: 1.1 is not a version": {"version": 1.10},
+    "version: '../1' is not a version": {"version": "../1"},
+    "date: '2026-02-30' is not a date": {"date": "2026-02-30"},
+    "date: '0026-01-31' is not a date": {"date": "0026-01-31"},
+    "date: '2200-01-01' is not a date": {"date": "2200-01-01"},
+    "date: '2026-01-31 12:00:00' is not a date": {"date": "2026-01-31 12:00:00"},
     "related_identifiers[0].identifier: 'the paper' is no": {
         "related_identifiers": [{"identifier": "the paper", "relation": "Cites"}]
     },
@@ -42,8 +44,8 @@ BAD = {
     "related_identifiers: ": {
         "related_identifiers": [{"identifier": each, "relation": "Cites"} for each in (DOI, f"https://doi.org/{DOI}")]
     },
-    "doi: 'reserved' is no DOI": {"doi": "reserved"},
-    "doi: '10.1000/<1' is no DOI": {"doi": "10.1000/<1"},
+    "doi: 'reserved' is not a DOI": {"doi": "reserved"},
+    "doi: '10.1000/<1' is not a DOI": {"doi": "10.1000/<1"},
     "funding[0].funder: the key is missing": {"funding": [{}]},
     "funding[0].funder: ''": {"funding": [{"funder": ""}]},
     "funding[0].funder_id: 'https://example.org' is no": {
@@ -59,7 +61,7 @@ BAD = {
     "title: 'A title\\n' holds a line break": {"title": "A title\n"},
     "title: ' ' is blank": {"title": " "},
     "keywords[1]: '\\u200b' is blank": {"keywords": ["a", "\u200b"]},
-    "communities[0]: 'Contact Mechanics' is no community": {"communities": ["Contact Mechanics"]},
+    "communities[0]: 'Contact Mechanics' is not a community": {"communities": ["Contact Mechanics"]},
     "keyword: unknown key": {"keyword": ["x"]},
 }
 
@@ -97,11 +99,11 @@ def test_what_differs_may_stand_side_by_side(load):
 def test_days_of_the_command_line(load):
     day = datetime.date(2026, 1, 31)
     assert load(overrides={"publication": {"date": day}}).campaign.publication.date == "2026-01-31"
-    with pytest.raises(ConfigurationError, match=r"publication\.date: .* is no date; allowed: "):
+    with pytest.raises(ConfigurationError, match=r"publication\.date: .* is not a date; expected "):
         load(overrides={"publication": {"date": datetime.datetime(2026, 1, 31, 12)}})
 
 
 def test_texts_of_the_campaign_that_no_deposit_can_have(load):
-    title, summary = needed(load({"title": "A\nB", "summary": " "}).campaign.published())[-2:]
+    title, summary = missing_metadata(load({"title": "A\nB", "summary": " "}).campaign.deposit_metadata())[-2:]
     assert title.startswith("title: 'A\\nB' holds a line break")
-    assert summary.startswith("summary: ' ' is blank; allowed: ")
+    assert summary.startswith("summary: ' ' is blank; expected ")

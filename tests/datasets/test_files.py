@@ -35,12 +35,12 @@ def test_the_same_values_give_the_same_bytes(tmp_path, what):
 
 
 def content(group):
-    """All that a netCDF group holds, value for value as it is kept, and how."""
+    """Dimensions, attributes, variables with stored values and storage, and groups of a netCDF group."""
     variables = {}
     for name, variable in group.variables.items():
         variable.set_auto_maskandscale(False)
         variable.set_auto_chartostring(False)
-        # What bounds inherit xarray takes from them, and has them have coordinates.
+        # xarray removes attributes of bounds that they inherit, and gives them coordinates.
         left_out = {"units", "long_name", "coordinates"} if name.endswith("_bounds") else set()
         attrs = {key: np.asarray(variable.getncattr(key)).tolist() for key in {*variable.ncattrs()} - left_out}
         kept = variable[...].tobytes()
@@ -54,7 +54,7 @@ def content(group):
 
 
 def as_xarray_would(dataset):
-    """What to tell xarray for files as the project keeps them."""
+    """Encodings with which xarray writes the same files."""
     encodings = {}
     for name, variable in dataset.variables.items():
         encodings[name] = {"dtype": "S1"} if variable.dtype.kind in "OU" else {"_FillValue": None}
@@ -195,7 +195,7 @@ def test_every_run_can_be_taken_out_unchanged():
 
 
 def test_a_run_with_failed_checks_keeps_its_values_and_reasons(tmp_path):
-    """It has its own status; its values stay in the file, and what is told of one run is not told of another."""
+    """It has its own status; its values stay in the file, and reasons belong to one run only."""
     (first, run), (second, other) = [each for each in small.runs() if each[0].study == "slopes"][:2]
     reasons = {"failed_checks": "loss: -0.1 (a loss)", "applicability": "asperity model not applicable: a reason"}
     tree = campaign_tree([(first, run.assign_attrs(reasons)), (second, other)])

@@ -101,7 +101,7 @@ def test_netcdf4_and_xarray_read_the_same_and_plot_it(folder, tmp_path, file, gr
 
 
 def test_missing_values_and_texts_are_what_was_written(folder):
-    """Of the study with a failed run, by plain netCDF4."""
+    """Read the study with a failed run by plain netCDF4."""
     plain = by_netcdf4(folder / "campaign.nc", "/slopes")
     labels = [dict(zip(plain["material"], range(2), strict=True))[name] for name in ("soft", "hertz")]
     failed, whole = ((0, 0, 0, 1, material) for material in labels)
@@ -197,7 +197,7 @@ def test_every_file_says_what_it_is(folder):
                 assert not re.search(r"\d\d:\d\d|/home/|/tmp/|/root/", text), (path.name, group.path)
 
 
-# What the checker recommends and the files do not follow: every variable here has units and long_name, bounds, too;
+# Recommendations of the checker that files do not follow: every variable has units and long_name, also bounds;
 # bins that differ from run to run stand along further dimensions, where it takes an interval for a polygon with too few
 # corners; and bins of runs that are missing are missing.
 _RECOMMENDED = (

@@ -1,4 +1,4 @@
-"""What is read quickly of a run's file is what the file holds."""
+"""The fast reader of runs returns the content of the file."""
 
 import netCDF4
 import numpy as np

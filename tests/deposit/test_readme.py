@@ -20,7 +20,7 @@ from icha.datasets.campaign_file import write_campaign
 from icha.deposit.readme import markdown, readme
 from icha.planning.costs import Cost
 
-# What Markdown, HTML or a table would take for something else.
+# Texts with a meaning in Markdown, HTML or a table.
 ODD = (
     "<load>|*x*|**x**|_x_|__a b__|a_b_c _d e_|`code`|[text](address)|![image]|~~gone~~|\\|\\*x\\*|&lt;|&#60;|R&D &c|"
     "<!-- not here -->|<b>bold</b>|# one #|> two|- three|+ four|5. five|6) six|1.5 mm|-7 °C|---|===|***|```|~~~|[a]: b|"
@@ -28,13 +28,12 @@ ODD = (
 )
 ODD += ["a | b", "\\|", "a ||| b |", "see (https://example.org/a|b)."]
 
-
-# That of GitHub, with its formulas; what is no link by its brackets is none.
+# The Markdown of GitHub with its formulas; links need brackets.
 MARKDOWN = MarkdownIt("gfm-like", {"linkify": False}).use(dollarmath_plugin)
 
 
 def shown(text, kind="paragraph"):
-    """What a reader sees of all paragraphs, headings or cells of a page."""
+    """The visible texts of all paragraphs, headings or cells of a page."""
     tokens = MARKDOWN.parse(text)
     texts = []
     for opened, inline in itertools.pairwise(tokens):

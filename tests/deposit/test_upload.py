@@ -78,7 +78,7 @@ class Server(ThreadingHTTPServer):
         self.address = f"http://127.0.0.1:{self.server_port}"
 
     def handle_error(self, request, client_address):
-        """Connections that tests break are no errors."""
+        """Ignore connections that tests break."""
 
     def deposition(self):
         files = {name: hashlib.md5(content).hexdigest() for name, content in self.files.items()}
@@ -213,7 +213,7 @@ def test_nothing_is_sent_without_consent(server, deposit):
 
 @pytest.mark.parametrize(("answers", "status", "requests_made"), [([False], 1, 0), ([True, False], 0, 5)])
 def test_a_declined_question(answers, status, requests_made, server, deposit, monkeypatch):
-    """Of the questions at a terminal, the first is about sending, the second about publishing."""
+    """At a terminal, the first question is about sending, the second about publishing."""
     asked = []
     monkeypatch.setattr(deposits, "confirm", lambda question: asked.append(question) or answers[len(asked) - 1])
     terminal = SimpleNamespace(isatty=lambda: True)

@@ -101,7 +101,7 @@ def test_make_hands_any_name_over_as_it_is(tmp_path):
 def test_what_is_no_deposit_is_refused(tmp_path):
     (tmp_path / "SHA256SUMS").touch()
     done = validated(tmp_path)
-    assert done.returncode == 1 and "is no deposit" in done.stderr
+    assert done.returncode == 1 and "is not a deposit" in done.stderr
     (tmp_path / "ro-crate-metadata.json").write_text("{}")
     done = validated(sealed(tmp_path), "cffconvert", "sha256sum")
     assert done.returncode == 1 and "CITATION.cff is missing" in done.stdout

@@ -2,27 +2,24 @@
 
 import numpy as np
 import pytest
-from half_space import periodic_displacement, periodic_point_load, spectral_displacement
+from half_space import (
+    CENTRES,
+    CURVATURE,
+    ENERGIES,
+    MODULUS,
+    RADIUS,
+    law,
+    periodic_displacement,
+    periodic_point_load,
+    spectral_displacement,
+)
 
-from icha import Material
-from icha.asperity.jkr import JKR
-from icha.half_space.ewald import HalfSpace
+from icha.half_space.ewald import PointHalfSpace
 from icha.half_space.interaction import Interaction, displacement_at
-
-MODULUS, RANGE = 2.0, 1e-3
-CENTRES = np.array([[0.2, 0.3], [0.6, 0.55], [0.9, 0.85]])
-RADIUS = np.array([0.02, 0.03, 0.015])
-CURVATURE = np.array([0.5, 0.8, 0.3])
-# Without adhesion, and with so much that the spots are in tension on the whole.
-ENERGIES = [0.0, 3e-4]
-
-
-def law(energy):
-    return JKR(Material(MODULUS, energy, RANGE))
 
 
 def between(law, centres, largest, R, period=1.0):
-    return Interaction.between(law, HalfSpace.at(centres, period, MODULUS), R, largest)
+    return Interaction.between(law, PointHalfSpace.at(centres, period, MODULUS), R, largest)
 
 
 def at_spots(energy, centres=CENTRES, a=RADIUS, R=CURVATURE):
@@ -180,7 +177,7 @@ def test_points_may_be_added_later(energy):
     rng = np.random.default_rng(6)
     centres, a = rng.random((300, 2)), rng.uniform(0.2, 1, 300) * 4e-3
     R = np.ones(300)
-    grown = HalfSpace.at(centres[:170], 1.0, MODULUS).extended(centres[170:210]).extended(centres[210:])
+    grown = PointHalfSpace.at(centres[:170], 1.0, MODULUS).extended(centres[170:210]).extended(centres[210:])
     value = Interaction.between(law(energy), grown, R, a).displacement(a)
     np.testing.assert_allclose(value, at_spots(energy, centres, a, R), atol=1e-7 * np.max(np.abs(value)))
 

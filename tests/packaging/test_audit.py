@@ -1,4 +1,4 @@
-"""What is installed is what its checksum says; without a database, an audit for vulnerabilities is skipped."""
+"""Installed files have checksums; without a database, an audit for vulnerabilities is skipped."""
 
 import re
 import subprocess
@@ -17,7 +17,7 @@ def test_without_a_database_the_audit_is_skipped_and_says_why(monkeypatch):
     for required, status in (("0", 0), ("1", 2)):
         monkeypatch.setenv("ICHA_REQUIRE_AUDIT", required)
         done = subprocess.run(command, capture_output=True, text=True)
-        assert done.returncode == status and "the database could not be asked: error: " in done.stdout + done.stderr
+        assert done.returncode == status and "the database could not be reached: error: " in done.stdout + done.stderr
 
 
 def test_every_file_that_is_locked_has_a_checksum():
@@ -28,8 +28,8 @@ def test_every_file_that_is_locked_has_a_checksum():
             assert files and all(re.fullmatch("sha256:[0-9a-f]{64}", file["hash"]) for file in files), package["name"]
 
 
-def test_whatever_make_installs_is_held_against_a_checksum():
-    """By pip and uv pip; `uv sync --locked` always does. Our own files and a code that must be compiled have none."""
+def test_make_installs_only_files_with_checksums():
+    """Checks pip and uv pip; `uv sync --locked` always does. Our own files and a code to be compiled have none."""
     makefile = (REPOSITORY / "Makefile").read_text()
     calls = re.findall(r"^\t-?(.*pip (?:install|sync) .*)$", makefile, re.MULTILINE)
     without = [call for call in calls if "--require-hashes" not in call]

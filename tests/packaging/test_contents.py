@@ -11,7 +11,7 @@ from conftest import REPOSITORY
 PROJECT = tomllib.loads((REPOSITORY / "pyproject.toml").read_text(encoding="utf-8"))
 METADATA = PROJECT["project"]
 WHEEL = PROJECT["tool"]["hatch"]["build"]["targets"]["wheel"]
-# What a wheel of a program has no use for.
+# Files that a wheel does not need.
 LEFT_OUT = ("tests/", "docs/", "benchmarks/", "validation/", "recipe/", "results/", ".")
 LEFT_OUT += ("CONTRIBUTING.md", "VISION.md", "Containerfile")
 

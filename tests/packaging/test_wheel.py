@@ -42,7 +42,7 @@ study = xr.open_datatree("campaign.nc")["slopes"].to_dataset()
 print(float(study.contact_area_fraction.sum()))
 """
 
-# What editors and type checkers are to see, and what they are to find.
+# Types that editors and type checkers see, and errors that they find.
 TYPED = """
 import icha
 
@@ -243,7 +243,7 @@ def test_its_deposit_holds_what_was_installed_and_computes_the_same_again(built,
         if path.suffix in (".md", ".json", ".yaml", ".html") and str(work) in path.read_text()
     ]
     call(workflow / "icha", "verify", deposit, cwd=tmp_path)
-    again = ["reproduce", f"{deposit}.zip", "--only", "smallest", "--json", "found.json"]  # as its lock file says
+    again = ["reproduce", f"{deposit}.zip", "--only", "smallest", "--json", "found.json"]
     said = call(workflow / "icha", *again, cwd=tmp_path)
     assert "identical: 2 files, every value" in said and json.loads((tmp_path / "found.json").read_text())
 

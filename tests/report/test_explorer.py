@@ -149,7 +149,7 @@ def test_between_stops_the_other_model_is_at_the_nearest_separation():
 def test_failures_are_on_the_page_and_runs_without_a_stop_are_counted(folder, page, data):
     assert contact_of(data, FAILED)["runs"]["asperities"]["failure"] == REASON
     assert NOTHING[0] == "slopes" and len(data["contacts"]) == len({each._replace(model="") for each in runs()}) - 1
-    assert "Left out: 1 contact whose runs reached no stop" in page.read_text(encoding="utf-8")
+    assert "Omitted: 1 contact whose runs reached no stop" in page.read_text(encoding="utf-8")
 
 
 def test_the_page_needs_nothing_else_and_is_closed_to_the_network(page):
@@ -184,7 +184,7 @@ def test_a_page_stays_as_small_as_it_is_asked_to(folder, page, data, tmp_path):
     # The first seed of every kind, before the others.
     assert {("one", "soft", 1), ("one", "hertz", 1), ("loops", "soft", 1)} <= set(shown)
     assert [seed for *_, seed in shown] == sorted(seed for *_, seed in shown)
-    assert f"Left out: {written.left_out} contacts" in (tmp_path / "less.html").read_text(encoding="utf-8")
+    assert f"Omitted: {written.left_out} contacts" in (tmp_path / "less.html").read_text(encoding="utf-8")
     with pytest.raises(NothingToExplore, match="not even one contact"):
         write_explorer(folder, tmp_path / "none.html", largest=1)
     assert not (tmp_path / "none.html").exists()

@@ -151,13 +151,13 @@ def test_where_there_is_no_snapshot_the_page_says_so(page):
     page.press("Home")
     start = shown(page)
     assert start["images"] == [None] and start["curves"] == [[], [], [], []]
-    assert start["points"][0][0] != [None, None] and "no snapshot up to here" in start["notices"][0]
+    assert start["points"][0][0] != [None, None] and "no snapshot up to this step" in start["notices"][0]
     page.press("ArrowRight")
     on_it = shown(page)
     assert on_it["notices"] == [] and on_it["images"][0][1] == 1 and on_it["table"][0][-1] == "yes"
     page.press("End")
     later = shown(page)
-    assert "pale, are those of the last one before" in later["notices"][0] and later["table"][0][-1] == "no"
+    assert "(pale) are those of the previous snapshot" in later["notices"][0] and later["table"][0][-1] == "no"
     assert later["images"][0][1] < 1 and {curve[0][1] for curve in later["curves"]} == {0.3}
     assert later["points"] != on_it["points"]
 

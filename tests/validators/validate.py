@@ -1,9 +1,9 @@
-"""Put a deposit to the validators of others, without any network.
+"""Check a deposit with the validators of other projects, without network.
 
     .venv-validators/bin/python tests/validators/validate.py DEPOSIT
 
-DEPOSIT is its folder or its zip archive. It is verified first, and only one that is whole is put to them. One line for
-each validator; the status is 1 if one of them fails.
+DEPOSIT is its folder or its zip archive. It is verified first; validators read only a whole deposit. The program prints
+one line for each validator; its status is 1 if one of them fails.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ PROFILE = "provenance-run-crate-0.5"
 CONVENTIONS = "cf:1.11"
 # Attributes by which a variable names others (CF 1.11, appendix A).
 NAMING = "ancillary_variables bounds cell_measures climatology coordinates formula_terms grid_mapping".split()
-# Questions that compliance-checker asks of a file some thousand times, each time looking at all variables anew.
+# Functions that compliance-checker calls some thousand times for a file, each time searching all variables.
 ASKED = (
     "auxiliary_coordinate_variables axis_variables cell_boundary_variables climatology_variable coordinate_variables "
     "geophysical_variables latitude_variables longitude_variables time_variable time_variables z_variables".split()
@@ -43,7 +43,13 @@ ASKED = (
 
 
 class Outcome(NamedTuple):
-    """What a validator says: what it looked at, what is wrong, and what could be better."""
+    """The result of a validator.
+
+    Attributes
+    ----------
+    counted : what it checked, with numbers.
+    problems, remarks : errors, and recommendations.
+    """
 
     counted: str
     problems: list[str]
@@ -88,7 +94,7 @@ def check_crate(folder: Path) -> Outcome:
 
 
 def _cache_contexts(path: Path) -> None:
-    """Put the JSON-LD context of RO-Crate 1.1, which comes with `rocrate`, where the validator looks for it."""
+    """Put the JSON-LD context of RO-Crate 1.1, which comes with `rocrate`, into the validator's cache."""
     from requests.adapters import HTTPAdapter
     from requests_cache import CachedSession
     from urllib3 import HTTPResponse
@@ -96,7 +102,7 @@ def _cache_contexts(path: Path) -> None:
     context = (resources.files("rocrate") / "data" / "ro-crate.jsonld").read_bytes()
 
     class Shelf(HTTPAdapter):
-        """Answers from what is at hand."""
+        """Answers every request with the context."""
 
         def send(self, request, **_):
             headers = {"Content-Type": "application/ld+json"}
@@ -150,7 +156,7 @@ def check_datacite(folder: Path) -> Outcome:
 
 
 def check_zenodo(folder: Path) -> Outcome:
-    """A schema written after Zenodo's documentation of its deposit API; there is none of Zenodo's own to be had."""
+    """A schema written after Zenodo's documentation of its deposit API; Zenodo publishes no schema."""
     from jsonschema import Draft7Validator, FormatChecker
 
     schema = json.loads(Path(__file__).with_name("zenodo.schema.json").read_bytes())
@@ -204,15 +210,15 @@ def _conventions_of(path: Path) -> list[Conformance]:
                 points = result.value if isinstance(result.value, tuple) else (int(bool(result.value)), 1)
                 score, out_of = score + points[0], out_of + points[1]
                 if points[0] < points[1]:
-                    told = problems if result.weight == BaseCheck.HIGH else remarks
-                    told += [f"{result.name}: {message}" for message in result.msgs or ["failed"]]
+                    messages = problems if result.weight == BaseCheck.HIGH else remarks
+                    messages += [f"{result.name}: {message}" for message in result.msgs or ["failed"]]
             answers.append(Conformance(path / group.strip("/"), (score, out_of), problems, remarks))
     return answers
 
 
 @functools.cache
 def remember_answers() -> None:
-    """Have compliance-checker remember its answers about a file, which does not change meanwhile."""
+    """Cache results of compliance-checker for a file, which does not change meanwhile."""
     from compliance_checker.cf import util
 
     for name in ASKED:
@@ -221,9 +227,9 @@ def remember_answers() -> None:
 
 
 def flat_files(path: Path, folder: Path) -> Iterator[tuple[str, Path]]:
-    """Write every group with variables to a file of its own, for tools that know no groups; yield its name and file.
+    """Write every group with variables to a separate file, for tools that know no groups; yield its name and file.
 
-    What a group inherits stands in its file, too. A file without groups is yielded as it is.
+    The file also has what the group inherits. A file without groups is yielded unchanged.
     """
     import netCDF4
 
@@ -272,9 +278,9 @@ def _copy_group(group, flat) -> None:
 
 
 def stay_off_the_network() -> None:
-    """From now on, connect this process to nothing but other processes here: files may ask for more.
+    """From now on, refuse connections of this process to other machines, which attributes of files may cause.
 
-    The attribute `standard_name_vocabulary`, for one, has compliance-checker download a table.
+    The attribute `standard_name_vocabulary`, for instance, makes compliance-checker download a table.
     """
 
     def refuse(event, arguments):
@@ -323,7 +329,7 @@ VALIDATORS: dict[str, Callable[[Path], Outcome]] = {
 
 
 def validate(folder: Path, names: list[str], most: int) -> bool:
-    """Run validators and print what they say; whether all are content."""
+    """Run validators and print their results; return True if none found a problem."""
     from icha.support.formatting import printable
 
     good = True
@@ -347,12 +353,14 @@ def validate(folder: Path, names: list[str], most: int) -> bool:
 
 
 def main() -> int:
-    """Validate what the command line names."""
-    from icha.deposit.verify import LARGE, Damaged, whole_deposit
+    """Validate the deposit on the command line."""
+    from icha.deposit.verify import LARGE, DamagedDeposit, whole_deposit
     from icha.support.formatting import printable
     from icha.support.input_files import refuse_traps
 
-    parser = argparse.ArgumentParser(description="Put a deposit to the validators of others, without any network.")
+    parser = argparse.ArgumentParser(
+        description="Check a deposit with the validators of other projects, without network."
+    )
     parser.add_argument("deposit", type=Path, help="a folder or a zip archive")
     parser.add_argument("--only", nargs="+", choices=VALIDATORS, default=list(VALIDATORS), metavar="NAME")
     parser.add_argument("--all", action="store_true", help="all messages, and not the first five of a kind")
@@ -364,7 +372,7 @@ def main() -> int:
     try:
         with whole_deposit(arguments.deposit.absolute(), large=arguments.large) as folder:
             if not (folder / CRATE).is_file():
-                sys.exit(f"{name}: is no deposit: there is no {CRATE} in it")
+                sys.exit(f"{name}: is not a deposit, because it has no {CRATE}")
             for file in sorted(folder.rglob("*.nc")):
                 try:
                     refuse_traps(file)
@@ -372,9 +380,9 @@ def main() -> int:
                     sys.exit(f"{name}: {printable(file.relative_to(folder))}: {printable(error)}")
             stay_off_the_network()
             return 0 if validate(folder, arguments.only, sys.maxsize if arguments.all else 5) else 1
-    except Damaged as damaged:
+    except DamagedDeposit as damaged:
         print(*damaged.args, sep="\n")
-        sys.exit(f"{name}: is not whole, so no validator has seen it")
+        sys.exit(f"{name}: is not whole, so no validator was run")
     except OSError as error:
         sys.exit(f"{name}: {printable(error)}")
 

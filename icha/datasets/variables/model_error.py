@@ -6,7 +6,7 @@ In the limit of a short range contact has an edge beyond which nothing acts: all
 from icha.contact.models import MODELS, REFERENCE_MODEL
 from icha.datasets.variables.terms import Variable, bin_table, read_tables
 
-# What the model is compared with: the attribute `truth` of an entry.
+# References with which the model is compared: the attribute `truth` of an entry.
 SHORT_RANGE, FINITE_RANGE = MODELS[REFERENCE_MODEL].words, "boundary elements at finite range"
 
 ASKED = Variable(("reduced_pressure",), "1", "reduced pressure asked for, p/(E* h'rms)", coordinate=True)

@@ -1,5 +1,5 @@
 "use strict";
-// The data of the page (icha/report/explorer_data.py): contacts, each with its runs by model; and topographies.
+// The data of the page (icha/report/explorer.py): contacts, each with its runs by model; and topographies.
 const { contacts, topographies } = JSON.parse(document.getElementById("data").textContent);
 const CHOICES = ["study", "surface", "rms_slope", "material", "seed"];
 const WORDS = { asperities: "asperities", boundary_elements: "boundary elements" };
@@ -15,12 +15,12 @@ const bytes = (text) => Uint8Array.from(atob(text), (letter) => letter.charCodeA
 const floats = (text) => new Float32Array(bytes(text).buffer);
 // A number as text to four digits, with a true minus sign.
 const digits = (value) => (value && Math.abs(value) < 1e-4 ? value.toExponential(3) : value.toPrecision(4));
-const said = (value) => digits(value).replace(/(\.\d*?)0+(e|$)/, "$1$2").replace(/\.(e|$)/, "$1").replaceAll("-", "−");
+const format = (value) => digits(value).replace(/(\.\d*?)0+(e|$)/, "$1$2").replace(/\.(e|$)/, "$1").replaceAll("-", "−");
 
-// What is chosen: the contact, its shown runs by model, and the run along which the slider moves; ranges of axes.
+// The chosen contact, its visible runs by model, the run along which the slider moves, and ranges of axes.
 let contact, runs, leading, ranges;
 
-// Options of a list; what was chosen remains so if it is still there.
+// Fill a list; keep the choice if it is still available.
 function fill(list, values, words = {}) {
   const before = list.value;
   list.replaceChildren(...values.map((value) => new Option(words[value] || String(value), value)));
@@ -28,7 +28,7 @@ function fill(list, values, words = {}) {
   list.disabled = values.length < 2;
 }
 
-// Each list offers what there is with the choices before it.
+// Each list offers the values that exist with the choices before it.
 function choose() {
   let left = contacts;
   for (const name of CHOICES) {
@@ -49,7 +49,7 @@ function opened(run) {
   return { ...run, ...Object.fromEntries(["pressure", "area", "gap"].map((name) => [name, floats(run[name])])) };
 }
 
-// Which step of a run belongs to the place of the slider; -1 if the run has none.
+// The step of a run at the position of the slider; -1 if there is none.
 const stepOf = (run) => (run === leading || !run.partners ? Number(stop.value) : run.partners[Number(stop.value)]);
 // The latest snapshot at or before a step, if there is any. Snapshots stand in the order of the campaign.
 function snapshotOf(run, step) {
@@ -140,7 +140,7 @@ function pictureOf(run, snapshot) {
   return `data:image/svg+xml,${encodeURIComponent(svg)}`;
 }
 
-// The curves of all runs, each with the point at which the path is.
+// The curves of all runs, each with the point of the present step.
 function drawCurves() {
   const type = byId("log").checked ? "log" : "linear";
   const load = { title: "reduced pressure <i>p</i>/(<i>E</i>*<i>h</i>′<sub>rms</sub>)", type };
@@ -157,7 +157,7 @@ function drawCurves() {
   }
 }
 
-// Which curve of a snapshot, its axes, and the powers of a length that its values have.
+// Curve of a snapshot, its axes, and the powers of a length in its units.
 const DISTRIBUTIONS = {
   gap_density: ["gap", { title: "gap <i>u</i>/<i>h</i><sub>rms</sub>", type: "log" }, { title: "<i>P</i>(<i>u</i>) <i>h</i><sub>rms</sub>", type: "log" }, 0, 0],
   pressure_density: ["pressure", { title: "pressure <i>p</i>/(<i>E</i>*<i>h</i>′<sub>rms</sub>)" }, { title: "<i>P</i>(<i>p</i>) <i>E</i>*<i>h</i>′<sub>rms</sub>", type: "log" }, 0, 0],
@@ -184,7 +184,7 @@ function drawDistributions(now) {
   }
 }
 
-// From the least to the largest value of some lists, with a margin; of a logarithmic axis as plotly.js wants it.
+// From the least to the largest value of some lists, with a margin; for a logarithmic axis the exponents that plotly.js expects.
 function rangeOf(lists, type) {
   const values = lists.flatMap((list) => Array.from(list, (value) => (type === "log" ? Math.log10(value) : value))).filter(Number.isFinite);
   if (!values.length) return undefined;
@@ -193,7 +193,7 @@ function rangeOf(lists, type) {
   return [low - margin, high + margin];
 }
 
-// What the slider moves: contact, points, distributions and words.
+// Everything that the slider moves: contact, points, distributions and text.
 function drawStop() {
   const now = Object.entries(runs).map(([model, run]) => {
     const step = stepOf(run), snapshot = snapshotOf(run, step);
@@ -203,7 +203,7 @@ function drawStop() {
     const side = run.period * unitOf(run.period)[0], node = side / run.grid, source = snapshot ? pictureOf(run, snapshot) : "";
     const image = { source, xref: "x", yref: "y", x: -node / 2, y: side - node / 2, sizex: side, sizey: side, sizing: "stretch", layer: "above", opacity: exact ? 1 : 0.3 };
     Plotly.relayout(`map-${model}`, { images: source ? [image] : [] });
-    byId(`map-${model}`).setAttribute("aria-label", `Topography with the contact by ${WORDS[model]}${exact ? "" : ", not of this state"}`);
+    byId(`map-${model}`).setAttribute("aria-label", `Topography with the contact of ${WORDS[model]}${exact ? "" : ", of an earlier state"}`);
   }
   const points = now.map((_, k) => now.length + k);
   for (const [id, name] of [["area", "area"], ["separation", "gap"]]) {
@@ -214,41 +214,41 @@ function drawStop() {
   tell(now);
 }
 
-// The state in words and numbers.
+// The state as text and numbers.
 function tell(now) {
   const place = Number(stop.value), count = leading.pressure.length;
-  const words = `${legOf(leading, place)}, p* = ${said(leading.pressure[place])}`;
+  const words = `${legOf(leading, place)}, p* = ${format(leading.pressure[place])}`;
   byId("state").textContent = `${place + 1} of ${count}: ${words}`;
   stop.setAttribute("aria-valuetext", `${place + 1} of ${count}, ${words}`);
   const steps = leading.snapshots.map((each) => each.step);
   byId("before").disabled = !steps.some((step) => step < place);
   byId("after").disabled = !steps.some((step) => step > place);
   const rows = now.map(({ model, run, step, exact }) => {
-    const cells = step < 0 ? ["–", "–", "–", "–"] : [said(run.pressure[step]), said(run.area[step]), said(run.gap[step]), run.spots[step]];
+    const cells = step < 0 ? ["–", "–", "–", "–"] : [format(run.pressure[step]), format(run.area[step]), format(run.gap[step]), run.spots[step]];
     return `<tr><th scope="row" class="${model}">${WORDS[model]}</th>${cells.map((cell) => `<td class="num">${cell}</td>`).join("")}<td>${exact ? "yes" : "no"}</td></tr>`;
   });
   byId("values").innerHTML = "<table><thead><tr><th scope='col'>Model</th><th scope='col' class='num'><i>p</i>/(<i>E</i>*<i>h</i>′<sub>rms</sub>)</th>"
     + "<th scope='col' class='num'><i>A</i>/<i>A</i><sub>0</sub></th><th scope='col' class='num'><i>u</i>/<i>h</i><sub>rms</sub></th>"
     + `<th scope='col' class='num'>Spots or patches</th><th scope='col'>Snapshot</th></tr></thead><tbody>${rows.join("")}</tbody></table>`;
-  // What is to be said of both models is said once.
+  // A notice for both models is printed once.
   const notices = new Map();
   for (const each of now) for (const text of noticesOf(each)) notices.set(text, [...(notices.get(text) || []), WORDS[each.model]]);
   byId("notices").replaceChildren(...Array.from(notices, ([text, models]) =>
-    Object.assign(document.createElement("p"), { className: "notice", textContent: `By ${models.join(" and ")}: ${text}` })));
+    Object.assign(document.createElement("p"), { className: "notice", textContent: `With ${models.join(" and ")}: ${text}` })));
 }
 
 function noticesOf({ run, step, snapshot, exact }) {
   const found = [];
   if (run.failure) found.push(`the run failed; ${run.failure}`);
-  if (step < 0) found.push("the run has no such state.");
-  else if (!run.snapshots.length) found.push("the run has no snapshot, so there are neither spots nor distributions to show.");
-  else if (!snapshot) found.push(`no snapshot up to here, so spots and distributions are not shown. The first is at p* = ${said(run.pressure[Math.min(...run.snapshots.map((each) => each.step))])}.`);
-  else if (!exact) found.push(`no snapshot here. Spots and distributions, pale, are those of the last one before: ${legOf(run, snapshot.step)}, p* = ${said(run.pressure[snapshot.step])}.`);
-  if (snapshot && !snapshot.map && !snapshot.circles) found.push("the file of the run, which has the maps of contact, was not there.");
+  if (step < 0) found.push("the run does not have this state.");
+  else if (!run.snapshots.length) found.push("the run has no snapshots, so spots and distributions are not available.");
+  else if (!snapshot) found.push(`no snapshot up to this step, so spots and distributions are not shown. The first one is at p* = ${format(run.pressure[Math.min(...run.snapshots.map((each) => each.step))])}.`);
+  else if (!exact) found.push(`no snapshot at this step. Spots and distributions (pale) are those of the previous snapshot: ${legOf(run, snapshot.step)}, p* = ${format(run.pressure[snapshot.step])}.`);
+  if (snapshot && !snapshot.map && !snapshot.circles) found.push("the file of the run with the maps of contact was missing.");
   return found;
 }
 
-// Another contact, model or scheme of colours: everything is drawn anew.
+// Draw everything for another contact, model or colour scheme.
 function drawAll() {
   mix();
   drawMaps();
@@ -258,12 +258,12 @@ function drawAll() {
 function start() {
   choose();
   stop.max = leading.pressure.length - 1;
-  // It begins at the last snapshot, where there is most to see.
+  // Start at the last snapshot.
   stop.value = Math.max(0, ...leading.snapshots.map((each) => each.step));
   byId("log").checked = Object.values(runs).every((run) => run.pressure.every((value) => value > 0));
   drawAll();
 }
-// To the nearest snapshot on one side.
+// Move to the nearest snapshot on one side.
 function jump(side) {
   const steps = leading.snapshots.map((each) => each.step).filter((step) => (step - Number(stop.value)) * side > 0);
   if (steps.length) stop.value = side < 0 ? Math.max(...steps) : Math.min(...steps);
@@ -271,7 +271,7 @@ function jump(side) {
 }
 
 for (const name of [...CHOICES, "model"]) byId(name).addEventListener("change", start);
-// While the slider is dragged, each picture shows the latest place only.
+// While the slider moves, draw the latest position only.
 let waiting = 0;
 stop.addEventListener("input", () => {
   waiting ||= requestAnimationFrame(() => { waiting = 0; drawStop(); });

@@ -23,7 +23,7 @@ class LogHandler(LogHandlerBase):
 
     writes_to_stream = False
     writes_to_file = False
-    has_filter = True  # there is no filter: `emit` selects the events
+    has_filter = True  # `emit` selects the events
     has_formatter = True
     needs_rulegraph = False
 
