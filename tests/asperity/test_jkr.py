@@ -151,13 +151,13 @@ def test_force_and_second_moment_are_integrals_of_the_pressure(both):
 
 @pytest.mark.parametrize("relative", [0.3, 0.732296, 1.523237, 2.417988, 40.0])
 def test_energy_is_the_work_that_makes_the_spot(both, relative):
-    """The integral of the force over the approach, from no spot on, over the unstable branch too where there is one."""
+    """The integral of the force over the approach from a = 0 includes the unstable branch."""
     law, energy = both, both.material.surface_energy
     a_unit, delta_unit, force_unit = units(R)
 
     def work(x):  # a = x^2 makes the lower end regular
         a = x**2 * a_unit
-        # Not the law's own derivative, which is infinite where there is no spot.
+        # The derivative of the law itself is infinite at a = 0.
         slope = 4 * x**3 - np.sqrt(2 * np.pi) * (energy > 0)
         return float(law.force(a, R)) / force_unit * slope
 
