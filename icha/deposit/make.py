@@ -66,7 +66,7 @@ def make_deposit(
         exactly the known failures.
     """
     folder, archive, results = Path(folder), Path(archive), Path(results)
-    files, publication = sorted(files), campaign.published()
+    files, publication = sorted(files), campaign.deposit_metadata()
     refuse_unknown_failures(read_checks(results / "checks.json"), [each.run for each in publication.known_failures])
     _refuse_changed(results, files)
     part = folder.with_name(f".{folder.name}.part")
@@ -144,7 +144,7 @@ def refuse_mixed(results: Path, campaign: Campaign, recorded: Mapping[str, str])
 
 def _describe(part: Path, files: Sequence[str], campaign: Campaign, revision: str, cost: Cost) -> None:
     """Write licence, citation, metadata, data dictionary and page of the deposit."""
-    publication, dictionary = campaign.published(), data_dictionary(part, files)
+    publication, dictionary = campaign.deposit_metadata(), data_dictionary(part, files)
     _write(part / "LICENSE.txt", known_licence(publication.license).page())
     _write(part / "CITATION.cff", citation_cff(publication, revision))
     for name, metadata in ((ZENODO, zenodo_metadata(publication)), ("datacite.json", datacite_metadata(publication))):

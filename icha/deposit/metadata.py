@@ -71,7 +71,7 @@ def known_licence(identifier: str) -> Licence:
 
 def licence_problem(campaign: Campaign) -> tuple[str, str] | None:
     """Return key and text of a problem with the licence of a campaign's data; None if a deposit can have it."""
-    licence = campaign.published().license
+    licence = campaign.deposit_metadata().license
     try:
         known_licence(licence)
     except ValueError as error:

@@ -182,7 +182,7 @@ def readme(
     sizes : bytes of every file, by its path in the deposit.
     cost : expected cost of computing the whole campaign.
     """
-    publication = campaign.published()
+    publication = campaign.deposit_metadata()
     authors = "; ".join(author.sorted_name for author in publication.authors)
     text = _template().render(
         publication=publication,
