@@ -377,7 +377,7 @@ def test_results_that_do_not_belong_together_are_refused(campaign):
     path, case = next(iter(files.runs.items()))
     run = small.run(1, material="hertz").assign_attrs(config_sha256=run_sha256(campaign, case), summary="Older")
     write(results, path, run)
-    with pytest.raises(ValueError, match=f"dataset/small.nc: it was made from another {path}"):
+    with pytest.raises(ValueError, match=f"dataset/small.nc: it was made from another version of {path}"):
         refuse_mixed(results, campaign, recorded)
     write(results, path, run.assign_attrs(config_sha256="a" * 64))
     with pytest.raises(ValueError, match=f"{path}: it was not computed with the settings of this campaign"):
