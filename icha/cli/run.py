@@ -30,7 +30,7 @@ from icha.cli.project import (
     profile_settings,
     project,
     read_configuration,
-    shown,
+    short_path,
     workflow_folder,
 )
 from icha.support import formatting
@@ -134,15 +134,15 @@ def run(
     if not set(targets) - {"all", "report", "publish"}:
         _print_checks(campaign, results)
     if "publish" in targets:
-        echo(f"deposit: {shown(results / 'publish' / f'{campaign.name}-{campaign.published().version}.zip')}")
+        echo(f"deposit: {short_path(results / 'publish' / f'{campaign.name}-{campaign.published().version}.zip')}")
 
 
 def _refuse_obstacles(folder: Path, results: Path, name: str, path: Path, workflow: Path) -> None:
     from icha.planning.ownership import belongs_to_another
 
-    if reason := belongs_to_another(shown(results), name, path, workflow):
+    if reason := belongs_to_another(short_path(results), name, path, workflow):
         raise UserError(f"{reason} Nothing was started")
-    if obstacle := in_the_way(shown(folder / ".snakemake")):
+    if obstacle := in_the_way(short_path(folder / ".snakemake")):
         raise UserError(f"{obstacle}: Snakemake needs this folder for its records. Remove it or repair it")
 
 
@@ -345,7 +345,8 @@ def _print_outcome(status: int, stopped: bool, progress, campaign, folder: Path,
     if status and results.is_dir() and (reason := why_not_writable(results)):
         # Logs are in this folder, so jobs may have been unable to report it.
         echo(
-            f"cannot write to {shown(results)}: {reason.strerror}. Repeat the command when this is repaired.", fg="red"
+            f"cannot write to {short_path(results)}: {reason.strerror}. Repair this and repeat the command.",
+            fg="red",
         )
     if stopped or status < 0:
         echo("Stopped before the end. Repeat the command to continue.", fg="red")
@@ -358,9 +359,9 @@ def _print_outcome(status: int, stopped: bool, progress, campaign, folder: Path,
         files = {"figures": "figures", "dataset": f"dataset/{campaign.name}.nc", "report": "report.html"}
         for name, file in files.items():
             if (results / file).exists():
-                echo(f"{name + ':':<9}{shown(results / file)}")
+                echo(f"{name + ':':<9}{short_path(results / file)}")
     if status:
-        echo(f"log:     {shown(log)}")
+        echo(f"log:     {short_path(log)}")
 
 
 def _print_failures(status: int, stopped: bool, progress, campaign, folder: Path, log: Path) -> None:
@@ -378,7 +379,7 @@ def _print_failures(status: int, stopped: bool, progress, campaign, folder: Path
     if failed:
         echo(f"{format_count(len(failed), 'job')} failed:", fg="red")
         for job in failed:
-            logs = ", ".join(str(shown(folder / name)) for name in job.logs)
+            logs = ", ".join(str(short_path(folder / name)) for name in job.logs)
             # The verdict repeats the runs without a result.
             reason = [line for line in error_of(job, folder) if not any(line.startswith(path) for path in incomplete)]
             unknown = f"it ended without a message, perhaps killed (out of memory?); see {logs or log}"
