@@ -156,13 +156,7 @@ def _profile_folder(profile: str | None, workflow: Path) -> Path:
 
 
 def _confirm_if_too_large(items, targets: list[str], cores: int, results: Path, profile: dict) -> None:
-    """Ask whether to start if memory or disk space is probably too small.
-
-    Raises
-    ------
-    UserError
-        If the answer is no, or without a terminal.
-    """
+    """Ask whether to start if memory or disk space is probably too small; without a terminal, refuse."""
     from icha.planning.requirements import wanting
 
     if "surfaces" in targets:
@@ -250,13 +244,7 @@ def _log_file(folder: Path, campaign: str) -> Path:
 
 
 def _run_snakemake(command: list[str], workflow: Path, log: Path, progress, view) -> tuple[int, bool]:
-    """Run Snakemake; pass its events to `progress` and ended jobs to `view`.
-
-    Returns
-    -------
-    status : exit status of Snakemake.
-    stopped : whether a signal stopped it.
-    """
+    """Run Snakemake with its events passed to `progress` and `view`; return its status, and whether it was stopped."""
     stopped = []
     reading, writing = os.pipe()
     # The plugins of this workflow precede installed ones.
@@ -317,22 +305,13 @@ def _listen(reading: int, progress, view, stopped: list) -> None:
 
 
 def _print_outcome(status: int, stopped: bool, progress, campaign, folder: Path, log: Path, expected) -> None:
-    """Print how the call ended: jobs done and failed with reasons, and where results and log are.
-
-    Parameters
-    ----------
-    status, stopped : as returned by `_run_snakemake`.
-    progress : the jobs.
-    folder : the folder that holds results/.
-    log : output of Snakemake; removed if all went well, since Snakemake keeps it too.
-    expected : estimated duration of the call in s; None if unknown.
-    """
+    """Print the jobs done and failed with reasons, and where results and log are; `expected` is the duration in s."""
     from icha.support.atomic_files import why_not_writable
 
     results = folder / "results" / campaign.name
     ended = len(progress.done) + len(progress.failed)
     if status == 0:
-        log.unlink(missing_ok=True)
+        log.unlink(missing_ok=True)  # Snakemake has its own copy
     if status == 0 and progress.started is None:
         echo("Nothing to do: all requested results exist and are up to date.")
     elif ended:

@@ -205,10 +205,9 @@ def _mean(values: np.ndarray, form) -> Markup:
 
 
 def _range(values: np.ndarray, form) -> Markup | str:
-    """Format the accuracy of a mean: its 95 % interval, or the extremes of fewer than five values.
+    """Format the 95 % interval of a mean, or the extremes of fewer than five values; nothing without scatter.
 
-    If the interval of positive values would reach below zero, it is that of the logarithm. Values without scatter have
-    none.
+    If the interval of positive values would reach below zero, it is that of the logarithm.
     """
     over = ensemble(values)
     # Loads are met exactly, but for rounding errors.
@@ -297,10 +296,9 @@ def _with_unit(values: np.ndarray, unit: str = "") -> Markup:
 
 
 def _spread(comparison: xr.Dataset) -> dict[str, float | None]:
-    """Return the largest differences of the area between materials and between slopes.
+    """Return the largest differences of the area between materials and slopes, at equal pressure and at equal load.
 
-    They are at equal reduced pressure, and at equal load (`_at_load`); None if no two complete runs differ in this
-    label only, or none share a load.
+    None if no two complete runs differ in this label only, or share a load.
     """
     complete = comparison["status"] == COMPLETE
 
