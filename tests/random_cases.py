@@ -7,7 +7,7 @@ import numpy as np
 from hypothesis import strategies as st
 
 import icha
-from icha.analysis.checks import told
+from icha.analysis.checks import describe_failure
 from icha.asperity.full_contact import FULL_CONTACT_BELOW
 from icha.checks.run import check_run
 from icha.contact.models import DEFAULT_MODEL, REFERENCE_MODEL
@@ -218,4 +218,4 @@ def wrong(run) -> list[str]:
     assert ended or all(f"{check.name}: " in marked for check in found)
     marked_only = OF_STICKY_SURFACES if float(run["full_contact_energy_ratio"]) < FULL_CONTACT_BELOW else OF_UNIONS
     found = [check for check in found if not (check.name in marked_only and float(run["surface_energy"]) > 0)]
-    return [told(check) for check in found] + problems_with_file(RUN, run)
+    return [describe_failure(check) for check in found] + problems_with_file(RUN, run)

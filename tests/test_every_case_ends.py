@@ -123,7 +123,7 @@ def test_every_case_ends(series, bounded):
     completed = []
 
     @seed(series)
-    @settings(max_examples=min(CASES_IN_SERIES, settings.default.max_examples // 2), derandomize=False)
+    @settings(max_examples=min(CASES_IN_SERIES, settings.default.max_examples // 3), derandomize=False)
     @given(cases())
     @example(WITHOUT_A_SPOT_TO_LET_GO)
     @example(FRONT_THAT_JUMPS_WITHIN_ITS_PATCH)
@@ -190,7 +190,7 @@ def test_loops_without_adhesion_pass_their_checks(series):
     completed = []
 
     @seed(series)
-    @settings(max_examples=min(CASES_IN_SERIES, settings.default.max_examples // 2), derandomize=False)
+    @settings(max_examples=min(CASES_IN_SERIES, settings.default.max_examples // 4), derandomize=False)
     @given(loops())
     def are_sound(case):
         completed.append(assert_loop_is_sound(case))
@@ -230,7 +230,7 @@ def loss_and_rise(run):
 @pytest.mark.hypothesis
 def test_loops_that_gain_energy_or_move_apart_in_loading_are_marked(series):
     @seed(series)
-    @settings(max_examples=STICKY_LOOPS_IN_SERIES, derandomize=False)
+    @settings(max_examples=min(STICKY_LOOPS_IN_SERIES, settings.default.max_examples // 8), derandomize=False)
     @given(sticky_loops())
     def are_marked(case):
         try:
@@ -248,7 +248,7 @@ def test_loops_that_gain_energy_or_move_apart_in_loading_are_marked(series):
 
 
 def test_a_cycle_begins_at_its_highest_stop():
-    surface = SelfAffineSpectrum(PERIOD, PERIOD / 2, PERIOD / 5, 0.8, 0.2).realise(32, 1)
+    surface = SelfAffineSpectrum(PERIOD, PERIOD / 2, PERIOD / 3, 0.8, 0.2).realise(16, 1)
     stops = [surface.rms_height * height for height in (4.5, 4.0, 2.0)]
     for energy in (0.0, 2e-3):
         run = simulate(surface, Material(0.24e6, energy, 2e-9), Path(mean_separations=stops, unload=True))

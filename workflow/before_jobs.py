@@ -16,9 +16,9 @@ from snakemake.logging import logger
 from snakemake_records import METADATA, file_of, mark_incomplete, record_of
 
 from icha.deposit.program import note_versions
-from icha.planning.ownership import belongs_to_another, claim
+from icha.planning.ownership import claim, find_conflict
 from icha.support import checksums
-from icha.support.atomic_files import Superseded, is_left_over, take_over, while_owned, why_not_writable
+from icha.support.atomic_files import Superseded, is_left_over, probe_folder, take_over, while_owned
 from icha.support.program import beginning_of, end_with_parent
 
 ANOTHER_FOLDER = "use another folder: `icha run --directory FOLDER`, `snakemake --directory FOLDER`"
@@ -93,7 +93,7 @@ class Campaign:
         """
         self.results, self.dry_run = results, dry_run
         self._origin = Path(file).resolve(), Path(workflow)
-        if reason := belongs_to_another(Path(results), name, *self._origin):
+        if reason := find_conflict(Path(results), name, *self._origin):
             raise SystemExit(f"{reason} Nothing was computed.")
         self._other_process = None if dry_run else hold_lock(f".snakemake/{Path(results).name}.lock")
         damaged = checksums.damaged(results)
@@ -214,7 +214,7 @@ class Campaign:
         for folder in (self.results, ".snakemake"):
             with _writing(folder):
                 Path(folder).mkdir(parents=True, exist_ok=True)
-                if reason := why_not_writable(Path(folder)):
+                if reason := probe_folder(Path(folder)):
                     raise reason
         for folder, _, _ in os.walk(self.results):
             with _writing(folder):

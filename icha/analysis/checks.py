@@ -1,7 +1,4 @@
-"""Checks of results: what every run must satisfy, whoever computed it.
-
-They are identities and bounds of the physics, evaluated on the dataset alone.
-"""
+"""Checks of campaigns and of boundary-element solutions: identities and bounds, evaluated on the datasets alone."""
 
 import json
 import os
@@ -20,43 +17,41 @@ from icha.datasets.labels import RunLabels
 from icha.datasets.variables.campaign import MISSING
 from icha.support.atomic_files import whole_file
 
-# The mean gap that carries a load is searched for to 2e-4 of the load.
+# Largest relative error of a load; the search for its mean gap stops at 2e-4.
 LOAD_LIMIT = 1e-3
-# The check of every run of a campaign that it reached its end and passed its checks.
+# Name of the check that a run reached its end and passed its checks.
 COMPLETED = "completed"
 
 
 def check_campaign(tree: xr.DataTree, expected: Iterable[RunLabels | tuple] | None = None) -> tuple[Check, ...]:
-    """Check a campaign dataset: every run there and complete, every variable described, and `check_run` for each.
+    """Check a campaign dataset: every run present and complete, every variable described, `check_run` for each run.
 
     A run that is incomplete or failed its own checks has one check, which fails and has the reason as its description.
 
     Parameters
     ----------
     tree : the campaign dataset.
-    expected : labels of the runs that the campaign asks for; those of the dataset's own design, if left out.
+    expected : labels of the runs of the campaign; by default those of the dataset's own design.
     """
     checks = []
 
-    def none_of(name, count, description, subject):
+    def require_none(name, count, description, subject):
         checks.append(Check(name, float(count), 0.0, bool(count == 0), description, subject))
 
-    wanted = None if expected is None else {str(RunLabels(*labels)) for labels in expected}
     present = run_labels(tree)
-    if wanted is not None:
-        lacking = wanted - {str(labels) for labels in present}
-        none_of(
-            "all runs", len(lacking), "number of runs that the campaign asks for and lacks", ", ".join(sorted(lacking))
-        )
+    if expected is not None:
+        lacking = sorted({str(RunLabels(*labels)) for labels in expected} - {str(labels) for labels in present})
+        description = "number of runs that the campaign asks for and lacks"
+        require_none("all runs", len(lacking), description, ", ".join(lacking))
     for study, node in tree.children.items():
         missing = np.count_nonzero(node["status"].values == MISSING)
-        none_of("no run missing", missing, "number of runs of the design that are missing", study)
+        require_none("no run missing", missing, "number of runs of the design that are missing", study)
         variables = node.to_dataset().variables.values()
         bare = sum("units" not in v.attrs or "long_name" not in v.attrs for v in variables)
-        none_of("described", bare, "number of variables without units or long name", study)
+        require_none("described", bare, "number of variables without units or long name", study)
     for labels in present:
         variables, attrs = variables_of_run(tree, labels)
-        # The values of a failed run are not used, so that the reason is its only finding.
+        # The values of a failed run are not used, so its reason is the only finding.
         if reason := attrs.get("incomplete") or attrs.get("failed_checks"):
             checks.append(Check(COMPLETED, 1.0, 0.0, False, reason, str(labels)))
             continue
@@ -66,19 +61,19 @@ def check_campaign(tree: xr.DataTree, expected: Iterable[RunLabels | tuple] | No
 
 
 def check_solution(solution: xr.Dataset, subject: str = "") -> tuple[Check, ...]:
-    """Check a boundary-element solution: finite, converged, resolved, at its load, and true to its identities.
+    """Check a boundary-element solution: finite, converged, resolved, at its load, with consistent distributions.
 
     Parameters
     ----------
     solution : a dataset as `icha.references.finite_range.finite_range_solution` returns it.
     subject : name of the solution in the findings.
     """
-    findings = (*_of_solver(solution), *_identities_of_solution(solution))
+    findings = (*_check_solver(solution), *_check_identities(solution))
     return tuple(compare_with_limit(f"boundary elements: {name}", *rest, subject) for name, *rest in findings)
 
 
-def _of_solver(solution) -> Iterator[Finding]:
-    """Findings on how well a solution was found."""
+def _check_solver(solution) -> Iterator[Finding]:
+    """Yield findings on values, convergence, load and resolution."""
     values = (variable.values for variable in solution.variables.values())
     yield "finite", count_not_finite(values), 0, "number of values that are not finite"
     yield (
@@ -87,7 +82,7 @@ def _of_solver(solution) -> Iterator[Finding]:
         1,
         "error of the solver over the one at which it was to stop",
     )
-    load_error = abs(float(solution["nominal_pressure"]) / _asked(solution) - 1)
+    load_error = abs(float(solution["nominal_pressure"]) / _target_pressure(solution) - 1)
     yield "load", load_error, LOAD_LIMIT, "mean traction against the load asked for"
     yield (
         "resolved",
@@ -97,14 +92,14 @@ def _of_solver(solution) -> Iterator[Finding]:
     )
 
 
-def _asked(solution):
-    """The nominal pressure asked for, Pa."""
+def _target_pressure(solution):
+    """Nominal pressure that was prescribed, Pa."""
     unit = float(solution["contact_modulus"]) * float(solution["rms_slope"])
     return float(solution["target_reduced_pressure"]) * unit
 
 
-def _identities_of_solution(solution) -> Iterator[Finding]:
-    """Errors of the identities between a solution's distributions, area and load."""
+def _check_identities(solution) -> Iterator[Finding]:
+    """Yield the errors of the identities between distributions, area and load."""
     gaps = solution["gap_density"].values * np.diff(solution["gap_bin_edges"].values)
     pressures = solution["pressure_density"].values * np.diff(solution["pressure_bin_edges"].values)
     loads = pressures * solution["pressure_bin_mean"].values
@@ -123,14 +118,15 @@ def _identities_of_solution(solution) -> Iterator[Finding]:
     )
     yield (
         "load from P(p)",
-        abs(loads.sum() + float(solution["outside_pressure"]) - nominal) / max(np.abs(loads).sum(), _asked(solution)),
+        abs(loads.sum() + float(solution["outside_pressure"]) - nominal)
+        / max(np.abs(loads).sum(), _target_pressure(solution)),
         IDENTITY_LIMIT,
         "integral of p P(p) over p, plus the traction outside contact, against F/A0, over the sum of both signs",
     )
 
 
 def worst(checks: Iterable[Check]) -> tuple[Check, ...]:
-    """One check of every name: a failed one before passed ones, then the one with the largest value."""
+    """Select one check per name: a failed one if there is one, then the one with the largest value."""
     found: dict[str, Check] = {}
     for check in checks:
         best = found.get(check.name)
@@ -139,26 +135,20 @@ def worst(checks: Iterable[Check]) -> tuple[Check, ...]:
     return tuple(found.values())
 
 
-def told(check: Check) -> str:
-    """A failed check in a line."""
+def describe_failure(check: Check) -> str:
+    """Describe a failed check in one line."""
     if check.name == COMPLETED:
         return f"{check.subject}: the run failed: {check.description}"
-    return f"{check.subject}: {check.name}: {check.value:.3g} ({check.description}); allowed: at most {check.limit:g}"
+    return f"{check.subject}: {check.name}: {check.value:.3g} ({check.description}); expected at most {check.limit:g}"
 
 
 def refuse_unknown_failures(checks: Iterable[Check], known: Iterable[str]) -> None:
-    """Refuse failed checks of other subjects than those that are known to fail.
-
-    Raises
-    ------
-    ValueError
-        Listing the checks that failed and are not known to, and the subjects that are known to fail and do not.
-    """
+    """Raise ValueError unless exactly the known subjects fail; it lists the others, and known ones that passed."""
     failed = [check for check in checks if not check.passed]
     known = list(known)
     passing = sorted(set(known) - {check.subject for check in failed})
-    lines = [told(check) for check in failed if check.subject not in known]
-    lines += [f"{subject}: is said to fail, and all of its checks passed" for subject in passing]
+    lines = [describe_failure(check) for check in failed if check.subject not in known]
+    lines += [f"{subject}: is listed as a known failure, but all of its checks passed" for subject in passing]
     if lines:
         raise ValueError("\n".join(lines))
 

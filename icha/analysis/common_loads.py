@@ -1,4 +1,4 @@
-"""Runs of a study side by side: areas and separations at common loads, and what spreads them."""
+"""Comparison of the runs of a study: areas and separations at common loads, and their spread."""
 
 import warnings
 from collections.abc import Mapping, Sequence
@@ -17,9 +17,9 @@ from icha.support.statistics import ensemble
 
 # Loads at which curves are compared, per decade.
 _POINTS_PER_DECADE = 8
-# Points of a mean loop on every way.
-_WAY_POINTS = 200
-# Stops whose loads differ by less than this part, from seed to seed, are stops at the same load.
+# Points of a mean loop on every leg.
+_LEG_POINTS = 200
+# Relative difference below which the loads of two seeds are the same.
 _SAME_LOAD = 1e-6
 
 _WITHOUT_SEED = tuple(label for label in LABELS if label != "seed")
@@ -36,27 +36,29 @@ _STATISTICS = {
 }
 
 
-def interpolated(load, values, at, *, logarithmic: bool) -> np.ndarray:
-    """Values of a monotone curve at loads `at` within its range, by monotone cubics in the logarithm of the load.
+def interpolate(load, values, at, *, logarithmic: bool) -> np.ndarray:
+    """Interpolate a monotone curve at loads `at`, by monotone cubics in the logarithm of the load.
 
     Parameters
     ----------
-    load, values : the curve, in any order; loads positive. Of equal loads the first is kept.
-    at : loads within the curve's.
-    logarithmic : whether to interpolate the logarithm of the values, which are then positive.
+    load, values : the curve, in any order; loads are positive. The first of equal loads is used.
+    at : loads within the range of the curve.
+    logarithmic : whether to interpolate the logarithm of the values, which must then be positive.
 
     Raises
     ------
     ValueError
-        If a load lies outside the curve's.
+        If a load lies outside the range of the curve.
     """
     load, first = np.unique(np.asarray(load, float), return_index=True)
-    # Targets of two kinds may be one state: what differs by rounding only cannot carry a slope.
-    apart = np.concatenate([[True], np.diff(load) > 1e-9 * load[1:]])
-    load, values = load[apart], np.asarray(values, float)[first][apart]
+    # Targets of two kinds may be one state: loads that differ by rounding alone define no slope.
+    distinct = np.concatenate([[True], np.diff(load) > 1e-9 * load[1:]])
+    load, values = load[distinct], np.asarray(values, float)[first][distinct]
     at = np.asarray(at, float)
     if at.size and (at.min() < load[0] * (1 - 1e-9) or at.max() > load[-1] * (1 + 1e-9)):
-        raise ValueError(f"loads {at.min():g} to {at.max():g} lie outside the curve's, {load[0]:g} to {load[-1]:g}")
+        raise ValueError(
+            f"loads {at.min():g} to {at.max():g} lie outside the curve; expected {load[0]:g} to {load[-1]:g}"
+        )
     x = np.log(np.clip(at, load[0], load[-1]))
     if len(load) == 1:
         return np.full(at.shape, values[0])
@@ -65,7 +67,7 @@ def interpolated(load, values, at, *, logarithmic: bool) -> np.ndarray:
 
 
 def compare_runs(study: xr.Dataset, *, attrs: Mapping[str, str] = {}) -> xr.Dataset:
-    """Contact area and mean separation of all runs of a study at common loads, and their spread.
+    """Compare contact area and mean separation of all runs of a study at common loads.
 
     Parameters
     ----------
@@ -74,18 +76,21 @@ def compare_runs(study: xr.Dataset, *, attrs: Mapping[str, str] = {}) -> xr.Data
 
     Returns
     -------
-    Dataset on two grids of loads, `reduced_pressure` and `relative_load`, each over the range that all complete runs
-    cover (of length zero where there is no such range) between stops of their first loading. On each, with the suffix
-    `_at_load` on the second: `contact_area_fraction` and `reduced_separation` along the labels of the runs; over the
-    seeds mean, standard deviation and half the width of the 95 % confidence interval of both (`area_mean`,
-    `area_deviation`, `area_confidence`, `separation_mean`, …; `icha.support.statistics`);
-    `material_spread` and `slope_spread`, the largest over the smallest area of all materials (slopes), minus one. Runs
-    that are not complete lack values, as `status` says, and do not count; runs to which the asperity model is not
-    applicable are in no mean. `seed_count` says how many seeds means are over, and `asked_seed_count` how many were
-    asked for, of every model, surface, slope and material. A single one has no deviation and no band: they are missing.
+    Dataset on two grids of loads, `reduced_pressure` and `relative_load`. Each spans the range between targets of the
+    first loading that all complete runs cover, and is empty if there is no such range. On each grid, with the suffix
+    `_at_load` on the second:
+
+    - `contact_area_fraction` and `reduced_separation` along the labels of the runs;
+    - their mean, standard deviation and half the width of the 95 % confidence interval over the seeds (`area_mean`,
+      `area_deviation`, `area_confidence`, `separation_mean`, …; `icha.support.statistics`);
+    - `material_spread` and `slope_spread`: the largest over the smallest area of all materials (slopes), minus one.
+
+    Incomplete runs (`status`) have no values and do not count. Runs to which the asperity model is not applicable are
+    in no mean. `seed_count` is the number of seeds in the means, `asked_seed_count` the number of seeds asked for. One
+    seed alone has no deviation and no confidence interval.
     """
     complete = study["status"].transpose(*LABELS).values == COMPLETE
-    averaged = complete & _applicable(study)
+    averaged = complete & _is_applicable(study)
     asked = np.isin(study["status"].transpose(*LABELS).values, (*COMPUTED_RUNS, MISSING))
     variables = {"status": study["status"]}
     for name, description, counted in (
@@ -98,7 +103,8 @@ def compare_runs(study: xr.Dataset, *, attrs: Mapping[str, str] = {}) -> xr.Data
         suffix = "" if axis == "reduced_pressure" else "_at_load"
         at, on_grid = _on_common_grid(study, load, complete)
         coords[axis] = make_variable(TERMS[axis]._replace(dims=(axis,)), at)
-        for name, (description, values) in (_curves(study, on_grid) | _spreads(on_grid, averaged)).items():
+        curves = {name: (Variable(LABELS, "1", study[name].attrs["long_name"]), on_grid[name]) for name in on_grid}
+        for name, (description, values) in (curves | _spreads(on_grid, averaged)).items():
             along = description._replace(
                 dims=(*description.dims, axis), long_name=f"{description.long_name}, at {TERMS[axis].long_name}"
             )
@@ -114,7 +120,7 @@ def compare_runs(study: xr.Dataset, *, attrs: Mapping[str, str] = {}) -> xr.Data
 
 
 def _loads(study):
-    """Loads of all steps on both axes, NaN but at the stops of the first loading: tensile ones have no logarithm."""
+    """Loads of all steps on both axes; NaN except at compressive targets of the first loading."""
     pressure = study["reduced_pressure"].transpose(*LABELS, "step").values
     slope = study["rms_slope"].broadcast_like(study["status"]).transpose(*LABELS).values[..., None]
     shown = loading_stops(study).transpose(*LABELS, "step").values & (pressure > 0)
@@ -123,37 +129,32 @@ def _loads(study):
 
 
 def _on_common_grid(study, load, complete):
-    """A grid of loads that all complete runs cover, and the curves of all runs on it, by name."""
+    """Return loads that all complete runs cover, and the curves of all runs at these loads, by name."""
     curves = {
         "contact_area_fraction": study["contact_area_fraction"].transpose(*LABELS, "step").values,
         "reduced_separation": reduced_gap(study).transpose(*LABELS, "step").values,
     }
-    places = [tuple(place) for place in np.argwhere(complete)]
+    runs = [tuple(index) for index in np.argwhere(complete)]
     shown = ~np.isnan(load)
-    at = _common_grid([load[place][shown[place]] for place in places])
+    at = _common_grid([load[run][shown[run]] for run in runs])
     on_grid = {name: np.full((*complete.shape, len(at)), np.nan) for name in curves}
     for name, values in curves.items():
-        for place in places if len(at) else ():
-            own = shown[place]
-            logarithmic = name == "contact_area_fraction"
-            on_grid[name][place] = interpolated(load[place][own], values[place][own], at, logarithmic=logarithmic)
+        logarithmic = name == "contact_area_fraction"
+        for run in runs if len(at) else ():
+            steps = shown[run]
+            on_grid[name][run] = interpolate(load[run][steps], values[run][steps], at, logarithmic=logarithmic)
     return at, on_grid
 
 
-def _curves(study, on_grid):
-    """Descriptions and values of the curves of all runs."""
-    return {name: (Variable(LABELS, "1", study[name].attrs["long_name"]), values) for name, values in on_grid.items()}
-
-
-def _applicable(study):
-    """Which runs nothing is known of that makes the asperity model not applicable to them."""
-    if "applicability" not in study:  # which campaigns of earlier versions lack
+def _is_applicable(study):
+    """Whether the model is applicable to each run, as far as is known."""
+    if "applicability" not in study:  # campaigns of earlier versions lack it
         return True
     return study["applicability"].transpose(*LABELS).values == ""
 
 
 def _spreads(on_grid, averaged):
-    """Descriptions and values of what spreads the curves: the seeds that are averaged, and materials and slopes."""
+    """Descriptions and values of statistics over the averaged seeds, and of the spread over materials and slopes."""
     found = {}
     for name, short, symbol in _AVERAGED:
         over_seeds = ensemble(np.where(averaged[..., None], on_grid[name], np.nan), LABELS.index("seed"))
@@ -173,17 +174,18 @@ def _spreads(on_grid, averaged):
 def at_common_loads(
     curves: Sequence[tuple[np.ndarray, np.ndarray]], *, logarithmic: bool
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The curves of an ensemble, one for each seed, at common positive loads.
+    """Evaluate the curves of an ensemble, one for each seed, at common positive loads.
 
     Parameters
     ----------
     curves : load and values of every member.
-    logarithmic : whether to interpolate the logarithm of the values, which are then positive.
+    logarithmic : whether to interpolate the logarithm of the values, which must then be positive.
 
     Returns
     -------
-    The loads, those of the members where they are the same and else evenly spaced by their logarithm over the range
-    that all cover (none if there is no such range), and the values (members, loads) at them.
+    loads : (loads,), those of the members if they are the same; otherwise evenly spaced by their logarithm over the
+        range that all members cover, empty if there is no such range.
+    values : (members, loads).
     """
     curves = [(load[load > 0], values[load > 0]) for load, values in curves]
     loads = [np.sort(load) for load, _ in curves]
@@ -192,55 +194,55 @@ def at_common_loads(
     at = _common_grid(loads)
     if not len(at):
         return at, np.empty((len(curves), 0))
-    return at, np.array([interpolated(load, values, at, logarithmic=logarithmic) for load, values in curves])
+    return at, np.array([interpolate(load, values, at, logarithmic=logarithmic) for load, values in curves])
 
 
-def at_common_displacements(ways: Sequence[xr.Dataset]) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-    """Reduced pressure and contact area of an ensemble on one leg of a path, at common displacements.
+def at_common_displacements(legs: Sequence[xr.Dataset]) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    """Evaluate reduced pressure and contact area of an ensemble on one leg of a path, at common displacements.
 
-    They are counted from where the leg is loaded most, so that legs that meet there meet in their mean as well. Where a
-    member is separated, pressure and area are zero; ways that end in contact end where the first of them does.
+    Displacements are measured from the largest load of the leg, so that the means of two legs meet where the legs meet.
+    Pressure and area of a separated member are zero. Legs that end in contact end where the first of them ends.
 
     Parameters
     ----------
-    ways : the same leg of every member (`icha.figures.select.branches`).
+    legs : the same leg of every member (`icha.figures.select.branches`).
 
     Returns
     -------
-    Means of the mean separations over the rms height, in the order of the leg, and `reduced_pressure` and
-    `contact_area_fraction` (members, separations) at them.
+    separations : means of the mean separations over the rms height, in the order of the leg.
+    values : `reduced_pressure` and `contact_area_fraction`, (members, separations).
     """
-    separations = [way["reduced_separation"].values for way in ways]
+    separations = [leg["reduced_separation"].values for leg in legs]
     closest = [float(separation.min()) for separation in separations]
     falling = separations[0][-1] < separations[0][0]
-    apart = all(float(way["contact_area_fraction"].values[0 if falling else -1]) == 0 for way in ways)
+    apart = all(float(leg["contact_area_fraction"].values[0 if falling else -1]) == 0 for leg in legs)
     reach = max if apart else min
-    at = np.linspace(0, reach(np.ptp(separation) for separation in separations), _WAY_POINTS)
+    at = np.linspace(0, reach(np.ptp(separation) for separation in separations), _LEG_POINTS)
     found = {}
     for name in ("reduced_pressure", "contact_area_fraction"):
         members = []
-        for way, separation, least in zip(ways, separations, closest, strict=True):
+        for leg, separation, least in zip(legs, separations, closest, strict=True):
             order = np.argsort(separation, kind="stable")
-            beyond = 0.0 if apart else None
-            members.append(np.interp(least + at, separation[order], way[name].values[order], right=beyond))
+            outside = 0.0 if apart else None
+            members.append(np.interp(least + at, separation[order], leg[name].values[order], right=outside))
         found[name] = np.array(members)
     order = slice(None, None, -1 if falling else 1)
     return (at + np.mean(closest))[order], {name: values[:, order] for name, values in found.items()}
 
 
 def _spread(area, axis):
-    """Largest over smallest area, less 1; NaN of no complete run at all."""
+    """Largest over smallest area, minus 1; NaN without a complete run."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)
         return np.nanmax(area, axis) / np.nanmin(area, axis) - 1
 
 
 def _common_grid(loads):
-    """Loads, evenly spaced by their logarithm, that every run covers; `loads` are those of each, all positive."""
+    """Loads that every run covers, evenly spaced by their logarithm; `loads` are positive arrays, one per run."""
     if not loads or not all(map(len, loads)):
         return np.empty(0)
-    lowest = max(float(own.min()) for own in loads)
-    highest = min(float(own.max()) for own in loads)
+    lowest = max(float(load.min()) for load in loads)
+    highest = min(float(load.max()) for load in loads)
     if highest <= lowest:
         return np.empty(0)
     count = max(2, round(np.log10(highest / lowest) * _POINTS_PER_DECADE) + 1)
@@ -248,7 +250,7 @@ def _common_grid(loads):
 
 
 def compare_campaign(tree: xr.DataTree, *, attrs: Mapping[str, str] = {}) -> xr.DataTree:
-    """`compare_runs` for every study of a campaign, as a tree of the same shape."""
+    """Apply `compare_runs` to every study of a campaign; return a tree of the same shape."""
     groups = {f"/{name}": compare_runs(node.to_dataset()) for name, node in tree.children.items()}
     root = combine_attributes(
         "Comparison of the runs of every study",

@@ -1,7 +1,7 @@
-"""How far asperities are from boundary elements on the same topography, at the same load.
+"""Error of the asperity model against boundary elements on the same topography, at the same load.
 
-In the limit of a short range those are runs of the same study by another model, with stops at the same loads; at finite
-ranges they are solutions of Tamaas beside the study.
+In the limit of a short range the reference is a run of the same study with the other model, with targets at the same
+loads. At finite ranges it is a solution of Tamaas.
 """
 
 import contextlib
@@ -29,17 +29,17 @@ from icha.path.targets import REDUCED_PRESSURE
 _TITLE = "Error of the model against boundary elements"
 _SUMMARY = "The same topographies, loads and materials by the model and by boundary elements."
 
-# Labels of the runs, all of one model.
+# Labels of the runs without the model.
 _LABELS = tuple(label for label in LABELS if label != "model")
 AXES = (*_LABELS, "reduced_pressure")
 
-# What a run and a solution must share for their difference to be the model's error, and to which relative accuracy.
+# Variables that a run and a solution must share, to this relative accuracy.
 SHARED = ("period", "rms_height", "rms_slope", "contact_modulus", "surface_energy", "interaction_range")
 _ROUNDING = 1e-6
-# From this part on a cell of a contact map is in contact.
+# Contact fraction from which a cell of a contact map is in contact.
 _HALF = 0.5
 
-# Of these, mean and deviation over the seeds.
+# Variables with mean and deviation over the seeds.
 SUMMARISED = (
     "area_error",
     "energetic_area_error",
@@ -57,33 +57,36 @@ def model_error(
     runs: Iterable[tuple[RunLabels | tuple, xr.Dataset]] = (),
     attrs: Mapping[str, str] = {},
 ) -> xr.DataTree:
-    """The runs of a campaign by asperities beside boundary elements, state by state.
+    """Compare the runs with the asperity model with boundary elements, state by state.
 
     Parameters
     ----------
-    campaign : the campaign dataset; its runs have a snapshot of kind `reduced_pressure` at every solution's load.
+    campaign : the campaign dataset; its runs have a snapshot of kind `reduced_pressure` at the load of every solution.
     solutions : at finite ranges: pairs of labels (entry, study, surface, seed, rms_slope, material, reduced_pressure)
-        and the solution's dataset (`icha.references.finite_range`), in any order.
-    runs : in the limit of a short range: pairs of labels and dataset of the runs by boundary elements, with their maps,
-        in any order. They are compared at the stops of kind `reduced_pressure` of their first loading, distributions
-        and maps where both models keep a snapshot.
+        and dataset (`icha.references.finite_range`), in any order.
+    runs : in the limit of a short range: pairs of labels and dataset of the boundary-element runs, with their maps, in
+        any order. States at targets of kind `reduced_pressure` of the first loading are compared; distributions and
+        maps where both models have a snapshot.
     attrs : further global attributes.
 
     Returns
     -------
-    DataTree with a group for the runs of every study, named as the study is, and for every entry of solutions; its
-    attribute `truth` says which (`SHORT_RANGE`, `FINITE_RANGE`). All are along surface, seed, rms_slope, material and
-    reduced_pressure (the one asked for) and have those of `icha.datasets.variables.model_error`; for those of
-    `SUMMARISED` the mean over the seeds,
-    `<name>_mean`, and from two seeds on their standard deviation, `<name>_deviation`; modulus, energy, range and Tabor
-    parameter of the runs. `status(surface, seed, rms_slope, material)` says which of these combinations have solutions
-    beside a complete run; elsewhere values are missing, and do not count.
+    DataTree with a group for every study with boundary-element runs, named as the study, and for every entry of
+    solutions; the attribute `truth` tells them apart (`SHORT_RANGE`, `FINITE_RANGE`). Variables are along surface,
+    seed, rms_slope, material and reduced_pressure, the prescribed one:
+
+    - those of `icha.datasets.variables.model_error`;
+    - `<name>_mean` over the seeds for names in `SUMMARISED`, and from two seeds on `<name>_deviation`, the standard
+      deviation;
+    - modulus, energy, range and Tabor parameter of the runs;
+    - `status(surface, seed, rms_slope, material)`: which combinations have solutions and a complete run; values of the
+      others are missing.
 
     Raises
     ------
     ValueError
-        Naming entry, run and pressure: if a run is not there, has no snapshot at that pressure, or is another contact
-        than the solution's; if a contact lacks a state that others of its entry have, or has one twice.
+        If a run is missing, has no snapshot at the pressure of a solution, or is another contact; if a contact lacks a
+        state that others of its entry have, or has one twice. The message names entry, run and pressure.
     """
     origins: dict[str, list[dict[str, str]]] = {}
     select = cache(lambda labels: select_run(campaign, labels))
@@ -97,14 +100,14 @@ def model_error(
     for entry, states in entries.items():
         truth = SHORT_RANGE if entry in short_range else FINITE_RANGE
         title = f"{_TITLE}, {'study' if entry in short_range else 'entry'} {entry}"
-        described = combine_attributes(title, _SUMMARY, DERIVED, origins.get(entry, [])) | {"truth": truth}
-        groups[f"/{entry}"] = _entry_dataset(campaign, entry, states).assign_attrs(described)
+        attributes = combine_attributes(title, _SUMMARY, DERIVED, origins.get(entry, [])) | {"truth": truth}
+        groups[f"/{entry}"] = _entry_dataset(campaign, entry, states).assign_attrs(attributes)
     root = combine_attributes(_TITLE, _SUMMARY, DERIVED, itertools.chain(*origins.values()))
     return xr.DataTree.from_dict({"/": xr.Dataset(attrs=root | dict(attrs))} | groups)
 
 
 def _short_range_entries(select, runs, origins):
-    """States of every study, beside runs in the limit of a short range; adds to `origins` attributes of the runs."""
+    """Compare every study with runs in the limit of a short range; append attributes of the runs to `origins`."""
     entries: dict[str, dict[SolutionLabels, dict | None]] = {}
     for labels, truth in runs:
         labels = RunLabels(*labels)
@@ -119,7 +122,7 @@ def _short_range_entries(select, runs, origins):
 
 
 def _finite_range_entries(select, solutions, origins):
-    """States of every entry, beside solutions at finite ranges; adds to `origins` attributes of the runs."""
+    """Compare every entry with solutions at finite ranges; append attributes of the runs to `origins`."""
     entries: dict[str, dict[SolutionLabels, dict | None]] = {}
     for labels, solution in solutions:
         labels = SolutionLabels(*labels)
@@ -131,11 +134,11 @@ def _finite_range_entries(select, solutions, origins):
             if why_no_result(run.attrs):
                 states[labels] = None
                 continue
-            at = find_snapshot(run, REDUCED_PRESSURE, labels.reduced_pressure)
-            asked = float(solution["target_reduced_pressure"])
-            if not np.isclose(asked, labels.reduced_pressure, rtol=1e-9):
-                raise ValueError(f"the solution is one of reduced pressure {asked:g}")
-            states[labels] = compare_state(run, at, solution)
+            snapshot = find_snapshot(run, REDUCED_PRESSURE, labels.reduced_pressure)
+            target = float(solution["target_reduced_pressure"])
+            if not np.isclose(target, labels.reduced_pressure, rtol=1e-9):
+                raise ValueError(f"the solution is one of reduced pressure {target:g}")
+            states[labels] = compare_state(run, snapshot, solution)
         except ValueError as error:
             raise ValueError(f"{_name(labels)}: {error}") from None
         origins.setdefault(labels.entry, []).extend((run.attrs, solution.attrs))
@@ -143,12 +146,16 @@ def _finite_range_entries(select, solutions, origins):
 
 
 def compare_state(run: xr.Dataset, snapshot: int, solution: xr.Dataset) -> dict[str, float | np.ndarray]:
-    """The variables of `MODEL_ERROR` for one snapshot of a run and the boundary-element solution of the same state.
+    """Compare one snapshot of a run with the boundary-element solution of the same state.
+
+    Returns
+    -------
+    The variables of `MODEL_ERROR`.
 
     Raises
     ------
     ValueError
-        If they are not the same contact, or the solution has no contact or no gap to be compared with.
+        If they are not the same contact, or the contact area or mean separation of the solution is not positive.
     """
     check_same_contact(run, solution)
     state = state_of(run, snapshot)
@@ -156,7 +163,7 @@ def compare_state(run: xr.Dataset, snapshot: int, solution: xr.Dataset) -> dict[
 
 
 def _compare_stops(labels, run, truth):
-    """The states of a run by boundary elements and of the one by asperities, by their labels; None where one failed."""
+    """Compare the states of both models by label; None if a run failed or lacks the state."""
     check_same_contact(run, truth)
     failed = why_no_result(run.attrs) or why_no_result(truth.attrs)
     found = {}
@@ -166,27 +173,27 @@ def _compare_stops(labels, run, truth):
         if not failed and load in stops and load in true_stops:
             solution = _as_solution(truth, true_stops[load], load)
             state = _amounts(run.isel(step=stops[load]), solution)
-            if "contact" in solution and (kept := _snapshot_at(run, load)) is not None:
-                state |= _shapes(run, kept, state_of(run, kept), solution)
+            if "contact" in solution and (snapshot := _snapshot_at(run, load)) is not None:
+                state |= _shapes(run, snapshot, state_of(run, snapshot), solution)
         found[SolutionLabels(labels.study, labels.study, *labels[2:], load)] = state
     return found
 
 
 def _with_all_loads(states):
-    """The states of a study with those, None, that a run lacks and others have."""
+    """Add None for states that a run lacks and others of the study have."""
     loads = {labels.reduced_pressure for labels in states}
     everywhere = {labels._replace(reduced_pressure=load) for labels in states for load in loads}
     return dict.fromkeys(everywhere) | states
 
 
 def _stops(run):
-    """Steps of the stops of a run's first loading at given reduced pressures, by these."""
-    asked = loading_stops(run) & (run["step_kind"] == REDUCED_PRESSURE)
-    return {float(run["step_target"].values[step]): step for step in np.flatnonzero(asked.values).tolist()}
+    """Steps of the targets of kind `reduced_pressure` in the first loading, by their values."""
+    targets = loading_stops(run) & (run["step_kind"] == REDUCED_PRESSURE)
+    return {float(run["step_target"].values[step]): step for step in np.flatnonzero(targets.values).tolist()}
 
 
 def _snapshot_at(run, load):
-    """Where a run keeps its state of a reduced pressure; None if it does not."""
+    """Snapshot of a run at a reduced pressure; None if there is none."""
     try:
         return find_snapshot(run, REDUCED_PRESSURE, load)
     except ValueError:
@@ -194,14 +201,14 @@ def _snapshot_at(run, load):
 
 
 def _as_solution(run, step, load):
-    """A state of a run by boundary elements under the names of a solution; distributions and map if it keeps them.
+    """Rename a state of a boundary-element run as a solution, with distributions and map if it has a snapshot.
 
-    Their contact has an edge, beyond which nothing acts: all its areas are one.
+    Nothing acts outside the edge of such a contact, so its areas of all definitions are equal.
     """
-    state, kept = run.drop_dims([*RAGGED, "snapshot"], errors="ignore").isel(step=step), _snapshot_at(run, load)
-    if kept is not None:
-        contact = run["contact_map"].isel(snapshot=kept).rename(row="y", column="x") >= _HALF
-        state = state_of(run, kept).assign(contact=contact)
+    state, snapshot = run.drop_dims([*RAGGED, "snapshot"], errors="ignore").isel(step=step), _snapshot_at(run, load)
+    if snapshot is not None:
+        contact = run["contact_map"].isel(snapshot=snapshot).rename(row="y", column="x") >= _HALF
+        state = state_of(run, snapshot).assign(contact=contact)
     area = state["contact_area_fraction"]
     return state.assign(
         contact_area_fraction_raw=area,
@@ -212,14 +219,14 @@ def _as_solution(run, step, load):
 
 
 def _amounts(state, solution):
-    """Areas and separations of a state and a solution, and what is known of the solution itself."""
+    """Compare areas and separations of a state and a solution; add residual and grid of the solution."""
     area, truth = (float(each["contact_area_fraction"]) for each in (state, solution))
     separation, true_separation = (float(each["reduced_separation"]) for each in (state, solution))
     for name, value in (("contact area", truth), ("mean separation", true_separation)):
         if not value > 0:
-            raise ValueError(f"boundary elements have a {name} of {value:g}, relative to which there is no error")
-    # Around the area of zero gap the attraction acts; of the two areas the energetic one tends to JKR's sooner as the
-    # range vanishes.
+            raise ValueError(f"boundary elements have a {name} of {value:g}; a relative error needs a positive one")
+    # The attraction acts around the area of zero gap. As the range vanishes, the energetic area tends to that of JKR
+    # sooner than the area of zero gap.
     adhesive = float(solution["surface_energy"]) > 0
     raw, energetic = float(solution["contact_area_fraction_raw"]), float(solution["energetic_area_fraction"])
     return {
@@ -240,13 +247,13 @@ def _amounts(state, solution):
 
 
 def _shapes(run, snapshot, state, solution):
-    """How far distributions and contact map of a snapshot and a solution are apart, and what the solution has."""
+    """Compare distributions and contact map of a snapshot and a solution; add the densities of the solution."""
     spots = contact_of_spots(run, snapshot, solution.sizes["x"])
     contact = solution["contact"].transpose("y", "x").values == 1
     height, nominal = float(solution["rms_height"]), float(state["nominal_pressure"])
     pressure = float(solution["contact_modulus"]) * float(solution["rms_slope"])
     gaps = solution["gap_density"].values * height
-    # The last bin of a deep surface reaches farther than that of the others.
+    # The last bin of a deep surface is wider than that of the others.
     gaps[-1] *= np.diff(solution["gap_bin_edges"].values)[-1] / np.diff(GAP_BINS * height)[-1]
     return {
         "gap_distribution_distance": distribution_distance("gap", state, solution) / height,
@@ -262,22 +269,16 @@ def _shapes(run, snapshot, state, solution):
 def check_same_contact(run: xr.Dataset, solution: xr.Dataset) -> None:
     """Raise ValueError unless a run and a solution are of the same topography, half-space and attraction."""
     for name in SHARED:
-        own, other = float(run[name]), float(solution[name])
-        if not np.isclose(own, other, rtol=_ROUNDING, atol=0):
+        value, expected = float(run[name]), float(solution[name])
+        if not np.isclose(value, expected, rtol=_ROUNDING, atol=0):
             units = run[name].attrs.get("units", "1")
-            raise ValueError(f"{name} is {own:.7g} for the run, {other:.7g} for the solution (in {units})")
+            raise ValueError(f"{name} is {value:.7g} for the run, {expected:.7g} for the solution (in {units})")
     if int(solution["seed"]) != int(run["seed"]):
         raise ValueError(f"seed is {int(run['seed'])} for the run, {int(solution['seed'])} for the solution")
 
 
 def run_of_same_contact(runs: Iterable[tuple[RunLabels, xr.Dataset]], solution: xr.Dataset) -> RunLabels:
-    """Labels of the first run that is of the same contact as a solution.
-
-    Raises
-    ------
-    ValueError
-        If there is none.
-    """
+    """Labels of the first run of the same contact as a solution; raise ValueError if there is none."""
     for labels, run in runs:
         try:
             check_same_contact(run, solution)
@@ -290,48 +291,48 @@ def run_of_same_contact(runs: Iterable[tuple[RunLabels, xr.Dataset]], solution: 
 
 
 def state_of(run: xr.Dataset, snapshot: int) -> xr.Dataset:
-    """What a run has of one snapshot, under the names of a boundary-element solution; without spots and events."""
+    """Variables of a run at one snapshot, without spots and events."""
     step = int(run["snapshot_step"].values[snapshot])
     return run.drop_dims(RAGGED, errors="ignore").isel(snapshot=snapshot, step=step)
 
 
 def contact_of_spots(run: xr.Dataset, snapshot: int, grid: int) -> np.ndarray:
-    """Which nodes of a grid, (n, n) of bool along y and x, lie inside the spots of a snapshot."""
+    """Map of the nodes inside the spots of a snapshot: (n, n) bool along y and x."""
     spots = spots_of(run, snapshot)
     centres = np.column_stack([spots["spot_x"].values, spots["spot_y"].values])
     return nodes_in_discs(float(run["period"]), grid, centres, spots["spot_radius"].values)
 
 
 def jaccard(one: np.ndarray, other: np.ndarray) -> float:
-    """Nodes in both maps over nodes in either; 1 where both maps are empty, which then agree."""
+    """Jaccard index: nodes in both maps over nodes in either; 1 if both maps are empty."""
     either = np.count_nonzero(one | other)
     return np.count_nonzero(one & other) / either if either else 1.0
 
 
 def shared(one: np.ndarray, other: np.ndarray) -> float:
-    """Nodes in both maps over nodes in the first; 1 where the first is empty, of which nothing is missing."""
-    own = np.count_nonzero(one)
-    return np.count_nonzero(one & other) / own if own else 1.0
+    """Nodes in both maps over nodes in the first; 1 if the first is empty."""
+    count = np.count_nonzero(one)
+    return np.count_nonzero(one & other) / count if count else 1.0
 
 
 def distribution_distance(quantity: str, one: xr.Dataset, other: xr.Dataset) -> float:
     """First Wasserstein distance between two P(u) in m, or P(p) in Pa, over the nominal area.
 
-    It is the area between the cumulative distributions. Contact, and what overlaps outside it, has gap zero; a bin of
-    gaps stands at the geometric mean of its edges. The area out of contact has pressure zero, whatever attracts there;
-    a bin of pressures stands at its mean pressure.
+    It is the area between the cumulative distributions. The gap is zero in contact and where surfaces overlap outside
+    it; a bin of gaps stands for the geometric mean of its edges. The pressure is zero out of contact, even where there
+    is attraction; a bin of pressures stands for its mean pressure.
 
     Parameters
     ----------
     quantity : "gap" or "pressure".
     one, other : states with the densities and their bins.
     """
-    (u, weights), (v, other_weights) = (_values_and_parts(quantity, state) for state in (one, other))
+    (u, weights), (v, other_weights) = (_values_and_weights(quantity, state) for state in (one, other))
     return float(wasserstein_distance(u, v, weights, other_weights))
 
 
-def _values_and_parts(quantity, state):
-    """Values, and the parts of the nominal area that have them; zero, for the rest of the area, comes first."""
+def _values_and_weights(quantity, state):
+    """Values and the shares of the nominal area that have them; zero, for the rest of the area, comes first."""
     edges = state[f"{quantity}_bin_edges"].values
     content = state[f"{quantity}_density"].values * np.diff(edges)
     values = np.sqrt(edges[1:] * edges[:-1]) if quantity == "gap" else state["pressure_bin_mean"].values
@@ -344,10 +345,7 @@ def _name(labels):
 
 
 def _entry_dataset(campaign, entry, states):
-    """The states of one entry as full arrays along `AXES`, in the order of the campaign's labels.
-
-    Those of runs that failed are None.
-    """
+    """Arrange the states of one entry as arrays along `AXES`, in the order of the labels; failed ones are None."""
     studies = sorted({labels.study for labels in states})
     if len(studies) > 1:
         raise ValueError(f"entry {entry}: its solutions are of several studies: {', '.join(studies)}")
@@ -370,15 +368,17 @@ def _entry_dataset(campaign, entry, states):
     if missing := [labels for labels in grid if labels.run in contacts and labels not in states]:
         raise ValueError(f"{_name(missing[0])}: no solution, nor of {len(missing) - 1} other states of this entry")
 
-    # Of a contact that was compared at some loads the best one counts.
-    of_state = [NOT_IN_DESIGN if labels not in states else _status(states[labels]) for labels in grid]
-    variables = {"status": make_variable(STATUS._replace(dims=_LABELS), np.reshape(of_state, shape).min(axis=-1))}
-    variables |= _along_axes([states.get(labels) for labels in grid], shape)
+    # A contact is complete if it is complete at one load.
+    statuses = [
+        NOT_IN_DESIGN if labels not in states else INCOMPLETE if states[labels] is None else COMPLETE for labels in grid
+    ]
+    variables = {"status": make_variable(STATUS._replace(dims=_LABELS), np.reshape(statuses, shape).min(axis=-1))}
+    variables |= _arrange(shape, [states.get(labels) for labels in grid])
     applicable, applicability = True, None
-    if "applicability" in study:  # which campaigns of earlier versions lack
+    if "applicability" in study:  # campaigns of earlier versions lack it
         applicability = _of_asperities(study["applicability"], labelled)
         applicable = applicability.values[..., None] == ""
-    variables |= _over_seeds(variables, applicable)
+    variables |= _summarise_over_seeds(variables, applicable)
     bins = describe_variables(BINS, bin_values("gap", GAP_BINS) | bin_values("pressure", PRESSURE_BINS))
     coords |= {name: bins.pop(name) for name in BINS if BINS[name].coordinate}
     result = xr.Dataset(variables | bins, coords, {"entry": entry, "study": studies[0]})
@@ -391,7 +391,7 @@ def _entry_dataset(campaign, entry, states):
 
 
 def _of_asperities(quantity, labelled):
-    """A quantity of the runs by asperities at all labels of a dataset; missing where the study has no such labels."""
+    """A quantity of the runs with the asperity model at all labels of a dataset; missing where there is no run."""
     none = "" if quantity.dtype.kind in "OSU" else np.nan
     values = np.full([labelled.sizes[label] for label in _LABELS], none, object if none == "" else float)
     for place in np.ndindex(values.shape):
@@ -402,7 +402,7 @@ def _of_asperities(quantity, labelled):
 
 
 def _axes(study, states):
-    """Values of `AXES` that an entry asks for; rms slopes as `arrange_slopes` has them."""
+    """Values of `AXES` in the states of an entry; rms slopes as `arrange_slopes` returns them."""
     asked = {axis: {getattr(labels, axis) for labels in states} for axis in AXES}
     axes = {
         label: [value for value in study[label].values.tolist() if value in asked[label]]
@@ -414,8 +414,8 @@ def _axes(study, states):
     return {axis: axes[axis] for axis in AXES}
 
 
-def _along_axes(states, shape):
-    """The variables of all states, missing where there is none, as arrays of a shape along `AXES`."""
+def _arrange(shape, states):
+    """Arrange the variables of all states as arrays of a shape along `AXES`; missing where a state is None."""
     bins = {"gap_bin": len(GAP_BINS) - 1, "pressure_bin": len(PRESSURE_BINS) - 1}
     variables = {}
     for name, description in MODEL_ERROR.items():
@@ -428,8 +428,8 @@ def _along_axes(states, shape):
     return variables
 
 
-def _over_seeds(variables, applicable):
-    """Mean and standard deviation over the seeds of what is summarised, of the runs that the model is applicable to."""
+def _summarise_over_seeds(variables, applicable):
+    """Mean and standard deviation over the seeds of `SUMMARISED`, for runs to which the model is applicable."""
     seeds = AXES.index("seed")
     others = tuple(axis for axis in AXES if axis != "seed")
     found = {}
@@ -437,7 +437,7 @@ def _over_seeds(variables, applicable):
         values, long_name = np.where(applicable, variables[name].values, np.nan), MODEL_ERROR[name].long_name
         further = {"missing": "where no run counts"} | MODEL_ERROR[name].further
         mean = Variable(others, "1", f"mean over the seeds: {long_name}", further=further)
-        # Of no complete run there is no mean.
+        # NumPy warns where no run is complete; the mean is missing there.
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", RuntimeWarning)
             found[f"{name}_mean"] = make_variable(mean, np.nanmean(values, axis=seeds))
@@ -450,7 +450,3 @@ def _over_seeds(variables, applicable):
                 )
                 found[f"{name}_deviation"] = make_variable(deviation, np.nanstd(values, axis=seeds, ddof=1))
     return found
-
-
-def _status(state):
-    return INCOMPLETE if state is None else COMPLETE

@@ -1,7 +1,7 @@
-"""Whether the model holds for a campaign: where its parts were verified, and how far it is from the truth.
+"""Validity of the models for a campaign: where their parts were verified, and how large their errors are.
 
-Checks say that equations were solved; this says what the solutions are worth. The lines are short, to be read before a
-campaign is run, after it, and on top of its report.
+Checks verify that equations were solved; these statements describe what the solutions are worth. They are short lines,
+printed before a campaign runs and after it, and at the top of its report.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ from icha.surfaces.moments import RESOLVED_CELLS, cells_per_short_wave, error_of
 if TYPE_CHECKING:
     import xarray as xr
 
-# Errors of the model in per cent, least and most of the means over the seeds, with adhesion and without: the summary of
-# docs/validation.md, which is computed by campaign `validation`; a test compares them.
+# Errors of the asperity model in per cent, smallest and largest mean over the seeds, with adhesion and without: the
+# summary of docs/validation.md, which campaign `validation` computes; a test compares them.
 VALIDATION = {
     True: {"contact area": (-25.3, -8.1), "mean separation": (-36.1, -0.8)},
     False: {"contact area": (-21.4, -4.9), "mean separation": (-36.4, -0.8)},
@@ -35,25 +35,20 @@ _VALIDATED = "on seven self-affine surfaces, p* from 0.001 to 0.1 (page on valid
 
 _RATIO = "full_contact_energy_ratio"
 
-# Of single spots so many may lie outside the range of Wu's formula before it is said where: of every surface some do.
+# Share of single spots outside the range of Wu's formula above which a case is named; every surface has some.
 _FEW = 0.05
-# So many cases are named.
+# Most cases that a statement names.
 _MOST_NAMES = 4
-
-
-# --- surfaces and materials of the validation: study `short_range` of campaign `validation`, rounded outwards; a test
-# compares them ---
 
 
 class Range(NamedTuple):
     """Range of a quantity in the validation.
 
-    Parameters
+    Attributes
     ----------
-    words : what the quantity is, as messages name it.
-    least : smallest value.
-    most : largest value.
-    reason : what is said instead of a value outside; empty to give the value.
+    words : name of the quantity in messages.
+    least, most : smallest and largest value.
+    reason : text that replaces the value in a message; empty to print the value.
     """
 
     words: str
@@ -63,23 +58,23 @@ class Range(NamedTuple):
 
     @property
     def shown(self) -> str:
-        """The range as messages give it."""
+        """The range as messages print it."""
         if self.most == math.inf:
             return f"{self.least:g} and more"
         return f"{self.least:g} to {self.most:g}"
 
 
-# By the name of the quantity.
+# Surfaces and materials of study `short_range` of campaign `validation`, rounded outwards; a test compares them.
 VALIDATED = {
-    # Exactly 1 there, where amplitudes are fixed by the spectrum; random ones of the same spectra scatter up to this.
+    # Exactly 1 in the validation, whose spectra fix the amplitudes; random amplitudes scatter up to 1.2.
     "slope_anisotropy": Range("anisotropy of slopes", 1.0, 1.2),
     "height_skewness": Range("skewness of heights", -0.2, 0.2),
     "height_kurtosis": Range("kurtosis of heights", 2.3, 3.5),
-    # Narrower spectra than those there, with 3.3, have fewer unions of spots; 1.5 is the least of isotropic surfaces.
+    # The validation begins at 3.3. Narrower spectra have fewer unions of spots; isotropic surfaces have 1.5 or more.
     "nayak_parameter": Range("Nayak's parameter", 1.5, 47.0),
-    # Of the validation's surfaces at most one in two hundred.
+    # In the validation at most one in two hundred.
     "unsupported_summits": Range("share of unsupported summits", 0.0, 0.01),
-    # Better resolved surfaces and less adhesion are no harder; so there is no upper end.
+    # Better resolution and less adhesion are not harder, so there is no upper end.
     "nodes_per_short_wave": Range("nodes per shortest wave", 5.8, math.inf),
     "full_contact_energy_ratio": Range("U_full/dgamma", 76.0, math.inf),
     # 1 for a single square, 0 for a periodic surface.
@@ -88,12 +83,7 @@ VALIDATED = {
 
 
 def outside_validation(facts: Mapping[str, float]) -> list[str]:
-    """Name the quantities of a contact that lie outside the validation, with their values and ranges.
-
-    Parameters
-    ----------
-    facts : values by the names of `VALIDATED`; any may be left out.
-    """
+    """List the quantities outside the validation with values and ranges; `facts` are by the names of `VALIDATED`."""
     return [
         known.reason or f"{known.words} {facts[name]:.2g}, validated: {known.shown}"
         for name, known in VALIDATED.items()
@@ -101,7 +91,7 @@ def outside_validation(facts: Mapping[str, float]) -> list[str]:
     ]
 
 
-def surface_in_words(runs: Iterable[Mapping[str, float]]) -> str:
+def describe_surface(runs: Iterable[Mapping[str, float]]) -> str:
     """Describe a surface by the quantities that are compared with the validation, over its runs."""
     runs = list(runs)
     found = []
@@ -114,11 +104,15 @@ def surface_in_words(runs: Iterable[Mapping[str, float]]) -> str:
     return ", ".join(found)
 
 
-# --- what is said of a campaign ---
-
-
 class Statement(NamedTuple):
-    """A line: what it is about, what it says, and whether all is as it was verified."""
+    """One line on the validity of a campaign.
+
+    Attributes
+    ----------
+    about : subject of the line.
+    text : the statement.
+    good : whether the campaign is within the verified range.
+    """
 
     about: str
     text: str
@@ -126,14 +120,12 @@ class Statement(NamedTuple):
 
 
 class Case(NamedTuple):
-    """A run, as far as it matters how well its model is known to hold.
+    """A run and the quantities on which the validity of its model depends.
 
-    Parameters
+    Attributes
     ----------
-    model : name of the model.
-    surface : name of the surface.
-    material : name of the material.
-    facts : values by the names of `VALIDATED`, the ratio of energies among them.
+    model, surface, material : names.
+    facts : values by the names of `VALIDATED`, with the ratio of energies.
     """
 
     model: str
@@ -143,7 +135,7 @@ class Case(NamedTuple):
 
     @property
     def ratio(self) -> float:
-        """Elastic energy of full contact over the work of adhesion; infinite without adhesion."""
+        """Elastic energy of full contact over the adhesion energy; infinite without adhesion."""
         return self.facts[_RATIO]
 
 
@@ -153,14 +145,14 @@ def statements(
     outside: str | None = None,
     sticky: Collection[str] = (),
 ) -> list[Statement]:
-    """What is to be known of the models of a campaign, one line of each kind.
+    """State what is known of the validity of the models of a campaign, one line per subject.
 
     Parameters
     ----------
-    models : those of every study.
+    models : names of the models of each study.
     cases : the runs.
-    outside : where jumps into contact lie outside what was verified, `named`; None if nothing jumps.
-    sticky : materials on surfaces that stick to each other without load, as `in_words_if_sticky` names them.
+    outside : cases whose jumps into contact are outside the verified range, as text; None if nothing jumps.
+    sticky : materials on surfaces that stick without load, as `describe_sticky` names them.
     """
     cases = list(cases)
     found = [Statement("models", _used(models)), *_full_contact(cases)]
@@ -168,7 +160,7 @@ def statements(
         verified = f"Wu's distance is verified for Tabor parameters of {WU_HOLDS_FROM:g} and more"
         found.append(Statement("jump-in", f"{verified}; {outside or 'all cases inside'}", not outside))
     if sticky:
-        text = f"attraction outweighs repulsion: {named(sticky)}; errors can be many times those of the validation"
+        text = f"attraction outweighs repulsion: {join_first(sticky)}; errors can be many times those of the validation"
         found.append(Statement("sticky", text, False))
     found += _resolution(cases)
     of_asperities = [case for case in cases if MODELS[case.model].by_summits]
@@ -178,7 +170,7 @@ def statements(
 
 
 def _full_contact(cases):
-    """The statement on the energy of full contact, where there is adhesion."""
+    """Yield the statement on the energy of full contact if there is adhesion."""
     adhesive = [case for case in cases if case.ratio < math.inf]
     if not adhesive:
         return
@@ -190,32 +182,32 @@ def _full_contact(cases):
 
 
 def _resolution(cases):
-    """The statement on boundary elements with few grid cells for the shortest waves."""
+    """Yield the statement on boundary elements with few grid cells per shortest wave."""
     few = {
         case.surface: cells
         for case in cases
         if MODELS[case.model].by_cells and error_of_cells(cells := case.facts.get("nodes_per_short_wave", math.inf))
     }
     if few:
-        places = named(f"{cells:.2g} on {surface}" for surface, cells in few.items())
+        surfaces = join_first(f"{cells:.2g} on {surface}" for surface, cells in few.items())
         text = (
-            f"boundary elements have few grid cells for the shortest waves ({places}), with which areas are off by "
+            f"boundary elements have few grid cells per shortest wave ({surfaces}), so the error of areas is "
             f"{error_of_cells(min(few.values()))}; {RESOLVED_CELLS} recommended"
         )
         yield Statement("grid", text, False)
 
 
 def _surfaces(cases):
-    """The statement on what the surfaces are."""
+    """State the properties of the surfaces."""
     of_surface: dict[str, list] = {}
     for case in cases:
         of_surface.setdefault(case.surface, []).append(case.facts)
-    described = (f"{name}: {surface_in_words(facts)}" for name, facts in of_surface.items())
-    return Statement("surfaces", named(described, ". "))
+    descriptions = (f"{name}: {describe_surface(facts)}" for name, facts in of_surface.items())
+    return Statement("surfaces", join_first(descriptions, ". "))
 
 
 def _accuracy(cases):
-    """The statement on the error of asperities: known where surface and material are within the validation."""
+    """State the error of the asperity model, which is known where surface and material are within the validation."""
     unknown, adhesive = {}, set()
     for case in cases:
         of_surface = outside_validation({name: case.facts[name] for name in case.facts if name != _RATIO})
@@ -225,30 +217,28 @@ def _accuracy(cases):
             unknown.setdefault(f"{case.material} on {case.surface}", of_material)
         else:
             adhesive.add(case.ratio < math.inf)
-    quoted = f"{_error(adhesive)} {_VALIDATED}" if adhesive else ""
+    known = f"{_error(adhesive)} {_VALIDATED}" if adhesive else ""
     if not unknown:
-        return Statement("accuracy", quoted)
-    places = [f"{place}: {'; '.join(reasons)}" for place, reasons in unknown.items()]
+        return Statement("accuracy", known)
+    reasons = join_first((f"{name}: {'; '.join(found)}" for name, found in unknown.items()), ". ")
     text = (
-        f"nothing is known of the accuracy {'of the others' if adhesive else 'here'} ({named(places, '. ')}); "
-        "`models: [asperities, boundary_elements]` would tell"
+        f"the accuracy {'of the others' if adhesive else 'of this campaign'} is unknown ({reasons}); "
+        "`models: [asperities, boundary_elements]` measures it"
     )
-    return Statement("accuracy", f"{quoted}; {text}" if quoted else text, False)
+    return Statement("accuracy", f"{known}; {text}" if known else text, False)
 
 
-def named(cases: Iterable[str], between: str = ", ") -> str:
-    """The first of some cases, and how many there are besides."""
+def join_first(cases: Iterable[str], between: str = ", ") -> str:
+    """Join the first cases and append the number of the others."""
     cases = list(cases)
     more = len(cases) - _MOST_NAMES
     return between.join(cases[:_MOST_NAMES]) + (f" and {more} more" if more > 0 else "")
 
 
-def of_dataset(campaign: xr.DataTree) -> list[Statement]:
-    """The statements on what was computed; other than complete runs count as far as they went.
+def statements_on_dataset(campaign: xr.DataTree) -> list[Statement]:
+    """State the validity of a campaign dataset; incomplete runs count up to where they ended.
 
-    Parameters
-    ----------
-    campaign : the campaign dataset; of one that is left in its file only a few variables are read.
+    Only a few variables are read of a dataset that is open in its file.
     """
     models, cases, shares, sticky = {}, [], {}, {}
     for name, node in campaign.children.items():
@@ -262,20 +252,22 @@ def of_dataset(campaign: xr.DataTree) -> list[Statement]:
                 shares[surface, material] = max(share, shares.get((surface, material), 0.0))
                 found = study["stickiness"].sel(surface=surface, material=material)
                 sticky[surface, material] = max(float(found.max()), sticky.get((surface, material), 0.0))
-    outside = _shares_in_words(shares) if shares else None
-    return [*statements(models, cases, outside, in_words_if_sticky(sticky)), *_not_applicable(campaign)]
+    outside = _describe_shares(shares) if shares else None
+    return [*statements(models, cases, outside, describe_sticky(sticky)), *_not_applicable(campaign)]
 
 
 def _not_applicable(campaign):
-    """The statement on the runs to which their model is not applicable."""
+    """Yield the statement on the runs to which their model is not applicable."""
     reasons = sum(map(reasons_not_applicable, campaign.children.values()), Counter())
     if reasons:
-        text = f"{format_count(reasons.total(), 'run')} to which the model is not applicable: {named(reasons, '. ')}"
+        text = (
+            f"{format_count(reasons.total(), 'run')} to which the model is not applicable: {join_first(reasons, '. ')}"
+        )
         yield Statement("applicability", text, False)
 
 
 def _cases(study):
-    """The runs of a study that were computed."""
+    """Yield the cases of the computed runs of a study."""
     measured = [name for name in VALIDATED if name in study]
     status = study["status"].transpose(*LABELS)
     values = {
@@ -283,11 +275,11 @@ def _cases(study):
         for name in (*measured, "grid", "asperity_count", "boundary")
     }
     unsupported = np.zeros(status.shape)
-    if "unsupported_summit_count" in study:  # which campaigns of earlier versions lack
+    if "unsupported_summit_count" in study:  # campaigns of earlier versions lack it
         unsupported = study["unsupported_summit_count"].broadcast_like(status).transpose(*LABELS).values
     labels = [study[label].values for label in LABELS]
     for at in map(tuple, np.argwhere(np.isin(status.values, COMPUTED_RUNS))):
-        model, surface, _, _, material = (str(own[index]) for own, index in zip(labels, at, strict=True))
+        model, surface, _, _, material = (str(values[index]) for values, index in zip(labels, at, strict=True))
         facts = {name: float(values[name][at]) for name in measured}
         summits = values["asperity_count"][at] + unsupported[at]
         facts["nodes_per_short_wave"] = cells_per_short_wave(values["grid"][at], summits)
@@ -296,23 +288,30 @@ def _cases(study):
         yield Case(model, surface, material, facts)
 
 
-def in_words_if_sticky(found: Mapping[tuple[str, str], float]) -> list[str]:
-    """Those materials on surfaces whose stickiness (`icha.asperity.stickiness`) is above 1, by surface and material."""
+def describe_sticky(stickiness: Mapping[tuple[str, str], float]) -> list[str]:
+    """Describe the cases whose stickiness (`icha.asperity.stickiness`) exceeds 1; keys are surface and material."""
     return [
-        f"{material} on {surface} (stickiness {value:.2g})" for (surface, material), value in found.items() if value > 1
+        f"{material} on {surface} (stickiness {value:.2g})"
+        for (surface, material), value in stickiness.items()
+        if value > 1
     ]
 
 
-def _shares_in_words(shares):
-    there = sorted(((share, *at) for at, share in shares.items() if share > _FEW), key=lambda each: -each[0])
-    cases = [f"{material} on {surface} ({100 * share:.0f} % of single spots)" for share, surface, material in there]
-    return f"outside: {named(cases)}" if cases else ""
+def _describe_shares(shares):
+    """Describe the cases with many single spots outside the range of Wu's formula, the worst first."""
+    cases = [
+        f"{material} on {surface} ({100 * share:.0f} % of single spots)"
+        for (surface, material), share in sorted(shares.items(), key=lambda item: -item[1])
+        if share > _FEW
+    ]
+    return f"outside: {join_first(cases)}" if cases else ""
 
 
 def _outside(study):
-    """Surface and material of contacts, and the largest share of single spots outside the range, over seeds and slopes.
+    """Yield surface, material and the largest share of single spots outside the range of Wu's formula.
 
-    It is that at the end of the first loading; None without adhesion, where nothing jumps.
+    The share is that at the end of the first loading, the largest over seeds and slopes; None without adhesion, where
+    nothing jumps.
     """
     runs = study[["status", "leg", "outside_wu_fraction", "surface_energy"]].sel(model=DEFAULT_MODEL)
     status = runs["status"].transpose(*LABELS[1:]).values
@@ -320,36 +319,31 @@ def _outside(study):
     energy = runs["surface_energy"].values
     for s, surface in enumerate(runs["surface"].values):
         for m, material in enumerate(runs["material"].values):
-            there = np.isin(status[s, ..., m], COMPUTED_RUNS)
-            loadings = zip(share[s, ..., m, :][there], leg[s, ..., m, :][there] == 0, strict=True)
-            ends = [own[loading][-1] for own, loading in loadings if loading.any()]
+            computed = np.isin(status[s, ..., m], COMPUTED_RUNS)
+            loadings = zip(share[s, ..., m, :][computed], leg[s, ..., m, :][computed] == 0, strict=True)
+            ends = [values[loading][-1] for values, loading in loadings if loading.any()]
             if ends:
                 yield str(surface), str(material), float(max(ends)) if energy[m] > 0 else None
 
 
 def _used(models):
-    """Which models compute which studies."""
+    """Describe which models compute which studies."""
     studies: dict[str, list[str]] = {}
-    for study, own in models.items():
-        for model in own:
+    for study, names in models.items():
+        for model in names:
             studies.setdefault(model, []).append(study)
-    return "; ".join(f"{model.replace('_', ' ')} in {named(own)}" for model, own in studies.items())
+    return "; ".join(f"{model.replace('_', ' ')} in {join_first(names)}" for model, names in studies.items())
 
 
 def _error(adhesive):
-    """How far asperities were found to be from boundary elements, with adhesion, without, or both."""
-    quantities = ", ".join(f"{name} {_too_small(name, adhesive)}" for name in VALIDATION[True])
-    return f"{quantities}, beside boundary elements"
+    """Describe the errors against boundary elements; `adhesive` holds True, False or both, for with and without."""
 
+    def describe(quantity):
+        ranges = [VALIDATION[each][quantity] for each in sorted(adhesive, reverse=True)]
+        first, *others = (f"{-high:.0f} to {-low:.0f} %" for low, high in ranges)
+        if not others or others == [first]:
+            return f"{first} too small"
+        return f"{first} too small with adhesion and {others[0]} without"
 
-def _too_small(quantity, adhesive):
-    """The range of an error, of both kinds of contact if they differ."""
-    # With adhesion first.
-    first, *others = (_range(*VALIDATION[kind][quantity]) for kind in sorted(adhesive, reverse=True))
-    if not others or others == [first]:
-        return f"{first} too small"
-    return f"{first} too small with adhesion and {others[0]} without"
-
-
-def _range(low, high):
-    return f"{-high:.0f} to {-low:.0f} %"
+    quantities = ", ".join(f"{name} {describe(name)}" for name in VALIDATION[True])
+    return f"{quantities}, compared with boundary elements"

@@ -61,10 +61,10 @@ def _print_scans(campaign, plot: Path | None) -> None:
         if plot is not None:
             raise UserError("--plot: draws measured surfaces; the studies of this campaign use none")
         return
-    from icha.surfaces.measured.resolution import scan_resolution
+    from icha.surfaces.measured.resolution import examine_scan
 
     sections = {name: campaign.surfaces[name] for name in models}
-    scans = {name: scan_resolution(section.path, section.preparation) for name, section in sections.items()}
+    scans = {name: examine_scan(section.path, section.preparation) for name, section in sections.items()}
     echo("")
     for name, scan in scans.items():
         for line in about_scan(name, scan, models=models[name]):
@@ -91,9 +91,9 @@ def print_plan(path: Path, campaign, workflow: Path, home: Path, cores: int, *, 
     from rich.console import Console
 
     from icha.deposit.metadata import licence_problem
-    from icha.planning.ownership import belongs_to_another
+    from icha.planning.ownership import find_conflict
     from icha.planning.plan import plan
-    from icha.planning.requirements import missing_software, wanting
+    from icha.planning.requirements import find_shortages, missing_software
     from icha.planning.validity import expected_validity
     from icha.support.checksums import damaged
 
@@ -119,14 +119,14 @@ def print_plan(path: Path, campaign, workflow: Path, home: Path, cores: int, *, 
         print_line("bold", statement.about, statement.text)
     problem = licence_problem(campaign)
     obstacles = {
-        "cannot be run": belongs_to_another(short_path(results), campaign.name, path, workflow),
+        "cannot be run": find_conflict(short_path(results), campaign.name, path, workflow),
         "cannot be published": problem and f"{short_path(path)}: {': '.join(problem)}",
         "missing": missing_software(campaign),
     }
     for name, reason in obstacles.items():
         if reason:
             print_line("red", name, reason)
-    for shortage in wanting(items, cores, results, profile_settings(profile or workflow / "profiles/default")):
+    for shortage in find_shortages(items, cores, results, profile_settings(profile or workflow / "profiles/default")):
         print_line("red", "too small", shortage)
 
 
@@ -147,10 +147,10 @@ def _print_sums(console, items) -> None:
     """Print a table with a row for each kind of result."""
     from rich.table import Table
 
-    from icha.planning.plan import around_jobs, total
+    from icha.planning.plan import overhead, total
 
     table = Table(box=None, pad_edge=False, header_style="dim", show_footer=True)
-    every, around = total(items), around_jobs(items)
+    every, around = total(items), overhead(items)
     footers = {"": "all", "files": str(every.count), "done": str(every.done), "failed": str(every.failed or "")}
     footers |= {"to do": str(every.to_do), "each": "", "core time": formatting.duration(every.work + around)}
     footers |= {"memory": formatting.size(every.memory), "disk": formatting.size(every.disk)}

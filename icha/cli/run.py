@@ -34,7 +34,7 @@ from icha.cli.project import (
     workflow_folder,
 )
 from icha.support import formatting
-from icha.support.atomic_files import in_the_way
+from icha.support.atomic_files import find_obstacle
 from icha.support.formatting import format_count
 
 TARGETS = ("all", "surfaces", "runs", "references", "figures", "dataset", "report", "publish")
@@ -134,15 +134,17 @@ def run(
     if not set(targets) - {"all", "report", "publish"}:
         _print_checks(campaign, results)
     if "publish" in targets:
-        echo(f"deposit: {short_path(results / 'publish' / f'{campaign.name}-{campaign.published().version}.zip')}")
+        echo(
+            f"deposit: {short_path(results / 'publish' / f'{campaign.name}-{campaign.deposit_metadata().version}.zip')}"
+        )
 
 
 def _refuse_obstacles(folder: Path, results: Path, name: str, path: Path, workflow: Path) -> None:
-    from icha.planning.ownership import belongs_to_another
+    from icha.planning.ownership import find_conflict
 
-    if reason := belongs_to_another(short_path(results), name, path, workflow):
+    if reason := find_conflict(short_path(results), name, path, workflow):
         raise UserError(f"{reason} Nothing was started")
-    if obstacle := in_the_way(short_path(folder / ".snakemake")):
+    if obstacle := find_obstacle(short_path(folder / ".snakemake")):
         raise UserError(f"{obstacle}: Snakemake needs this folder for its records. Remove it or repair it")
 
 
@@ -157,7 +159,7 @@ def _profile_folder(profile: str | None, workflow: Path) -> Path:
 
 def _confirm_if_too_large(items, targets: list[str], cores: int, results: Path, profile: dict) -> None:
     """Ask whether to start if memory or disk space is probably too small; without a terminal, refuse."""
-    from icha.planning.requirements import wanting
+    from icha.planning.requirements import find_shortages
 
     if "surfaces" in targets:
         items = [item for item in items if item.part == "surfaces"]
@@ -165,7 +167,7 @@ def _confirm_if_too_large(items, targets: list[str], cores: int, results: Path, 
         return  # the cost of single files is unknown
     # Resources of the command line precede those of the profile.
     resources = [each for each in targets if "=" in each] + profile.get("resources", [])
-    shortages = wanting(items, cores, results, profile | {"resources": resources})
+    shortages = find_shortages(items, cores, results, profile | {"resources": resources})
     if not shortages:
         return
     message = "\n".join(["this machine is probably too small:", *(f"  {shortage}" for shortage in shortages)])
@@ -306,7 +308,7 @@ def _listen(reading: int, progress, view, stopped: list) -> None:
 
 def _print_outcome(status: int, stopped: bool, progress, campaign, folder: Path, log: Path, expected) -> None:
     """Print the jobs done and failed with reasons, and where results and log are; `expected` is the duration in s."""
-    from icha.support.atomic_files import why_not_writable
+    from icha.support.atomic_files import probe_folder
 
     results = folder / "results" / campaign.name
     ended = len(progress.done) + len(progress.failed)
@@ -321,7 +323,7 @@ def _print_outcome(status: int, stopped: bool, progress, campaign, folder: Path,
             text += f"; expected about {formatting.duration(expected)}"
         echo(text)
     _print_failures(status, stopped, progress, campaign, folder, log)
-    if status and results.is_dir() and (reason := why_not_writable(results)):
+    if status and results.is_dir() and (reason := probe_folder(results)):
         # Logs are in this folder, so jobs may have been unable to report it.
         echo(
             f"cannot write to {short_path(results)}: {reason.strerror}. Repair this and repeat the command.",

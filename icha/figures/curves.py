@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from icha.contact.models import MODELS
+from icha.contact.models import MODELS, REFERENCE_MODEL
 from icha.datasets.variables.model_error import SHORT_RANGE
 from icha.figures.ensembles import draw_members, lines_handles, mark_fewer
 from icha.figures.hysteresis import mean_legs
@@ -27,7 +27,6 @@ from icha.figures.select import (
     group_by_contact,
     name_of_place,
     path_steps,
-    runs_by_boundary_elements,
     shown_model,
     snapshot_label,
     study_runs,
@@ -102,8 +101,8 @@ def study_curves(campaign: xr.DataTree, study: str, boundary_elements: str | Non
             look |= {"marker": MODEL_MARKERS[name], "ms": look["ms"] + 2}
         lines.append(Curve(group, look))
     other = boundary_elements or (study if name == ASPERITIES_NAME else None)
-    truths = group_by_contact(campaign, runs_by_boundary_elements(campaign, other)) if other else []
-    crosses = [Curve(truth, cross_look(looks, truth.contact)) for truth in truths]
+    truths = study_runs(campaign, other, ragged=False, model=REFERENCE_MODEL) if other else []
+    crosses = [Curve(truth, cross_look(looks, truth.contact)) for truth in group_by_contact(campaign, truths)]
     changed = {"ls": "-" if looks.scale or any(len(group.runs) > 1 for group in groups) else "none"}
     changed |= {} if looks.many_places else {"marker": MODEL_MARKERS[name]}
     handles = looks.handles(**changed) | {name: model_handle(name, mfc="white")}

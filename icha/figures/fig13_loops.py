@@ -23,7 +23,7 @@ from icha.figures.select import (
     branches,
     group_by_contact,
     pick,
-    runs_by_boundary_elements,
+    study_runs,
     unloading_legs,
 )
 from icha.figures.style import GREY, in_style, legend_handle, new_panels, slope_label
@@ -52,7 +52,7 @@ def inputs(campaign: Campaign, options: LoopsFigure, files: results.ResultFiles)
         files.path(results.LOOP, ContactLabels(label, *contact))
         for label, entry in campaign.boundary_element_loops.items()
         if entry.study == options.study
-        for contact in campaign.solved(entry)
+        for contact in campaign.contacts_beside(entry)
     ]
     return {"campaign": files.path(results.DATASET)} | ({"loops": loops} if loops else {})
 
@@ -136,8 +136,8 @@ def _loops(campaign, study, other_study, loops, surface, seed):
     """Return the loops of a surface and seed, and which surface and seed (None: all) these are."""
     runs = unloaded_runs(campaign, study)
     surface = pick("surface", surface, [labels.surface for labels, _ in runs])
-    others = [run for _, run in runs_by_boundary_elements(campaign, other_study) if unloading_legs(run)]
-    truths = _truths(study, runs, [*others, *loops])
+    others = study_runs(campaign, other_study, ragged=False, model=REFERENCE_MODEL)
+    truths = _truths(study, runs, [*(run for _, run in others if unloading_legs(run)), *loops])
     runs = [(labels, run) for labels, run in runs if labels.surface == surface]
     if seed is None:
         seed = next((labels.seed for labels, _ in runs if labels in truths), None)

@@ -166,7 +166,7 @@ def _from_runs(line, truth, points, *, logarithmic):
 
     The loads are those of the runs, as far as boundary elements reach. Their values are interpolated.
     """
-    from icha.analysis.common_loads import at_common_loads, interpolated
+    from icha.analysis.common_loads import at_common_loads, interpolate
 
     members, runs, truths = [], line.stops, truth.stops
     for seed in [seed for seed in runs if seed in truths]:
@@ -176,7 +176,7 @@ def _from_runs(line, truth, points, *, logarithmic):
             true_load, true_values = true_load[pressed], true_values[pressed]
             at = np.clip(load, true_load.min(), true_load.max())
             reached = np.isclose(at, load, rtol=_SAME_LOAD, atol=0)
-            true_values = interpolated(true_load, true_values, at[reached], logarithmic=logarithmic)
+            true_values = interpolate(true_load, true_values, at[reached], logarithmic=logarithmic)
             members.append((load[reached], 100 * (values[reached] / true_values - 1)))
     return at_common_loads(members, logarithmic=False) if members else (np.empty(0), np.empty((0, 0)))
 

@@ -11,8 +11,8 @@ from icha.figures.declaration import Campaign, Declaration, StudyFigure
 from icha.figures.legends import legend_below
 from icha.figures.looks import NOT_APPLICABLE_ALONE, Scale
 from icha.figures.maps import circles_in_cell, draw_spots
-from icha.figures.select import is_applicable, pick, study_runs
-from icha.figures.style import choose_unit, format_number, in_style, new_panels, slope_label
+from icha.figures.select import is_applicable, pick, snapshot_label, study_runs
+from icha.figures.style import choose_unit, in_style, new_panels, slope_label
 from icha.support.values import Label, Problem, Seed
 
 if TYPE_CHECKING:
@@ -45,7 +45,6 @@ DECLARATION = Declaration(
 )
 
 _KINDS = ("relative_load", "area_fraction")
-_TITLES = {"relative_load": r"$F/(E^{\ast}A_0)$", "area_fraction": "$A/A_0$"}
 
 
 @in_style
@@ -73,10 +72,9 @@ def figure(
     fig, [panels] = new_panels(3.8, sharey=True)
     length, unit = choose_unit(float(by_slope[slopes[0]]["period"]), "m")
     for ax, kind in zip(panels, _KINDS, strict=True):
-        value = _draw_slopes(ax, by_slope, kind, colours, length)
+        _draw_slopes(ax, by_slope, kind, colours, length)
         ax.set_aspect("equal")
         ax.set_xlabel(f"x ({unit})")
-        ax.set_title(f"{_TITLES[kind]} = {format_number(value)}", loc="right")
     panels[0].set_ylabel(f"y ({unit})")
     names = {
         slope: slope_label(slope) + ("" if is_applicable(run) else f" ({NOT_APPLICABLE_ALONE})")
@@ -87,7 +85,7 @@ def figure(
 
 
 def _draw_slopes(ax, runs, kind, colours, length):
-    """Draw the spots of the runs, by slope, at their first snapshot of a kind; return its load or area."""
+    """Draw the spots of the runs, by slope, at their first snapshot of a kind."""
     from matplotlib.collections import PatchCollection
     from matplotlib.patches import Wedge
 
@@ -112,6 +110,5 @@ def _draw_slopes(ax, runs, kind, colours, length):
             share = 360 / len(runs)
             start = 90 + share * list(colours).index(slope)
             ax.add_collection(PatchCollection([Wedge((x, y), r, start, start + share) for x, y, r in circles], **look))
-    ax.set_xlim(0, side)
-    ax.set_ylim(0, side)
-    return float(run["snapshot_target"].values[at[slope]])
+    ax.set(xlim=(0, side), ylim=(0, side))
+    ax.set_title(snapshot_label(run, at[slope]), loc="right")

@@ -5,6 +5,7 @@ All functions raise ValueError if the campaign has no such study, run or snapsho
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -62,17 +63,17 @@ def group_by_contact(campaign: xr.DataTree, runs: Iterable[tuple[RunLabels, xr.D
 def study_runs(
     campaign: xr.DataTree, study: str, *, ragged: bool = True, model: str | None = None
 ) -> list[tuple[RunLabels, xr.Dataset]]:
-    """Return all complete runs of a study with a model, at least one.
+    """Return all complete runs of a study with a model.
 
     Parameters
     ----------
     ragged : whether the runs have their spots and events, which take long to select.
-    model : left out, the `shown_model` of the study.
+    model : name of the model; left out, the `shown_model` of the study.
 
     Raises
     ------
     NothingToDraw
-        If no run of the study is complete.
+        If no run of the `shown_model` is complete.
     """
     import xarray as xr
 
@@ -81,26 +82,14 @@ def study_runs(
 
     _check_study(campaign, study)
     dataset = campaign[study].to_dataset()
-    asked = model or shown_model(dataset)
-    found = [labels for labels in runs_of_status(dataset, study, (COMPLETE,)) if labels.model == asked]
-    if not found:
+    wanted = model or shown_model(dataset)
+    found = [labels for labels in runs_of_status(dataset, study, (COMPLETE,)) if labels.model == wanted]
+    if not found and model is None:
         raise NothingToDraw(f"study {study}: no run is complete, so there is nothing to draw")
     if not ragged:
-        campaign = xr.DataTree.from_dict(
-            {f"/{study}": dataset.drop_dims([dim for dim in RAGGED if dim in dataset.dims])}
-        )
+        campaign = xr.DataTree.from_dict({f"/{study}": dataset.drop_dims(RAGGED, errors="ignore")})
     runs = [(labels, select_run(campaign, labels)) for labels in found]
     return [(labels, run.assign(reduced_separation=reduced_gap(run))) for labels, run in runs]
-
-
-def runs_by_boundary_elements(
-    campaign: xr.DataTree, study: str, *, ragged: bool = False
-) -> list[tuple[RunLabels, xr.Dataset]]:
-    """Return all complete runs of a study with boundary elements, if any; `ragged` as for `study_runs`."""
-    try:
-        return study_runs(campaign, study, ragged=ragged, model=REFERENCE_MODEL)
-    except NothingToDraw:
-        return []
 
 
 def asked_seeds(study: xr.Dataset, labels: RunLabels) -> int:
@@ -237,32 +226,19 @@ def snapshots_of_materials(
     from icha.datasets.campaign import find_snapshot
 
     groups = group_by_contact(campaign, study_runs(campaign, study))
-    first = groups[0].labels
-    truths = {} if first.model == REFERENCE_MODEL else dict(runs_by_boundary_elements(campaign, study, ragged=True))
+    reference = [] if groups[0].labels.model == REFERENCE_MODEL else study_runs(campaign, study, model=REFERENCE_MODEL)
     found = []
     for group in groups:
-        if group.contact[1:] != (first.surface, first.rms_slope):
-            continue
-        members = [(run, find_snapshot(run, kind, target)) for run in group.runs.values()]
-        run, at = members[0]
-        state = str(run["snapshot_kind"].values[at]), float(run["snapshot_target"].values[at])
-        same_contact = (
-            truth
-            for labels, truth in truths.items()
-            if labels._replace(seed=None) == group.labels._replace(seed=None, model=REFERENCE_MODEL)
-        )
-        found.append(Snapshots(group, members, [(run, at) for run in same_contact for at in _positions(run, *state)]))
+        if group.contact[1:] == groups[0].contact[1:]:
+            members = [(run, find_snapshot(run, kind, target)) for run in group.runs.values()]
+            run, at = members[0]
+            state = str(run["snapshot_kind"].values[at]), float(run["snapshot_target"].values[at])
+            found.append(Snapshots(group, members, []))
+            for labels, truth in reference:
+                if labels._replace(model=group.labels.model, seed=group.labels.seed) == group.labels:
+                    with contextlib.suppress(ValueError):  # if the run does not keep the snapshot
+                        found[-1].truths.append((truth, find_snapshot(truth, *state)))
     return found
-
-
-def _positions(run, kind, target):
-    """Return the position of a snapshot in a list, which is empty if the run does not keep it."""
-    from icha.datasets.campaign import find_snapshot
-
-    try:
-        return [find_snapshot(run, kind, target)]
-    except ValueError:
-        return []
 
 
 def name_of_place(dataset: xr.Dataset, surface: str, rms_slope: float) -> str:

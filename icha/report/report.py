@@ -17,7 +17,7 @@ from pathlib import Path
 import xarray as xr
 
 from icha.analysis.checks import worst
-from icha.analysis.validity import of_dataset
+from icha.analysis.validity import statements_on_dataset
 from icha.checks.findings import Check
 from icha.contact.models import MODEL_PAPER
 from icha.datasets.results import EXPLORER
@@ -125,7 +125,7 @@ def _campaign_values(campaign: xr.DataTree, studies: list[dict]) -> dict:
         "attributes": campaign.attrs,
         "studies": studies,
         "totals": totals | {"not_applicable": sum(len(study["not_applicable"]) for study in studies)},
-        "validity": of_dataset(campaign),
+        "validity": statements_on_dataset(campaign),
         "most_rows": MOST_ROWS,
         "folded": FOLDED_ROWS,
         "paper": MODEL_PAPER.line,

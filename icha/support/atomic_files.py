@@ -1,8 +1,8 @@
-"""Files that appear whole or not at all, and are still there after a power cut; and whose results they may become.
+"""Atomic writes: a file appears whole or not at all, survives a power cut, and is written only by the owner of results.
 
-A folder of results belongs to the call of the program that began last. What an earlier call has left running, on
-another machine or stopped at a bad moment, can complete no result any more: whatever is moved into place asks before,
-and no call begins in between.
+A folder of results belongs to the call of the program that began last. Jobs of an earlier call, which may still run on
+another machine, cannot complete a result: each move into place checks the owner first, under a lock that a new call
+needs as well.
 """
 
 import fcntl
@@ -12,29 +12,29 @@ from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from pathlib import Path
 
-# As much as libraries want to write at once; a disk on which less is free is full.
+# Bytes that must fit on the disk; libraries write about as much at once.
 _PROBE = 2**20
 _ENDING = ".part"
-# For the programs that an owner starts, wherever they run: what the file says while the results are its own; the file.
-_TOLD = "ICHA_OWNER"
+# Environment variable for the programs that an owner starts: content of the owner's file, and its path.
+_OWNER_VARIABLE = "ICHA_OWNER"
 _moving: Callable[[], AbstractContextManager] = nullcontext
-_SUPERSEDED = "the campaign was begun again since, and the later call makes this result; nothing was written"
+_SUPERSEDED = "a later call of this campaign owns this result and computes it; nothing was written"
 
 
 @contextmanager
 def whole_file(path: str | os.PathLike, *, lasting: bool = True) -> Iterator[Path]:
-    """Give a temporary path beside `path`; move it there when the block ends well, remove it when it does not.
+    """Give a temporary path beside `path`; move it there if the block succeeds, remove it if it fails.
 
-    The folder is created if need be. The temporary path is nobody else's: two programs that write the same file do not
-    write into each other's. What is moved is on the disk before, and its name after, unless it need not be `lasting`.
+    The folder is created if it is missing. The temporary path is unique, so two programs may write the same file.
+    Unless `lasting` is False, the content is synchronised to the disk before the move, and the name after it.
 
     Raises
     ------
     Superseded
-        If files are moved only while owned, and the results are another call's by now.
+        If files are moved only while owned, and a later call owns the results.
     OSError
-        If the folder cannot be written to. Libraries for data files have other errors for a full disk, which say
-        nothing of it: whatever the block raises, this one is raised instead where that is the case.
+        If the folder cannot be written to. It replaces the errors of libraries for data files, which do not mention a
+        full disk.
     """
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -46,13 +46,13 @@ def whole_file(path: str | os.PathLike, *, lasting: bool = True) -> Iterator[Pat
         with moving():
             os.replace(temporary, path)
         if lasting:
-            # Some file systems do not know how.
+            # Some file systems cannot synchronise folders.
             with suppress(OSError):
                 _sync(path.parent)
     except Superseded:
         raise
     except Exception as error:
-        reason = why_not_writable(path.parent)
+        reason = probe_folder(path.parent)
         if reason is not None:
             raise OSError(reason.errno, reason.strerror, str(path.parent)) from error
         raise
@@ -61,7 +61,7 @@ def whole_file(path: str | os.PathLike, *, lasting: bool = True) -> Iterator[Pat
 
 
 def move_only_while_owned() -> None:
-    """From now on, move files into place only while their owner is the one that has started this process: in jobs."""
+    """From now on, move files into place only while the call that started this process owns the results; for jobs."""
     global _moving
     _moving = while_owned
 
@@ -72,12 +72,12 @@ def moving() -> AbstractContextManager:
 
 
 def is_left_over(name: str) -> bool:
-    """Whether a file of this name is what a killed program has left where nobody writes any more."""
+    """Return whether a file name is that of a temporary file, which a killed program leaves behind."""
     return name.startswith(".") and name.endswith(_ENDING)
 
 
 def sync_folder(folder: Path) -> None:
-    """Have all files below a folder, and their names, on the disk."""
+    """Synchronise all files below a folder, and their names, to the disk."""
     for top, _, names in os.walk(folder):
         for name in names:
             _sync(Path(top, name))
@@ -85,19 +85,19 @@ def sync_folder(folder: Path) -> None:
             _sync(Path(top))
 
 
-def in_the_way(folder: Path) -> str | None:
-    """What is where a folder is to be, if anything but a folder is: a file, or a link to what is not there."""
+def find_obstacle(folder: Path) -> str | None:
+    """Describe the file or broken link in the place of a folder; None if the folder exists or can be created."""
     for path in (folder, *folder.parents):
-        # Methods of Path raise errors where a folder on the way may not be entered.
+        # The methods of Path raise errors below a folder that may not be entered.
         if os.path.exists(path):
-            return None if os.path.isdir(path) else f"{path} is a file, and no folder"
+            return None if os.path.isdir(path) else f"{path} is a file, not a folder"
         if os.path.islink(path):
-            return f"{path} is a link to {os.readlink(path)}, which is not there, or not to be reached"
+            return f"{path} is a link to {os.readlink(path)}, which does not exist or cannot be reached"
     return None
 
 
-def why_not_writable(folder: Path) -> OSError | None:
-    """What the system says against data in a folder, if anything; they are removed again."""
+def probe_folder(folder: Path) -> OSError | None:
+    """Write some data to a folder and remove them; return the error if it cannot be written to."""
     probe = folder / f".{os.getpid()}.probe{_ENDING}"
     try:
         probe.write_bytes(bytes(_PROBE))
@@ -109,7 +109,7 @@ def why_not_writable(folder: Path) -> OSError | None:
 
 
 def _sync(path: Path) -> None:
-    """Have a file's content, or the names in a folder, on the disk; on macOS that may still have it in its memory."""
+    """Synchronise the content of a file, or the names in a folder, to the disk; macOS may still buffer it."""
     descriptor = os.open(path, os.O_RDONLY)
     try:
         os.fsync(descriptor)
@@ -118,7 +118,7 @@ def _sync(path: Path) -> None:
 
 
 def _remove(file: Path) -> None:
-    with suppress(OSError):  # it is not there, or was never, for the folder is read-only
+    with suppress(OSError):  # it may be missing, as in a read-only folder
         file.unlink()
 
 
@@ -127,14 +127,8 @@ class Superseded(ValueError):
 
 
 def take_over(file: str | os.PathLike) -> None:
-    """Own from now on the results that the file `file` stands for, in this process and in those that it will start.
-
-    Raises
-    ------
-    OSError
-        If the file cannot be written.
-    """
-    os.environ.pop(_TOLD, None)
+    """Make this process and those that it starts the owner of the results of `file`; raise OSError if it cannot."""
+    os.environ.pop(_OWNER_VARIABLE, None)
     word = secrets.token_hex(8)
     Path(file).parent.mkdir(parents=True, exist_ok=True)
     with open(file, "a+", encoding="ascii") as owner:
@@ -143,19 +137,13 @@ def take_over(file: str | os.PathLike) -> None:
         owner.write(word)
         owner.flush()
         os.fsync(owner.fileno())
-    os.environ[_TOLD] = f"{word} {file}"
+    os.environ[_OWNER_VARIABLE] = f"{word} {file}"
 
 
 @contextmanager
 def while_owned() -> Iterator[None]:
-    """A context in which nobody takes the results over from the owner that has started this process, if one has.
-
-    Raises
-    ------
-    Superseded
-        If somebody has taken them over.
-    """
-    word, _, file = os.environ.get(_TOLD, "").partition(" ")
+    """Keep other calls from taking over the results; raise `Superseded` if one has done so."""
+    word, _, file = os.environ.get(_OWNER_VARIABLE, "").partition(" ")
     if not word:
         yield
         return
@@ -172,5 +160,5 @@ def while_owned() -> Iterator[None]:
 
 def _lock(file, kind):
     """Lock a file until it is closed."""
-    with suppress(OSError):  # a file system without locks: a moment remains
+    with suppress(OSError):  # on a file system without locks a short race remains
         fcntl.flock(file, kind)

@@ -1,13 +1,13 @@
-"""Checksum sidecars of results: begun, written, verified, and what a result was made from; results that are set aside.
+"""Checksum sidecars of results: they tell whether a result is whole, and from what it was made.
 
-The sidecar of `results/<campaign>/<path>` is `results/<campaign>/checksums/<path>.json`, with the file's SHA-256, size
-and time of change. A file of the same size and time is trusted, any other one is hashed; what the storage itself has
-spoilt changes neither, and is found where a file is hashed in any case (`thorough`). A result may be a folder, too.
+The sidecar of `results/<campaign>/<path>` is `results/<campaign>/checksums/<path>.json`. It holds SHA-256, size and
+modification time of the file or folder. A file with the same size and time is trusted, any other one is hashed. Errors
+of the storage change neither; they are found where every file is hashed (`thorough`).
 
-A sidecar without its result says that the result was there, or was about to be, and is to be made again.
+A sidecar without its result means that the result existed, or was about to be written, and must be made again.
 
-It also says what was asked of the job that made the result, and from which content of which other results: a result
-that is whole may still be one of other settings, of another program, or of data that are not those beside it.
+The sidecar also holds a checksum of the parameters of the job, and those of the results that the job read. A whole
+result may still belong to other settings, another program version, or other input data.
 """
 
 import contextlib
@@ -22,14 +22,19 @@ from typing import NamedTuple
 from icha.support.atomic_files import whole_file
 
 FOLDER = "checksums"
-# Why a result is stale that Snakemake sees for itself, if its record belongs to the result.
+# Reason that Snakemake also finds, if its own record belongs to the result.
 OTHER_SETTINGS = "it was made with other settings, or by another version of the program"
 
 
 class Checksum(NamedTuple):
-    """A result as it was written; of a folder the sum of sizes and the latest time of its files.
+    """Record of a result as it was written.
 
-    `asked` is the checksum of what was asked of its job (`asked_of`); `inputs` are those of the results that it read.
+    Attributes
+    ----------
+    sha256 : checksum of the content.
+    size, mtime_ns : size and modification time; of a folder the sum and the latest time of its files.
+    asked : checksum of the parameters of its job (`asked_of`).
+    inputs : checksums of the results that its job read, by path.
     """
 
     sha256: str
@@ -40,47 +45,34 @@ class Checksum(NamedTuple):
 
 
 def asked_of(parameters: Iterable[str]) -> str:
-    """Checksum of what is asked of a job: of its parameters as Python represents them, in any order."""
+    """Checksum of the parameters of a job, given as Python represents them, in any order."""
     return hashlib.sha256("\n".join(sorted(parameters)).encode()).hexdigest()
 
 
 def write_checksum(results: str | os.PathLike, path: str, *, asked: str = "", inputs: Mapping[str, str] = {}) -> None:
-    """Write the sidecar of the result `path`, given from the campaign's folder `results`.
-
-    Parameters
-    ----------
-    results, path : the result.
-    asked, inputs : what it was made from, see `Checksum`; left out if nobody knows.
-
-    Raises
-    ------
-    OSError
-        If there is no such result, or the sidecar cannot be written.
-    """
+    """Write the sidecar of the result `path` in the campaign's folder `results`; see `Checksum` for the others."""
     file = Path(results, path)
     size, mtime_ns = _size_and_time(file)
     _write(results, path, Checksum(sha256_of(file), size, mtime_ns, asked, inputs))
 
 
 def begin(results: str | os.PathLike, path: str) -> None:
-    """Say that a result is about to be written; until its checksum is, it is not checked for damage, and stale."""
+    """Record that a result is about to be written; until its checksum is written, it counts as stale, not damaged."""
     _write(results, path, _BEGUN, lasting=False)
 
 
 def distrust(results: str | os.PathLike, path: str) -> None:
-    """Have a result hashed by whoever looks at it next, whatever its size and time."""
+    """Force the next check to hash a result, whatever its size and time."""
     written = _read(results, path)
     if written not in (None, _BEGUN):
         _write(results, path, written._replace(mtime_ns=0))
 
 
 def is_whole(results: str | os.PathLike, path: str, *, thorough: bool = False) -> bool:
-    """True if the result `path` in the campaign's folder `results` is what was written, or has no sidecar.
+    """Return whether the result `path` in the campaign's folder `results` is what was written, or has no sidecar.
 
-    A file of the same size and time is taken for whole, unless all are to be hashed (`thorough`). A file that was only
-    copied or touched has another time and the same content; its sidecar gets the new time, where it can be written.
-
-    A sidecar that cannot be read vouches for nothing: its result does not count as whole.
+    A file of the same size and time counts as whole unless `thorough`. The sidecar of a file that was only copied or
+    touched gets the new time. A result whose sidecar cannot be read does not count as whole.
     """
     file = Path(results, path)
     try:
@@ -92,7 +84,7 @@ def is_whole(results: str | os.PathLike, path: str, *, thorough: bool = False) -
     try:
         size, mtime_ns = _size_and_time(file)
     except FileNotFoundError:
-        return True  # nothing there that could be damaged
+        return True  # a missing result is not damaged
     if size != written.size:
         return False
     if mtime_ns == written.mtime_ns and not thorough:
@@ -106,25 +98,25 @@ def is_whole(results: str | os.PathLike, path: str, *, thorough: bool = False) -
 
 
 def damaged(results: str | os.PathLike, *, thorough: bool = False) -> list[str]:
-    """Paths of all results of a campaign that are there but are not what was written, sorted."""
+    """Paths of all results of a campaign that exist but are not what was written, sorted."""
     return [path for path in with_sidecar(results) if not is_whole(results, path, thorough=thorough)]
 
 
 def stale(
     results: str | os.PathLike, paths: Iterable[str], asked: Callable[[str], str] | None = None
 ) -> Iterator[tuple[str, str]]:
-    """Those of some results that are there but are not what is asked for now, with the reason of each.
+    """Yield the existing results that are not those of the present settings or inputs, with the reason.
 
     Parameters
     ----------
     results, paths : the results.
-    asked : what is asked of each now (`asked_of`); left out, only what they were made from is looked at.
+    asked : returns the present checksum of the parameters of a result (`asked_of`); without it only inputs are checked.
     """
     known = cache(lambda path: _known(results, path))
 
     @cache
     def content(path):
-        """SHA-256 of an input, empty if it is not there; a file that came with the configuration has no sidecar."""
+        """SHA-256 of an input, empty if it is missing; a file of the configuration has no sidecar."""
         with contextlib.suppress(FileNotFoundError):
             return known(path).sha256 or sha256_of(Path(results, path))
         return ""
@@ -134,22 +126,22 @@ def stale(
             continue
         written = known(path)
         if not written.asked:
-            yield path, "nothing says what it was made from"
+            yield path, "there is no record of what it was made from"
         elif asked is not None and asked(path) != written.asked:
             yield path, OTHER_SETTINGS
         else:
             others = [each for each, sha256 in written.inputs.items() if content(each) != sha256]
             if others:
-                yield path, f"it was made from another {others[0]} than is there"
+                yield path, f"it was made from another version of {others[0]}"
 
 
 def made_as(results: str | os.PathLike, path: str) -> str:
-    """What was asked of the job that made a result (`asked_of`), by its sidecar; an empty text if nobody knows."""
+    """Checksum of the parameters of the job that made a result, by its sidecar; empty if unknown."""
     return _known(results, path).asked
 
 
 def sha256_as_written(results: str | os.PathLike, path: str) -> str:
-    """SHA-256 of a result by its sidecar, or else of what is there."""
+    """SHA-256 of a result by its sidecar, or of its content if there is no sidecar."""
     return _known(results, path).sha256 or sha256_of(Path(results, path))
 
 
@@ -160,7 +152,7 @@ def _known(results, path) -> Checksum:
 
 
 def with_sidecar(results: str | os.PathLike) -> Iterator[str]:
-    """Paths of all results that have a sidecar, whether they are there or not, sorted."""
+    """Paths of all results that have a sidecar, whether they exist or not, sorted."""
     top = os.path.join(results, FOLDER)
     for folder, folders, names in os.walk(top):
         folders.sort()
@@ -171,15 +163,7 @@ def with_sidecar(results: str | os.PathLike) -> Iterator[str]:
 
 
 def set_aside(results: str | os.PathLike, path: str) -> Path:
-    """Rename a result to `<name>.damaged`, or `.damaged2` and so on; return the new path.
-
-    Its sidecar stays: the result is lost now, and to be made again.
-
-    Raises
-    ------
-    OSError
-        If it cannot be renamed, in a folder that is read-only for one.
-    """
+    """Rename a result to `<name>.damaged`, `.damaged2` and so on, so that it is made again; return the new path."""
     file = Path(results, path)
     number = 1
     while (aside := file.with_name(f"{file.name}.damaged{number if number > 1 else ''}")).exists():
@@ -188,7 +172,7 @@ def set_aside(results: str | os.PathLike, path: str) -> Path:
     return aside
 
 
-# No file has this digest.
+# Record of a result that is about to be written; no file has an empty digest.
 _BEGUN = Checksum("", 0, 0)
 
 
@@ -197,14 +181,14 @@ def _sidecar(results, path) -> Path:
 
 
 def _read(results, path) -> Checksum | None:
-    """The checksum in the sidecar of a result, if it has one; `ValueError` if it cannot be read."""
+    """Read the sidecar of a result, None without one; raise ValueError if it is not valid."""
     try:
         with open(os.path.join(results, FOLDER, f"{path}.json"), "rb") as file:
             return Checksum(**json.loads(file.read()))
     except FileNotFoundError:
         return None
     except TypeError as error:
-        raise ValueError(f"{_sidecar(results, path)}: no checksum: {error}") from None
+        raise ValueError(f"{_sidecar(results, path)}: not a checksum record: {error}") from None
 
 
 def _write(results, path, checksum: Checksum, *, lasting: bool = True) -> None:
@@ -221,7 +205,7 @@ def _size_and_time(file) -> tuple[int, int]:
 
 
 def sha256_of(file: Path) -> str:
-    """SHA-256 of a file, hexadecimal; of a folder that of its files with their paths."""
+    """SHA-256 of a file, hexadecimal; for a folder, of its files with their paths."""
     if not file.is_dir():
         with file.open("rb") as content:
             return hashlib.file_digest(content, "sha256").hexdigest()
@@ -232,5 +216,5 @@ def sha256_of(file: Path) -> str:
 
 
 def _files_in(folder: Path) -> list[Path]:
-    """All files below a folder, sorted, without the mark that Snakemake leaves in folders."""
+    """All files below a folder, sorted, without the timestamp files of Snakemake."""
     return sorted(each for each in folder.rglob("*") if each.is_file() and each.name != ".snakemake_timestamp")

@@ -8,7 +8,15 @@ import small_campaign as small
 from conftest import REPOSITORY
 
 import icha
-from icha.analysis.validity import VALIDATED, VALIDATION, Case, named, of_dataset, outside_validation, statements
+from icha.analysis.validity import (
+    VALIDATED,
+    VALIDATION,
+    Case,
+    join_first,
+    outside_validation,
+    statements,
+    statements_on_dataset,
+)
 from icha.configuration.load import load_configuration
 from icha.datasets.campaign import campaign_tree
 from icha.planning.validity import surface_facts
@@ -60,7 +68,7 @@ def test_each_kind_is_said_in_one_line():
     assert "rough: anisotropy of slopes 1, skewness of heights 0" in found["surfaces"][0]
     assert "8 to 25 %" not in told({}, [case(BARE)])["accuracy"][0]
     assert set(told({}, [case({"full_contact_energy_ratio": math.inf}, model="boundary_elements")])) == {"models"}
-    assert named("abcdef") == "a, b, c, d and 2 more" and named("ab") == "a, b"
+    assert join_first("abcdef") == "a, b, c, d and 2 more" and join_first("ab") == "a, b"
 
 
 @pytest.mark.parametrize(
@@ -77,7 +85,7 @@ def test_no_accuracy_is_quoted_of_surfaces_outside_the_validation(name, value, r
     text, good = told({}, [case(other, "scan")])["accuracy"]
     assert not good and "%" not in text and "scan: " in text and reason in text
     text, _ = told({}, [case(other, "scan"), case(BARE)])["accuracy"]
-    assert "5 to 21 %" in text and "of the others (scan: " in text
+    assert "5 to 21 %" in text and "of the others is unknown (scan: " in text
 
 
 def test_sticky_materials_are_named():
@@ -130,7 +138,7 @@ def test_the_range_of_the_validation_is_that_of_its_surfaces():
 
 
 def test_the_data_say_where_spots_lay_outside():
-    found = {each.about: each for each in of_dataset(small.tree())}
+    found = {each.about: each for each in statements_on_dataset(small.tree())}
     assert found["models"].text == "asperities in slopes, single"
     assert "nodes per shortest wave" in found["accuracy"].text and not found["accuracy"].good
     assert found["surfaces"].text.startswith("rough: anisotropy of slopes 1, skewness of heights ")
@@ -144,18 +152,20 @@ def test_the_data_say_where_spots_lay_outside():
         (labels, run.assign(outside_wu_fraction=0.4 + 0 * run["residual"]) if labels.material == "soft" else run)
         for labels, run in small.runs()
     ]
-    found = {each.about: each for each in of_dataset(campaign_tree(runs, attrs=small.tree().attrs))}
+    found = {each.about: each for each in statements_on_dataset(campaign_tree(runs, attrs=small.tree().attrs))}
     assert found["jump-in"].text.endswith("; outside: soft on rough (40 % of single spots)")
     assert not found["jump-in"].good
 
 
 def test_the_data_say_to_which_runs_their_model_is_not_applicable():
-    assert "applicability" not in {each.about for each in of_dataset(small.tree())}
+    assert "applicability" not in {each.about for each in statements_on_dataset(small.tree())}
     runs = [
         (labels, run.assign_attrs(applicability=f"{labels.material} surface") if labels.seed == 1 else run)
         for labels, run in small.runs()
     ]
     marked = [labels.material for labels, _ in runs if labels.seed == 1]
-    found = {each.about: each for each in of_dataset(campaign_tree(runs, attrs=small.tree().attrs))}["applicability"]
+    found = {each.about: each for each in statements_on_dataset(campaign_tree(runs, attrs=small.tree().attrs))}[
+        "applicability"
+    ]
     assert not found.good and found.text.startswith(f"{len(marked)} runs to which the model is not applicable: ")
     assert all(f"{material} surface" in found.text for material in marked)

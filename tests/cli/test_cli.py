@@ -28,7 +28,7 @@ from icha.datasets.campaign_file import write_campaign
 from icha.datasets.files import read_dataset, write_dataset
 from icha.datasets.surface_file import write_surface
 from icha.figures.style import format_quantity
-from icha.planning.ownership import belongs_to_another, claim
+from icha.planning.ownership import claim, find_conflict
 from icha.planning.plan import CHANGED, DAMAGED, DONE, FAILED, TO_DO, failed_runs, plan, time_on, total
 from icha.references.theories import reference_dataset
 from icha.support.checksums import damaged, write_checksum
@@ -436,8 +436,8 @@ def test_the_configuration_as_used_belongs_to_its_results(project):
     claim(results, project / "tiny.yaml", project)
     claim(results, project / "copy.yaml", project)
     assert (results / "belongs_to.txt").read_text() == "tiny.yaml\n"
-    assert belongs_to_another(results, "tiny", results / "config.used.yaml", project) is None
-    assert belongs_to_another(results, "tiny", project / "config/../tiny.yaml", project) is None
+    assert find_conflict(results, "tiny", results / "config.used.yaml", project) is None
+    assert find_conflict(results, "tiny", project / "config/../tiny.yaml", project) is None
 
 
 def test_validity_of_the_models_is_printed_before_a_run(tiny, small_machine):

@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 from icha.analysis.checks import check_campaign
 from icha.analysis.common_loads import compare_campaign
-from icha.analysis.validity import of_dataset
+from icha.analysis.validity import statements_on_dataset
 from icha.cli import app
 from icha.datasets.campaign import run_labels, select_run
 from icha.datasets.campaign_file import write_campaign
@@ -162,7 +162,7 @@ def test_report_checks_and_validity_of_either_form_are_the_same():
 
     assert section(tree) == section(other)
     assert check_campaign(tree) == check_campaign(other)
-    assert of_dataset(tree) == of_dataset(other)
+    assert statements_on_dataset(tree) == statements_on_dataset(other)
     rows = [error_section.error_section(crops.errors(each)[crops.STUDY].to_dataset()) for each in (tree, other)]
     assert repr(rows[0]) == repr(rows[1]) and len(rows[0]["rows"]) == 3 * 2 * 2
 

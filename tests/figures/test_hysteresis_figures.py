@@ -1,4 +1,4 @@
-"""Figures of loading and unloading show what the runs hold, of separate asperities whose loops are known exactly."""
+"""Figures of loading and unloading of separate asperities, whose loops are known exactly."""
 
 import numpy as np
 import pytest
@@ -39,10 +39,12 @@ def draw(module, tree, surface, study):
 
 
 def curves(axes):
-    """The ways of the loops in an axes: solid and dashed lines, without the thin ones of single seeds."""
+    """Return the solid and the dashed lines in an axes, without the thin ones of single seeds."""
     lines = [line for line in axes.get_lines() if line.get_linestyle() != "None" and len(line.get_xdata()) > 2]
-    lines = [line for line in lines if line.get_linewidth() > 0.5]
-    return [line for line in lines if line.get_linestyle() == "-"], [x for x in lines if x.get_linestyle() != "-"]
+    return tuple(
+        [line for line in lines if line.get_linewidth() > 0.5 and (line.get_linestyle() == "-") == solid]
+        for solid in (True, False)
+    )
 
 
 def marks(axes):
@@ -69,50 +71,40 @@ def test_the_exact_loops_close_and_lose_what_the_jumps_release(material):
 # --- figure 13 --------------------------------------------------------------------------------------------------
 
 
-def test_fig13_draws_both_ways_and_the_pull_off():
+def test_fig13_draws_loading_unloading_and_the_pull_off():
     run = separate.run("sticky", 0.5)
     figure = fig13_loops.figure(one(), study="one")
-    left, right = figure.axes
-    turn = int(np.flatnonzero(run["leg"].values == 0)[-1])
-    for axes, (x, y) in zip((left, right), NAMES, strict=True):
+    turn, at = int(np.flatnonzero(run["leg"].values == 0)[-1]), int(np.argmin(run["nominal_pressure"].values))
+    for axes, names in zip(figure.axes, NAMES, strict=True):
+        x, y = (run[name].values for name in names)
         (solid,), (dashed,) = curves(axes)
-        for line, part in ((solid, slice(turn + 1)), (dashed, slice(turn, None))):
-            np.testing.assert_array_equal(line.get_xdata(), run[x].values[part])
-            np.testing.assert_array_equal(line.get_ydata(), run[y].values[part])
+        for line, steps in ((solid, slice(turn + 1)), (dashed, slice(turn, None))):
+            np.testing.assert_array_equal(line.get_data(), (x[steps], y[steps]))
         assert solid.get_color() == dashed.get_color()
         (pull_off,) = marks(axes)
-        at = int(np.argmin(run["nominal_pressure"].values))
-        assert (pull_off.get_xdata()[0], pull_off.get_ydata()[0]) == (run[x].values[at], run[y].values[at])
+        assert pull_off.get_xydata().tolist() == [[x[at], y[at]]]
     unit = float(run["contact_modulus"] * run["rms_slope"])
-    (pull_off,) = marks(left)
-    assert -unit * pull_off.get_ydata()[0] == pytest.approx(float(run["pull_off_pressure"]))
+    assert -unit * run["reduced_pressure"].values[at] == pytest.approx(float(run["pull_off_pressure"]))
     assert {"loading", "unloading", "pull-off"} <= set(legend(figure))
-    # The area between the drawn ways is the loss.
-    (solid,), (dashed,) = curves(left)
-    work = [-np.trapezoid(line.get_ydata(), line.get_xdata()) for line in (solid, dashed)]
+    # The area between loading and unloading is the loss.
+    work = [-np.trapezoid(line.get_ydata(), line.get_xdata()) for (line,) in curves(figure.axes[0])]
     loss = sum(work) * unit * float(run["rms_height"])
     assert loss == pytest.approx(float(run["hysteresis_loss"]), rel=0.01)
 
 
-def test_fig13_without_adhesion_has_one_way_and_no_pull_off():
-    figure = fig13_loops.figure(one("hertz"), study="one")
-    (solid,), (dashed,) = curves(figure.axes[0])
-    on_the_way_in = np.interp(dashed.get_xdata(), solid.get_xdata()[::-1], solid.get_ydata()[::-1])
-    np.testing.assert_allclose(dashed.get_ydata(), on_the_way_in, atol=1e-12)
-    assert not marks(figure.axes[0]) and not figure.axes[0].child_axes
-    assert "pull-off" not in legend(figure)
-
-
-def test_rounding_is_no_tension():
+def test_fig13_without_adhesion_has_no_hysteresis_and_rounding_is_no_pull_off():
     run = separate.run("hertz", 0.5)
     tiny = {name: run[name].copy(deep=True) for name in ("nominal_pressure", "reduced_pressure")}
     for values in tiny.values():
         values.values[-2] = -1e-52
     figure = fig13_loops.figure(one("hertz", **tiny), study="one")
+    (solid,), (dashed,) = curves(figure.axes[0])
+    loading = np.interp(dashed.get_xdata(), solid.get_xdata()[::-1], solid.get_ydata()[::-1])
+    np.testing.assert_allclose(dashed.get_ydata(), loading, atol=1e-12)
     assert not marks(figure.axes[0]) and not figure.axes[0].child_axes and "pull-off" not in legend(figure)
 
 
-def test_loops_of_free_squares_are_along_the_separation_that_does_the_work():
+def test_loops_of_free_squares_are_along_the_mean_separation():
     ((labels, run), *_) = separate.study("one", materials=("sticky",), slopes=(0.5,), seeds=(1,))
     gap = (run["mean_separation"] + run["rms_height"]).assign_attrs(run["mean_gap"].attrs)
     free = run.assign(boundary=run["boundary"].copy(data="free"), mean_gap=gap)
@@ -133,7 +125,7 @@ def test_fig13_shows_one_surface_and_seed(tree):
         fig13_loops.figure(tree, study="hard", surface="smooth")
 
 
-def test_fig13_tells_slopes_apart_by_marks_and_many_by_panels(tree):
+def test_fig13_distinguishes_slopes_by_marks_and_many_by_panels(tree):
     figure = fig13_loops.figure(tree, study="slopes")
     assert len(figure.axes) == 2
     turns = [line for line in marks(figure.axes[0]) if line.get_markeredgecolor() != "black"]
@@ -178,7 +170,7 @@ def test_fig13_enlarges_tension_that_is_small():
 @pytest.mark.parametrize(
     ("name", "markers"), [("boundary elements", ["+", "x"]), ("boundary elements at finite range", ["1", "2"])]
 )
-def test_fig13_lays_boundary_elements_over_the_run_they_belong_to(tree, name, markers):
+def test_fig13_draws_boundary_elements_over_their_run(tree, name, markers):
     shown, other = (separate.run("sticky", 0.5, seed=seed, depth=0.5) for seed in (1, 2))
     if name == "boundary elements":
         own = RunLabels("hard", "asperities", "rough", 1, 0.5, "sticky")
@@ -189,13 +181,12 @@ def test_fig13_lays_boundary_elements_over_the_run_they_belong_to(tree, name, ma
     else:
         truth = shown.isel(step=slice(None, None, 7))
         figure = fig13_loops.figure(tree, [truth, other], study="hard")
-    for axes, (x, y) in zip(figure.axes, NAMES, strict=False):
+    for axes, names in zip(figure.axes, NAMES, strict=False):
         crosses = [line for line in marks(axes) if line.get_markersize() < 4]
         assert [line.get_marker() for line in crosses] == markers
         for line, branch in zip(crosses, ("loading", "unloading"), strict=True):
-            part = truth.isel(step=truth["branch"].values == branch)
-            np.testing.assert_array_equal(line.get_xdata(), part[x].values)
-            np.testing.assert_array_equal(line.get_ydata(), part[y].values)
+            states = truth.isel(step=truth["branch"].values == branch)
+            np.testing.assert_array_equal(line.get_data(), [states[name].values for name in names])
             assert line.get_color() in {each.get_color() for each in curves(axes)[0]}
     assert {f"{name}, loading", f"{name}, unloading"} <= set(legend(figure))
 
@@ -212,13 +203,6 @@ def test_fig13_without_a_seed_shows_one_with_boundary_elements_or_the_mean(tree)
 # --- figure 14 --------------------------------------------------------------------------------------------------
 
 
-def bars(container, direction):
-    """Lengths of the error bars of a line, from its middle; None where it has none."""
-    segments = [path for collection in container[2] for path in collection.get_segments()]
-    lengths = [np.ptp(path[:, direction]) / 2 for path in segments if np.ptp(path[:, direction]) > 0]
-    return lengths or None
-
-
 @pytest.mark.parametrize("quantity", ["pull_off_pressure", "pull_off_over_strength", "pull_off_over_summits"])
 def test_fig14_shows_means_and_scatter_over_the_seeds(tree, quantity):
     figure = fig14_pull_off.figure(tree, study="slopes", load_studies=list(DEPTHS), quantity=quantity)
@@ -231,30 +215,25 @@ def test_fig14_shows_means_and_scatter_over_the_seeds(tree, quantity):
     np.testing.assert_array_equal(sticky[0].get_xdata(), slopes)
     np.testing.assert_allclose(sticky[0].get_ydata(), values.mean(axis=0))
     # Two seeds are too few for a confidence interval: they are shown themselves.
-    assert not bars(sticky, 1)
+    assert not sticky.has_yerr
     dots = next(line for line in left.get_lines() if line.get_marker() == ".")
     np.testing.assert_allclose(sorted(dots.get_ydata()), sorted(values.ravel()))
     assert left.get_title("right") == "asperities"
     assert np.all(bare[0].get_ydata() == 0) and bare[0].get_markerfacecolor() == "white"
 
     sticky, bare = right.containers
+    runs = [[separate.run("sticky", 0.5, seed, depth) for seed in (1, 2)] for depth in DEPTHS.values()]
     states = np.array(
-        [
-            [
-                [float(run["largest_reduced_pressure"]), factor * float(run[quantity])]
-                for run in (separate.run("sticky", 0.5, seed, depth) for seed in (1, 2))
-            ]
-            for depth in DEPTHS.values()
-        ]
-    ).mean(axis=1)
-    np.testing.assert_allclose(np.transpose(sticky[0].get_data()), sorted(states.tolist()))
+        [[[float(run["largest_reduced_pressure"]), factor * float(run[quantity])] for run in each] for each in runs]
+    )
+    np.testing.assert_allclose(np.transpose(sticky[0].get_data()), sorted(states.mean(axis=1).tolist()))
     assert np.all(bare[0].get_ydata() == 0)
     assert "0.5" in right.get_title("right")
     assert sticky[0].get_color() == left.containers[0][0].get_color() != bare[0].get_color()
     assert len(legend(figure)) == 3
 
 
-def test_fig14_has_a_place_for_zero_and_for_decades():
+def test_fig14_shows_zero_and_values_that_span_decades():
     slopes = (1.0, 0.5, 0.2, 0.1)
     many = separate.tree(separate.study("one", slopes=slopes, materials=("sticky", "weak", "hertz"), seeds=(1,)))
     (axes,) = fig14_pull_off.figure(many, study="one").axes
@@ -264,18 +243,16 @@ def test_fig14_has_a_place_for_zero_and_for_decades():
     low, high = axes.get_ylim()
     assert low < 0 and high > positive.max()
     # The smallest of them stands apart from zero.
-    at_zero, at_least = (
-        axes.transAxes.inverted().transform(axes.transData.transform((1, y)))[1] for y in (0, positive.min())
-    )
-    assert at_least - at_zero > 0.03
-    for container, name in zip(axes.containers, ("sticky", "weak"), strict=False):
-        assert [f"{tick:g}" for tick in axes.get_xticks()] == ["0.1", "0.2", "0.5", "1"], name
+    heights = axes.transData.transform([(1, 0), (1, positive.min())])[:, 1] / axes.bbox.height
+    assert np.diff(heights) > 0.03
+    assert [f"{tick:g}" for tick in axes.get_xticks()] == ["0.1", "0.2", "0.5", "1"]
+    for container in axes.containers[:2]:
         assert np.all(np.diff(container[0].get_ydata()) < 0), "rougher surfaces stick less"
     (alone,) = fig14_pull_off.figure(one("hertz"), study="one").axes
     assert alone.containers[0][0].get_ydata().tolist() == [0]
 
 
-def test_fig14_tells_slopes_of_the_loads_apart(tree):
+def test_fig14_distinguishes_slopes_of_the_loads(tree):
     figure = fig14_pull_off.figure(tree, study="slopes", load_studies=["slopes", "gentle"])
     looks = {(each[0].get_color(), each[0].get_marker()) for each in figure.axes[1].containers}
     assert len(figure.axes[1].containers) == len(looks) == 4
@@ -309,7 +286,7 @@ def linear_campaign(slope=0.4, offset=1e-3, scale=2e-5):
     return campaign_tree(runs)
 
 
-def test_fig15_fits_a_straight_line_through_what_differs_in_load_only():
+def test_fig15_fits_a_straight_line_to_runs_that_differ_in_load_only():
     figure = fig15_loss.figure(linear_campaign(), studies=["middle", "hard", "gentle"])
     axes = figure.axes[0]
     (points,) = axes.containers
@@ -331,11 +308,9 @@ def test_fig15_fits_a_straight_line_through_what_differs_in_load_only():
 def test_fig15_fits_nothing_through_two_loads_or_other_seeds(tree):
     assert not any("r^2" in name for name in legend(fig15_loss.figure(tree, studies=["gentle", "hard"])))
     runs = [
-        each
-        for k, (name, depth) in enumerate(DEPTHS.items())
-        for each in separate.study(name, slopes=(0.5,), seeds=(k,), depth=depth)
+        separate.study(name, slopes=(0.5,), seeds=(k,), depth=depth) for k, (name, depth) in enumerate(DEPTHS.items())
     ]
-    figure = fig15_loss.figure(campaign_tree(runs), studies=list(DEPTHS))
+    figure = fig15_loss.figure(separate.tree(*runs), studies=list(DEPTHS))
     assert not any("r^2" in name for name in legend(figure))
     assert len(figure.axes[0].containers[0][0].get_xdata()) == 3
 
@@ -462,7 +437,7 @@ def two_cycles():
     return campaign_tree([(labels, whole)]), deep, shallow
 
 
-def test_of_more_cycles_figures_show_the_first_way_in_and_the_last_way_back(surface):
+def test_figures_of_several_cycles_show_the_first_loading_and_the_last_unloading(surface):
     tree, deep, shallow = two_cycles()
     axes = fig13_loops.figure(tree, study="one").axes[0]
     assert [len(lines) for lines in curves(axes)] == [2, 2]
@@ -486,7 +461,7 @@ def test_wrong_studies_are_named(tree, surface, module):
 
 
 @pytest.mark.parametrize("module", (fig14_pull_off, fig15_loss), ids=("fig14", "fig15"))
-def test_runs_that_were_not_separated_have_no_pull_off_and_no_loss(surface, module):
+def test_runs_in_contact_at_the_end_have_no_pull_off_and_no_loss(surface, module):
     scalars = [
         "hysteresis_loss",
         "pull_off_pressure",

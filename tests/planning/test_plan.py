@@ -11,7 +11,7 @@ from icha.planning.costs import WORKFLOW, Cost
 from icha.planning.plan import DONE, TO_DO, Item, memory_on, plan, start_up, time_on
 from icha.planning.results import campaign_files
 from icha.planning.validity import expected_summits
-from icha.surfaces.measured.topography import prepared_topography
+from icha.surfaces.measured.topography import prepare_topography
 from icha.surfaces.summits import find_summits
 
 GB = 1e9
@@ -50,7 +50,7 @@ def campaign(tmp_path):
 
 def test_the_summits_of_a_measured_surface_are_counted_in_its_file(campaign):
     section = campaign.surfaces["scan"]
-    surface = prepared_topography(section.path, section.preparation).surface
+    surface = prepare_topography(section.path, section.preparation).surface
     counted = expected_summits(campaign, "scan")
     assert counted == len(find_summits(surface))
     assert expected_summits(campaign, "map") != pytest.approx(counted, rel=0.1)
@@ -98,24 +98,24 @@ def test_too_much_memory_is_told_with_what_is_there_and_what_would_do(monkeypatc
     jobs = [item(name, memory=20 * GB) for name in "abc"]
     monkeypatch.setattr(requirements, "memory_of_machine", lambda: 24 * GB)
     monkeypatch.setattr(requirements, "free_disk", lambda folder: 100 * GB)
-    (said,) = requirements.wanting(jobs, 2, tmp_path, {})
+    (said,) = requirements.find_shortages(jobs, 2, tmp_path, {})
     assert said.startswith(
         "about 40.3 GB of memory are needed on 2 cores, and this machine has 24 GB; --cores 1 needs 20"
     )
-    assert requirements.wanting(jobs, 1, tmp_path, {}) == []
+    assert requirements.find_shortages(jobs, 1, tmp_path, {}) == []
     # Snakemake starts no more of them side by side than it is told.
-    assert requirements.wanting(jobs, 2, tmp_path, {"executor": "icha", "resources": ["mem_mb=23000"]}) == []
+    assert requirements.find_shortages(jobs, 2, tmp_path, {"executor": "icha", "resources": ["mem_mb=23000"]}) == []
     # On a cluster it is the nodes that need it.
-    assert requirements.wanting(jobs, 2, tmp_path, {"executor": "slurm-batches"}) == []
-    (said,) = requirements.wanting([item("a", memory=30 * GB)], 2, tmp_path, {"resources": ["mem_mb=14000"]})
+    assert requirements.find_shortages(jobs, 2, tmp_path, {"executor": "slurm-batches"}) == []
+    (said,) = requirements.find_shortages([item("a", memory=30 * GB)], 2, tmp_path, {"resources": ["mem_mb=14000"]})
     assert said.startswith("about 30.3 GB of memory") and "--cores" not in said
 
 
 def test_too_little_room_is_told_with_what_is_free(monkeypatch, tmp_path):
     monkeypatch.setattr(requirements, "free_disk", lambda folder: 9 * GB)
-    (said,) = requirements.wanting([item("a"), item("b")], 2, tmp_path, {})
+    (said,) = requirements.find_shortages([item("a"), item("b")], 2, tmp_path, {})
     assert said.startswith(f"about 10 GB of disk are needed for {tmp_path}, and 9 GB are free there")
-    assert requirements.wanting([item("a"), item("b", state=DONE)], 2, tmp_path, {}) == []
+    assert requirements.find_shortages([item("a"), item("b", state=DONE)], 2, tmp_path, {}) == []
 
 
 def test_what_there_is_is_looked_at_where_results_will_be(tmp_path):

@@ -12,7 +12,7 @@ import small_campaign as small
 from scipy.stats import t
 
 from icha.analysis.checks import check_campaign
-from icha.analysis.common_loads import compare_campaign, compare_runs, interpolated
+from icha.analysis.common_loads import compare_campaign, compare_runs, interpolate
 from icha.checks.findings import Check
 from icha.datasets.campaign import campaign_tree
 from icha.datasets.files import read_campaign, read_dataset, write_dataset
@@ -383,14 +383,14 @@ def test_comparison_is_of_the_first_loading():
 def test_interpolation_is_exact_at_the_stops_and_monotone_between():
     run = small.run()
     load, area = run["reduced_pressure"].values, run["contact_area_fraction"].values
-    np.testing.assert_allclose(interpolated(load, area, load, logarithmic=True), area, rtol=1e-12)
-    fine = interpolated(load, area, np.geomspace(load[0], load[-1], 200), logarithmic=True)
+    np.testing.assert_allclose(interpolate(load, area, load, logarithmic=True), area, rtol=1e-12)
+    fine = interpolate(load, area, np.geomspace(load[0], load[-1], 200), logarithmic=True)
     assert np.all(np.diff(fine) > 0)
     np.testing.assert_allclose(
-        interpolated([1e-3, 1e-2, 1e-1], [2e-3, 2e-2, 2e-1], [3e-3, 5e-2], logarithmic=True), [6e-3, 0.1], rtol=1e-12
+        interpolate([1e-3, 1e-2, 1e-1], [2e-3, 2e-2, 2e-1], [3e-3, 5e-2], logarithmic=True), [6e-3, 0.1], rtol=1e-12
     )
     with pytest.raises(ValueError, match="outside"):
-        interpolated(load, area, [2 * load[-1]], logarithmic=True)
+        interpolate(load, area, [2 * load[-1]], logarithmic=True)
 
 
 def test_comparison_of_slopes_without_adhesion_shows_no_spread():

@@ -5,16 +5,18 @@ from pathlib import Path
 
 import pytest
 
-from icha.support.atomic_files import in_the_way, is_left_over, take_over, whole_file, why_not_writable
+from icha.support.atomic_files import find_obstacle, is_left_over, probe_folder, take_over, whole_file
 
 
 def test_what_is_where_a_folder_is_to_be_is_named(tmp_path):
     (tmp_path / "file").write_text("something else")
     (tmp_path / "link").symlink_to("nowhere")
     (tmp_path / "folder").mkdir()
-    assert in_the_way(tmp_path / "folder/results/mine") is None
-    assert in_the_way(tmp_path / "file/mine") == f"{tmp_path}/file is a file, and no folder"
-    assert in_the_way(tmp_path / "link/mine").startswith(f"{tmp_path}/link is a link to nowhere, which is not there")
+    assert find_obstacle(tmp_path / "folder/results/mine") is None
+    assert find_obstacle(tmp_path / "file/mine") == f"{tmp_path}/file is a file, not a folder"
+    assert find_obstacle(tmp_path / "link/mine").startswith(
+        f"{tmp_path}/link is a link to nowhere, which does not exist"
+    )
 
 
 def test_a_link_into_a_folder_that_may_not_be_entered_is_in_the_way(tmp_path, monkeypatch):
@@ -28,15 +30,15 @@ def test_a_link_into_a_folder_that_may_not_be_entered_is_in_the_way(tmp_path, mo
         return found(path, *args, follow_symlinks=follow_symlinks, **options)
 
     monkeypatch.setattr(os, "stat", stat)
-    assert in_the_way(link / "mine") == (
-        f"{link} is a link to {closed}/results, which is not there, or not to be reached"
+    assert find_obstacle(link / "mine") == (
+        f"{link} is a link to {closed}/results, which does not exist or cannot be reached"
     )
 
 
 def test_whatever_a_killed_program_leaves_is_known_by_its_name(tmp_path, monkeypatch):
     with pytest.raises(KeyboardInterrupt), monkeypatch.context() as patch:
         patch.setattr(Path, "unlink", lambda *_, **__: None)  # as by a kill, after which nothing is removed
-        assert why_not_writable(tmp_path) is None
+        assert probe_folder(tmp_path) is None
         with whole_file(tmp_path / "a.txt") as temporary:
             temporary.write_text("half")
             raise KeyboardInterrupt

@@ -154,7 +154,7 @@ def test_results_that_are_not_of_what_is_asked_for_or_of_what_is_there_are_stale
     # Another run in its place, asked for in the same way: what was made from the former one is not what is there.
     (results / PATH).write_bytes(CONTENT[::-1])
     write_checksum(results, PATH, asked=asked[PATH])
-    assert damaged(results) == [] and found() == {"checks.json": f"it was made from another {PATH} than is there"}
+    assert damaged(results) == [] and found() == {"checks.json": f"it was made from another version of {PATH}"}
     # What was begun and not ended, and what is not there at all.
     begin(results, PATH)
     assert PATH in found()
@@ -170,7 +170,7 @@ def test_what_was_made_from_a_file_that_no_job_wrote_is_stale_once_that_is_anoth
     write_checksum(results, PATH, asked="a", inputs={path: sha256_as_written(results, path)})
     assert dict(stale(results, [PATH])) == {}
     table.write_text("p,b\n")
-    assert dict(stale(results, [PATH])) == {PATH: f"it was made from another {path} than is there"}
+    assert dict(stale(results, [PATH])) == {PATH: f"it was made from another version of {path}"}
     table.unlink()
     assert set(dict(stale(results, [PATH]))) == {PATH}
 

@@ -91,11 +91,11 @@ def workflow(tmp_path_factory):
     command = [sys.executable, "-m", "snakemake", "--executor", "icha", "--cores", "2", "--keep-going", "--nolock"]
     found = os.pathsep.join([str(folder), str(REPOSITORY / "workflow/plugins")])
 
-    def start(*targets, before=(), **environment):
+    def start(*targets, **environment):
         return subprocess.Popen(
             [*command, *targets],
             cwd=folder,
-            env=os.environ | {"PYTHONPATH": os.pathsep.join([*before, found])} | environment,
+            env=os.environ | {"PYTHONPATH": found} | environment,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             text=True,
@@ -105,8 +105,15 @@ def workflow(tmp_path_factory):
     return start
 
 
-def test_jobs_are_forks_that_are_told_what_snakemake_tells_them(workflow):
-    said = workflow().communicate(timeout=120)[0]
+@pytest.fixture(scope="module")
+def call(workflow):
+    """One call with jobs that do well, that need memory and that fail; what it prints, and its exit status."""
+    process = workflow("all", "heavy0.txt", "heavy100.txt", "wrong3", "wrong1", "wrong9")
+    return process.communicate(timeout=120)[0], process.returncode
+
+
+def test_jobs_are_forks_that_are_told_what_snakemake_tells_them(workflow, call):
+    said, _ = call
     assert (workflow.folder / "alone.txt").exists(), said
     told, again, alone = ((workflow.folder / f"{name}.txt").read_text().split() for name in ("told", "again", "alone"))
     assert told[:7] == ["True", "beside", "1", "1", "red", "told", str(workflow.folder)], said
@@ -116,6 +123,22 @@ def test_jobs_are_forks_that_are_told_what_snakemake_tells_them(workflow):
     assert float((workflow.folder / "told.jsonl").read_text().split('"max_rss": ')[1].split(",")[0]) > 1
 
 
+def test_the_memory_of_a_job_is_its_own_at_its_peak(workflow, call):
+    took = {name: json.loads((workflow.folder / f"heavy{name}.jsonl").read_text()) for name in (0, 100)}
+    assert took[0]["max_rss"] > 200, call
+    assert took[0]["max_uss"] < 50
+    assert 100 < took[100]["max_uss"] < 150
+
+
+def test_jobs_that_fail_are_told_with_how_they_ended(call):
+    said, status = call
+    assert status == 1
+    assert "wrong.py ended with status 1." in said and "a message" in said
+    assert "wrong.py ended with status 3." in said and "wrong.py was killed by signal 9." in said
+    assert "Traceback" not in said
+
+
+@pytest.mark.slow
 def test_jobs_run_by_themselves_where_nothing_can_be_forked(workflow, tmp_path):
     """For one, where the path of temporary files is too long for a socket."""
     folder = tmp_path / ("long" * 30)
@@ -125,23 +148,6 @@ def test_jobs_run_by_themselves_where_nothing_can_be_forked(workflow, tmp_path):
     said = process.communicate(timeout=120)[0]
     assert process.returncode == 0 and "the fork server cannot be started" in said
     assert (workflow.folder / "told.txt").read_text().startswith("False"), said
-
-
-def test_the_memory_of_a_job_is_its_own_at_its_peak(workflow):
-    said = workflow("heavy0.txt", "heavy100.txt").communicate(timeout=120)[0]
-    took = {name: json.loads((workflow.folder / f"heavy{name}.jsonl").read_text()) for name in (0, 100)}
-    assert took[0]["max_rss"] > 200, said
-    assert took[0]["max_uss"] < 50
-    assert 100 < took[100]["max_uss"] < 150
-
-
-def test_jobs_that_fail_are_told_with_how_they_ended(workflow):
-    process = workflow("wrong3", "wrong1", "wrong9")
-    said = process.communicate(timeout=120)[0]
-    assert process.returncode == 1
-    assert "wrong.py ended with status 1." in said and "a message" in said
-    assert "wrong.py ended with status 3." in said and "wrong.py was killed by signal 9." in said
-    assert "Traceback" not in said
 
 
 @pytest.fixture
@@ -164,6 +170,7 @@ def test_all_processes_end_with_snakemake(long):
     wait_for(lambda: not is_alive(job) and not is_alive(server))
 
 
+@pytest.mark.slow
 def test_a_job_whose_fork_server_is_killed_ends_and_is_run_by_the_next_call(workflow, long):
     process, job, server = long
     os.kill(server, signal.SIGKILL)
@@ -173,6 +180,7 @@ def test_a_job_whose_fork_server_is_killed_ends_and_is_run_by_the_next_call(work
     assert workflow("long.txt").wait(timeout=120) == 0
 
 
+@pytest.mark.slow
 def test_a_call_that_is_interrupted_ends_its_jobs(workflow, long):
     process, job, _ = long
     os.kill(job, signal.SIGINT)  # as from a terminal, to all processes

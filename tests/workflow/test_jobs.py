@@ -160,7 +160,7 @@ def test_a_job_of_an_earlier_call_completes_nothing_that_a_later_one_owns(job, t
     assert ended(job(later, log="logs/later.log")) == (0, "")
     (tmp_path / "go on").touch()
     assert ended(orphan)[0] == 1
-    assert "the campaign was begun again since" in (job.results / "logs/b.log").read_text()
+    assert "a later call of this campaign owns this result" in (job.results / "logs/b.log").read_text()
     assert (job.results / "runs/b.nc").read_text() == "30 MPa" and is_whole(job.results, "runs/b.nc", thorough=True)
     assert [file.name for file in (job.results / "runs").iterdir()] == ["b.nc"]
 

@@ -21,7 +21,6 @@ from icha.configuration.load import load_configuration
 from icha.planning.requirements import missing_software
 from icha.planning.results import campaign_files
 
-CAMPAIGNS = ["config/config.yaml", *(f"config/campaigns/{p.name}" for p in (REPOSITORY / "config/campaigns").iterdir())]
 PROMISED = """
 surfaces/challenge/seed1.nc surfaces/challenge/seed2.nc
 runs/challenge/challenge/seed2/slope1/cmc_adhesionless.nc
@@ -114,8 +113,8 @@ def test_a_second_call_does_nothing(smoke, tmp_path):
     assert times() == before
 
 
-@pytest.mark.parametrize("configuration", CAMPAIGNS)
-def test_shipped_campaigns_can_be_planned(configuration, smoke, tmp_path):
+@pytest.mark.parametrize("configuration", ["config/config.yaml", "config/campaigns/validation.yaml"])
+def test_large_campaigns_can_be_planned(configuration, smoke, tmp_path):
     # That of the session has fewer figures.
     plan = snakemake(smoke, "all", "publish", "-n", "-d", str(tmp_path), configuration=REPOSITORY / configuration)
     assert plan.returncode == 0 and "campaign_dataset" in plan.stdout and "deposit" in plan.stdout, plan.stdout
@@ -124,7 +123,7 @@ def test_shipped_campaigns_can_be_planned(configuration, smoke, tmp_path):
 def test_the_campaign_as_shipped_needs_no_tamaas_and_has_every_figure():
     campaign = load_configuration(REPOSITORY / SMOKE).campaign
     assert missing_software(campaign) is None and not campaign_files(campaign, "results/smoke").solutions
-    assert set(campaign.figures.drawn()) == {file.stem for file in (REPOSITORY / "icha/figures").glob("fig*.py")}
+    assert set(campaign.figures.by_name()) == {file.stem for file in (REPOSITORY / "icha/figures").glob("fig*.py")}
 
 
 @pytest.mark.slow
@@ -178,7 +177,6 @@ def test_a_failed_check_stops_the_campaign_and_is_named(smoke, tmp_path, monkeyp
     ("old", "new", "message"),
     [
         ("25 MPa", "25 mPa", "materials.cmc.contact_modulus: '25 mPa' is unusual"),
-        ("hurst: 0.8", "hurst: 0.8\n    hurst: 0.9", "key 'hurst' is given twice"),
         ("grid: 64", "grid: 32", "Warning: surfaces.challenge.grid: 32"),
     ],
 )
