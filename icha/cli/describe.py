@@ -19,7 +19,7 @@ from icha.cli.project import (
     profile_settings,
     project,
     read_configuration,
-    shown,
+    short_path,
     workflow_folder,
 )
 from icha.cli.scans import about_scan
@@ -61,10 +61,10 @@ def _print_scans(campaign, plot: Path | None) -> None:
         if plot is not None:
             raise UserError("--plot: draws measured surfaces; the studies of this campaign use none")
         return
-    from icha.surfaces.measured.resolution import scan_resolution
+    from icha.surfaces.measured.resolution import examine_scan
 
     sections = {name: campaign.surfaces[name] for name in models}
-    scans = {name: scan_resolution(section.path, section.preparation) for name, section in sections.items()}
+    scans = {name: examine_scan(section.path, section.preparation) for name, section in sections.items()}
     echo("")
     for name, scan in scans.items():
         for line in about_scan(name, scan, models=models[name]):
@@ -105,7 +105,7 @@ def print_plan(path: Path, campaign, workflow: Path, home: Path, cores: int, *, 
         console.print(f"[{style}]{name}:[/] {markup(text)}", soft_wrap=True)
 
     console.print(f"[bold]{campaign.name}[/]: {markup(campaign.title)}")
-    console.print(f"configuration: {markup(shown(path))}\n")
+    console.print(f"configuration: {markup(short_path(path))}\n")
     if runs:
         _print_files(console, items)
     _print_sums(console, items)
@@ -119,8 +119,8 @@ def print_plan(path: Path, campaign, workflow: Path, home: Path, cores: int, *, 
         print_line("bold", statement.about, statement.text)
     problem = licence_problem(campaign)
     obstacles = {
-        "cannot be run": find_conflict(shown(results), campaign.name, path, workflow),
-        "cannot be published": problem and f"{shown(path)}: {': '.join(problem)}",
+        "cannot be run": find_conflict(short_path(results), campaign.name, path, workflow),
+        "cannot be published": problem and f"{short_path(path)}: {': '.join(problem)}",
         "missing": missing_software(campaign),
     }
     for name, reason in obstacles.items():

@@ -144,7 +144,7 @@ def _derived_files(campaign, files: CampaignFiles, computed: list[Item]) -> Iter
         for path in paths:
             yield "dataset and checks", path, stage, inputs, costs.table_cost(kind, count, disk, held)
     result_files = ResultFiles(campaign.name)
-    for name in campaign.figures.drawn():
+    for name in campaign.figures.by_name():
         path = result_files.path(results_files.FIGURE, name=name, ending="png")
         inputs = campaign.figures.inputs(name, campaign, result_files).values()
         shown = set(campaign.figures.studies_of(name, campaign))

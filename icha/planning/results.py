@@ -91,11 +91,11 @@ def campaign_files(campaign: Campaign, folder: str = "") -> CampaignFiles:
         verdict=path(results.VERDICT),
         figures=[
             path(results.FIGURE, name=name, ending=ending)
-            for name in campaign.figures.drawn()
+            for name in campaign.figures.by_name()
             for ending in ("png", "pdf")
         ],
         report=path(results.REPORT),
         run_times=path(results.RUN_TIMES),
         configuration=path(results.CONFIGURATION),
-        deposit=path(results.DEPOSIT, version=campaign.published().version or "without_version"),
+        deposit=path(results.DEPOSIT, version=campaign.deposit_metadata().version or "without_version"),
     )
