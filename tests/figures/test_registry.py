@@ -1,8 +1,9 @@
-"""A figure is one module: nothing else knows its name, and libraries for drawing are imported where it is drawn."""
+"""A figure is one module: nothing else knows its name, and only drawing imports libraries for drawing."""
 
 import subprocess
 import sys
 
+import pytest
 import small_campaign as small
 
 from icha.datasets.files import write_dataset
@@ -57,6 +58,7 @@ def python(script, *arguments, cwd):
     subprocess.run([sys.executable, "-c", script, *map(str, arguments)], cwd=cwd, check=True)
 
 
+@pytest.mark.slow
 def test_a_module_on_the_path_is_a_figure(tmp_path):
     (tmp_path / "fig99_trivial.py").write_text(MODULE)
     (tmp_path / "dataset").mkdir()
