@@ -148,7 +148,7 @@ def _curves(model_error, study, quantities):
     entries = study_errors(model_error, study)
     if not entries:
         compared = ", ".join(sorted({str(node.attrs["study"]) for node in model_error.children.values()}))
-        raise ValueError(f"no boundary elements beside study {study!r}; there are some for {compared}")
+        raise ValueError(f"no boundary elements beside study {study!r}; expected one of: {compared}")
     variables = {variable for each in quantities for variable in (each.name, each.other) if variable}
     found = []
     for (name, errors), applicable in itertools.product(entries.items(), (True, False)):
@@ -161,7 +161,7 @@ def _curves(model_error, study, quantities):
             if any(np.isfinite(values[each.name].values).any() for each in quantities):
                 found.append(_Curve(name, values, (material, surface, slope), applicable))
     if not found:
-        raise NothingToDraw(f"study {study}: no run beside boundary elements is complete, so there is nothing to draw")
+        raise NothingToDraw(f"study {study}: no run beside boundary elements is complete")
     return found
 
 

@@ -92,7 +92,7 @@ def figure(campaign: xr.DataTree, surface: xr.Dataset, *, study: str, **which: o
     """Draw the events of one run over its topography, which `surface` must be, and against the separation."""
     labels, run = run_on_topography(campaign, study, surface, **which)
     if not unloading_legs(run):
-        raise NothingToDraw(f"study {study}: no run was unloaded, so unloading cannot be drawn")
+        raise NothingToDraw(f"study {study}: no run was unloaded; expected a study that unloads")
     events = _events(run)
     fig, [(where, when)] = new_panels(3.1, width_ratios=(1.3, 1))
     handles = _draw_places(where, run, surface, events)

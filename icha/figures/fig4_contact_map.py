@@ -149,7 +149,7 @@ def _solved(labels, run, at, pressure, truth, solution):
     try:
         check_same_contact(run, truth if solution is None else solution)
     except ValueError as error:
-        raise ValueError(f"{labels}: the boundary elements given are of another contact: {error}") from None
+        raise ValueError(f"{labels}: the boundary elements are of another contact: {error}") from None
     if solution is None:
         kind, target = (run[name].values[at] for name in ("snapshot_kind", "snapshot_target"))
         try:
@@ -160,7 +160,7 @@ def _solved(labels, run, at, pressure, truth, solution):
     else:
         solved = float(solution["target_reduced_pressure"])
         if not np.isclose(pressure, solved, rtol=1e-6):
-            raise ValueError(f"{labels}: boundary elements of reduced pressure {solved:g} for one of {pressure:g}")
+            raise ValueError(f"{labels}: boundary elements of reduced pressure {solved:g}; expected {pressure:g}")
         state, contact, name = solution, solution["contact"].transpose("y", "x"), FINITE_RANGE
     return _Solved(contact.values.astype(float), float(state["contact_area_fraction"]), name)
 

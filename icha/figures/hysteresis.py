@@ -76,7 +76,7 @@ def unloaded_runs(campaign: xr.DataTree, study: str) -> list[tuple[RunLabels, xr
     """
     runs = [(labels, run) for labels, run in study_runs(campaign, study, ragged=False) if unloading_legs(run)]
     if not runs:
-        raise NothingToDraw(f"study {study}: no run was unloaded, so unloading cannot be drawn")
+        raise NothingToDraw(f"study {study}: no run was unloaded; expected a study that unloads")
     return [
         (labels, run.assign(reduced_separation=run["mean_separation"] / run["rms_height"]))
         if str(run["boundary"].values) == "free"

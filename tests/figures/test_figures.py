@@ -155,7 +155,7 @@ def test_fig3_points_keep_the_probability():
 
 def test_fig4_refuses_another_surface_or_state(tmp_path, surface):
     write_surface(tmp_path / "s.nc", small.surface(2), name="rough", seed=2)
-    with pytest.raises(ValueError, match="the surface given has seed 2"):
+    with pytest.raises(ValueError, match="the surface has seed 2"):
         fig4_contact_map.figure(small.tree(), read_dataset(tmp_path / "s.nc"), study="slopes")
     with pytest.raises(ValueError, match="another period or grid"):
         fig4_contact_map.figure(small.tree(), surface.assign(period=surface["period"] * 2), study="slopes")
@@ -219,11 +219,11 @@ def test_fig5_draws_measurements_over_the_curves(tmp_path):
 
 
 def test_values_that_the_campaign_lacks_are_named_with_those_it_has():
-    with pytest.raises(ValueError, match=r"no study 'nothing'.*there are slopes, single"):
+    with pytest.raises(ValueError, match=r"no study 'nothing'.*expected one of: slopes, single"):
         fig2_area_and_gap.figure(small.tree(), study="nothing")
-    with pytest.raises(ValueError, match="no boundary elements beside study 'slopes'; there are some for one"):
+    with pytest.raises(ValueError, match="no boundary elements beside study 'slopes'; expected one of: one"):
         fig10_model_error.figure(compared.tree(), compared.errors(), study="slopes")
-    with pytest.raises(ValueError, match="no material 'steel' in this study; there are soft"):
+    with pytest.raises(ValueError, match="no material 'steel' in this study; expected one of: soft"):
         fig6_spots_by_slope.figure(small.tree(), study="slopes", material="steel")
 
 
@@ -379,7 +379,7 @@ def test_fig4_shows_the_maps_of_the_other_model(surface):
     )
     own, other = truth["contact_map"].values[1] > 0, shifted["contact_map"].values[1] > 0
     assert figure.axes[3].get_title(loc="right").endswith(f"{jaccard(own, other):.2f}")
-    with pytest.raises(ValueError, match=r"soft: the boundary elements given are of another contact: seed is 1"):
+    with pytest.raises(ValueError, match=r"soft: the boundary elements are of another contact: seed is 1"):
         fig4_contact_map.figure(compared.tree(), surface, truth=shifted.assign(seed=2), study="one")
     # Where that run ended before, the model's spots stand alone.
     ended = {"truth": shifted.isel(snapshot=[0]), "target": 1e-2, "kind": KIND}
