@@ -5,8 +5,11 @@ from functools import cache
 import numpy as np
 import small_campaign as small
 
+import icha
 from icha.datasets.campaign import campaign_tree
 from icha.datasets.labels import RunLabels
+from icha.datasets.variables.terms import MATERIAL
+from icha.path.energy_balance import summarise_loop
 
 # In units of the largest pressure: by how much unloading with adhesion lies below loading; a tenth more for every step
 # between the stops, so that runs differ.
@@ -84,28 +87,11 @@ def unloaded(run, between=0):
         "event_y": x[::-1],
         "event_members": np.ones(len(kinds), int),
     }
-    energy = float(run["surface_energy"])
-    strength = 16 * energy / (9 * np.sqrt(3) * float(run["interaction_range"]))
-    pull_off = max(-p[leg == 1].min(), 0.0)
-    at_most = int(np.flatnonzero(leg == 1)[np.argmin(p[leg == 1])])
-    scalars = {
-        "pull_off_pressure": pull_off,
-        "pull_off_separation": u[at_most],
-        "pull_off_over_strength": pull_off / strength if adhesive else 0.0,
-        "pull_off_over_summits": 0.25 if adhesive else 0.0,
-        "detachment_pressure": p[-2] if adhesive else 0.0,
-        "detachment_separation": u[-2],
-        "hysteresis_loss": loss,
-        "hysteresis_loss_over_surface_energy": loss / energy if adhesive else 0.0,
-        "loss_by_jump_in": 0.0,
-        "loss_by_jump_off": loss,
-        "uphill_jump_in_count": 0,
-        "loss_by_coalescence": 0.0,
-        "loss_by_load_jump": 0.0,
-        "loss_unattributed": 0.0,
-        "largest_contact_area_fraction": columns["contact_area_fraction"].max(),
-        "largest_reduced_pressure": columns["reduced_pressure"].max(),
-    }
+    material = icha.Material(*(float(run[name]) for name in MATERIAL))
+    rows = [{name: values[k] for name, values in columns.items()} for k in range(len(at))]
+    pull_off = int(np.argmin(np.where(leg == 1, p, np.inf)))
+    scalars = summarise_loop(rows, pull_off, material, 4 * max(-p[pull_off], 0.0), 0.0)
+    scalars |= {"uphill_jump_in_count": 0, "detachment_pressure": p[-2] if adhesive else 0.0}
     kept = run.drop_dims("step").assign_attrs(run.attrs)
     new = {name: ("step", values, run[name].attrs if name in run else _UNKNOWN) for name, values in columns.items()}
     new |= {name: ("event", values, _UNKNOWN) for name, values in events.items()}

@@ -10,6 +10,20 @@ import numpy as np
 import scipy.integrate
 import scipy.special
 
+from icha import Material
+from icha.asperity.jkr import JKR
+
+# Three spots in a unit cell, without adhesion and with so much of it that all of them are in tension.
+MODULUS, RANGE = 2.0, 1e-3
+CENTRES = np.array([[0.2, 0.3], [0.6, 0.55], [0.9, 0.85]])
+RADIUS = np.array([0.02, 0.03, 0.015])
+CURVATURE = np.array([0.5, 0.8, 0.3])
+ENERGIES = [0.0, 3e-4]
+
+
+def law(energy):
+    return JKR(Material(MODULUS, energy, RANGE))
+
 
 def jkr_force(a, R, modulus, energy):
     return 4 * modulus * a**3 / (3 * R) - np.sqrt(8 * np.pi * modulus * energy * a**3)

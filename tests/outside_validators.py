@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from icha.deposit.verify import DamagedDeposit, whole_deposit
+
 REPOSITORY = Path(__file__).parents[1]
 PYTHON = REPOSITORY / ".venv-validators/bin/python"
 
@@ -30,6 +32,15 @@ def sealed(folder):
     digests = {file.relative_to(folder).as_posix(): hashlib.sha256(file.read_bytes()).hexdigest() for file in files}
     sums.write_text("".join(f"{digest}  {name}\n" for name, digest in digests.items()))
     return folder
+
+
+def problems_with(deposit, **options):
+    """The problems of a deposit; none if it is whole."""
+    try:
+        with whole_deposit(deposit, **options):
+            return []
+    except DamagedDeposit as damaged:
+        return list(damaged.args)
 
 
 def validated(deposit, *names):

@@ -18,7 +18,7 @@ def publishable_source(configuration: Configuration, project: str, results: str)
         any of the results was made.
     """
     campaign = configuration.campaign
-    problems = [f"{configuration.origin}: {line}" for line in missing_metadata(campaign.published())]
+    problems = [f"{configuration.origin}: {line}" for line in missing_metadata(campaign.deposit_metadata())]
     if problem := licence_problem(campaign):
         problems.append(": ".join([configuration.origin, *problem]))
     try:

@@ -1,4 +1,4 @@
-"""Contact with adhesion at a given separation: fronts come to rest, contact forms within reach of the attraction."""
+"""Contact with adhesion at a given separation: fronts relax, and contact forms within reach of the attraction."""
 
 from __future__ import annotations
 
@@ -6,33 +6,35 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from icha.boundary_elements.elastic_equilibrium import Held, held
-from icha.boundary_elements.elasticity import Contact, Topography
-from icha.boundary_elements.front import COMPLIANCE, Front
-from icha.boundary_elements.kernel import HalfSpace
-from icha.boundary_elements.newton import front_at_rest
-from icha.boundary_elements.patches import region
-from icha.boundary_elements.windows import relaxed_in_windows
+from icha.boundary_elements.cells import mask_of
+from icha.boundary_elements.elastic_contact import AdhesiveContact, Contact, Topography
+from icha.boundary_elements.front import Front
+from icha.boundary_elements.front_solver import FrontProblem, relax_front
+from icha.boundary_elements.half_space import HalfSpace
+from icha.boundary_elements.local_relaxation import relax_in_windows
 from icha.contact.model import FullContact, NotConverged
 
-# Deviation of sqrt(G/dgamma) at which a front rests well enough to see where new contact forms.
-_NEARLY_AT_REST = 1e-3
-# The same where it is clear, and what is clear: by so much of the gap at which a cell lets go.
-_IN_SIGHT, _CLEARLY = 3e-2, 0.02
-# Accuracy of displacements, over that gap, at which this can be seen.
-_ROUGHLY = 1e-2
-# Rounds of new contacts: they end, but may be as many as there are cells.
+# Residual of the front, and distance within the reach of the attraction over the critical opening, at which new contact
+# forms: first where it is clear, then where it is certain.
+_CLEAR_RESIDUAL, _CLEAR_DISTANCE, _CERTAIN_RESIDUAL = 3e-2, 0.02, 1e-3
+# Accuracy of displacements, over the critical opening, in rounds of new contact.
+_ROUND_ACCURACY = 1e-2
+# Rounds of new contact: they end, but there may be as many as cells.
 _MAX_ROUNDS = 1000
-# More of the surface than this in contact, and the rest follows.
-_NEARLY_ALL = 0.98
+# Contact area over nominal area from which the last gaps close by themselves.
+_NEARLY_FULL = 0.98
 
 
 @dataclass(frozen=True, eq=False)
 class Summits:
-    """Where contact may form out of nothing. Arrays of length k; lengths in cells.
+    """Summits at which contact may form. Lengths in cells.
 
-    cell: of the grid, counted through. above: how far above its node each summit rises. reach: how far its attraction
-    does. radius: of the contact that it makes there, were it alone; from a smaller one it could not grow.
+    Parameters
+    ----------
+    cell : (k,) int, of the grid.
+    above : (k,), height of the summit above the node of its cell.
+    reach : (k,), range of the attraction at the summit.
+    radius : (k,), of the contact that a lone summit makes there; from a smaller one it could not grow.
     """
 
     cell: np.ndarray
@@ -40,19 +42,37 @@ class Summits:
     reach: np.ndarray
     radius: np.ndarray
 
-    def contacts(self, which: np.ndarray, grid: int) -> np.ndarray:
-        """Cells, counted through, that these summits (k,) touch with when they jump into contact."""
+    def contacts(self, chosen: np.ndarray, grid: int) -> np.ndarray:
+        """Cells, ascending, that chosen summits (k,) touch with when they jump into contact."""
         touched = np.zeros((grid, grid), bool)
-        # Whatever would be larger than the surface covers it with its periodic images.
-        for cell, radius in zip(self.cell[which], np.minimum(self.radius[which], 0.75 * grid), strict=True):
-            way = np.arange(-int(radius), int(radius) + 1)
-            rows, columns = np.nonzero(np.hypot(way[:, None], way) <= radius)
+        # A larger disc would cover the surface with its periodic images.
+        for cell, radius in zip(self.cell[chosen], np.minimum(self.radius[chosen], 0.75 * grid), strict=True):
+            offset = np.arange(-int(radius), int(radius) + 1)
+            rows, columns = np.nonzero(np.hypot(offset[:, None], offset) <= radius)
             row, column = divmod(int(cell), grid)
-            touched[(row + way[rows]) % grid, (column + way[columns]) % grid] = True
+            touched[(row + offset[rows]) % grid, (column + offset[columns]) % grid] = True
         return np.flatnonzero(touched)
 
+    def within_reach(self, state: AdhesiveContact, margin: float) -> tuple[np.ndarray, np.ndarray]:
+        """Summits out of contact within reach by more than a margin, (k,) bool; and cells that overlap likewise."""
+        gap, touched = state.gap.ravel(), mask_of(state.cells, state.gap.shape).ravel()
+        within = (gap[self.cell] - self.above - self.reach < -margin) & ~touched[self.cell]
+        # Surfaces also touch where they overlap without a summit; next to a front this is up to the front.
+        touched[state.rim] = True
+        return within, np.flatnonzero((gap < -margin) & ~touched)
 
-def settled(
+    def new_contact(
+        self, state: AdhesiveContact, margin: float, tried: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, int]:
+        """Contact that forms at places not tried before: its cells, the places, and how many are within reach."""
+        within, overlapping = self.within_reach(state, margin)
+        places = np.union1d(self.cell[within], overlapping)
+        new = places[~tried[places]]
+        jumping = within & ~tried[self.cell]
+        return np.union1d(self.contacts(jumping, state.gap.shape[-1]), new), new, len(places)
+
+
+def solve_adhesive_contact(
     space: HalfSpace,
     front: Front,
     topography: Topography,
@@ -61,87 +81,71 @@ def settled(
     contact: Contact,
     tolerance: float,
     *,
-    near: bool = False,
-) -> tuple[Held, int]:
-    """The contact in equilibrium at a separation (cells), and how many summits within reach it left open.
+    close: bool = False,
+) -> tuple[AdhesiveContact, int]:
+    """Solve the contact at a separation: relax the fronts, and form contact at all summits within reach.
 
-    tolerance: of sqrt(G/dgamma) along the fronts. near: whether they are already so near to rest that it is clear where
-    new contact forms.
+    A summit that loses its new contact again stays open.
 
-    Fronts come nearly to rest first; then all summits within reach make contact, until there is none, and fronts come
-    to rest. A summit that loses the contact again stays open.
+    Parameters
+    ----------
+    separation : mean separation, in cells.
+    contact : to start from.
+    tolerance : residual of the fronts.
+    close : whether the contact is so close to equilibrium that it is clear where contact forms.
+
+    Returns
+    -------
+    The contact, and the number of summits within reach that stayed open.
 
     Raises
     ------
     FullContact
-        If the contact runs over the whole surface.
+        If the contact covers the surface.
     NotConverged
-        If an equilibrium is not found.
+        If the equilibrium is not found.
     """
-    opening = COMPLIANCE * front.strength
-    margin = _CLEARLY * opening
-    stages = _stages(tolerance, margin, near)
+    problem = FrontProblem(space, front, topography, separation)
+    margin = _CLEAR_DISTANCE * front.critical_opening
 
-    def in_windows(contact, gap, restless):
-        return relaxed_in_windows(space, front, separation, contact, gap, restless)
+    def relax_locally(state, far):
+        return relax_in_windows(space, front, separation, state, state.gap, far)
 
-    def mended(state, restless):
-        return in_windows(state, state.gap, restless)
-
-    tried = np.zeros(space.size, dtype=bool)
-    stage = rounds = 0
+    stages = [(_CLEAR_RESIDUAL, margin), (_CERTAIN_RESIDUAL, 0.0), (tolerance, 0.0)]
+    if tolerance > _CERTAIN_RESIDUAL:
+        stages[1:] = [(tolerance, margin)]
+    first = len(stages) - 1 if close else 0
+    tried, rounds, stage = np.zeros(space.size, dtype=bool), 0, first
     while True:
-        accuracy, beyond = stages[stage]
-        contact = front_at_rest(space, front, topography, separation, contact, accuracy, near=near, mended=mended)
-        if np.sum(contact.fraction) > _NEARLY_ALL * space.size:
+        residual, distance = stages[stage]
+        solved = relax_front(problem, contact, residual, close=close, relax_locally=relax_locally)
+        if np.sum(solved.fraction) > _NEARLY_FULL * space.size:
             raise FullContact("the contact runs over the whole surface")
-        made, new, within = _new_contact(summits, contact, beyond, tried)
+        formed, new, within = summits.new_contact(solved, distance, tried)
         if not len(new):
             stage += 1
             if stage == len(stages):
-                return contact, within
+                return solved, within
+            contact = solved
             continue
-        stage = 0
-        # What comes within reach of new contact, clearly, makes contact before the whole comes to rest.
+        stage = first
+        # Contact that is clearly within reach of new contact forms before the whole front is relaxed.
         while len(new):
             rounds += 1
             if rounds > _MAX_ROUNDS:
-                raise NotConverged(f"no equilibrium after {rounds - 1} rounds of new contacts")
+                raise NotConverged(f"no equilibrium after {_MAX_ROUNDS} rounds of new contacts")
             tried[new] = True
-            closed = contact.with_closed(made)
-            relaxed = in_windows(closed, contact.gap, made)
-            if relaxed is None:
-                contact = closed
+            contact = _form_contact(problem, solved, formed)
+            if not isinstance(contact, AdhesiveContact):
                 break
-            contact = held(space, topography, separation, relaxed, _ROUGHLY * opening, since=contact)
-            made, new, _ = _new_contact(summits, contact, margin, tried)
+            solved = contact
+            formed, new, _ = summits.new_contact(solved, margin, tried)
 
 
-def _stages(tolerance, margin, near):
-    """Accuracies to which fronts come to rest, in order, and how clearly new contact is within reach then."""
-    stages = [(_IN_SIGHT, margin), (_NEARLY_AT_REST, 0.0), (tolerance, 0.0)]
-    if tolerance > _NEARLY_AT_REST:
-        stages[1:] = [(tolerance, margin)]
-    return stages[2:] if near else stages
-
-
-def _new_contact(summits, state, margin, tried):
-    """Contact within reach by more than a margin (cells) that was not tried: its cells, and those that count as tried.
-
-    And how many are within reach, tried or not.
-    """
-    within, overlapping = _within_reach(summits, state, margin)
-    seeds = np.union1d(summits.cell[within], overlapping)
-    new = seeds[~tried[seeds]]
-    jumping = within & ~tried[summits.cell]
-    return np.union1d(summits.contacts(jumping, state.gap.shape[-1]), new), new, len(seeds)
-
-
-def _within_reach(summits, state, margin):
-    """Which summits out of contact are within reach, by more than a margin (cells), (k,); and cells that overlap."""
-    gap = state.gap.ravel()
-    touched = region(state.cells, gap.shape)
-    within = (gap[summits.cell] - summits.above - summits.reach < -margin) & ~touched[summits.cell]
-    # Without a summit, surfaces that overlap touch; beside a front this is its own business.
-    touched[state.rim] = True
-    return within, np.flatnonzero((gap < -margin) & ~touched)
+def _form_contact(problem, contact, formed):
+    """Close cells (m,); relax the fronts around them in windows and solve the elastic contact if windows pay."""
+    closed = contact.with_closed(formed)
+    relaxed = relax_in_windows(problem.space, problem.front, problem.separation, closed, contact.gap, formed)
+    if relaxed is None:
+        return closed
+    return problem.solve_elastic(relaxed, _ROUND_ACCURACY)

@@ -61,10 +61,10 @@ def _print_scans(campaign, plot: Path | None) -> None:
         if plot is not None:
             raise UserError("--plot: draws measured surfaces; the studies of this campaign use none")
         return
-    from icha.surfaces.measured.resolution import scan_resolution
+    from icha.surfaces.measured.resolution import examine_scan
 
     sections = {name: campaign.surfaces[name] for name in models}
-    scans = {name: scan_resolution(section.path, section.preparation) for name, section in sections.items()}
+    scans = {name: examine_scan(section.path, section.preparation) for name, section in sections.items()}
     echo("")
     for name, scan in scans.items():
         for line in about_scan(name, scan, models=models[name]):
@@ -147,10 +147,10 @@ def _print_sums(console, items) -> None:
     """Print a table with a row for each kind of result."""
     from rich.table import Table
 
-    from icha.planning.plan import around_jobs, total
+    from icha.planning.plan import overhead, total
 
     table = Table(box=None, pad_edge=False, header_style="dim", show_footer=True)
-    every, around = total(items), around_jobs(items)
+    every, around = total(items), overhead(items)
     footers = {"": "all", "files": str(every.count), "done": str(every.done), "failed": str(every.failed or "")}
     footers |= {"to do": str(every.to_do), "each": "", "core time": formatting.duration(every.work + around)}
     footers |= {"memory": formatting.size(every.memory), "disk": formatting.size(every.disk)}

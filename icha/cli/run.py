@@ -134,7 +134,7 @@ def run(
     if not set(targets) - {"all", "report", "publish"}:
         _print_checks(campaign, results)
     if "publish" in targets:
-        echo(f"deposit: {shown(results / 'publish' / f'{campaign.name}-{campaign.published().version}.zip')}")
+        echo(f"deposit: {shown(results / 'publish' / f'{campaign.name}-{campaign.deposit_metadata().version}.zip')}")
 
 
 def _refuse_obstacles(folder: Path, results: Path, name: str, path: Path, workflow: Path) -> None:

@@ -94,7 +94,7 @@ def _resolution(scan, to_scale: bool, models: list[Model]) -> Iterator[str]:
 
 def _noise(scan) -> Iterator[str]:
     """Return where the spectrum ends in noise, and the recommended keys."""
-    from icha.surfaces.measured.resolution import slope_left
+    from icha.surfaces.measured.resolution import filtered_slope_share
 
     if (noise := scan.noise) is None:
         yield "no noise floor: the spectrum decreases down to the shortest waves"
@@ -107,7 +107,7 @@ def _noise(scan) -> Iterator[str]:
     if scan.advice:
         keys = " and ".join(f"`{key}: {value}`" for key, value in advice_in_yaml(scan.advice).items())
         cutoff = scan.advice.get("cutoff")
-        effect = f", which keeps {slope_left(scan.measured, cutoff):.0%} of the rms slope" if cutoff else ""
+        effect = f", which keeps {filtered_slope_share(scan.measured, cutoff):.0%} of the rms slope" if cutoff else ""
         yield f"recommended: {keys}{effect}"
 
 
@@ -152,7 +152,7 @@ def measured_section(path: Path, data: str | None, folder: Path) -> MeasuredSect
     """
     import numpy as np
 
-    from icha.surfaces.measured.resolution import scan_resolution
+    from icha.surfaces.measured.resolution import examine_scan
     from icha.surfaces.measured.settings import UnfitTopography
 
     _check_file(path)
@@ -163,7 +163,7 @@ def measured_section(path: Path, data: str | None, folder: Path) -> MeasuredSect
     boundary, detrend = ("periodic", "none") if periodic else ("free", "tilt")
     settings = {"format": "auto", "boundary": boundary, "data": data, "detrend": detrend, "missing": "fill"} | assumed
     try:
-        resolution = scan_resolution(path, settings)
+        resolution = examine_scan(path, settings)
     except UnfitTopography as error:
         raise UserError(f"--measured {path}: {error.key} {error}") from None
 

@@ -64,7 +64,7 @@ class BesideStudy(Section):
                 if value not in known:
                     expected = listed(getattr(study, key))
                     yield (key, index), value, f"is not in study {self.study!r}; expected one of {expected}"
-        contacts = campaign.solved(self)
+        contacts = campaign.contacts_beside(self)
         if not contacts and MEASURED not in study.rms_slopes:
             yield (), self.study, "has none of the chosen combinations; expected combinations of the study"
         materials: dict[str, dict[str, None]] = {}

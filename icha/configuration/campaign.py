@@ -104,7 +104,7 @@ class Campaign(Section):
     _topographies: dict[str, Topography] = PrivateAttr(default={})
     _origins: dict[tuple[str, str], str] = PrivateAttr(default={})
 
-    def published(self) -> Publication:
+    def deposit_metadata(self) -> Publication:
         """Return the metadata of a deposit; title, summary and licence default to those of the campaign."""
         given = self.publication
         return given.model_copy(
@@ -182,7 +182,7 @@ class Campaign(Section):
         known = set(snapshots)
         return snapshots + [state for p in loads if (state := ("reduced_pressure", p)) not in known]
 
-    def solved(self, entry: BesideStudy) -> list[Contact]:
+    def contacts_beside(self, entry: BesideStudy) -> list[Contact]:
         """Return the contacts of a study for which an entry beside it asks."""
         lists = (entry.surfaces, entry.seeds, entry.rms_slopes, entry.materials)
         asked = [None if values is None else set(values) for values in lists]
@@ -220,7 +220,7 @@ class Campaign(Section):
             if label in self.studies and self.compares_models(label):
                 reason = "is the name of a study that has boundary elements itself; expected another name"
                 yield ("finite_range", label), label, reason
-        for label, figure in self.figures.drawn().items():
+        for label, figure in self.figures.by_name().items():
             yield from _within(("figures", label), figure.problems(self))
 
     def measurement_problems(self) -> Iterator[Problem]:
@@ -278,7 +278,7 @@ class Campaign(Section):
                 )
         return found
 
-    def with_files_beside(self, folder: FilePath) -> Campaign:
+    def resolve_paths(self, folder: FilePath) -> Campaign:
         """Return the campaign with the paths of its files relative to `folder`."""
 
         def in_folder(section):

@@ -32,7 +32,7 @@ def solution_cases(campaign: Campaign) -> list[SolutionLabels]:
     return [
         SolutionLabels(label, entry.study, *contact, pressure)
         for label, entry in campaign.finite_range.items()
-        for contact, pressure in itertools.product(campaign.solved(entry), entry.reduced_pressures)
+        for contact, pressure in itertools.product(campaign.contacts_beside(entry), entry.reduced_pressures)
     ]
 
 
@@ -41,7 +41,7 @@ def loop_cases(campaign: Campaign) -> list[ContactLabels]:
     return [
         ContactLabels(label, *contact)
         for label, entry in campaign.boundary_element_loops.items()
-        for contact in campaign.solved(entry)
+        for contact in campaign.contacts_beside(entry)
     ]
 
 

@@ -33,7 +33,7 @@ _PREFIXES = {-15: "f", -12: "p", -9: "n", -6: "u", -3: "m", 0: "", 3: "k", 6: "M
 _Located = tuple[tuple, Any]
 
 
-def designed(campaign: Campaign, content: Mapping) -> tuple[Campaign, list[Problem]]:
+def expand_design(campaign: Campaign, content: Mapping) -> tuple[Campaign, list[Problem]]:
     """Expand the runs of every study.
 
     Parameters
@@ -127,7 +127,7 @@ def _too_many_beside(campaign: Campaign) -> Iterator[Problem]:
     """Report too many solutions beside the expanded runs."""
     for section in BESIDE_STUDIES:
         counts = {
-            label: len(campaign.solved(entry)) * len(getattr(entry, "reduced_pressures", [0]))
+            label: len(campaign.contacts_beside(entry)) * len(getattr(entry, "reduced_pressures", [0]))
             for label, entry in getattr(campaign, section).items()
             if entry.study in campaign.studies
         }
@@ -312,5 +312,5 @@ def _replace_varied_names(campaign: Campaign, origin: Mapping[tuple[str, str], s
         section: {label: entry_with_variants(entry) for label, entry in getattr(campaign, section).items()}
         for section in BESIDE_STUDIES
     }
-    figures = {name: figure_with_variant(figure) for name, figure in campaign.figures.drawn().items()}
+    figures = {name: figure_with_variant(figure) for name, figure in campaign.figures.by_name().items()}
     return campaign.model_copy(update=update | {"figures": campaign.figures.model_copy(update=figures)})

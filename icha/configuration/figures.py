@@ -103,7 +103,7 @@ class Measurement(Section):
 
 
 class _Drawn(Section):
-    def drawn(self) -> dict[str, FigureOptions]:
+    def by_name(self) -> dict[str, FigureOptions]:
         """Return the figures to draw, by name."""
         return {name: getattr(self, name) for name in type(self).model_fields if getattr(self, name) is not None}
 

@@ -15,7 +15,7 @@ import yaml
 from pydantic import ValidationError
 
 from icha.configuration.campaign import Campaign
-from icha.configuration.design import designed
+from icha.configuration.design import expand_design
 from icha.configuration.errors import MOST_PROBLEMS, ConfigurationError, format_problem, problem_of
 from icha.configuration.plausibility import (
     CONFIRMED,
@@ -28,12 +28,12 @@ from icha.configuration.plausibility import (
 )
 from icha.configuration.topographies import inspect_topographies
 from icha.configuration.yaml_files import (
-    dumped,
+    apply_defaults,
+    dump_yaml,
     excessive_defaults,
     location_in_defaults,
-    merged,
+    merge,
     read_yaml,
-    with_defaults,
 )
 from icha.support.values import Problem
 
@@ -114,16 +114,16 @@ def parse_configuration(path: str | os.PathLike, overrides: Mapping[str, Any] | 
     """Read and check the text of a configuration; parameters and errors as in `load_configuration`."""
     path = Path(path)
     from_file = read_yaml(path)
-    written = merged(from_file, overrides or {})
+    written = merge(from_file, overrides or {})
     draft = Draft(path, from_file, overrides or {}, written)
     unusual = unusual_values(written)
     draft.fail(excessive_defaults(written), unusual)
-    content = with_defaults(written)
+    content = apply_defaults(written)
     try:
         campaign = Campaign.model_validate(content)
     except ValidationError as error:
         draft.fail((problem_of(details, content) for details in error.errors()), unusual)
-    campaign, design_problems = designed(campaign.with_files_beside(path.parent), content)
+    campaign, design_problems = expand_design(campaign.resolve_paths(path.parent), content)
     draft.fail(design_problems, unusual)
     draft.fail(itertools.chain(campaign.problems(), plausibility_problems(unusual, draft.confirmed)))
     return replace(draft, campaign=campaign)
@@ -146,7 +146,7 @@ def load_configuration(
         If any key or file is wrong; the message has a line for each.
     """
     draft = parse_configuration(path, overrides)
-    text, campaign = dumped(draft.written, str(draft.path)), draft.campaign
+    text, campaign = dump_yaml(draft.written, str(draft.path)), draft.campaign
     draft.fail(_files_outside(campaign, within) if within is not None else ())
     topographies, unread = inspect_topographies(campaign)
     draft.fail(itertools.chain(unread, campaign.measurement_problems()))
@@ -186,7 +186,7 @@ def _files_outside(campaign: Campaign, folder: str | os.PathLike) -> list[Proble
 INPUTS = "inputs"
 
 
-def with_files_beside_it(configuration: Configuration) -> tuple[str, dict[str, str]]:
+def collect_inputs(configuration: Configuration) -> tuple[str, dict[str, str]]:
     """Return the text of a configuration as used, and the files to store beside it.
 
     Returns
@@ -210,4 +210,4 @@ def with_files_beside_it(configuration: Configuration) -> tuple[str, dict[str, s
             files[stored] = path
     # Every surface has its own path now.
     (content.get("defaults") or {}).get("surfaces", {}).pop("path", None)
-    return dumped(content, configuration.origin), files
+    return dump_yaml(content, configuration.origin), files

@@ -141,7 +141,7 @@ for _kind in ("int", "float", "timestamp"):
     _Loader.add_constructor(f"tag:yaml.org,2002:{_kind}", partial(_Loader.construct_unless_text, construct=_construct))
 
 
-def dumped(content: Mapping, origin: str) -> str:
+def dump_yaml(content: Mapping, origin: str) -> str:
     """Return the text of a configuration in its order, with a line for each value.
 
     Raises ConfigurationError, which names the file `origin`, if the text is too long to be read again.
@@ -159,17 +159,17 @@ def dumped(content: Mapping, origin: str) -> str:
 _MOST_DEFAULTS = 500_000
 
 
-def merged(content: Mapping, overrides: Mapping) -> dict:
+def merge(content: Mapping, overrides: Mapping) -> dict:
     """Return `content` with the values of `overrides`, which replace lists as a whole."""
     result = deepcopy(dict(content))
     for key, value in overrides.items():
         inside = result.get(key)
         both = isinstance(inside, Mapping) and isinstance(value, Mapping)
-        result[key] = merged(inside, value) if both else deepcopy(value)
+        result[key] = merge(inside, value) if both else deepcopy(value)
     return result
 
 
-def _sections_with_defaults(content: Mapping) -> Iterator[tuple[str, Mapping, dict]]:
+def _find_defaults(content: Mapping) -> Iterator[tuple[str, Mapping, dict]]:
     """Return sections with their defaults and entries, if both are mappings; the model refuses others."""
     defaults = content.get("defaults")
     for section in Defaults.model_fields if isinstance(defaults, Mapping) else ():
@@ -178,35 +178,35 @@ def _sections_with_defaults(content: Mapping) -> Iterator[tuple[str, Mapping, di
             yield section, given, entries
 
 
-def with_defaults(content: Mapping) -> dict:
+def apply_defaults(content: Mapping) -> dict:
     """Return `content` with its `defaults` in the entries; surfaces take the keys of their kind."""
     result = deepcopy(dict(content))
-    for section, given, entries in _sections_with_defaults(result):
+    for section, given, entries in _find_defaults(result):
         for name, entry in entries.items():
             if not isinstance(entry, Mapping | None):
                 continue
             entry = dict(entry or {})
             kind = entry.get("kind", given.get("kind"))
-            foreign = _of_other_kinds(kind) if section == "surfaces" and isinstance(kind, str) else ()
+            foreign = _keys_of_other_kinds(kind) if section == "surfaces" and isinstance(kind, str) else ()
             entries[name] = {key: deepcopy(value) for key, value in given.items() if key not in foreign} | entry
     return result
 
 
 def excessive_defaults(written: Mapping) -> Iterator[Problem]:
     """Report sections of defaults with too many values when repeated in all entries."""
-    for section, given, entries in _sections_with_defaults(written):
-        count = _values_in(given) * len(entries)
+    for section, given, entries in _find_defaults(written):
+        count = _count_values(given) * len(entries)
         if count > _MOST_DEFAULTS:
             reason = f"has {count} values when repeated in all {section}; expected at most {_MOST_DEFAULTS}"
             yield ("defaults", section), NOTHING, reason
 
 
-def _values_in(content) -> int:
+def _count_values(content) -> int:
     inside = content.values() if isinstance(content, Mapping) else content if isinstance(content, list) else ()
-    return 1 + sum(map(_values_in, inside))
+    return 1 + sum(map(_count_values, inside))
 
 
-def _of_other_kinds(kind: str) -> set[str]:
+def _keys_of_other_kinds(kind: str) -> set[str]:
     """Return the keys that only surfaces of other kinds have; none for an unknown kind."""
     if kind not in SURFACE_KINDS:
         return set()
@@ -216,7 +216,7 @@ def _of_other_kinds(kind: str) -> set[str]:
 
 def location_in_defaults(location: tuple, written: Mapping) -> tuple:
     """Return where the value at `location` was written: in its entry, or in the defaults of its section."""
-    for section, given, entries in _sections_with_defaults(written):
+    for section, given, entries in _find_defaults(written):
         if len(location) > 2 and location[0] == section:
             _, name, key = location[:3]
             entry = entries.get(name) or {}

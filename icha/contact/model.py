@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 import numpy as np
 
 if TYPE_CHECKING:
+    from icha.contact.models import PathAccuracy
     from icha.surfaces.summits import Asperities
     from icha.surfaces.surface import Surface
 
@@ -114,6 +115,10 @@ class ContactModel(Protocol[S]):
     @property
     def largest_area_fraction(self) -> float:
         """Contact area over nominal area above which the model is not valid."""
+
+    @property
+    def path_accuracy(self) -> PathAccuracy:
+        """Accuracy to which a path resolves its events."""
 
     def untouched(self) -> S:
         """State in which contact is about to form first."""

@@ -48,6 +48,26 @@ MODEL_PAPER = Paper(
 
 
 @dataclass(frozen=True)
+class PathAccuracy:
+    """Accuracy to which a path resolves what a model does between two equilibria.
+
+    Attributes
+    ----------
+    event : separation within which an event that changes the pressure is located, in h_rms.
+    loss : largest unknown work of one step with events, relative to the work so far.
+    balance : largest difference between work and change of energy in a long step without events, likewise.
+    tension : largest error of the largest tension between two equilibria without an event, relative to it.
+    predicts_steps : whether the length of a step follows from the errors of the one before; otherwise it doubles.
+    """
+
+    event: float = 1e-12
+    loss: float = 1e-10
+    balance: float = 3e-6
+    tension: float = 1e-8
+    predicts_steps: bool = False
+
+
+@dataclass(frozen=True)
 class Model:
     """Record of a contact model.
 
@@ -66,6 +86,7 @@ class Model:
     unites : whether spots unite by a rule, which may cost or gain a little energy.
     periodic_only : whether it cannot press a square with free edges.
     least_cells : smallest number of grid cells per shortest wavelength; 0 for any number.
+    accuracy : accuracy to which a path resolves its events.
     resumable : whether a run saves checkpoints (`resumable(contact, folder)` of its module).
     """
 
@@ -82,6 +103,7 @@ class Model:
     unites: bool = False
     periodic_only: bool = False
     least_cells: int = 0
+    accuracy: PathAccuracy = PathAccuracy()
     resumable: bool = False
 
 
@@ -132,6 +154,8 @@ MODELS = {
         by_cells=True,
         periodic_only=True,
         least_cells=4,
+        # Fronts that hop from cell to cell lose energy that only a finer grid would resolve.
+        accuracy=PathAccuracy(event=1e-5, loss=1e-5, tension=1e-5, predicts_steps=True),
         resumable=True,
     ),
 }

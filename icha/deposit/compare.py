@@ -43,6 +43,8 @@ FLOOR = 1e-6
 NOISE = {"residual": RESIDUAL_LIMIT, "gap_residual": RESIDUAL_LIMIT, "front_residual": FRONT_LIMIT}
 # Endings of files that are made from the data, whose differences are remarks.
 _DERIVED = (".png", ".pdf", ".html", "checks.json")
+# Largest number of variables in a table.
+_MOST_LINES = 20
 # Longest text of an error and of a value, in characters.
 _LONGEST_ERROR, _LONGEST_VALUE = 300, 60
 
@@ -247,10 +249,10 @@ def _shown(value: object) -> str:
     return text if len(text) <= _LONGEST_VALUE else f"{text[: _LONGEST_VALUE - 3]}..."
 
 
-def format_comparison(comparison: Comparison, most: int = 20) -> str:
+def format_comparison(comparison: Comparison) -> str:
     """Write the result as text: a line for every kind of file, and one for every variable that is not identical.
 
-    Variables with the largest deviations come first: at most `most` that differ, and as many within tolerance.
+    Variables with the largest deviations come first: at most `_MOST_LINES` that differ, and as many within tolerance.
     """
     kinds = sorted({file.kind for file in comparison.files}, key=COMPUTED.index)
     width = max(map(len, kinds), default=0)
@@ -262,9 +264,9 @@ def format_comparison(comparison: Comparison, most: int = 20) -> str:
         text.append(" ".join([f"{kind:<{width}}", f"{counts.total():>7}", *columns]).rstrip())
     for within in (False, True):
         found = _lines(comparison, within)
-        text += [printable(line) for line in found[:most]]
-        if len(found) > most:
-            text.append(f"… and {len(found) - most} more")
+        text += [printable(line) for line in found[:_MOST_LINES]]
+        if len(found) > _MOST_LINES:
+            text.append(f"… and {len(found) - _MOST_LINES} more")
     if any(file.is_remark for file in comparison.files):
         text.append("Figures, pages and checks are made from the data above; if only they differ, nothing is wrong.")
     return "\n".join(text)

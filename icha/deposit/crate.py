@@ -22,7 +22,7 @@ from rocrate.rocrate import ROCrate
 from icha.configuration.publication import Author, Publication
 from icha.contact.models import MODEL_PAPER
 from icha.datasets.results import CONFIGURATION
-from icha.deposit.metadata import TABLES, known_licence, web_address
+from icha.deposit.metadata import TABLES, find_licence, web_address
 from icha.deposit.verify import CRATE, README, SOURCE
 from icha.support.atomic_files import whole_file
 
@@ -93,7 +93,7 @@ def write_crate(
         crate.add(ContextEntity(crate, key, properties))
     _describe(crate, publication, campaign)
     shown = {path for path in checksums if not path.startswith(_PROGRAM)}
-    shown |= {*_SHOWN, *(job.script for job in jobs)} & set(checksums)
+    shown |= {*_SHOWN, *(job.script for job in jobs)}
     files = {path: _add_file(crate, path, Path(folder, path), checksums[path]) for path in sorted(shown)}
     source = crate.add(Dataset(crate, dest_path=_PROGRAM))
     _set(
@@ -108,8 +108,7 @@ def write_crate(
     _describe_workflow(crate, files, revision, _steps(jobs))
     _add_jobs(crate, jobs, files, f"Campaign {campaign}", publication.title)
     _set(crate.root_dataset, mainEntity=files[_WORKFLOW])
-    if README in files:
-        _set(files[README], about=crate.root_dataset)
+    _set(files[README], about=crate.root_dataset)
     with whole_file(Path(folder) / CRATE) as part:
         part.write_text(json.dumps(crate.metadata.generate(), indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
     Path(folder, CRATE).chmod(0o644)
@@ -127,7 +126,7 @@ def _steps(jobs: Sequence[Job]) -> list[Job]:
 
 def _describe(crate: ROCrate, publication: Publication, campaign: str) -> None:
     """Describe the deposit as a whole."""
-    licence = known_licence(publication.license)
+    licence = find_licence(publication.license)
     _set(
         crate.root_dataset,
         name=publication.title,
@@ -214,7 +213,7 @@ def _describe_workflow(crate: ROCrate, files: Mapping[str, File], revision: str,
         name="ICHA: adhesive rough contact by interacting and coalescing asperities",
         version=revision,
         conformsTo={"@id": "https://bioschemas.org/profiles/ComputationalWorkflow/1.0-RELEASE"},
-        license=files.get(_LICENCE),
+        license=files[_LICENCE],
         programmingLanguage=crate.dereference("#snakemake"),
         hasPart=list(tools.values()),
         step=how_to,

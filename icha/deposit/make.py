@@ -18,7 +18,7 @@ from icha.configuration.campaign import Campaign
 from icha.configuration.cases import campaign_sha256, run_sha256
 from icha.datasets.files import read_campaign
 from icha.deposit.crate import Job, write_crate
-from icha.deposit.metadata import citation_cff, datacite_metadata, known_licence, zenodo_metadata
+from icha.deposit.metadata import citation_cff, datacite_metadata, find_licence, zenodo_metadata
 from icha.deposit.program import Source
 from icha.deposit.readme import data_dictionary, dictionary_csv, readme
 from icha.deposit.verify import CHECKSUMS, CRATE, README, SOURCE, ZENODO, files_of, problem_with_name
@@ -66,7 +66,7 @@ def make_deposit(
         exactly the known failures.
     """
     folder, archive, results = Path(folder), Path(archive), Path(results)
-    files, publication = sorted(files), campaign.published()
+    files, publication = sorted(files), campaign.deposit_metadata()
     refuse_unknown_failures(read_checks(results / "checks.json"), [each.run for each in publication.known_failures])
     _refuse_changed(results, files)
     part = folder.with_name(f".{folder.name}.part")
@@ -144,8 +144,8 @@ def refuse_mixed(results: Path, campaign: Campaign, recorded: Mapping[str, str])
 
 def _describe(part: Path, files: Sequence[str], campaign: Campaign, revision: str, cost: Cost) -> None:
     """Write licence, citation, metadata, data dictionary and page of the deposit."""
-    publication, dictionary = campaign.published(), data_dictionary(part, files)
-    _write(part / "LICENSE.txt", known_licence(publication.license).page(SOURCE))
+    publication, dictionary = campaign.deposit_metadata(), data_dictionary(part, files)
+    _write(part / "LICENSE.txt", find_licence(publication.license).page())
     _write(part / "CITATION.cff", citation_cff(publication, revision))
     for name, metadata in ((ZENODO, zenodo_metadata(publication)), ("datacite.json", datacite_metadata(publication))):
         _write(part / name, json.dumps(metadata, indent=1, ensure_ascii=False, allow_nan=False) + "\n")

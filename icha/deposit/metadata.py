@@ -12,7 +12,7 @@ from packaging.licenses import InvalidLicenseExpression, canonicalize_license_ex
 from icha.configuration.campaign import Campaign
 from icha.configuration.publication import Author, Funding, Publication, RelatedIdentifier
 from icha.contact.models import MODEL_PAPER
-from icha.deposit.verify import ZENODO, read_text
+from icha.deposit.verify import SOURCE, ZENODO, read_text
 
 _FOLDER = Path(__file__).parent
 TABLES = yaml.safe_load((_FOLDER / "tables.yaml").read_text(encoding="utf-8"))
@@ -34,17 +34,17 @@ class Licence(NamedTuple):
     address: str
     text: str
 
-    def page(self, source: str) -> str:
-        """Write LICENSE.txt of a deposit whose data have this licence; `source` is the folder of the program."""
+    def page(self) -> str:
+        """Write LICENSE.txt of a deposit whose data have this licence."""
         name = self.identifier if self.name == self.identifier else f"{self.name} ({self.identifier})"
         statement = (
             f"Data, figures and texts of this deposit: {name}\n{self.address}\n\n"
-            f"The program in {source}/ has a licence of its own: {source}/LICENSE\n"
+            f"The program in {SOURCE}/ has a licence of its own: {SOURCE}/LICENSE\n"
         )
         return f"{statement}\n{'-' * 72}\n\n{self.text}" if self.text else statement
 
 
-def known_licence(identifier: str) -> Licence:
+def find_licence(identifier: str) -> Licence:
     """Return the licence with an SPDX identifier.
 
     Raises
@@ -71,9 +71,9 @@ def known_licence(identifier: str) -> Licence:
 
 def licence_problem(campaign: Campaign) -> tuple[str, str] | None:
     """Return key and text of a problem with the licence of a campaign's data; None if a deposit can have it."""
-    licence = campaign.published().license
+    licence = campaign.deposit_metadata().license
     try:
-        known_licence(licence)
+        find_licence(licence)
     except ValueError as error:
         return "publication.license" if campaign.publication.license else "license", f"{licence!r} {error}"
     return None
@@ -120,7 +120,7 @@ def citation_cff(publication: Publication, revision: str) -> str:
     publication : complete metadata (`icha.configuration.publication.missing_metadata`).
     revision : that of the program that made the data.
     """
-    licence = known_licence(publication.license)
+    licence = find_licence(publication.license)
     paper = {
         "type": "article",
         "title": MODEL_PAPER.title,
@@ -188,7 +188,7 @@ def zenodo_metadata(publication: Publication) -> dict[str, Any]:
         "version": publication.version,
         "creators": creators,
         "access_right": "open",
-        "license": known_licence(publication.license).identifier.lower(),
+        "license": find_licence(publication.license).identifier.lower(),
         "language": "eng",
         "doi": publication.doi,
         "keywords": publication.keywords,
@@ -229,7 +229,7 @@ def datacite_metadata(publication: Publication) -> dict[str, Any]:
 
     Without a DOI the publisher is unknown, and `:tba`, DataCite's word for values that will be known later.
     """
-    licence = known_licence(publication.license)
+    licence = find_licence(publication.license)
     paper = RelatedIdentifier(identifier=f"arXiv:{MODEL_PAPER.arxiv}", relation="Cites", resource="Preprint")
     rights = {
         "rights": licence.name,

@@ -26,7 +26,7 @@ from icha.datasets.campaign import run_place, runs_of_status
 from icha.datasets.labels import LABELS, RunLabels, slopes_of
 from icha.datasets.results import LOOP, RUN, SOLUTION, SURFACE, THEORIES
 from icha.datasets.variables.campaign import COMPLETE, FAILED_CHECKS, INCOMPLETE, NOT_IN_DESIGN, STATUS_MEANINGS
-from icha.deposit.metadata import TABLES, acknowledgement, known_licence, paragraphs, web_address
+from icha.deposit.metadata import TABLES, acknowledgement, find_licence, paragraphs, web_address
 from icha.deposit.verify import COMPUTED
 from icha.planning.costs import Cost
 from icha.planning.requirements import further_software
@@ -182,14 +182,14 @@ def readme(
     sizes : bytes of every file, by its path in the deposit.
     cost : expected cost of computing the whole campaign.
     """
-    publication = campaign.published()
+    publication = campaign.deposit_metadata()
     authors = "; ".join(author.sorted_name for author in publication.authors)
     text = _template().render(
         publication=publication,
         citation=f"{authors} ({publication.date[:4]}): {publication.title}. Version {publication.version}. Data set.",
         paper=MODEL_PAPER,
         summary=paragraphs(publication.summary),
-        licence=known_licence(publication.license),
+        licence=find_licence(publication.license),
         revision=revision,
         variables=_short_dictionary(dictionary, campaign.name),
         cost=cost,

@@ -1,7 +1,5 @@
 """Distributions of gap and pressure over the nominal area, and the contact area of every grid cell."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from icha.asperity.jkr import JKR
@@ -11,41 +9,6 @@ from icha.half_space.grid_displacement import DisplacementField, row_blocks, win
 from icha.support.parallel import on_cores
 from icha.surfaces.square import cell_of
 from icha.surfaces.surface import Surface
-
-
-@dataclass(frozen=True, eq=False)
-class GapDistribution:
-    """Distribution P(u) of the gap over the nominal area.
-
-    Attributes
-    ----------
-    edges : (bins + 1,) float, edges of the bins, m.
-    density : (bins,) float, 1/m.
-    overlap_fraction : area fraction of negative gaps, where the model lets the surfaces overlap.
-    beyond_edges : A/A0 less the area fraction that spots cover. Spots may reach over the edges of a free square, and
-        two spots that have split may overlap.
-    """
-
-    edges: np.ndarray
-    density: np.ndarray
-    overlap_fraction: float
-    beyond_edges: float = 0.0
-
-
-@dataclass(frozen=True, eq=False)
-class PressureDistribution:
-    """Distribution P(p) of the pressure over the nominal area.
-
-    Attributes
-    ----------
-    edges : (bins + 1,) float, edges of the bins, Pa.
-    density : (bins,) float, 1/Pa.
-    mean : (bins,) float, area-weighted mean pressure of each bin, Pa.
-    """
-
-    edges: np.ndarray
-    density: np.ndarray
-    mean: np.ndarray
 
 
 def contact_cover(surface: Surface, spots: Spots) -> np.ndarray:
@@ -73,12 +36,18 @@ def _cover_grid(period, grid, centres, radii, free):
     return tuple(np.concatenate(parts) for parts in zip(*blocks, strict=True))
 
 
-def gap_distribution(law: JKR, surface: Surface, state: ContactState) -> GapDistribution:
-    """Return P(u) from the gaps of all grid cells; a cell on the edge of a spot counts with its part outside the spot.
+def gap_distribution(law: JKR, surface: Surface, state: ContactState) -> dict:
+    """Return the distribution P(u) of the gap over the nominal area, by the names of its variables.
 
-    The integral of P(u) + A/A0 + overlap is 1 + beyond_edges. If the node of a cell lies inside a spot, the part of the
-    cell outside has gap zero: it is the spot's edge. The last bin includes larger gaps. The field is evaluated in
-    blocks of rows, never as a whole.
+    A cell on the edge of a spot counts with its part outside the spot; if its node lies inside the spot, this part has
+    gap zero. The last bin includes larger gaps. The gaps are evaluated in blocks of rows, never as a whole field.
+
+    Returns
+    -------
+    gap_density : (bins,) float, P(u) in the bins of `icha.contact.model.gap_bins`, 1/m.
+    overlap_fraction : area fraction of negative gaps, where the model lets the surfaces overlap.
+    area_beyond_edges : A/A0 less the area fraction that spots cover. Spots may reach over the edges of a free square,
+        and two spots that have split may overlap. The integral of P(u) + A/A0 + overlap_fraction is 1 more than this.
     """
     edges = gap_bins(surface)
     spots, a = state.spots, state.spots.contact_radius
@@ -101,7 +70,8 @@ def gap_distribution(law: JKR, surface: Surface, state: ContactState) -> GapDist
     if free:
         area = np.sum(np.pi * a**2) / period**2
         beyond += max(float(area - sum(covered) / grid**2), 0.0)
-    return GapDistribution(edges, content[1:] / np.diff(edges), float(content[0]), beyond)
+    density = content[1:] / np.diff(edges)
+    return {"gap_density": density, "overlap_fraction": float(content[0]), "area_beyond_edges": beyond}
 
 
 def _gap_bin(u, edges):
@@ -115,11 +85,16 @@ def _gap_bin(u, edges):
     return index
 
 
-def pressure_distribution(law: JKR, surface: Surface, spots: Spots) -> PressureDistribution:
-    """Return P(p) over the nominal area from the closed form for every spot, without a grid.
+def pressure_distribution(law: JKR, surface: Surface, spots: Spots) -> dict:
+    """Return the distribution P(p) of the pressure over the nominal area, by the names of its variables.
 
-    The integral of P(p) is A/A0; the sum of density times width times mean over the bins is F/A0. The last bin, which
-    ends at 500 E* h'_rms, includes larger pressures.
+    It follows from the closed form for every spot, without a grid. The integral of P(p) is A/A0; the sum of density
+    times width times mean over the bins is F/A0. The last bin, which ends at 500 E* h'_rms, includes larger pressures.
+
+    Returns
+    -------
+    pressure_density : (bins,) float, P(p) in the bins of `icha.contact.model.PRESSURE_BINS`, 1/Pa.
+    pressure_bin_mean : (bins,) float, area-weighted mean pressure of each bin, Pa.
     """
     edges = PRESSURE_BINS * (law.material.contact_modulus * surface.rms_slope)
     a, R = spots.contact_radius, spots.radius_of_curvature
@@ -133,7 +108,7 @@ def pressure_distribution(law: JKR, surface: Surface, spots: Spots) -> PressureD
         area[0] = force[0] = 0.0
     content, load = np.diff(area), np.diff(force)
     mean = np.divide(load, content, out=np.zeros(len(content)), where=content > 0)
-    return PressureDistribution(edges, content / (surface.period**2 * np.diff(edges)), mean)
+    return {"pressure_density": content / (surface.period**2 * np.diff(edges)), "pressure_bin_mean": mean}
 
 
 def _cover(period, grid, centres, radii, rows, free=False):

@@ -10,6 +10,7 @@ import numpy as np
 from icha.asperity.jkr import JKR
 from icha.asperity.material import Material
 from icha.contact.model import AREA_FRACTION, PRESSURE, Control, Events, count_summits, largest_tension
+from icha.contact.models import DEFAULT_MODEL, MODELS, PathAccuracy
 from icha.equilibrium.distributions import gap_distribution, pressure_distribution
 from icha.equilibrium.equations import nominal_derivative, nominal_value, radius_response
 from icha.equilibrium.sites import ContactState, Problem, Sites
@@ -35,6 +36,11 @@ class InteractingAsperities(Problem):
     def largest_area_fraction(self) -> float:
         """Contact area fraction above which spots have lost their identity."""
         return _LARGEST_AREA
+
+    @property
+    def path_accuracy(self) -> PathAccuracy:
+        """Accuracy to which a path resolves events."""
+        return MODELS[DEFAULT_MODEL].accuracy
 
     def untouched(self) -> ContactState:
         """Return the state in which the first asperity is about to make contact."""
@@ -153,14 +159,9 @@ class AsperityObservables:
     def of_snapshot(self, state: ContactState) -> dict:
         """Return the distributions of gap and pressure, and the spots."""
         law, spots = self.contact.law, state.spots
-        gaps = gap_distribution(law, self.surface, state)
-        pressures = pressure_distribution(law, self.surface, spots)
         return {
-            "overlap_fraction": gaps.overlap_fraction,
-            "area_beyond_edges": gaps.beyond_edges,
-            "gap_density": gaps.density,
-            "pressure_density": pressures.density,
-            "pressure_bin_mean": pressures.mean,
+            **gap_distribution(law, self.surface, state),
+            **pressure_distribution(law, self.surface, spots),
             "spot_x": spots.position[:, 0],
             "spot_y": spots.position[:, 1],
             "spot_radius": spots.contact_radius,

@@ -56,7 +56,6 @@ def find_equilibrium(
 
     Parameters
     ----------
-    start : equilibrium to start from.
     separation : mean separation, or its first guess if there is a control, m.
     control : load or area to hold instead of the separation.
     break_first : number of spots that break contact first, those closest to jump-off.

@@ -52,7 +52,7 @@ def inputs(campaign: Campaign, options: LoopsFigure, files: results.ResultFiles)
         files.path(results.LOOP, ContactLabels(label, *contact))
         for label, entry in campaign.boundary_element_loops.items()
         if entry.study == options.study
-        for contact in campaign.solved(entry)
+        for contact in campaign.contacts_beside(entry)
     ]
     return {"campaign": files.path(results.DATASET)} | ({"loops": loops} if loops else {})
 

@@ -49,7 +49,7 @@ def finest_solution(campaign: Campaign, options: MapFigure) -> SolutionLabels | 
     _, _, *contact = options.run(campaign)
     for label, entry in sorted(campaign.finite_range.items(), key=lambda each: -each[1].refinement):
         solved = entry.study == options.study and value in entry.reduced_pressures
-        if solved and tuple(contact) in campaign.solved(entry):
+        if solved and tuple(contact) in campaign.contacts_beside(entry):
             return SolutionLabels(label, options.study, *contact, value)
     return None
 

@@ -26,23 +26,19 @@ from icha.path.stops import (
     TargetFunction,
     find_first_target,
 )
-from icha.path.targets import LOADS, MEAN_SEPARATION, UNBALANCED_WORK, UNRESOLVED_LOSS, UNRESOLVED_REST, Path
+from icha.path.targets import LOADS, MEAN_SEPARATION, UNRESOLVED_LOSS, Path
 
 # Largest unknown work of a step where jumps have released no energy, relative to the work so far.
 UNRESOLVED_WORK = 2e-4
 # Longest step in which spots may coalesce or split, relative to the longest step of the path.
 UNION_STEP = 1 / 16
 # Largest integration error of a step without events, relative to the work so far, unless work and change of energy
-# agree to UNBALANCED_WORK.
+# agree.
 _CURVED_WORK = 1e-4
-# Smallest scale of the losses in tension, relative to the work so far. The fronts of boundary elements lose such parts
-# when they move from cell to cell, which no short step resolves.
+# Smallest scale of the losses in tension, relative to the work so far.
 _LEAST_LOSS = 1e-2
-# Shortest step of the separation, in h_rms; the first contact is made and the last one broken within it.
-_SHORTEST_STEP = 1e-12
-# Largest error of the largest tension, relative to it: at an event, and between two equilibria without an event.
+# Largest error of the largest tension at an event, relative to it.
 _MISSED_TENSION = 1e-3
-_MISSED_SMOOTH_TENSION = 1e-8
 # Without adhesion unloading visits a separation so far above first contact, in h_rms, in case the error of an
 # equilibrium leaves a spot in contact there.
 _ABOVE_CONTACT = 1e-8
@@ -77,7 +73,7 @@ def follow_cycle(
     yield waypoint_between(start, 0)
     cycle = _Cycle(contact, longest, progress, start)
     if contact.adhesive:
-        cycle.step_length = _SHORTEST_STEP * contact.rms_height
+        cycle.step_length = cycle.shortest
     else:
         cycle.stations = [start.separation + _ABOVE_CONTACT * contact.rms_height]
     yield from cycle.follow_leg(0, targets)
@@ -111,6 +107,8 @@ class _Cycle:
     leg : number of the leg, even on loading and odd on unloading.
     step_length : length of the next step, m.
     event_at : first known position of an event that is not resolved yet, as direction times separation, m.
+    event_width : length of a step that resolves it, m.
+    smooth_length : length of steps without events, m.
     effort : sum of work and losses so far, without their signs, J/m^2.
     jump_energy : energy released by jumps so far, each as if its spot were alone, J/m^2.
     lowest_pressure : lowest nominal pressure so far, at most zero, Pa.
@@ -124,6 +122,8 @@ class _Cycle:
     leg: int = 0
     step_length: float = np.nan
     event_at: float = np.inf
+    event_width: float = 0.0
+    smooth_length: float = 0.0
     effort: float = 0.0
     jump_energy: float = 0.0
     lowest_pressure: float = 0.0
@@ -139,6 +139,11 @@ class _Cycle:
         return self.leg % 2 == 0
 
     @property
+    def shortest(self) -> float:
+        """Length of a step that makes the first contact or breaks the last one, m."""
+        return self.contact.path_accuracy.event * self.contact.rms_height
+
+    @property
     def direction(self) -> int:
         """Direction of the separation: -1 on loading, 1 on unloading."""
         return -1 if self.loading else 1
@@ -151,7 +156,7 @@ class _Cycle:
         self, leg: int, targets: list[TargetFunction], until_apart: bool = False
     ) -> Generator[Waypoint, TargetFunction | None, None]:
         """Yield the equilibria of a leg until all targets are met or, with `until_apart`, until nothing touches."""
-        self.leg, self.event_at = leg, np.inf
+        self.leg, self.event_at, self.smooth_length = leg, np.inf, 0.0
         pending, sent = PendingTargets(targets, self.direction), None
         visited, width_limit = [self.state.separation], np.inf
         while pending or until_apart:
@@ -182,7 +187,7 @@ class _Cycle:
             self.progress.require_validity(self.state, met, listed, pending, self.loading)
             # The first contact forms in the shortest step; after that the longest one is tried.
             first = leg == 0 and len(visited) == 1
-            self.step_length = self.longest if first else min(self.longest, 2 * self.step_length)
+            self.step_length = self.longest if first else self._next_length(step, met)
             self._accept(met, step)
             width_limit = np.inf
             if self._is_new_station(met.separation, visited[-1]):
@@ -215,7 +220,7 @@ class _Cycle:
 
         width : length of the step that is tried first, m.
         """
-        start, unit = self.state, self.contact.rms_height
+        start = self.state
         while True:
             try:
                 state = self._find_equilibrium(start.separation + self.direction * width, width)
@@ -224,8 +229,8 @@ class _Cycle:
                 continue
             step = Step.between(self.contact, start, state)
             # Within the error of an equilibrium an event may happen in a long step and not in a short one.
-            passed = step.has_jump and self.direction * start.separation + _SHORTEST_STEP * unit >= self.event_at
-            sharp = width <= _SHORTEST_STEP * unit or passed
+            passed = step.has_jump and self.direction * start.separation + self.shortest >= self.event_at
+            sharp = width <= self.shortest or passed
             if sharp or (self._is_work_known(state, step) and self._is_tension_known(state, step)):
                 if step.has_jump:
                     self.event_at = np.inf
@@ -236,6 +241,9 @@ class _Cycle:
             else:
                 if step.has_jump:
                     self.event_at = min(self.event_at, self.direction * state.separation)
+                    self.event_width = 0.5 * width * min(1.0, self._unknown_work(step) / (step.unresolved or np.inf))
+                else:
+                    self.smooth_length = min(self.smooth_length, 0.5 * width)
                 width *= 0.5
             self.step_length = min(self.step_length, width)
 
@@ -274,20 +282,40 @@ class _Cycle:
         stored energy in a step without events.
         """
         width = abs(step.width)
-        effort = self.effort + abs(step.work) + abs(step.loss)
-        released = UNRESOLVED_LOSS * (self.jump_energy + step.jump_energy(self.contact))
-        if step.unresolved > (max(released, UNRESOLVED_REST * effort) if released else UNRESOLVED_WORK * effort):
+        if step.unresolved > self._unknown_work(step):
             return False
         # The union of two spots depends on how far they overlap when it is found.
         if step.has_union and width > UNION_STEP * self.longest:
             return False
-        scale = effort
+        accuracy = self.contact.path_accuracy
+        scale = effort = self.effort + abs(step.work) + abs(step.loss)
         if step.width > 0 and self.contact.pressure(state) < 0:
             # In compression loading and unloading visit the same stations, so that their errors cancel. In tension
             # they do not: the error is relative to the losses.
             scale = min(effort, max(10 * self.jump_energy, _LEAST_LOSS * effort))
-        unbalanced = step.integration_error > _CURVED_WORK * scale and abs(step.loss) > UNBALANCED_WORK * scale
+        unbalanced = step.integration_error > _CURVED_WORK * scale and abs(step.loss) > accuracy.balance * scale
         return step.has_jump or not unbalanced or width <= self.longest / 256
+
+    def _unknown_work(self, step):
+        """Return the largest work that the events of a step may leave unknown, J/m^2."""
+        effort = self.effort + abs(step.work) + abs(step.loss)
+        released = UNRESOLVED_LOSS * (self.jump_energy + step.jump_energy(self.contact))
+        return max(released, self.contact.path_accuracy.loss * effort) if released else UNRESOLVED_WORK * effort
+
+    def _next_length(self, step, state):
+        """Return the length of the step after one to a state: twice as long, or as far as its errors allow."""
+        longer = min(self.longest, 2 * self.step_length)
+        if not self.contact.path_accuracy.predicts_steps:
+            return longer
+        if step.has_jump:
+            return max(longer, self.smooth_length)
+        distance = self.event_at - self.direction * state.separation
+        if 0 < distance < np.inf:
+            return distance if distance <= self.event_width else 0.5 * distance
+        self.smooth_length = max(self.smooth_length, abs(step.width))
+        # The error of a step grows with the cube of its length.
+        effort = self.effort + abs(step.work) + abs(step.loss)
+        return longer if 8 * step.integration_error <= _CURVED_WORK * effort else self.step_length
 
     def _is_tension_known(self, state, step):
         """Return whether the largest tension of a step is known well enough, as far as its events decide it."""
@@ -314,7 +342,7 @@ class _Cycle:
         # The tangents meet below the curve.
         meet = (q - end_slope * step.width - p) / (slope - end_slope)
         lowest = p + slope * meet
-        if lowest >= self.lowest_pressure or min(p, q) - lowest <= _MISSED_SMOOTH_TENSION * abs(lowest):
+        if lowest >= self.lowest_pressure or min(p, q) - lowest <= contact.path_accuracy.tension * abs(lowest):
             return None
         lowest_at = _minimum_of_cubic(step.width, (p, q), (slope, end_slope))
         return start.separation + (meet if lowest_at is None else lowest_at)

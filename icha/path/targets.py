@@ -21,10 +21,6 @@ DEFAULT_STEP = 0.15
 # Largest unknown work of one step, relative to the energy that jumps have released so far. The work is unknown because
 # the events of a step may happen anywhere in it.
 UNRESOLVED_LOSS = 5e-4
-# The same relative to the work so far, where jumps release next to no energy: equilibria are known no better.
-UNRESOLVED_REST = 1e-10
-# Largest difference between work and change of energy in a long step without events, relative to the work so far.
-UNBALANCED_WORK = 3e-6
 
 STEP = FloatRange("h_rms", least=MIN_STEP, most=MAX_STEP)
 

@@ -1,9 +1,8 @@
-"""What computing costs: seconds, memory and disk of everything that a campaign makes, before it is made.
+"""Cost model: expected time, memory and disk of each job of a campaign.
 
-Times follow one power law for each kind of job. Its powers and scales are least squares of the logarithms of measured
-times, mostly on one core of an AMD EPYC; they are within a factor of two in nine of ten cases, which are kept in
-`tests/planning/measured_times.csv`. `correction` brings in what the jobs of the campaign itself took, on the machine
-that it runs on.
+Times follow one power law for each kind of job. Powers and scales are a least-squares fit to the logarithms of measured
+times, mostly on one core of an AMD EPYC. Nine of ten measured times, in `tests/planning/measured_times.csv`, are within
+a factor of two. `correction` calibrates the times by completed jobs of the campaign on the present machine.
 """
 
 from __future__ import annotations
@@ -24,17 +23,17 @@ _DOUBLE = 8
 
 @dataclass(frozen=True)
 class Workflow:
-    """Times (s) and memory (bytes) of a campaign besides those of its jobs.
+    """Time (s) and memory (bytes) of a campaign outside the work of its jobs.
 
-    Parameters
+    Attributes
     ----------
-    start : from the call to the first job: `icha run`, Snakemake, the plan.
+    start : time from the call to the first job: `icha run`, Snakemake, the plan.
     planned : further time for each file of the plan.
-    environment : imports of the process that jobs are forked from, once.
-    job : time of a job besides its work: scheduling, fork, log, checksums.
+    environment : time of the imports of the process that jobs are forked from, once.
+    job : time of a job outside its work: scheduling, fork, log, checksums.
     memory : of Snakemake, `icha run` and the process that jobs are forked from.
-    forked : of a job that is a fork, before its work.
-    program : of a job that is a process of its own, before its work.
+    forked : memory of a job that is a fork, before its work.
+    program : memory of a job that is a process of its own, before its work.
     """
 
     start: float = 2.6
@@ -51,13 +50,13 @@ WORKFLOW = Workflow()
 
 @dataclass(frozen=True)
 class PowerLaw:
-    """Seconds of a kind of job.
+    """Time of a kind of job.
 
-    Parameters
+    Attributes
     ----------
-    base : imports and files, s.
-    scale : seconds where all quantities are 1.
-    powers : power of each quantity by its name.
+    base : time of imports and files, s.
+    scale : time where all quantities are 1, s.
+    powers : power of each quantity, by its name.
     """
 
     base: float
@@ -65,12 +64,13 @@ class PowerLaw:
     powers: Mapping[str, float]
 
     def seconds(self, **quantities: float) -> float:
-        """Time of a job with these quantities, s; those without a power do not matter."""
+        """Time of a job with these quantities, s; quantities without a power are ignored."""
         return self.base + self.scale * math.prod(quantities[name] ** power for name, power in self.powers.items())
 
 
-# Of runs: model, whether they adhere, whether they also unload. `nodes` of a grid or of the solver's grid, `spots` at
-# the largest load, `stops` of the path, `load` p/(E* h'rms), `step` of the mean gap in h_rms, `runs` of a campaign.
+# Laws of runs are named by the model, adhesion and unloading. Quantities are `nodes` of the grid of the surface or the
+# solver, `spots` at the largest load, `stops` (targets of the path), `load` p/(E* h'rms), `step` of the mean gap in
+# h_rms, and `runs` of a campaign.
 LAWS = {
     "surface": PowerLaw(0.015, 2.4e-7, {"nodes": 1}),
     "asperities": PowerLaw(0.14, 1.6e-3, {"spots": 1.06}),
@@ -97,12 +97,12 @@ LAWS = {
 
 
 def _law(solver: str, *, adhesive: bool, cycle: bool = False) -> PowerLaw:
-    """The law of a solver with adhesion or without, of loading alone or of a cycle."""
+    """Power law of a solver, with or without adhesion, for loading alone or a cycle."""
     return LAWS[", ".join([solver, *["adhesion"] * adhesive, *["cycle"] * cycle])]
 
 
 class Recorded(NamedTuple):
-    """Numbers of steps and snapshots of a run, and of spots in all of its snapshots."""
+    """Numbers of steps and snapshots of a run, and of spots in all its snapshots."""
 
     steps: float
     snapshots: int
@@ -113,12 +113,12 @@ class Recorded(NamedTuple):
 class Cost:
     """Cost of a job.
 
-    Parameters
+    Attributes
     ----------
     seconds : on the cores that it gets.
-    memory : largest memory that is the job's own; bytes.
+    memory : largest memory of the job itself, bytes.
     disk : bytes.
-    recorded : what a run adds to the campaign dataset.
+    recorded : numbers that determine the size of a run in the campaign dataset.
     """
 
     seconds: float
@@ -128,40 +128,40 @@ class Cost:
 
 
 def job_threads(grid: int) -> int:
-    """Cores that a job of a surface takes, and is given: two where they pay, else one."""
+    """Cores of a job of a surface: two on a grid so large that they pay, otherwise one."""
     return 2 if grid >= LARGE_GRID else 1
 
 
 def _memory_before(grid):
-    """Bytes that the job of a surface takes before it begins: only those of one core are forks."""
+    """Memory of the job of a surface before its work, bytes; only jobs of one core are forks."""
     return WORKFLOW.program if job_threads(grid) > 1 else WORKFLOW.forked
 
 
 def surface_cost(grid: int) -> Cost:
-    """Making a topography of `grid` nodes a side, and writing it."""
+    """Cost of a topography of `grid` nodes a side."""
     heights = _DOUBLE * grid**2
-    # Compression makes heights smaller by about a sixth.
+    # Compression saves about a sixth of the heights.
     compression = 0.84 if grid**2 in COMPRESSED_SIZES else 1.0
     seconds = LAWS["surface"].seconds(nodes=grid**2)
     return Cost(seconds, _memory_before(grid) + 2.7 * heights, 18e3 + compression * heights)
 
 
 def spots(summits: float, load: float) -> float:
-    """Spots at a reduced pressure, good to a factor of two for surfaces of 10 to 200 000 summits."""
+    """Number of spots at a reduced pressure, to a factor of two for surfaces of 10 to 200 000 summits."""
     return max(1.0, summits * min(0.6, math.sqrt(load)))
 
 
 @dataclass(frozen=True)
 class RunSize:
-    """What runs of a model take besides the time of their power law.
+    """Memory, disk and time limit of the runs of a model.
 
-    Parameters
+    Attributes
     ----------
-    arrays : arrays of the grid that a run holds at a time.
-    summit : bytes that a run holds for every summit.
-    maps : bytes in the file for every cell and snapshot, compressed.
-    sticky : U_full/dgamma below which a run takes longer, as the inverse of it.
-    minutes : after which a run is taken for stuck: of a loading, of a cycle, of one that gets several cores.
+    arrays : number of arrays of the grid that a run holds at a time.
+    summit : memory of a run per summit, bytes.
+    maps : size of the maps in the file per cell and snapshot, compressed, bytes.
+    sticky : U_full/dgamma below which the time of a run grows as its inverse.
+    minutes : time limit of a loading, of a cycle, and of a run on several cores.
     """
 
     arrays: int
@@ -191,18 +191,20 @@ def run_cost(
     max_step: float = DEFAULT_STEP,
     energy_ratio: float = math.inf,
 ) -> Cost:
-    """A run of `icha.simulate`.
+    """Cost of a run of `icha.simulate`.
 
     Parameters
     ----------
-    model, grid, summits : contact model; nodes a side of the surface, and number of its summits.
+    model : contact model.
+    grid : nodes a side of the surface.
+    summits : number of its summits.
     load : largest reduced pressure p/(E* h'_rms) of the first loading.
-    stops : number of its stops.
-    snapshots : number of stops that keep their fields.
+    stops : number of targets of the first loading.
+    snapshots : number of targets with a snapshot.
     adhesive : whether the surface energy is not zero.
     legs : legs after the first loading: 0, or 1 and more for unloading and loading again.
     max_step : longest step of the mean separation, in h_rms.
-    energy_ratio : elastic energy of full contact over the work of adhesion, U_full/dgamma.
+    energy_ratio : elastic energy of full contact over the adhesion energy, U_full/dgamma.
     """
     most, nodes = spots(summits, load), grid**2
     law = _law(model, adhesive=adhesive, cycle=bool(legs))
@@ -211,7 +213,7 @@ def run_cost(
     seconds *= max(1.0, size.sticky / energy_ratio)
     steps: float = stops
     if legs:
-        # Every spot comes and goes, and with adhesion each of its jumps is resolved.
+        # Every spot forms and detaches; with adhesion the path resolves each of its jumps.
         further = DEFAULT_STEP / max_step
         steps = (1 + legs) / 2 * (120 * further + (40 if adhesive else 0.75) * most)
         seconds *= (1 + legs) / 2 * further
@@ -224,39 +226,39 @@ def run_cost(
 
 
 def solution_cost(nodes: int, reduced_pressure: float, *, adhesive: bool) -> Cost:
-    """Boundary elements at a finite range, of `nodes` a side, at one load."""
+    """Cost of boundary elements at a finite range at one load, on `nodes` a side."""
     seconds = _law("finite range", adhesive=adhesive).seconds(nodes=nodes**2, load=reduced_pressure)
     return Cost(seconds, WORKFLOW.forked + 20 * _DOUBLE * nodes**2, 40e3 + 0.04 * nodes**2)
 
 
 def loop_cost(nodes: int, separation_step: float, *, adhesive: bool) -> Cost:
-    """Boundary elements at a finite range, of `nodes` a side, in loading and unloading."""
+    """Cost of boundary elements at a finite range in loading and unloading, on `nodes` a side."""
     law = _law("finite range", adhesive=adhesive, cycle=True)
     seconds = law.seconds(nodes=nodes**2, step=separation_step)
     return Cost(seconds, WORKFLOW.forked + 20 * _DOUBLE * nodes**2, 33e3)
 
 
 def theories_cost() -> Cost:
-    """Theories and literature for a surface."""
+    """Cost of the theories and published points of a surface."""
     return Cost(LAWS["theories"].seconds(), WORKFLOW.forked, 35e3)
 
 
-# Edges of the bins of `icha.contact.model`, whose imports `icha describe` would wait for.
+# Numbers of bin edges in `icha.contact.model`, which takes long to import.
 GAP_EDGES, PRESSURE_EDGES = 112, 501
-# Arrays along the steps and the spots of runs; texts count for several.
+# Numbers of arrays along the steps and the spots of runs; texts count for several.
 _STEP_ARRAYS, _SPOT_ARRAYS = 30, 11
 
 
 def dataset_memory(cells: int, runs: Sequence[Recorded]) -> float:
-    """Bytes of the arrays of a study that are read as a whole from the campaign dataset.
+    """Memory of the arrays of a study that are read as a whole from the campaign dataset, bytes.
 
     Parameters
     ----------
-    cells : number of combinations of the labels in the dataset, whether they have runs or not.
-    runs : what is recorded of each run.
+    cells : number of combinations of the labels in the dataset, with and without runs.
+    runs : recorded numbers of each run.
     """
     steps, snapshots = cells * max(run.steps for run in runs), cells * max(run.snapshots for run in runs)
-    # Number of arrays, and values of each: densities, edges and bounds of bins, steps and spots.
+    # Number of arrays and values per array of densities, edges and bounds of bins, steps, and spots.
     arrays = [
         (2, snapshots * PRESSURE_EDGES),
         (1, snapshots * GAP_EDGES),
@@ -269,26 +271,31 @@ def dataset_memory(cells: int, runs: Sequence[Recorded]) -> float:
     return sum(count * _DOUBLE * values for count, values in arrays if _DOUBLE * values <= LEFT_IN_FILE)
 
 
-# Memory that reading and using the dataset takes, over its arrays: chunks, decoded values and selected runs.
+# Memory of reading and using the dataset, over that of its arrays: chunks, decoded values and selected runs.
 _COPIES = 2.7
-# Most bytes of the values of runs that the dataset's job holds, since it writes block by block.
+# Most memory of the values of runs in the job of the dataset, which writes block by block, bytes.
 _BLOCKS = 35 * MiB
 
 
 def table_cost(kind: str, runs: int, disk: float, held: float) -> Cost:
-    """A file made of all runs: the dataset, or one made of the dataset, whose arrays take `held` bytes."""
+    """Cost of the dataset, or of a table derived from it; the arrays of the dataset take `held` bytes."""
     values = min(_COPIES * held, _BLOCKS) if kind == "dataset" else _COPIES * held
     return Cost(LAWS[kind].seconds(runs=runs), WORKFLOW.forked + 4 * MiB + values, disk)
 
 
-# Arrays of a topography that a map of contacts holds at a time, by the number of models that it shows.
+# Arrays of a topography that a contact map holds at a time, by the number of models that it shows.
 MAP_ARRAYS = {1: 2, 2: 7}
 
 
 def figure_cost(runs: int, nodes: int, models: int = 1, held: float = 0.0) -> Cost:
-    """A figure of so many runs, as PNG and PDF, with a topography of so many nodes and contacts by so many models.
+    """Cost of a figure, as PNG and PDF.
 
-    The arrays of the campaign dataset take `held` bytes.
+    Parameters
+    ----------
+    runs : number of runs that it shows.
+    nodes : number of nodes of the topography that it shows, 0 without one.
+    models : number of models whose contacts it shows.
+    held : memory of the arrays of the campaign dataset, bytes.
     """
     seconds = LAWS["figure"].seconds(runs=runs) + LAWS["map"].seconds(nodes=nodes)
     memory = 85 * MiB + MAP_ARRAYS[models] * _DOUBLE * nodes + _COPIES * held
@@ -296,15 +303,15 @@ def figure_cost(runs: int, nodes: int, models: int = 1, held: float = 0.0) -> Co
 
 
 def report_cost(runs: int, figures: int, held: float = 0.0) -> Cost:
-    """The report, which holds its figures; the arrays of the campaign dataset take `held` bytes."""
+    """Cost of the report with its figures; the arrays of the campaign dataset take `held` bytes."""
     memory = WORKFLOW.forked + 18 * MiB + _COPIES * held
     return Cost(LAWS["report"].seconds(runs=runs), memory, 700e3 + 250e3 * figures)
 
 
 def correction(pairs: Sequence[tuple[float, float]]) -> float:
-    """Factor on the expected seconds of jobs, from pairs (expected, measured) of jobs of the same kind.
+    """Factor on the expected times of jobs, from pairs (expected, measured) of jobs of the same kind.
 
-    The median ratio; few pairs count for less, and none leaves 1.
+    It is the median ratio, closer to 1 for few pairs, and 1 without any.
     """
     if not pairs:
         return 1.0

@@ -1,4 +1,4 @@
-"""Every file that a campaign computes: what is there, what is to be done, and what that is expected to cost."""
+"""Plan of a campaign: every file that it computes, the state of the file, and the expected cost of its job."""
 
 import json
 import math
@@ -25,17 +25,25 @@ from icha.support.checksums import is_whole
 from icha.support.input_files import text
 
 DONE, TO_DO, CHANGED, FAILED, DAMAGED = "done", "to do", "changed", "failed", "damaged"
-# So many of the files that are there are compared with what was expected of them.
+# Most jobs of a group whose measured times calibrate the expected ones.
 _SAMPLE = 200
-# Taken for the reduced pressure of stops that are given as separations.
+# Reduced pressure assumed for targets that are separations.
 _UNKNOWN_LOAD = 0.03
 
 
 @dataclass(frozen=True)
 class Item:
-    """One file: the part of the campaign that it belongs to, its path in the results, its state and its cost.
+    """One file of a campaign.
 
-    `threads` are the cores that its job takes; jobs of a `stage` wait for those of the stages before.
+    Attributes
+    ----------
+    part : part of the campaign that it belongs to, as `icha describe` lists them.
+    path : in the folder of results.
+    state : DONE, TO_DO, CHANGED, FAILED or DAMAGED.
+    cost : of its job.
+    threads : cores that its job takes.
+    reason : why the run failed.
+    stage : jobs of a stage wait for those of earlier stages.
     """
 
     part: str
@@ -48,42 +56,41 @@ class Item:
 
     @property
     def is_run(self) -> bool:
-        """Whether it is a run of a study."""
+        """Whether the file is a run of a study."""
         return self.path.startswith("runs/")
 
     @property
     def to_do(self) -> bool:
-        """Whether it is still to be computed; a run that failed is not, it would fail again."""
+        """Whether the file must be computed; not for a failed run, which would fail again."""
         return self.state in (TO_DO, CHANGED, DAMAGED)
 
 
 def plan(campaign: Campaign, results: Path) -> list[Item]:
-    """All files of a campaign but those that cost next to nothing, in the order in which they are made.
+    """List all files of a campaign, except those of negligible cost, in the order in which they are made.
 
-    A run counts as done if its file is there and was made with the present settings (`config_sha256`); whether the
-    program has changed since is known to Snakemake only. Other files count as done if they are there, and what they
-    are made of is. What is not what was written, by its record (`icha.support.checksums`), is damaged, and to be made
-    again.
+    A run is done if its file exists and has the present settings (`config_sha256`); only Snakemake knows whether the
+    program has changed since. Another file is done if it and its inputs exist. A file that differs from its record
+    (`icha.support.checksums`) is damaged.
 
     Parameters
     ----------
     campaign : the campaign.
-    results : its folder of results. Benchmarks in there of jobs that were done say how fast this machine is.
+    results : its folder of results, whose benchmarks calibrate the expected times for this machine.
     """
-    return list(_calibrated(_items(campaign, results), results))
+    return list(_calibrate(_items(campaign, results), results))
 
 
 def _items(campaign, results) -> list[Item]:
     files = campaign_files(campaign)
-    items = list(_computed(campaign, results, files))
-    made_anew = {item.path for item in items if item.to_do}
-    for part, path, stage, inputs, cost in _gathered(campaign, files, items):
+    items = list(_computed_files(campaign, results, files))
+    outdated = {item.path for item in items if item.to_do}
+    for part, path, stage, inputs, cost in _derived_files(campaign, files, items):
         state = _state(results, path)
-        if state == DONE and not made_anew.isdisjoint(inputs):
+        if state == DONE and not outdated.isdisjoint(inputs):
             state = TO_DO
         items.append(Item(part, path, state, cost, stage=stage))
         if items[-1].to_do:
-            made_anew.add(path)
+            outdated.add(path)
     return items
 
 
@@ -91,8 +98,8 @@ def _state(results, path):
     return TO_DO if not (results / path).is_file() else DONE if is_whole(results, path) else DAMAGED
 
 
-def _computed(campaign, results, files) -> Iterator[Item]:
-    """Surfaces, runs, and what is computed beside them."""
+def _computed_files(campaign, results, files) -> Iterator[Item]:
+    """Yield surfaces, runs, theories and solutions at finite ranges."""
     summits, run_cost = cache(lambda surface: expected_summits(campaign, surface)), cache(costs.run_cost)
     for path, (name, _) in files.surfaces.items():
         grid = campaign.grid(name)
@@ -102,7 +109,7 @@ def _computed(campaign, results, files) -> Iterator[Item]:
         if not is_whole(results, path):
             state, reason = DAMAGED, ""
         grid = campaign.grid(case.surface)
-        sweep = _sweep_of(run_settings(campaign, case), case.rms_slope)
+        sweep = _cost_parameters(run_settings(campaign, case), case.rms_slope)
         ratio = energy_ratio(campaign, case) if sweep["adhesive"] else math.inf
         cost = run_cost(case.model, grid, summits(case.surface), energy_ratio=ratio, **sweep)
         part = f"study {case.study}" + (f", {MODELS[case.model].words}" if case.model != DEFAULT_MODEL else "")
@@ -110,20 +117,20 @@ def _computed(campaign, results, files) -> Iterator[Item]:
     for path in files.theories:
         yield Item("theories", path, _state(results, path), costs.theories_cost())
     for path, case in {**files.solutions, **files.loops}.items():
-        both_ways = path in files.loops
-        entry = (campaign.boundary_element_loops if both_ways else campaign.finite_range)[case.entry]
+        is_loop = path in files.loops
+        entry = (campaign.boundary_element_loops if is_loop else campaign.finite_range)[case.entry]
         nodes = campaign.grid(case.surface) * entry.refinement
         adhesive = campaign.materials[case.material].surface_energy > 0
-        if both_ways:
+        if is_loop:
             cost = costs.loop_cost(nodes, entry.separation_step, adhesive=adhesive)
         else:
             cost = costs.solution_cost(nodes, case.reduced_pressure, adhesive=adhesive)
-        part = f"boundary elements{' both ways' if both_ways else ''} {case.entry}"
+        part = f"boundary elements{', cycle' if is_loop else ''} {case.entry}"
         yield Item(part, path, _state(results, path), cost)
 
 
-def _gathered(campaign, files: CampaignFiles, computed: list[Item]) -> Iterator[tuple]:
-    """What is made of runs: part, path, stage, inputs and cost."""
+def _derived_files(campaign, files: CampaignFiles, computed: list[Item]) -> Iterator[tuple]:
+    """Yield part, path, stage, inputs and cost of the files that are derived from runs."""
     runs, held = len(files.runs), _dataset_memory(files, computed)
     size = sum(item.cost.disk for item in computed if item.is_run)
     beside = [*files.compared, *files.solutions]
@@ -137,7 +144,7 @@ def _gathered(campaign, files: CampaignFiles, computed: list[Item]) -> Iterator[
         for path in paths:
             yield "dataset and checks", path, stage, inputs, costs.table_cost(kind, count, disk, held)
     result_files = ResultFiles(campaign.name)
-    for name in campaign.figures.drawn():
+    for name in campaign.figures.by_name():
         path = result_files.path(results_files.FIGURE, name=name, ending="png")
         inputs = campaign.figures.inputs(name, campaign, result_files).values()
         shown = set(campaign.figures.studies_of(name, campaign))
@@ -154,22 +161,22 @@ def _gathered(campaign, files: CampaignFiles, computed: list[Item]) -> Iterator[
 
 
 def _dataset_memory(files, computed):
-    """Bytes of the arrays of the campaign dataset that are read as a whole."""
+    """Memory of the arrays of the campaign dataset that are read as a whole, bytes."""
     studies: dict[str, list] = {}
     for item in computed:
         if item.is_run:
             case = files.runs[item.path]
             studies.setdefault(case.study, []).append((case, item.cost.recorded))
     return sum(
-        costs.dataset_memory(count_cells([case for case, _ in own]), [recorded for _, recorded in own])
-        for own in studies.values()
+        costs.dataset_memory(count_cells([case for case, _ in runs]), [recorded for _, recorded in runs])
+        for runs in studies.values()
     )
 
 
-def _sweep_of(settings, rms_slope) -> dict:
-    """What of a run's settings its cost depends on."""
+def _cost_parameters(settings, rms_slope) -> dict:
+    """Arguments of `run_cost` from the settings of a run."""
     path, snapshots = settings["path"], settings["path"]["snapshots"]
-    # Reduced pressures, roughly: half of the area fractions; of separations a guess.
+    # Estimates of the reduced pressure: half of an area fraction; a guess for separations.
     loads = {
         "reduced_pressure": lambda value: value,
         "relative_load": lambda value: value / rms_slope,
@@ -188,12 +195,12 @@ def _sweep_of(settings, rms_slope) -> dict:
     }
 
 
-# Attributes of a run's file that say with which settings it was computed and what it is worth.
+# Attributes of the file of a run that determine its state.
 _OF_STATE = ("config_sha256", "incomplete", "failed_checks")
 
 
 def run_state(file: Path, sha256: str) -> tuple[str, str]:
-    """State of a run's file, and the reason why the run failed, if it did."""
+    """State of the file of a run, and the reason if the run failed."""
     if not file.is_file():
         return TO_DO, ""
     attributes = read_attributes(file)
@@ -206,20 +213,20 @@ def run_state(file: Path, sha256: str) -> tuple[str, str]:
 
 
 def read_attributes(file: Path) -> dict[str, str] | None:
-    """Attributes of a run's settings and end, read without its variables; None of a file that is no whole netCDF-4."""
+    """Read the attributes of a run that determine its state; None if the file is not valid netCDF-4."""
     import h5py
 
     try:
         with h5py.File(file, "r") as data:
             return {name: text(data.attrs[name]) for name in _OF_STATE if name in data.attrs}
     except OSError as error:
-        if error.errno is not None:  # no permission, for one: that says nothing of the content
+        if error.errno is not None:  # such as missing permission, which says nothing about the content
             raise
         return None
 
 
 def failed_runs(campaign: Campaign, results: Path) -> dict[str, str]:
-    """Paths of the runs that are no results with the present settings, with their reasons."""
+    """Paths of the runs that failed with the present settings, with their reasons."""
     states = {
         case.path: run_state(results / path, run_sha256(campaign, case))
         for path, case in campaign_files(campaign).runs.items()
@@ -228,21 +235,21 @@ def failed_runs(campaign: Campaign, results: Path) -> dict[str, str]:
 
 
 def expected_seconds(items: Iterable[Item], folder: str) -> dict[str, float]:
-    """Expected core-seconds of the job of every item, handing it out included, by its path with `folder` before it."""
+    """Expected core-seconds of each job with its scheduling, by its path with `folder` before it."""
     return {f"{folder}/{item.path}": item.cost.seconds * item.threads + WORKFLOW.job for item in items}
 
 
 def whole_cost(campaign: Campaign, results: Path) -> costs.Cost:
-    """What a whole campaign is expected to take: seconds on one core, memory of the largest job, disk.
+    """Expected cost of a whole campaign: seconds on one core, memory of the largest job, disk.
 
-    By the cost model alone, whatever the jobs of this machine have taken: the same wherever it is asked for.
+    It is that of the cost model without calibration, so it is the same on every machine.
     """
     items = [replace(item, state=TO_DO) for item in _items(campaign, results)]
     return costs.Cost(time_on(items, 1), memory_on(items, 1), total(items).disk)
 
 
-def _calibrated(items: list[Item], results: Path) -> Iterator[Item]:
-    """The items with times scaled to what the jobs of their kind that are done have taken."""
+def _calibrate(items: list[Item], results: Path) -> Iterator[Item]:
+    """Scale the times of items by the measured times of completed jobs of the same kind."""
     kinds: dict[str, list[Item]] = {}
     for item in items:
         kinds.setdefault(_kind(item), []).append(item)
@@ -260,7 +267,7 @@ def _kind(item):
 
 
 def _benchmark(results: Path, item: Item) -> float | None:
-    """Seconds that the job of a file took when it last ran."""
+    """Time of the last job of a file, s; None if it is unknown."""
     try:
         lines = (results / job_file(item.path, "benchmarks", ".jsonl")).read_text(encoding="utf-8").splitlines()
         return float(json.loads(lines[-1])["s"])
@@ -270,9 +277,16 @@ def _benchmark(results: Path, item: Item) -> float | None:
 
 @dataclass(frozen=True)
 class Total:
-    """Several items together: how many there are and in which state, and what those to be done cost.
+    """Totals of several items.
 
-    `work` is in core-seconds, `longest` in s, `memory` that of the largest job and `disk` that of all files, in bytes.
+    Attributes
+    ----------
+    count, done, failed, to_do : numbers of items, of all and by state.
+    work : of items to do, core-seconds.
+    longest : longest job to do, s.
+    memory : of the largest job, bytes.
+    disk : of all files, bytes.
+    typical : median time of a job, s.
     """
 
     count: int
@@ -287,7 +301,7 @@ class Total:
 
 
 def total(items: Iterable[Item]) -> Total:
-    """Take items together."""
+    """Add up items."""
     items = list(items)
     left = [item for item in items if item.to_do]
     return Total(
@@ -304,35 +318,36 @@ def total(items: Iterable[Item]) -> Total:
 
 
 def time_on(items: Iterable[Item], cores: int) -> float:
-    """Seconds from the call to the end on some cores, if anything is to be done.
+    """Expected time from the call to the end on some cores, s; 0 if nothing is to be done.
 
-    The work of every stage is shared out, but takes never less than its longest job; jobs are handed out one by one.
+    The work of a stage is divided among the cores, but takes at least the time of its longest job, and that of
+    scheduling all its jobs one by one.
     """
     items = list(items)
     seconds = start_up(items)
     for stage in {item.stage for item in items}:
         sums = total(item for item in items if item.stage == stage)
-        handing_out = WORKFLOW.job * sums.to_do
-        seconds += max((sums.work + handing_out) / cores, sums.longest, handing_out)
+        scheduling = WORKFLOW.job * sums.to_do
+        seconds += max((sums.work + scheduling) / cores, sums.longest, scheduling)
     return seconds
 
 
 def start_up(items: Collection[Item]) -> float:
-    """Seconds until the first job, for what is to be done: Snakemake, its plan, what jobs import."""
+    """Time until the first job, s: start of Snakemake, its plan, and imports of the jobs."""
     if not any(item.to_do for item in items):
         return 0.0
     return WORKFLOW.start + WORKFLOW.planned * len(items) + WORKFLOW.environment
 
 
-def around_jobs(items: Collection[Item]) -> float:
-    """Seconds on one core that go into starting and into handing out what is to be done."""
+def overhead(items: Collection[Item]) -> float:
+    """Time of starting and scheduling the jobs to be done, core-seconds."""
     return start_up(items) + WORKFLOW.job * sum(item.to_do for item in items)
 
 
 def memory_on(items: Iterable[Item], cores: int, most: float = math.inf) -> float:
-    """Bytes that Snakemake and the largest jobs to be done take, as many as run side by side.
+    """Memory of Snakemake and of the largest jobs to be done that run in parallel, bytes.
 
-    Those side by side are let take no more than `most`, unless one does alone.
+    Parallel jobs take at most `most`, unless a single one needs more.
     """
     left = sorted((item for item in items if item.to_do), key=lambda item: -item.cost.memory)
     together, free = 0.0, cores

@@ -1,4 +1,4 @@
-"""All files that a campaign consists of, and what each of them holds."""
+"""All files of a campaign, and what each of them holds."""
 
 from dataclasses import dataclass
 
@@ -13,8 +13,14 @@ from icha.datasets.labels import ContactLabels, RunLabels, SolutionLabels
 class CampaignFiles:
     """Paths of the files of a campaign, in the order of its configuration.
 
-    Where there are many of a kind, each has what it holds beside it: labels, name and seed of a surface, or name of
-    the surface of theories.
+    Attributes
+    ----------
+    surfaces : name and seed of each surface, by path.
+    runs : labels of each run, by path.
+    theories : name of the surface, by path.
+    solutions, loops : labels of each solution at a finite range, by path.
+    compared : the boundary-element runs of studies with both models.
+    model_error : one path; empty without boundary elements to compare with.
     """
 
     surfaces: dict[str, tuple[str, int]]
@@ -25,9 +31,7 @@ class CampaignFiles:
     dataset: str
     comparison: str
     compared: dict[str, RunLabels]
-    """The runs by boundary elements that stand beside those by asperities."""
     model_error: list[str]
-    """One file; none without boundary elements, for then there is no error to tell."""
     checks: str
     verdict: str
     figures: list[str]
@@ -38,12 +42,12 @@ class CampaignFiles:
 
     @property
     def references(self) -> list[str]:
-        """What runs are compared with."""
+        """Theories and solutions that runs are compared with."""
         return [*self.theories, *self.solutions, *self.loops]
 
     @property
     def computed(self) -> list[str]:
-        """All results but the configuration as used and the deposit."""
+        """All results except the configuration as used and the deposit."""
         return [
             *self.surfaces,
             *self.runs,
@@ -59,7 +63,7 @@ class CampaignFiles:
 
 
 def campaign_files(campaign: Campaign, folder: str = "") -> CampaignFiles:
-    """All files of a campaign, as paths below its folder of results, or with that folder before them."""
+    """Return the files of a campaign, as paths in its folder of results, with `folder` before them."""
     path = results.ResultFiles(campaign.name, folder).path
 
     def each(pattern, cases):
@@ -87,11 +91,11 @@ def campaign_files(campaign: Campaign, folder: str = "") -> CampaignFiles:
         verdict=path(results.VERDICT),
         figures=[
             path(results.FIGURE, name=name, ending=ending)
-            for name in campaign.figures.drawn()
+            for name in campaign.figures.by_name()
             for ending in ("png", "pdf")
         ],
         report=path(results.REPORT),
         run_times=path(results.RUN_TIMES),
         configuration=path(results.CONFIGURATION),
-        deposit=path(results.DEPOSIT, version=campaign.published().version or "without_version"),
+        deposit=path(results.DEPOSIT, version=campaign.deposit_metadata().version or "without_version"),
     )

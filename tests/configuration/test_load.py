@@ -7,7 +7,7 @@ from demo_configuration import measured_surface
 
 from icha.configuration.errors import ConfigurationError
 from icha.configuration.load import load_configuration
-from icha.configuration.yaml_files import dumped, read_yaml
+from icha.configuration.yaml_files import dump_yaml, read_yaml
 
 
 def test_all_mistakes_are_named_at_once(load):
@@ -83,7 +83,7 @@ def test_leading_zeros_are_no_octal_numbers_and_colons_no_base_of_60(tmp_path, t
     (tmp_path / "a.yaml").write_text(f"grid: {text}\n")
     content = read_yaml(tmp_path / "a.yaml")
     assert content == {"grid": value}
-    (tmp_path / "b.yaml").write_text(dumped(content, "a"))
+    (tmp_path / "b.yaml").write_text(dump_yaml(content, "a"))
     assert read_yaml(tmp_path / "b.yaml") == content
 
 

@@ -104,6 +104,6 @@ def test_days_of_the_command_line(load):
 
 
 def test_texts_of_the_campaign_that_no_deposit_can_have(load):
-    title, summary = missing_metadata(load({"title": "A\nB", "summary": " "}).campaign.published())[-2:]
+    title, summary = missing_metadata(load({"title": "A\nB", "summary": " "}).campaign.deposit_metadata())[-2:]
     assert title.startswith("title: 'A\\nB' holds a line break")
     assert summary.startswith("summary: ' ' is blank; expected ")

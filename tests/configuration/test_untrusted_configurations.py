@@ -217,7 +217,7 @@ def test_thousands_of_targets_snapshots_and_seeds_are_planned(load, tmp_path):
             "finite_range": {f"b{i}": beside for i in range(5)},
         }
     )
-    assert len(many.campaign.solved(many.campaign.finite_range["b0"])) == 20_000
+    assert len(many.campaign.contacts_beside(many.campaign.finite_range["b0"])) == 20_000
 
 
 @pytest.mark.parametrize(

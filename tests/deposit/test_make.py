@@ -20,13 +20,14 @@ import xarray as xr
 import yaml
 from bare_campaign import CAMPAIGN as BARE
 from conftest import REPOSITORY, copy_project, snakemake_command
+from outside_validators import problems_with
 from traces import traces
 from typer.testing import CliRunner
 
 from icha.analysis.checks import read_checks
 from icha.cli import app
 from icha.configuration.cases import campaign_sha256, run_sha256
-from icha.configuration.load import load_configuration, with_files_beside_it
+from icha.configuration.load import collect_inputs, load_configuration
 from icha.configuration.publication import KnownFailure
 from icha.datasets.campaign_file import write_campaign
 from icha.datasets.files import write_dataset
@@ -35,7 +36,7 @@ from icha.deposit.crate import Job
 from icha.deposit.make import make_deposit, refuse_mixed
 from icha.deposit.program import Source
 from icha.deposit.readme import data_dictionary, file_pattern
-from icha.deposit.verify import COMPUTED, verify_deposit
+from icha.deposit.verify import COMPUTED
 from icha.planning.costs import Cost
 from icha.planning.results import campaign_files
 from icha.support.checksums import asked_of, sha256_as_written, write_checksum
@@ -301,7 +302,7 @@ def published_as(folder, campaign, results):
 
 def test_the_same_results_give_the_same_bytes_and_what_fails_leaves_them(campaign, tmp_path, monkeypatch):
     first = published_as(tmp_path / "out/small-1.0.0", *campaign)
-    assert verify_deposit(first) == verify_deposit(f"{first}.zip") == []
+    assert problems_with(first) == problems_with(f"{first}.zip") == []
     for path in campaign[1].rglob("*"):
         os.utime(path, (1e9, 1e9))
     before = os.umask(0o077)
@@ -323,7 +324,7 @@ def test_the_same_results_give_the_same_bytes_and_what_fails_leaves_them(campaig
         published_as(first, *campaign)
     published_as(first, *campaign)
     assert sorted(path.name for path in first.parent.iterdir()) == ["small-1.0.0", "small-1.0.0.zip"]
-    assert verify_deposit(first) == [] and Path(f"{first}.zip").read_bytes() == content
+    assert problems_with(first) == [] and Path(f"{first}.zip").read_bytes() == content
 
 
 def test_results_that_are_not_what_was_written_are_refused(campaign, tmp_path):
@@ -376,7 +377,7 @@ def test_results_that_do_not_belong_together_are_refused(campaign):
     path, case = next(iter(files.runs.items()))
     run = small.run(1, material="hertz").assign_attrs(config_sha256=run_sha256(campaign, case), summary="Older")
     write(results, path, run)
-    with pytest.raises(ValueError, match=f"dataset/small.nc: it was made from another {path}"):
+    with pytest.raises(ValueError, match=f"dataset/small.nc: it was made from another version of {path}"):
         refuse_mixed(results, campaign, recorded)
     write(results, path, run.assign_attrs(config_sha256="a" * 64))
     with pytest.raises(ValueError, match=f"{path}: it was not computed with the settings of this campaign"):
@@ -396,7 +397,7 @@ def test_files_are_kept_with_the_configuration_whatever_names_them(tmp_path):
     campaign["measurements"]["lab"]["path"] = str(tmp_path / "areas.csv")
     (tmp_path / "asked.yaml").write_text(yaml.safe_dump(campaign))
     asked = load_configuration(tmp_path / "asked.yaml")
-    text, files = with_files_beside_it(asked)
+    text, files = collect_inputs(asked)
     assert str(tmp_path) not in text and "nobody" not in text
     places = ("measurements/lab/areas.csv", "surfaces/one/scan.txt", "surfaces/other/scan.txt")
     assert sorted(files) == [f"inputs/{place}" for place in places]
@@ -407,7 +408,7 @@ def test_files_are_kept_with_the_configuration_whatever_names_them(tmp_path):
     (kept / "config.used.yaml").write_text(text)
     again = load_configuration(kept / "config.used.yaml")
     assert campaign_sha256(again.campaign) == campaign_sha256(asked.campaign)
-    assert with_files_beside_it(again) == (text, {place: str(kept / place) for place in files})
+    assert collect_inputs(again) == (text, {place: str(kept / place) for place in files})
 
 
 def test_ranges_leave_out_what_is_missing_and_do_not_hang_on_the_size_of_blocks(tmp_path, monkeypatch):

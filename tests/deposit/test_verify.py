@@ -8,11 +8,12 @@ import zipfile
 from types import SimpleNamespace
 
 import pytest
+from outside_validators import problems_with
 from typer.testing import CliRunner
 
 from icha.cli import app
 from icha.deposit import verify
-from icha.deposit.verify import Damaged, files_of, problem_with_name, read_text, verify_deposit, whole_deposit
+from icha.deposit.verify import DamagedDeposit, files_of, problem_with_name, read_text, whole_deposit
 from icha.support.formatting import is_printable
 
 FILES = {"README.md": "# Tiny\n", "runs/load/soft.nc": bytes(range(256)) * 20, "inputs/Höhen (2).txt": "1 2\n"}
@@ -39,7 +40,7 @@ def zipped(tmp_path, **names):
 @pytest.mark.parametrize("ending", ["", ".zip"])
 def test_a_whole_deposit_is_whole(ending, folder):
     path = folder.with_name(folder.name + ending)
-    assert verify_deposit(path) == []
+    assert problems_with(path) == []
     with whole_deposit(path) as found:
         assert files_of(found) == sorted([*FILES, "SHA256SUMS"])
     assert found == path or not found.exists()
@@ -67,7 +68,7 @@ def test_a_whole_deposit_is_whole(ending, folder):
 )
 def test_whatever_is_done_to_a_folder_is_found(spoil, problems, folder):
     spoil(folder)
-    found = verify_deposit(folder)
+    found = problems_with(folder)
     assert len(found) == len(problems) and all(map(is_printable, found)), found
     for line, (name, problem) in zip(sorted(found), sorted(problems.items()), strict=True):
         assert line.startswith(name) and problem in line
@@ -78,7 +79,7 @@ def test_whatever_is_done_to_a_folder_is_found(spoil, problems, folder):
 def test_lists_name_files_of_the_deposit_once(line, folder):
     sums = folder / "SHA256SUMS"
     sums.write_text(sums.read_text() + (sums.read_text().splitlines()[0] if line == "twice" else line) + "\n")
-    (problem,) = verify_deposit(folder)
+    (problem,) = problems_with(folder)
     assert "line 4" in problem
 
 
@@ -96,12 +97,12 @@ def test_a_spoilt_zip_is_found_or_has_the_same_files(folder, tmp_path):
                 assert {name: (other / name).read_bytes() for name in files_of(other)} == {
                     name: (folder / name).read_bytes() for name in files_of(folder)
                 }
-        except (Damaged, OSError):
+        except (DamagedDeposit, OSError):
             found += 1
     assert found > 60
     for _ in range(20):
         spoilt.write_bytes(content[: chance.randrange(len(content))])
-        assert verify_deposit(spoilt)
+        assert problems_with(spoilt)
 
 
 @pytest.mark.parametrize(
@@ -112,29 +113,29 @@ def test_names_in_a_zip_lead_nowhere_else(name, tmp_path, monkeypatch):
     (tmp_path / "temporary").mkdir()
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "temporary"))
     path = zipped(tmp_path, **{name: stat.S_IFREG | 0o644})
-    found = verify_deposit(path)
+    found = problems_with(path)
     assert found and all(map(is_printable, found))
     assert sorted(each.name for each in tmp_path.rglob("*")) == ["a.zip", "temporary"]
 
 
 @pytest.mark.parametrize("mode", [stat.S_IFLNK | 0o777, stat.S_IFCHR | 0o644, stat.S_IFIFO | 0o644])
 def test_links_and_devices_in_a_zip_become_files(mode, tmp_path):
-    (problem,) = verify_deposit(zipped(tmp_path, **{"tiny/link": mode}))
+    (problem,) = problems_with(zipped(tmp_path, **{"tiny/link": mode}))
     assert problem.startswith("link: was added")
 
 
 def test_what_unpacks_to_far_more_is_not_unpacked_unless_asked(pack, monkeypatch):
     folder = pack({"zeros": bytes(10_000_000)})
     monkeypatch.setattr(verify, "ALLOWANCE", 1000)
-    (problem,) = verify_deposit(folder.with_name("tiny.zip"))
+    (problem,) = problems_with(folder.with_name("tiny.zip"))
     assert "to 10 MB; expected at most 50 times its size" in problem
-    assert verify_deposit(folder.with_name("tiny.zip"), large=True) == []
+    assert problems_with(folder.with_name("tiny.zip"), large=True) == []
 
 
 @pytest.mark.parametrize("ending", ["", ".zip"])
 def test_the_number_of_files_is_bounded(ending, folder, monkeypatch):
     monkeypatch.setattr(verify, "MOST_FILES", 2)
-    (problem,) = verify_deposit(folder.with_name(folder.name + ending))
+    (problem,) = problems_with(folder.with_name(folder.name + ending))
     assert "files or more; expected at most 2. Use --large" in problem
 
 
@@ -145,7 +146,7 @@ def test_no_more_bytes_are_written_than_are_declared(declared, folder, tmp_path)
     place = content.rindex(b"PK\x01\x02") + 24  # the uncompressed size of the last entry in the list of contents
     struct.pack_into("<I", content, place, declared)
     path.write_bytes(content)
-    if problems := verify_deposit(path):
+    if problems := problems_with(path):
         assert "not a readable zip archive" in problems[0]
     else:
         assert declared > len(FILES["runs/load/soft.nc"])  # it ends before, with the bytes that were packed
@@ -156,13 +157,13 @@ def test_an_encrypted_file_is_not_read(folder):
     content = bytearray(path.read_bytes())
     content[content.rindex(b"PK\x01\x02") + 8] |= 1
     path.write_bytes(content)
-    assert "not a readable zip archive" in verify_deposit(path)[0]
+    assert "not a readable zip archive" in problems_with(path)[0]
 
 
 def test_unpacking_needs_room(folder, monkeypatch):
     monkeypatch.setattr("shutil.disk_usage", lambda path: SimpleNamespace(free=3))
     with pytest.raises(OSError, match="3 B are free"):
-        verify_deposit(folder.with_name("tiny.zip"))
+        problems_with(folder.with_name("tiny.zip"))
 
 
 def test_a_large_text_is_not_read_as_a_whole(folder, monkeypatch):

@@ -89,10 +89,11 @@ def test_identity_of_the_gap_distribution(case):
     surface, contact, state = case
     gaps = gap_distribution(contact.law, surface, state)
     area = contact.area_fraction(state)
-    assert np.sum(gaps.density * np.diff(gaps.edges)) + area + gaps.overlap_fraction == pytest.approx(1, abs=1e-12)
-    assert 0 <= gaps.overlap_fraction < 0.1
-    assert np.all(gaps.density >= 0)
-    np.testing.assert_allclose(gaps.edges, GAP_BINS * surface.rms_height)
+    assert np.sum(gaps["gap_density"] * np.diff(gap_bins(surface))) + area + gaps["overlap_fraction"] == pytest.approx(
+        1, abs=1e-12
+    )
+    assert 0 <= gaps["overlap_fraction"] < 0.1
+    assert np.all(gaps["gap_density"] >= 0)
 
 
 @pytest.fixture(scope="module")
@@ -114,11 +115,11 @@ def test_gap_distribution_of_many_spots_from_their_fields(rough):
     gaps = gap_distribution(law, surface, state)
     u = np.where(covered_nodes(surface, state.spots), 0.0, gap(law, surface, state))
     outside = np.clip(1 - contact_cover(surface, state.spots), 0, 1) / surface.grid**2
-    expected, _ = np.histogram(u, bins=gaps.edges, weights=outside)
-    np.testing.assert_allclose(gaps.density * np.diff(gaps.edges), expected, rtol=1e-9, atol=1e-12)
-    assert gaps.overlap_fraction == pytest.approx(np.sum(outside[u < 0]), rel=1e-9)
+    expected, _ = np.histogram(u, bins=gap_bins(surface), weights=outside)
+    np.testing.assert_allclose(gaps["gap_density"] * np.diff(gap_bins(surface)), expected, rtol=1e-9, atol=1e-12)
+    assert gaps["overlap_fraction"] == pytest.approx(np.sum(outside[u < 0]), rel=1e-9)
     area = np.sum(np.pi * state.spots.contact_radius**2) / PERIOD**2
-    assert np.sum(expected) + gaps.overlap_fraction + area == pytest.approx(1, abs=1e-12)
+    assert np.sum(expected) + gaps["overlap_fraction"] + area == pytest.approx(1, abs=1e-12)
 
 
 def test_gaps_on_the_edges_of_bins_are_counted_in_the_bin_above():
@@ -139,7 +140,7 @@ def test_distributions_have_the_same_bits_on_any_number_of_cores(rough, monkeypa
         monkeypatch.setenv("OMP_NUM_THREADS", threads)
         gaps = gap_distribution(law, surface, state)
         cover = contact_cover(surface, state.spots)
-        bits.append(gaps.density.tobytes() + np.array(gaps.overlap_fraction).tobytes() + cover.tobytes())
+        bits.append(gaps["gap_density"].tobytes() + np.array(gaps["overlap_fraction"]).tobytes() + cover.tobytes())
     assert bits[0] == bits[1]
 
 
@@ -154,8 +155,8 @@ def test_gap_distribution_around_one_hertz_spot():
     top = -heights.mean()
     state = contact.equilibrium(contact.untouched(), top - 4e-7)
     a = state.spots.contact_radius[0]
-    gaps = gap_distribution(contact.law, surface, state)
-    cumulative = np.concatenate([[0.0], np.cumsum(gaps.density * np.diff(gaps.edges))]) + gaps.overlap_fraction
+    gaps, edges = gap_distribution(contact.law, surface, state), gap_bins(surface)
+    cumulative = np.concatenate([[0.0], np.cumsum(gaps["gap_density"] * np.diff(edges))]) + gaps["overlap_fraction"]
 
     def u(r):
         w = periodic_displacement(r, 0.0, a, R, MODULUS, 0.0, PERIOD)
@@ -163,8 +164,8 @@ def test_gap_distribution_around_one_hertz_spot():
 
     for factor in (1.5, 2.5, 4.0):
         level = u(factor * a)
-        edge = int(np.argmin(np.abs(gaps.edges - level)))
-        radius = scipy.optimize.brentq(lambda r, target=gaps.edges[edge]: u(r) - target, a, 6 * a)
+        edge = int(np.argmin(np.abs(edges - level)))
+        radius = scipy.optimize.brentq(lambda r, target=edges[edge]: u(r) - target, a, 6 * a)
         ring = np.pi * (radius**2 - a**2) / PERIOD**2
         assert cumulative[edge] == pytest.approx(ring, rel=0.01)
 
@@ -172,32 +173,35 @@ def test_gap_distribution_around_one_hertz_spot():
 def test_before_contact_the_gap_is_that_of_the_heights():
     surface, contact, state = pressed(0.0, levels=())
     gaps = gap_distribution(contact.law, surface, state)
-    counted, _ = np.histogram(state.separation - surface.heights, bins=gaps.edges)
+    counted, _ = np.histogram(state.separation - surface.heights, bins=gap_bins(surface))
     # The highest node may lie on the refined summit itself.
     np.testing.assert_allclose(
-        gaps.density * np.diff(gaps.edges), counted / surface.grid**2, atol=1.5 / surface.grid**2
+        gaps["gap_density"] * np.diff(gap_bins(surface)), counted / surface.grid**2, atol=1.5 / surface.grid**2
     )
     pressures = pressure_distribution(contact.law, surface, state.spots)
-    np.testing.assert_array_equal(pressures.density, 0)
-    np.testing.assert_array_equal(pressures.mean, 0)
+    np.testing.assert_array_equal(pressures["pressure_density"], 0)
+    np.testing.assert_array_equal(pressures["pressure_bin_mean"], 0)
 
 
 def test_identities_of_the_pressure_distribution(case):
     surface, contact, state = case
     pressures = pressure_distribution(contact.law, surface, state.spots)
-    width = np.diff(pressures.edges)
-    assert np.sum(pressures.density * width) == pytest.approx(contact.area_fraction(state), rel=1e-12)
-    assert np.sum(pressures.density * width * pressures.mean) == pytest.approx(contact.pressure(state), rel=1e-12)
-    tension = pressures.density[pressures.edges[1:] <= 0].sum()
+    width = np.diff(PRESSURE_BINS * MODULUS * surface.rms_slope)
+    assert np.sum(pressures["pressure_density"] * width) == pytest.approx(contact.area_fraction(state), rel=1e-12)
+    assert np.sum(pressures["pressure_density"] * width * pressures["pressure_bin_mean"]) == pytest.approx(
+        contact.pressure(state), rel=1e-12
+    )
+    tension = pressures["pressure_density"][(PRESSURE_BINS * MODULUS * surface.rms_slope)[1:] <= 0].sum()
     assert (tension > 0) == (contact.law.material.surface_energy > 0)
-    filled = np.flatnonzero(pressures.density > 0)
+    filled = np.flatnonzero(pressures["pressure_density"] > 0)
     # A bin's mean lies in it; the first also holds the tail to minus infinity.
     inner = filled[filled > 0]
     slack = 1e-6 * width[inner]
-    assert np.all(pressures.mean[inner] >= pressures.edges[inner] - slack)
-    assert np.all(pressures.mean[inner] <= pressures.edges[inner + 1] + slack)
-    assert np.all(pressures.mean[np.setdiff1d(np.arange(len(width)), filled)] == 0)
-    np.testing.assert_allclose(pressures.edges, PRESSURE_BINS * MODULUS * surface.rms_slope)
+    assert np.all(pressures["pressure_bin_mean"][inner] >= (PRESSURE_BINS * MODULUS * surface.rms_slope)[inner] - slack)
+    assert np.all(
+        pressures["pressure_bin_mean"][inner] <= (PRESSURE_BINS * MODULUS * surface.rms_slope)[inner + 1] + slack
+    )
+    assert np.all(pressures["pressure_bin_mean"][np.setdiff1d(np.arange(len(width)), filled)] == 0)
 
 
 def test_pressure_distribution_by_sampling_the_spots(case):
@@ -205,26 +209,32 @@ def test_pressure_distribution_by_sampling_the_spots(case):
     spots = state.spots
     pressures = pressure_distribution(contact.law, surface, spots)
     t = (np.arange(20_000) + 0.5) / 20_000
-    counted = np.zeros(len(pressures.density))
+    counted = np.zeros(len(pressures["pressure_density"]))
     for a, R in zip(spots.contact_radius, spots.radius_of_curvature, strict=True):
         p = contact.law.pressure(a * np.sqrt(t), a, R)
-        counted += np.histogram(p, bins=pressures.edges)[0] * np.pi * a**2 / (len(t) * PERIOD**2)
-    np.testing.assert_allclose(pressures.density * np.diff(pressures.edges), counted, atol=2e-4 * counted.sum())
+        counted += (
+            np.histogram(p, bins=(PRESSURE_BINS * MODULUS * surface.rms_slope))[0] * np.pi * a**2 / (len(t) * PERIOD**2)
+        )
+    np.testing.assert_allclose(
+        pressures["pressure_density"] * np.diff(PRESSURE_BINS * MODULUS * surface.rms_slope),
+        counted,
+        atol=2e-4 * counted.sum(),
+    )
 
 
 def test_pressures_and_gaps_beyond_the_bins_are_counted_in_the_last_one():
     surface, contact, state = pressed(0.0)
     sharp = replace(state.spots, radius_of_curvature=1e-6 * state.spots.radius_of_curvature)
     pressures = pressure_distribution(contact.law, surface, sharp)
-    content = pressures.density * np.diff(pressures.edges)
+    content = pressures["pressure_density"] * np.diff(PRESSURE_BINS * MODULUS * surface.rms_slope)
     assert content[-1] > 0
-    assert pressures.mean[-1] > pressures.edges[-1]
+    assert pressures["pressure_bin_mean"][-1] > (PRESSURE_BINS * MODULUS * surface.rms_slope)[-1]
     assert np.sum(content) == pytest.approx(np.sum(np.pi * sharp.contact_radius**2) / surface.period**2, rel=1e-9)
     force = np.sum(contact.law.force(sharp.contact_radius, sharp.radius_of_curvature)) / surface.period**2
-    assert np.sum(content * pressures.mean) == pytest.approx(force, rel=1e-9)
+    assert np.sum(content * pressures["pressure_bin_mean"]) == pytest.approx(force, rel=1e-9)
 
     gaps = gap_distribution(contact.law, surface, replace(state, separation=40 * surface.rms_height))
-    content = gaps.density * np.diff(gaps.edges)
+    content = gaps["gap_density"] * np.diff(gap_bins(surface))
     assert content[-1] > 0.9
     assert np.sum(content) + contact.area_fraction(state) == pytest.approx(1, abs=1e-12)
 

@@ -84,28 +84,6 @@ def test_jump_in_of_a_bump_happens_at_wus_gap():
     assert contact.pressure(after) < 0
 
 
-def test_jump_off_of_a_bump_happens_at_the_jkr_limit():
-    contact, top = bump(ENERGY)
-    state = contact.equilibrium(contact.untouched(), top)
-    # Rising far beyond the jump-in separation the spot holds, on the stable branch all the way.
-    limit = -0.75 * (np.pi**2 * (ENERGY / MODULUS) ** 2 * R) ** (1 / 3)
-    a_off = (np.pi / 8 * ENERGY / MODULUS * R**2) ** (1 / 3)
-    expected = top - limit - displacement_by_own_images(a_off, ENERGY)
-    assert expected > contact.untouched().separation
-    for separation in np.linspace(top, expected, 7)[1:-1]:
-        state = contact.equilibrium(state, separation)
-        a = lone_spot(separation, top, ENERGY, a_off)
-        assert state.spots.contact_radius[0] == pytest.approx(a, rel=1e-6)
-    attached = contact.equilibrium(state, expected + 1e-5 * limit)
-    assert len(attached.spots) == 1
-    assert attached.spots.contact_radius[0] == pytest.approx(a_off, rel=1e-3)
-    assert contact.pressure(attached) * PERIOD**2 == pytest.approx(-5 * np.pi / 6 * ENERGY * R, rel=5e-3)
-    detached = contact.equilibrium(state, expected - 1e-8 * limit)
-    assert len(detached.spots) == 0
-    assert detached.jump_offs == 1
-    np.testing.assert_array_equal(detached.spot_of_asperity, [-1])
-
-
 # --- several asperities -------------------------------------------------------------------------------------
 
 

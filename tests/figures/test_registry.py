@@ -39,7 +39,7 @@ from icha.configuration.schema import json_schema, key_tables
 from icha.datasets.results import ResultFiles
 from icha.figures.registry import draw_figure
 figures = Figures.model_validate({"fig99_trivial": {"study": "slopes"}})
-assert list(figures.drawn()) == ["fig99_trivial"]
+assert list(figures.by_name()) == ["fig99_trivial"]
 assert "and nothing else" in json_schema() and "`figures.fig99_trivial`" in key_tables()
 inputs = figures.inputs("fig99_trivial", None, ResultFiles("small", sys.argv[1]))
 arguments = figures.arguments("fig99_trivial", None)

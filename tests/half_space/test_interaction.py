@@ -2,23 +2,20 @@
 
 import numpy as np
 import pytest
-from half_space import periodic_displacement, periodic_point_load, spectral_displacement
+from half_space import (
+    CENTRES,
+    CURVATURE,
+    ENERGIES,
+    MODULUS,
+    RADIUS,
+    law,
+    periodic_displacement,
+    periodic_point_load,
+    spectral_displacement,
+)
 
-from icha import Material
-from icha.asperity.jkr import JKR
 from icha.half_space.ewald import PointHalfSpace
 from icha.half_space.interaction import Interaction, displacement_at
-
-MODULUS, RANGE = 2.0, 1e-3
-CENTRES = np.array([[0.2, 0.3], [0.6, 0.55], [0.9, 0.85]])
-RADIUS = np.array([0.02, 0.03, 0.015])
-CURVATURE = np.array([0.5, 0.8, 0.3])
-# Without adhesion, and with so much that the spots are in tension on the whole.
-ENERGIES = [0.0, 3e-4]
-
-
-def law(energy):
-    return JKR(Material(MODULUS, energy, RANGE))
 
 
 def between(law, centres, largest, R, period=1.0):

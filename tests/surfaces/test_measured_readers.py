@@ -12,9 +12,9 @@ from scipy.io import savemat
 from SurfaceTopography.Exceptions import CorruptFile
 
 from icha.surfaces.measured import text_tables
-from icha.surfaces.measured.resolution import scan_resolution
+from icha.surfaces.measured.resolution import examine_scan
 from icha.surfaces.measured.settings import UnfitTopography
-from icha.surfaces.measured.topography import prepared_topography
+from icha.surfaces.measured.topography import prepare_topography
 
 
 @pytest.mark.parametrize(("first_axis", "stored"), [("y", HEIGHTS), ("x", HEIGHTS.T)])
@@ -64,8 +64,8 @@ def test_text_files_of_the_challenge(tmp_path):
         ("surface.0008x0008.ASCII.xyz.dat", {}),
         ("surface.0008x0008.ASCII.dat", {"size": (1e-4, 1e-4)}),
     ):
-        how = preparation(boundary="periodic", height_unit=1e-4, touches_first="low", **keys)
-        surface = prepared_topography(tmp_path / name, how).surface
+        settings = preparation(boundary="periodic", height_unit=1e-4, touches_first="low", **keys)
+        surface = prepare_topography(tmp_path / name, settings).surface
         np.testing.assert_allclose(surface.heights, -1e-4 * centred(heights), atol=1e-18)
         assert surface.period == pytest.approx(1e-4, rel=1e-12)
 
@@ -159,15 +159,15 @@ def test_hdf5(tmp_path, first_axis, stored):
     assert_read(scan(path, size=SIZE, first_axis=first_axis, data="scans/first"))
 
 
-@pytest.mark.parametrize("how", ["_FillValue", "missing_value", "fillvalue"])
+@pytest.mark.parametrize("fill", ["_FillValue", "missing_value", "fillvalue"])
 @pytest.mark.parametrize("scale", [{}, {"scale_factor": 0.5, "add_offset": 3.0}])
-def test_hdf5_packed_as_netcdf(tmp_path, how, scale):
+def test_hdf5_packed_as_netcdf(tmp_path, fill, scale):
     factor, offset = scale.get("scale_factor", 1.0), scale.get("add_offset", 0.0)
     stored = np.rint(HEIGHTS * 1e4).astype("i4")
     stored[3, 7] = -99999
     with h5py.File(tmp_path / "scan.h5", "w") as file:
-        data = file.create_dataset("z", data=stored, fillvalue=-99999 if how == "fillvalue" else None)
-        data.attrs.update(scale | {"units": "nm"} | ({} if how == "fillvalue" else {how: -99999}))
+        data = file.create_dataset("z", data=stored, fillvalue=-99999 if fill == "fillvalue" else None)
+        data.attrs.update(scale | {"units": "nm"} | ({} if fill == "fillvalue" else {fill: -99999}))
     heights = scan(tmp_path / "scan.h5", size=SIZE).heights
     assert np.argwhere(np.isnan(heights)).tolist() == [[3, 7]]
     known = np.isfinite(heights)
@@ -203,8 +203,8 @@ def test_fourier_list_of_the_challenge(tmp_path, opposite, integers):
         fmt=["%d"] * 2 + ["%.12e"] * 2 if integers else "%.12e",
     )
     keys = {"size": (1e-4, 1e-4)} if integers else {}
-    how = preparation(boundary="periodic", height_unit=1e-4, grid=24, touches_first="low", **keys)
-    surface = prepared_topography(tmp_path / "list.dat", how).surface
+    settings = preparation(boundary="periodic", height_unit=1e-4, grid=24, touches_first="low", **keys)
+    surface = prepare_topography(tmp_path / "list.dat", settings).surface
     np.testing.assert_allclose(surface.heights, -1e-4 * summed(24), atol=1e-14)
     assert surface.period == pytest.approx(1e-4, rel=1e-10)
 
@@ -213,17 +213,17 @@ def test_fourier_lists_that_are_none(tmp_path):
     k, h = waves()
     path = tmp_path / "list.dat"
     np.savetxt(path, np.column_stack([k, h.real, h.imag]))
-    how = preparation(boundary="periodic", height_unit=1e-4)
+    settings = preparation(boundary="periodic", height_unit=1e-4)
     with refused("size"):
-        prepared_topography(path, how)
-    how["size"] = (1e-4, 1e-4)
-    assert prepared_topography(path, how).surface.grid == 32  # the next power of two with four cells per wave
+        prepare_topography(path, settings)
+    settings["size"] = (1e-4, 1e-4)
+    assert prepare_topography(path, settings).surface.grid == 32  # the next power of two with four cells per wave
     with refused("grid", "at least 12"):
-        prepared_topography(path, how | {"grid": 10})
+        prepare_topography(path, settings | {"grid": 10})
     both = np.concatenate([k, -k]), np.concatenate([h, h])
     np.savetxt(path, np.column_stack([both[0], both[1].real, both[1].imag]))
     with pytest.raises(UnfitTopography, match="conjugate"):
-        prepared_topography(path, how)
+        prepare_topography(path, settings)
 
 
 def write_by_surface_topography(path):
@@ -345,7 +345,7 @@ def test_what_is_missing_is_named(tmp_path):
     with pytest.raises(UnfitTopography, match="complex128"):
         scan(tmp_path / "scan.npy", height_unit=NM, size=SIZE)
     with pytest.raises(UnfitTopography, match="no such file"):
-        prepared_topography(tmp_path / "nothing.npy", preparation())
+        prepare_topography(tmp_path / "nothing.npy", preparation())
 
 
 @pytest.mark.parametrize("name", ["scan.txt", "scan.xyz", "scan.npy", "scan.nc", "scan.h5", "scan.dat"])
@@ -435,11 +435,11 @@ def test_share_of_filled_points_is_said(tmp_path, share):
     count = round(share * 400)
     heights.ravel()[np.random.default_rng(5).choice(400, count, replace=False)] = np.nan
     np.save(tmp_path / "scan.npy", heights)
-    how = preparation(boundary="free", missing="fill", height_unit=NM, size=(5e-6, 5e-6))
-    said = prepared_topography(tmp_path / "scan.npy", how).description
+    settings = preparation(boundary="free", missing="fill", height_unit=NM, size=(5e-6, 5e-6))
+    said = prepare_topography(tmp_path / "scan.npy", settings).description
     assert f"{count} missing points filled, {share:.2g}".split(", ")[0] in said
     assert f"{100 * share:.0f} % of the points" in said
-    resolution = scan_resolution(tmp_path / "scan.npy", how)
+    resolution = examine_scan(tmp_path / "scan.npy", settings)
     assert (resolution.filled, resolution.points) == (count, 400)
 
 

@@ -5,7 +5,7 @@ import pytest
 from scans import preparation
 
 from icha import SelfAffineSpectrum, Surface
-from icha.surfaces.measured.resolution import noise_floor, scan_resolution, slope_left
+from icha.surfaces.measured.resolution import examine_scan, filtered_slope_share, noise_floor
 from icha.surfaces.summits import find_summits
 
 SIDE, GRID = 100e-6, 200
@@ -33,7 +33,7 @@ def test_the_slope_that_a_cut_off_leaves(looked_at):
     rough = SPECTRUM.realise(GRID, 1)
     for cutoff in (4e-6, 8e-6):
         filtered = looked_at(rough, cutoff=cutoff).used
-        assert slope_left(rough, cutoff) == pytest.approx(filtered.rms_slope / rough.rms_slope, rel=0.05)
+        assert filtered_slope_share(rough, cutoff) == pytest.approx(filtered.rms_slope / rough.rms_slope, rel=0.05)
 
 
 def test_the_share_of_the_slope_that_is_noise():
@@ -55,7 +55,7 @@ def looked_at(tmp_path):
     def look(surface, **keys):
         np.save(tmp_path / "scan.npy", surface.heights)
         keys = {"height_unit": 1.0, "size": (surface.period, surface.period), "boundary": "free"} | keys
-        return scan_resolution(tmp_path / "scan.npy", preparation(**keys))
+        return examine_scan(tmp_path / "scan.npy", preparation(**keys))
 
     return look
 

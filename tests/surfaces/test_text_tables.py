@@ -8,7 +8,7 @@ import pytest
 from scans import refused
 
 from icha.surfaces.measured.settings import Preparation, UnfitTopography
-from icha.surfaces.measured.topography import prepared_topography
+from icha.surfaces.measured.topography import prepare_topography
 from icha.surfaces.spectrum import SelfAffineSpectrum
 
 NM, UM = 1e-9, 1e-6
@@ -29,8 +29,8 @@ def text(fields, delimiter=",", heading=()):
 def read(path, **keys):
     """Surface and description of a text, of which nothing is removed but the mean."""
     given = {"height_unit": NM, "size": (SIDE, SIDE)} | keys
-    how = Preparation(format="auto", boundary="periodic", missing="fill", **given)
-    prepared = prepared_topography(path, vars(how))
+    settings = Preparation(format="auto", boundary="periodic", missing="fill", **given)
+    prepared = prepare_topography(path, vars(settings))
     return prepared
 
 
@@ -82,9 +82,7 @@ def test_a_plane_is_no_table_with_numbered_rows(tmp_path):
     plane = np.add.outer(np.arange(GRID), 2.0 * np.arange(GRID))
     with pytest.raises(UnfitTopography, match="all the same but for the trend"):
         path = written(tmp_path, text(rows(plane)))
-        prepared_topography(
-            path, vars(Preparation("auto", "window", height_unit=NM, size=(SIDE, SIDE), detrend="tilt"))
-        )
+        prepare_topography(path, vars(Preparation("auto", "window", height_unit=NM, size=(SIDE, SIDE), detrend="tilt")))
 
 
 HEADINGS = {

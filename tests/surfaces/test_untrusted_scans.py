@@ -18,7 +18,7 @@ from scans import COLUMNS, HEIGHTS, NM, ROWS, SIZE, refused, scan, write_xyz
 from icha.datasets.format import SURFACE, UnknownFile, identify_file
 from icha.surfaces.measured.array_files import read_height_map
 from icha.surfaces.measured.settings import UnfitTopography
-from icha.surfaces.measured.topography import prepared_topography
+from icha.surfaces.measured.topography import prepare_topography
 
 HUGE = 200_000  # nodes a side: 320 GB as floats
 LINES = {"height_unit": NM, "size": SIZE}
@@ -263,7 +263,7 @@ def test_soft_links_are_no_datasets(tmp_path):
 
 def test_paths_that_are_no_files_are_not_opened(tmp_path, monkeypatch):
     os.mkfifo(tmp_path / "pipe.npy")
-    how = {"format": "auto", "boundary": "free"}
+    settings = {"format": "auto", "boundary": "free"}
     with socket.socket(socket.AF_UNIX) as own:
         monkeypatch.chdir(tmp_path)
         own.bind("socket.npy")
@@ -277,7 +277,7 @@ def test_paths_that_are_no_files_are_not_opened(tmp_path, monkeypatch):
             ("x" * 5000, "cannot be read"),
         ):
             with refused("path", f"{flaw}.*; expected a file of heights"):
-                prepared_topography(path, how)
+                prepare_topography(path, settings)
 
 
 @pytest.mark.parametrize("size", [2, 8, 128, 8192, 100_000])
@@ -355,7 +355,7 @@ def test_damaged_and_changed_files_are_read_or_refused(whole, name, data):
     path = folder / f"changed_{name}"
     path.write_bytes(content)
     size = (SIZE[0], SIZE[0]) if name == "waves.txt" else SIZE
-    how = {
+    settings = {
         "format": "auto",
         "boundary": "mirror",
         "height_unit": NM,
@@ -364,7 +364,7 @@ def test_damaged_and_changed_files_are_read_or_refused(whole, name, data):
         "detrend": "tilt",
     }
     try:
-        surface = prepared_topography(path, how).surface
+        surface = prepare_topography(path, settings).surface
     except UnfitTopography as error:
         assert re.search("expected|allowed: |leave it out", str(error))
     else:

@@ -12,7 +12,7 @@ import xarray as xr
 from conftest import REPOSITORY, modules_of
 
 from icha.configuration.load import load_configuration
-from icha.surfaces.measured.resolution import scan_resolution
+from icha.surfaces.measured.resolution import examine_scan
 
 DATA = REPOSITORY / "tests/data"
 CAMPAIGN = DATA / "published_topographies.yaml"
@@ -27,7 +27,7 @@ def test_the_files_are_those_that_their_origin_is_told_of():
 
 @pytest.mark.parametrize("name", SURFACES)
 def test_their_summits_are_resolved_as_they_are_used(name):
-    scan = scan_resolution(SURFACES[name].path, SURFACES[name].preparation)
+    scan = examine_scan(SURFACES[name].path, SURFACES[name].preparation)
     assert scan.cells_per_summit > 80
     assert "cutoff" not in scan.advice
 

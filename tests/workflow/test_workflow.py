@@ -123,7 +123,7 @@ def test_large_campaigns_can_be_planned(configuration, smoke, tmp_path):
 def test_the_campaign_as_shipped_needs_no_tamaas_and_has_every_figure():
     campaign = load_configuration(REPOSITORY / SMOKE).campaign
     assert missing_software(campaign) is None and not campaign_files(campaign, "results/smoke").solutions
-    assert set(campaign.figures.drawn()) == {file.stem for file in (REPOSITORY / "icha/figures").glob("fig*.py")}
+    assert set(campaign.figures.by_name()) == {file.stem for file in (REPOSITORY / "icha/figures").glob("fig*.py")}
 
 
 @pytest.mark.slow

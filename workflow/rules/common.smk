@@ -11,7 +11,7 @@ import before_jobs
 from command_line import campaign_configuration
 from fingerprint import code_fingerprint
 
-from icha.configuration.load import with_files_beside_it
+from icha.configuration.load import collect_inputs
 from icha.configuration.cases import run_sha256
 from icha.datasets import results
 from icha.planning.results import campaign_files
@@ -20,13 +20,13 @@ before_jobs.plan_without_collecting()
 
 CONFIGURATION = campaign_configuration(workflow, ROOT)
 CAMPAIGN = CONFIGURATION.campaign
-PUBLICATION = CAMPAIGN.published()
+PUBLICATION = CAMPAIGN.deposit_metadata()
 RESULTS = f"results/{CAMPAIGN.name}"
 # All results with their labels.
 FILES = campaign_files(CAMPAIGN, RESULTS)
 
 # The configuration as used has copies of the files that it names beside it.
-CONFIG_TEXT, NAMED_FILES = with_files_beside_it(CONFIGURATION)
+CONFIG_TEXT, NAMED_FILES = collect_inputs(CONFIGURATION)
 INPUTS = {f"{RESULTS}/{place}": file for place, file in NAMED_FILES.items()}
 COPIED = {copy: file for copy, file in INPUTS.items() if Path(copy).resolve() != Path(file).resolve()}
 

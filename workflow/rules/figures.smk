@@ -10,7 +10,7 @@ RESULT_FILES = ResultFiles(CAMPAIGN.name, RESULTS)
 
 
 wildcard_constraints:
-    name="|".join(CAMPAIGN.figures.drawn()) or "none",
+    name="|".join(CAMPAIGN.figures.by_name()) or "none",
 
 
 rule figure:

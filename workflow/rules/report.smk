@@ -26,11 +26,11 @@ rule report_page:
         mem_mb=4000,
         runtime=10,
     params:
-        figures={name: CAMPAIGN.figures.studies_of(name, CAMPAIGN) for name in CAMPAIGN.figures.drawn()},
+        figures={name: CAMPAIGN.figures.studies_of(name, CAMPAIGN) for name in CAMPAIGN.figures.by_name()},
         citations=as_it_is([measurement.citation for measurement in CAMPAIGN.measurements.values()]),
         benchmarks=f"{RESULTS}/benchmarks",
         further_software=further_software(CAMPAIGN),
-        code=code_of("make_report.py", *(f"icha.figures.{name}" for name in CAMPAIGN.figures.drawn())),
+        code=code_of("make_report.py", *(f"icha.figures.{name}" for name in CAMPAIGN.figures.by_name())),
     message:
         "Report"
     script:

@@ -11,13 +11,13 @@ from icha.support.input_files import bounded_memory, problem_with_path, refuse_t
 from icha.support.rules import LENGTH
 from icha.surfaces.measured.settings import (
     LINE_SCAN,
-    Found,
+    FileContent,
     Preparation,
     UnfitTopography,
-    chosen_name,
+    choose_name,
     metres_of,
+    put_y_first,
     regular_ticks,
-    with_y_first,
 )
 from icha.surfaces.square import problem_with_heights
 
@@ -39,12 +39,12 @@ _UNKNOWN = (
 _EXPECTED = "expected a square array of at least 8 x 8 finite heights (.npy, or .nc with a variable `height`)"
 
 
-def read_npy(file, how: Preparation) -> Found:
+def read_npy(file, settings: Preparation) -> FileContent:
     """Read a NumPy array, which has no names or units."""
-    return Found(with_y_first(_whole_npy(file.path), how), data_known=False)
+    return FileContent(put_y_first(_read_npy_array(file.path), settings), data_known=False)
 
 
-def _whole_npy(path: Path) -> np.ndarray:
+def _read_npy_array(path: Path) -> np.ndarray:
     # A mapped array cannot declare more than the file holds. NumPy warns of an overflow before it refuses it.
     with np.errstate(over="ignore"):
         array = np.lib.format.open_memmap(path, mode="r")
@@ -52,7 +52,7 @@ def _whole_npy(path: Path) -> np.ndarray:
     return np.array(array)
 
 
-def _whole_variable(variable) -> np.ndarray:
+def _read_variable(variable) -> np.ndarray:
     """Read a netCDF variable as floats, nan where numbers are missing."""
     _require_room(variable)
     return np.ma.filled(variable[...].astype(float), np.nan)
@@ -63,24 +63,28 @@ def _require_room(declared):
     require_room(_COPIES * 8 * math.prod(declared.shape))
 
 
-def read_netcdf(source, how: Preparation) -> Found:
+def read_netcdf(source, settings: Preparation) -> FileContent:
     """Read the variable `data`, `height`, `heights`, `z` or the only one of two dimensions, with its units and axes."""
     import netCDF4
 
     with netCDF4.Dataset(source.path) as file:
         shapes = {name: variable.shape for name, variable in file.variables.items()}
-        plane = maps_among(shapes)
-        asked = how.data if how.data in shapes else chosen_name(how.data, plane, ("height", "heights", "z"), "variable")
+        plane = find_maps(shapes)
+        asked = (
+            settings.data
+            if settings.data in shapes
+            else choose_name(settings.data, plane, ("height", "heights", "z"), "variable")
+        )
         chosen = file[asked]
         if not _is_map(chosen.shape):
             raise UnfitTopography(
                 "data", f"has {chosen.ndim} dimensions; expected two, as {', '.join(plane) or 'no variable has'}"
             )
-        heights = _whole_variable(chosen)
+        heights = _read_variable(chosen)
         heights = heights.reshape(heights.shape[-2:])
         dimensions = chosen.dimensions[-2:]
         names = [name.lower() for name in dimensions]
-        turned = names[0] == "x" if set(names) == {"x", "y"} else how.first_axis == "x"
+        turned = names[0] == "x" if set(names) == {"x", "y"} else settings.first_axis == "x"
         sides = []
         for axis, name in enumerate(dimensions):
             side, backwards = _side(file.variables.get(name), heights.shape[axis])
@@ -90,7 +94,7 @@ def read_netcdf(source, how: Preparation) -> Found:
         unit = _unit_of(chosen.__dict__)
     along_y, along_x = sides[::-1] if turned else sides
     size = (along_x, along_y) if along_x and along_y else None
-    return Found(heights.T if turned else heights, unit, size, data=asked if len(plane) > 1 else "")
+    return FileContent(heights.T if turned else heights, unit, size, data=asked if len(plane) > 1 else "")
 
 
 def _side(coordinate, count):
@@ -99,7 +103,7 @@ def _side(coordinate, count):
         return None, False
     attributes = coordinate.__dict__
     unit = _unit_of(attributes)
-    values = _whole_variable(coordinate)
+    values = _read_variable(coordinate)
     if unit is not None and "length" in attributes:
         return float(attributes["length"]) * unit, False
     if count < 2:
@@ -110,7 +114,7 @@ def _side(coordinate, count):
     return (count * step * unit if unit is not None else None), values[0] > values[-1]
 
 
-def read_hdf5(source, how: Preparation) -> Found:
+def read_hdf5(source, settings: Preparation) -> FileContent:
     """Read the dataset `data`, or the only one of two dimensions; attributes have the same meaning as in netCDF.
 
     MATLAB (from version 7.3) stores columns, so that HDF5 has the transpose of what MATLAB shows.
@@ -126,19 +130,19 @@ def read_hdf5(source, how: Preparation) -> Found:
                 shapes[name] = node.shape
 
         file.visititems(add)
-        plane = sorted(maps_among(shapes))
-        asked = how.data.strip("/") if how.data else None
-        name = str(asked) if asked in shapes else chosen_name(asked, plane, (), "dataset")
+        plane = sorted(find_maps(shapes))
+        asked = settings.data.strip("/") if settings.data else None
+        name = str(asked) if asked in shapes else choose_name(asked, plane, (), "dataset")
         chosen = file[name]
         _require_room(chosen)
-        heights = _unpacked(chosen).reshape(chosen.shape[-2:])
+        heights = _unpack(chosen).reshape(chosen.shape[-2:])
         if source.path.suffix.lower() == ".mat" or "MATLAB_class" in chosen.attrs:
             heights = heights.T
         unit = _unit_of(dict(chosen.attrs))
-        return Found(with_y_first(heights, how), unit, data=name if len(plane) > 1 else "")
+        return FileContent(put_y_first(heights, settings), unit, data=name if len(plane) > 1 else "")
 
 
-def _unpacked(dataset):
+def _unpack(dataset):
     """Read a dataset, nan where numbers are missing, by the attributes with which netCDF packs numbers."""
     stored, attributes = dataset[...], dataset.attrs
     fills = [each for name in ("_FillValue", "missing_value") for each in np.ravel(attributes.get(name, []))]
@@ -168,7 +172,7 @@ def _is_map(shape):
     return len(shape) >= 2 and all(count == 1 for count in shape[:-2])
 
 
-def maps_among(shapes: Mapping[Any, tuple[int, ...]]) -> list:
+def find_maps(shapes: Mapping[Any, tuple[int, ...]]) -> list:
     """Return the names of the arrays that can be maps of heights.
 
     Lines and single numbers of two dimensions, as which MATLAB stores them, count only if there is no other array.
@@ -204,7 +208,7 @@ def is_instrument_text(file) -> bool:
         return True
 
 
-def read_instrument(file, how: Preparation) -> Found:
+def read_instrument(file, settings: Preparation) -> FileContent:
     """Read a file with SurfaceTopography, whose arrays have x as first axis."""
     opened = file.instrument
     endings = opened.file_extensions() if opened is not None else ()
@@ -212,28 +216,28 @@ def read_instrument(file, how: Preparation) -> Found:
         opened.format() in _WITHOUT_SIGNATURE and file.path.suffix.lower().removeprefix(".") not in endings
     ):
         raise UnfitTopography("path", _UNKNOWN)
-    channel, data = _channel(opened, how)
+    channel, data = _channel(opened, settings)
     sized = channel.physical_sizes is not None
     topography = channel.topography(**({} if sized else {"physical_sizes": (1.0, 1.0)}))
     heights = np.ma.filled(np.ma.asarray(topography.heights()).astype(float), np.nan).T
     unit = None if topography.unit is None else metres_of(topography.unit)
     sides: Any = tuple(float(side) for side in topography.physical_sizes) if sized else None
-    lateral = how.lateral_unit or unit
+    lateral = settings.lateral_unit or unit
     if sized and lateral is not None:
-        return Found(heights, unit, tuple(side * lateral for side in sides), format=opened.name(), data=data)
-    return Found(heights, unit, coordinates=sides, format=opened.name(), data=data)
+        return FileContent(heights, unit, tuple(side * lateral for side in sides), format=opened.name(), data=data)
+    return FileContent(heights, unit, coordinates=sides, format=opened.name(), data=data)
 
 
-def _channel(opened, how):
+def _channel(opened, settings):
     """Return the channel that is asked for, or the default one, and its name, empty if it is the only map."""
     channels = opened.channels
     names = [channel.name for channel in channels]
-    maps = [channels[k] for k in maps_among({k: tuple(channel.nb_grid_pts) for k, channel in enumerate(channels)})]
-    if how.data is not None:
-        channel = channels[names.index(chosen_name(how.data, names, (), "channel"))]
+    maps = [channels[k] for k in find_maps({k: tuple(channel.nb_grid_pts) for k, channel in enumerate(channels)})]
+    if settings.data is not None:
+        channel = channels[names.index(choose_name(settings.data, names, (), "channel"))]
     elif opened.format() in _ARRAYS and maps:
         # Arrays of a workspace have no default; the first one could be anything.
-        channel = channels[names.index(chosen_name(None, [each.name for each in maps], (), "array"))]
+        channel = channels[names.index(choose_name(None, [each.name for each in maps], (), "array"))]
     else:
         channel = opened.default_channel
     if channel.dim != 2:
@@ -263,7 +267,7 @@ def read_height_map(path: str | Path, metres_per_unit: float) -> np.ndarray:
     try:
         with bounded_memory():
             refuse_traps(path)
-            heights = _whole_array(path)
+            heights = _read_array(path)
     except Exception as error:  # libraries raise all kinds for files that are damaged or of another format
         raise ValueError(f"cannot be read ({error}); {_EXPECTED}") from None
     if heights.dtype.kind not in "iuf":
@@ -276,12 +280,12 @@ def read_height_map(path: str | Path, metres_per_unit: float) -> np.ndarray:
     return heights
 
 
-def _whole_array(path: Path) -> np.ndarray:
+def _read_array(path: Path) -> np.ndarray:
     if path.suffix == ".npy":
-        return _whole_npy(path)
+        return _read_npy_array(path)
     if path.suffix == ".nc":
         import netCDF4
 
         with netCDF4.Dataset(path) as data:
-            return _whole_variable(data["height"])
+            return _read_variable(data["height"])
     raise ValueError(f"unknown kind of file {path.suffix!r}")

@@ -7,7 +7,7 @@ import scipy.fft
 
 from icha.support.input_files import require_room
 from icha.support.rules import GRID
-from icha.surfaces.measured.settings import Found, Preparation, UnfitTopography
+from icha.surfaces.measured.settings import FileContent, Preparation, UnfitTopography
 from icha.surfaces.measured.text_tables import SourceFile
 
 # The spectrum, its conjugate, their difference, the heights, and the masks of waves.
@@ -33,12 +33,12 @@ def looks_like_fourier(values: np.ndarray) -> bool:
     return max(differences, default=0.0) <= _CONJUGATE * np.max(np.abs(modes), initial=1e-300)
 
 
-def read_fourier(file: SourceFile, how: Preparation) -> Found:
+def read_fourier(file: SourceFile, settings: Preparation) -> FileContent:
     """Sum h = sum h_q exp(i q.r) over all waves; opposite ones that are left out are the conjugates."""
     table = file.values
     if table.shape[1] != 4:
         raise ValueError(f"{table.shape[1]} numbers in a line, not qx qy Re Im")
-    k = _wave_numbers(table[:, :2], how)
+    k = _wave_numbers(table[:, :2], settings)
     period = 2 * np.pi * np.max(np.abs(k)) / np.max(np.abs(table[:, :2]))
     modes = table[:, 2] + 1j * table[:, 3]
     if not np.all(np.isfinite(modes)):
@@ -46,7 +46,7 @@ def read_fourier(file: SourceFile, how: Preparation) -> Found:
     if len(np.unique(k, axis=0)) < len(k):
         raise ValueError("a wave vector is given twice")
     highest = int(np.max(np.abs(k)))
-    n = how.grid or 2 ** math.ceil(math.log2(max(4 * highest, 8)))
+    n = settings.grid or 2 ** math.ceil(math.log2(max(4 * highest, 8)))
     if 2 * highest >= n:
         raise UnfitTopography(
             "grid",
@@ -64,19 +64,19 @@ def read_fourier(file: SourceFile, how: Preparation) -> Found:
         raise ValueError("opposite wave vectors have amplitudes that are not conjugate: the heights would be complex")
     spectrum = np.where(opposite_present & ~present, conjugate, spectrum)
     heights = scipy.fft.ifft2(spectrum, norm="forward", workers=1).real
-    return Found(heights, coordinates=(period, period), data_known=False)
+    return FileContent(heights, coordinates=(period, period), data_known=False)
 
 
-def _wave_numbers(q, how):
+def _wave_numbers(q, settings):
     """Wave vectors (n, 2) as multiples of 2 pi over the period: as they are written if they are integers."""
     largest = np.max(np.abs(q))
     if not largest > 0 or not np.all(np.isfinite(q)):
         raise ValueError("no wave vectors, or some that are not finite")
-    if how.size is not None and how.size[0] != how.size[1]:
+    if settings.size is not None and settings.size[0] != settings.size[1]:
         raise UnfitTopography("size", "has two sides that differ, for a Fourier series; expected one length")
     if np.all(q == np.rint(q)):
         _require_few(largest)
-        if how.size is None:
+        if settings.size is None:
             raise UnfitTopography(
                 "size",
                 "is missing, and the wave vectors are integers, multiples of 2 pi/L; expected L, such as '0.1 mm'",

@@ -10,7 +10,7 @@ import numpy as np
 import scipy.fft
 
 from icha.surfaces.measured.steps import LEAST_PIXELS
-from icha.surfaces.measured.topography import PreparedTopography, prepared_topography
+from icha.surfaces.measured.topography import PreparedTopography, prepare_topography
 from icha.surfaces.moments import (
     LEAST_CELLS_OF_SUMMIT,
     RESOLVED_CELLS,
@@ -119,7 +119,7 @@ class ScanResolution(PreparedTopography):
         return found if found.get("cutoff", 0.0) < self.measured.period / RESOLVED_CELLS else {}
 
 
-def slope_left(surface: Surface, cutoff: float) -> float:
+def filtered_slope_share(surface: Surface, cutoff: float) -> float:
     """Estimate the fraction of the rms slope that the Gaussian filter of a nesting index (m) leaves."""
     q, power = radial_power_spectrum(surface)
     slopes = _squared_slopes(surface, q, power)
@@ -127,14 +127,14 @@ def slope_left(surface: Surface, cutoff: float) -> float:
     return math.sqrt(float(np.sum(slopes * transmission**2) / np.sum(slopes)))
 
 
-def scan_resolution(path: str | os.PathLike, preparation: Mapping) -> ScanResolution:
-    """Examine a scan; arguments and errors as `icha.surfaces.measured.topography.prepared_topography`."""
+def examine_scan(path: str | os.PathLike, preparation: Mapping) -> ScanResolution:
+    """Examine a scan; arguments and errors as `icha.surfaces.measured.topography.prepare_topography`."""
     raw = {key: preparation[key] for key in preparation if key not in ("cutoff", "taper")}
     if preparation["boundary"] != PERIODIC:
         raw |= {"boundary": FREE, "grid": None}
-    measured = prepared_topography(path, raw).surface
+    measured = prepare_topography(path, raw).surface
     return ScanResolution(
-        **vars(prepared_topography(path, preparation)), measured=measured, cutoff=preparation.get("cutoff")
+        **vars(prepare_topography(path, preparation)), measured=measured, cutoff=preparation.get("cutoff")
     )
 
 

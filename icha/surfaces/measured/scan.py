@@ -69,17 +69,17 @@ class Scan:
         return f"; the coordinates are taken to be in units of {unit}, see `lateral_unit`"
 
 
-def load_scan(path: Path, how: Preparation) -> Scan:
-    """Read a file of any format; raises errors as `icha.surfaces.measured.topography.prepared_topography`."""
+def load_scan(path: Path, settings: Preparation) -> Scan:
+    """Read a file of any format; raises errors as `icha.surfaces.measured.topography.prepare_topography`."""
     if not path.stat().st_size:
         raise UnfitTopography("path", "is empty; expected a file of heights")
-    name, found = _read(path, how)
-    unit = how.height_unit or found.unit
+    name, found = _read(path, settings)
+    unit = settings.height_unit or found.unit
     if unit is None:
         raise UnfitTopography("height_unit", "is missing, and the file does not give it; expected a unit such as 'um'")
-    size, coordinate_unit = how.size or found.size, None
+    size, coordinate_unit = settings.size or found.size, None
     if size is None and found.coordinates is not None:
-        coordinate_unit = how.lateral_unit or unit
+        coordinate_unit = settings.lateral_unit or unit
         size = tuple(each * coordinate_unit for each in found.coordinates)
     if size is None:
         raise UnfitTopography("size", "is missing, and the file does not give it; expected a length, such as '90 um'")
@@ -90,7 +90,7 @@ def load_scan(path: Path, how: Preparation) -> Scan:
     sides = [formatting.length(float(side)) for side in size]
     pixel = [formatting.length(size[0] / columns), formatting.length(size[1] / rows)]
     reading += f"; pixels of {' x '.join(pixel)}, {' x '.join(sides)} in all; heights in {formatting.length(unit)}"
-    reading += "".join(f"; {remark}" for remark in (found.remark, _replaced(how, found)) if remark)
+    reading += "".join(f"; {remark}" for remark in (found.remark, _describe_replaced(settings, found)) if remark)
     format_ = f"{name} ({found.format})" if name == "instrument" else name
     scan = Scan(found.heights.astype(float) * unit, tuple(size), (reading,), coordinate_unit, format_, found.data)
     if not all(np.isfinite(each) and LENGTH.contains(each) for each in size):
@@ -100,24 +100,24 @@ def load_scan(path: Path, how: Preparation) -> Scan:
     return scan
 
 
-def _replaced(how, found):
+def _describe_replaced(settings, found):
     """Describe the size and unit of the file that given ones replace; empty if there are none."""
     replaced = []
-    if how.size and found.size and not np.allclose(how.size, found.size, rtol=1e-3, atol=0):
+    if settings.size and found.size and not np.allclose(settings.size, found.size, rtol=1e-3, atol=0):
         replaced.append(f"its size {' x '.join(map(formatting.length, found.size))}")
-    if how.height_unit and found.unit and not np.isclose(how.height_unit, found.unit, rtol=1e-3, atol=0):
+    if settings.height_unit and found.unit and not np.isclose(settings.height_unit, found.unit, rtol=1e-3, atol=0):
         replaced.append(f"its unit of heights {formatting.length(found.unit)}")
     return f"the file has, and you replace, {' and '.join(replaced)}" if replaced else ""
 
 
-def _read(path, how):
+def _read(path, settings):
     """Return the format of a file and its content, after checking that these are heights."""
-    file, name = SourceFile(path, how.data), how.format
+    file, name = SourceFile(path, settings.data), settings.format
     try:
         with bounded_memory():
             refuse_traps(path)
             if name == "auto":
-                name = "xyz" if how.columns else _guess_format(path)
+                name = "xyz" if settings.columns else _guess_format(path)
             library = _LIBRARIES.get(name)
             if name in ("text", "matrix") and (file.layout is None or file.layout.heading):
                 library = "SurfaceTopography"
@@ -128,7 +128,7 @@ def _read(path, how):
                 name = format_of_text(file) or "instrument"
                 if name == "instrument" and file.instrument is None and (reason := reason_against_table(path)):
                     raise UnfitTopography("path", reason)
-            found = READERS[name](file, how)
+            found = READERS[name](file, settings)
     except UnfitTopography:
         raise
     except RefusedFile as error:
@@ -140,7 +140,7 @@ def _read(path, how):
             f"cannot be read{as_format}{_reason_of_this_package(error)}: the file is damaged or of another format; "
             "expected a sound file, or another `format`",
         ) from None
-    if how.data is not None and not found.data_known:
+    if settings.data is not None and not found.data_known:
         raise UnfitTopography(
             "data", f"is given, and a file that is read as {name} has one array without a name; leave it out"
         )

@@ -67,7 +67,7 @@ class Preparation:
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
+class FileContent:
     """The content of a file.
 
     Attributes
@@ -92,9 +92,9 @@ class Found:
     data_known: bool = True
 
 
-def with_y_first(heights: np.ndarray, how: Preparation) -> np.ndarray:
+def put_y_first(heights: np.ndarray, settings: Preparation) -> np.ndarray:
     """Return the array with y as its first axis; the settings give the first axis of the file."""
-    return heights.T if how.first_axis == "x" else heights
+    return heights.T if settings.first_axis == "x" else heights
 
 
 def regular_ticks(values: np.ndarray, axis: str) -> tuple[np.ndarray, int, float]:
@@ -121,7 +121,7 @@ def regular_ticks(values: np.ndarray, axis: str) -> tuple[np.ndarray, int, float
     return index, count, step
 
 
-def chosen_name(asked: str | None, names: Sequence[str], usual: Sequence[str], what: str) -> str:
+def choose_name(asked: str | None, names: Sequence[str], usual: Sequence[str], what: str) -> str:
     """Return the name that is asked for; else a usual one, or the only one.
 
     Raises UnfitTopography if no variable, dataset or channel (`what`) has it, or if several could be meant.

@@ -31,19 +31,19 @@ LEAST_PIXELS = 4
 _REACH = 6
 
 
-def cropped(scan: Scan, how: Preparation) -> Scan:
+def crop_square(scan: Scan, settings: Preparation) -> Scan:
     """Cut out a square of whole pixels; if these are oblong, one side may be too long by less than a pixel."""
     rows, columns = scan.heights.shape
     dx, dy = scan.pixel
     width, height = map(formatting.length, scan.size)
-    if how.crop is None:
+    if settings.crop is None:
         side = min(scan.size)
         nx, ny = (int(side / each * (1 + _ROUNDING)) for each in (dx, dy))
         if abs(dx / dy - 1) <= SQUARE:
             nx = ny = min(nx, ny)
         first_x, first_y = (columns - nx) // 2, (rows - ny) // 2
     else:
-        x, y, side = (how.crop[name] for name in ("x", "y", "side"))
+        x, y, side = (settings.crop[name] for name in ("x", "y", "side"))
         first_x, first_y = round(x / dx), round(y / dy)
         nx, ny = round(side / dx), round(side / dy)
         if first_x + nx > columns or first_y + ny > rows:
@@ -54,10 +54,10 @@ def cropped(scan: Scan, how: Preparation) -> Scan:
             )
     if nx < 8 or ny < 8:
         raise UnfitTopography(
-            "crop" if how.crop else "path",
+            "crop" if settings.crop else "path",
             f"leaves {nx} x {ny} points{scan.remark_on_unit}; expected at least 8 x 8",
         )
-    if how.boundary == PERIODIC and ((nx, ny) != (columns, rows) or abs(nx * dx / (ny * dy) - 1) > SQUARE):
+    if settings.boundary == PERIODIC and ((nx, ny) != (columns, rows) or abs(nx * dx / (ny * dy) - 1) > SQUARE):
         raise UnfitTopography(
             "boundary",
             f"needs a square, and the scan is {width} x {height}; expected a square one, or another boundary",
@@ -67,12 +67,12 @@ def cropped(scan: Scan, how: Preparation) -> Scan:
     return scan.after(square, *step, size=(nx * dx, ny * dy))
 
 
-def detrended(scan: Scan, how: Preparation) -> Scan:
+def remove_trend(scan: Scan, settings: Preparation) -> Scan:
     """Remove the plane or paraboloid that fits the known heights best."""
     known = np.isfinite(scan.heights)
     if not known.any():
         raise UnfitTopography("path", "holds no height within the square that is used; expected another crop or file")
-    degree = {"none": 0, "tilt": 1, "curvature": 2}[how.detrend]
+    degree = {"none": 0, "tilt": 1, "curvature": 2}[settings.detrend]
     if degree == 0:
         return scan
     rows, columns = scan.heights.shape
@@ -86,24 +86,24 @@ def detrended(scan: Scan, how: Preparation) -> Scan:
     coefficients = np.zeros((degree + 1, degree + 1))
     coefficients[tuple(np.transpose(powers))] = np.linalg.lstsq(matrix, right, rcond=None)[0]
     trend = y[:, : degree + 1] @ coefficients @ x[:, : degree + 1].T
-    return scan.after(scan.heights - trend, f"{how.detrend} removed")
+    return scan.after(scan.heights - trend, f"{settings.detrend} removed")
 
 
-def refuse_flat(prepared: Scan, square: Scan, how: Preparation) -> None:
+def refuse_flat(prepared: Scan, square: Scan, settings: Preparation) -> None:
     """Raise UnfitTopography if the prepared heights are only rounding of those of the square that was cut out."""
     known = np.isfinite(square.heights)
     if np.ptp(prepared.heights) <= _FLAT * np.nanmax(np.abs(square.heights), where=known, initial=0.0):
-        without = "" if how.detrend == "none" else " but for the trend that is removed"
+        without = "" if settings.detrend == "none" else " but for the trend that is removed"
         raise UnfitTopography("path", f"holds heights that are all the same{without}; expected a rough surface")
 
 
-def filled(scan: Scan, how: Preparation) -> Scan:
+def fill_missing_points(scan: Scan, settings: Preparation) -> Scan:
     """Fill missing points."""
     missing = ~np.isfinite(scan.heights)
     count = int(np.count_nonzero(missing))
     if not count:
         return scan
-    if how.missing == "refuse":
+    if settings.missing == "refuse":
         raise UnfitTopography(
             "missing",
             f"does not allow {count} of {missing.size} points without a height; expected fill, or a crop without them",
@@ -111,7 +111,7 @@ def filled(scan: Scan, how: Preparation) -> Scan:
     if 2 * count > missing.size:
         raise UnfitTopography("missing", f"cannot fill {count} of {missing.size} points; expected at most half")
     heights = scan.heights.copy()
-    heights[missing] = _harmonic(heights, missing, periodic=how.boundary == PERIODIC)
+    heights[missing] = _harmonic(heights, missing, periodic=settings.boundary == PERIODIC)
     return scan.after(heights, f"{count} missing points filled, {formatting.share(count, missing.size)} of the points")
 
 
@@ -138,15 +138,15 @@ def _harmonic(heights, missing, *, periodic):
     return scipy.sparse.linalg.spsolve(coupling + scipy.sparse.diags(neighbours, format="csc"), right)
 
 
-def squared(scan: Scan, how: Preparation) -> Scan:
+def resample_to_square_pixels(scan: Scan, settings: Preparation) -> Scan:
     """Resample to square cells as large as the shorter side of a pixel.
 
     Lines along that side stay as they are. Across them, heights are those of their cosine series, which is
     band-limited: it keeps all measured waves, hence their rms slope, and adds none that is shorter than two pixels.
-    Periodic scans are resampled by their Fourier series when they get their grid (`bounded`).
+    Periodic scans are resampled by their Fourier series when they get their grid (`treat_edges`).
     """
     dx, dy = scan.pixel
-    if how.boundary == PERIODIC or abs(dx / dy - 1) <= SQUARE:
+    if settings.boundary == PERIODIC or abs(dx / dy - 1) <= SQUARE:
         return scan
     across, cell = (0, dx) if dx < dy else (1, dy)
     grid = int(min(scan.size) / cell * (1 + 1e-9))
@@ -170,34 +170,34 @@ def _by_cosine_series(heights, axis, step, count):
     return np.moveaxis(czt(series, count, w=np.exp(turn), a=np.exp(-turn / 2), axis=0).real, 0, axis)
 
 
-def without_short_waves(scan: Scan, how: Preparation) -> Scan:
+def filter_short_waves(scan: Scan, settings: Preparation) -> Scan:
     """Apply the areal Gaussian filter of ISO 16610-61, whose nesting index is the cut-off.
 
     A wave of length l is multiplied by 2^-(cutoff/l)^2. Beyond the edges heights continue by reflection (ISO 16610-28),
     those of a periodic scan by its period.
     """
-    if how.cutoff is None:
+    if settings.cutoff is None:
         return scan
     # Slow to import, and rarely needed.
     from scipy.ndimage import gaussian_filter
 
     least, most = LEAST_PIXELS * max(scan.pixel), min(scan.size)
-    if not least * (1 - 1e-9) <= how.cutoff <= most:
+    if not least * (1 - 1e-9) <= settings.cutoff <= most:
         raise UnfitTopography(
             "cutoff",
-            f"is {how.cutoff / max(scan.pixel):.3g} pixels{scan.remark_on_unit}; expected from {LEAST_PIXELS} pixels, "
-            f"{formatting.length(least)}, to the side of the square, {formatting.length(most)}",
+            f"is {settings.cutoff / max(scan.pixel):.3g} pixels{scan.remark_on_unit}; expected from {LEAST_PIXELS} "
+            f"pixels, {formatting.length(least)}, to the side of the square, {formatting.length(most)}",
         )
     dx, dy = scan.pixel
-    sigma = DEVIATION * how.cutoff
-    mode = "wrap" if how.boundary == PERIODIC else "reflect"
+    sigma = DEVIATION * settings.cutoff
+    mode = "wrap" if settings.boundary == PERIODIC else "reflect"
     heights = gaussian_filter(scan.heights, (sigma / dy, sigma / dx), mode=mode, truncate=_REACH)
-    return scan.after(heights, f"Gaussian S-filter (ISO 16610-61) with a nesting index of {how.cutoff:.6g} m")
+    return scan.after(heights, f"Gaussian S-filter (ISO 16610-61) with a nesting index of {settings.cutoff:.6g} m")
 
 
-def bounded(scan: Scan, how: Preparation) -> tuple[Surface, list[str]]:
+def treat_edges(scan: Scan, settings: Preparation) -> tuple[Surface, list[str]]:
     """Make the surface with the edges of its boundary, on the grid that is asked for; return it and all steps."""
-    nodes = how.grid or (2 if how.boundary == MIRROR else 1) * max(scan.heights.shape)
+    nodes = settings.grid or (2 if settings.boundary == MIRROR else 1) * max(scan.heights.shape)
     try:
         # Heights are copied when they are resampled.
         require_room(3 * 8 * nodes**2)
@@ -205,23 +205,23 @@ def bounded(scan: Scan, how: Preparation) -> tuple[Surface, list[str]]:
         raise UnfitTopography("grid", f"gives a surface of {nodes} x {nodes} points, which {error}") from None
     heights, side = scan.heights - np.mean(scan.heights), scan.size[0]
     steps = list(scan.steps)
-    if how.boundary == WINDOW:
-        across, along = (_taper(n, how.taper) for n in heights.shape)
+    if settings.boundary == WINDOW:
+        across, along = (_taper(n, settings.taper) for n in heights.shape)
         heights = heights * across[:, None] * along
-        steps.append(f"heights fall to their mean on {how.taper:g} of the side at every edge")
-    if how.boundary == MIRROR:
+        steps.append(f"heights fall to their mean on {settings.taper:g} of the side at every edge")
+    if settings.boundary == MIRROR:
         heights = np.concatenate([heights, heights[:, ::-1]], axis=1)
         heights = np.concatenate([heights, heights[::-1]], axis=0)
         side = 2 * side
         steps.append("joined by its mirror images")
     # Only periodic pixels can still be oblong.
-    grid = how.grid or max(heights.shape)
+    grid = settings.grid or max(heights.shape)
     if heights.shape != (grid, grid):
-        heights = _resampled(heights, grid, free=how.boundary == FREE)
+        heights = _resampled(heights, grid, free=settings.boundary == FREE)
         steps.append(f"resampled to {grid} x {grid} points")
     if problem := problem_with_heights(heights):
         raise UnfitTopography("path", f"holds {problem}; expected a rough surface")
-    free = how.boundary == FREE
+    free = settings.boundary == FREE
     steps.append("one square on a free half-space" if free else f"repeats after {side:.6g} m")
     try:
         return Surface(heights, side, FREE if free else PERIODIC), steps

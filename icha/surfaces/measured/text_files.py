@@ -11,12 +11,12 @@ from icha.surfaces.measured.coordinate_lines import drop_coordinates
 from icha.surfaces.measured.fourier_files import looks_like_fourier
 from icha.surfaces.measured.settings import (
     LINE_SCAN,
-    Found,
+    FileContent,
     Preparation,
     UnfitTopography,
     metres_of,
+    put_y_first,
     regular_ticks,
-    with_y_first,
 )
 from icha.surfaces.measured.text_headings import WIDTH, check_counts, read_heading
 from icha.surfaces.measured.text_tables import SourceFile
@@ -44,24 +44,24 @@ def format_of_text(file: SourceFile) -> str | None:
     return "xyz" if 3 <= layout.columns < _FEWEST_COLUMNS else "matrix"
 
 
-def read_matrix(file: SourceFile, how: Preparation) -> Found:
+def read_matrix(file: SourceFile, settings: Preparation) -> FileContent:
     """Read a row of heights in every line, and units, size and missing heights from a heading."""
     values, layout = file.values, file.table_layout
     file.refuse_blocks()
     heights, steps, remark = drop_coordinates(values)
     check_counts(layout.heading, (values.shape, heights.shape))
-    if layout.heading and not layout.images and (known := _as_instrument_file(file, how)):
+    if layout.heading and not layout.images and (known := _as_instrument_file(file, settings)):
         return known
     rows, columns = heights.shape
     heading = read_heading(layout.heading, heights.shape, layout.notation.decimal_comma)
-    if heading.ambiguous and how.size is None:
+    if heading.ambiguous and settings.size is None:
         raise UnfitTopography(
             "size",
             f"is {heading.ambiguous!r} in the file, where the comma may be decimal or separate thousands; expected the "
             "size here",
         )
-    return Found(
-        with_y_first(_without_missing(heights, heading), how),
+    return FileContent(
+        put_y_first(_mark_missing(heights, heading), settings),
         heading.height_unit,
         heading.size,
         heading.coordinates or (steps and (columns * steps[0], rows * steps[1])),
@@ -71,13 +71,13 @@ def read_matrix(file: SourceFile, how: Preparation) -> Found:
     )
 
 
-def _as_instrument_file(file, how):
+def _as_instrument_file(file, settings):
     """Read the file with SurfaceTopography, which knows many headings; None if its heights are not all of the numbers.
 
     SurfaceTopography raises all kinds of errors for texts of other formats.
     """
     try:
-        found = read_instrument(file, how)
+        found = read_instrument(file, settings)
     except Exception:
         return None
     if found.unit is None or found.heights.shape != file.values.shape or np.isnan(file.values).any():
@@ -87,11 +87,11 @@ def _as_instrument_file(file, how):
     return found if np.allclose(found.heights, scale * file.values, rtol=1e-9, atol=1e-9 * largest) else None
 
 
-def read_xyz(file: SourceFile, how: Preparation) -> Found:
+def read_xyz(file: SourceFile, settings: Preparation) -> FileContent:
     """Read x y z in every line, in any order; points may be missing. A heading may give the units."""
     layout = file.table_layout
-    titles = _titles(layout, how.columns)
-    points = _columns_of_points(file.values, how, titles)
+    titles = _titles(layout, settings.columns)
+    points = _columns_of_points(file.values, settings, titles)
     heading = read_heading(layout.heading, points.shape, layout.notation.decimal_comma)
     if len(points) > 1 and any(np.ptp(points[:, axis]) == 0 for axis in (0, 1)):
         raise UnfitTopography("path", LINE_SCAN.format(len(points)))
@@ -104,20 +104,20 @@ def read_xyz(file: SourceFile, how: Preparation) -> Found:
         raise ValueError(f"the point x = {x:g}, y = {y:g} is given twice")
     require_room(2 * 8 * nx * ny)
     heights = np.full(nx * ny, np.nan)
-    heights[node] = _without_missing(points[:, 2], heading)
+    heights[node] = _mark_missing(points[:, 2], heading)
     sides, units = (nx * dx, ny * dy), [titles[axis].unit if axis in titles else None for axis in "xyz"]
     along_x, along_y = (unit or heading.lateral_unit for unit in units[:2])
     size = None
-    if along_x and along_y and how.lateral_unit is None:
+    if along_x and along_y and settings.lateral_unit is None:
         size = sides[0] * along_x, sides[1] * along_y
     reordered = titles and sorted(titles, key=lambda axis: titles[axis].column) != ["x", "y", "z"]
-    return Found(
+    return FileContent(
         heights.reshape(ny, nx),
         units[2] or heading.height_unit,
         size,
         sides,
         remark=f"columns {', '.join(f'{axis} {titles[axis].column}' for axis in 'xyz')} by names" if reordered else "",
-        data_known=heading.channel == how.data,
+        data_known=heading.channel == settings.data,
     )
 
 
@@ -145,13 +145,13 @@ def _titles(layout, columns=None):
     return titles if asked else {}
 
 
-def _columns_of_points(values, how, titles):
+def _columns_of_points(values, settings, titles):
     """Select the columns x, y and z (k, 3) of a table."""
     count = values.shape[1]
-    columns = how.columns or tuple(titles[axis].column for axis in titles) or (1, 2, 3)
+    columns = settings.columns or tuple(titles[axis].column for axis in titles) or (1, 2, 3)
     if max(columns) > count:
         raise UnfitTopography("columns", f"exceeds the {count} numbers of a line; expected 1 to {count}")
-    if how.columns is None and not titles and count != 3:
+    if settings.columns is None and not titles and count != 3:
         if not 3 < count < _FEWEST_COLUMNS:
             raise ValueError(f"{count} numbers in a line, not x y z")
         other = ", and no Fourier series, whose opposite waves have conjugate amplitudes" if count == 4 else ""
@@ -174,7 +174,7 @@ def _ticks(values, axis):
         ) from None
 
 
-def _without_missing(heights, heading):
+def _mark_missing(heights, heading):
     """Replace the numbers that, by the heading, stand for missing heights by nan."""
     for number in heading.missing:
         heights = np.where(np.isclose(heights, number, rtol=_FEW_DIGITS, atol=0), np.nan, heights)

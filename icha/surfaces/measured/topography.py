@@ -20,7 +20,15 @@ from icha.support.checksums import sha256_of
 from icha.support.input_files import problem_with_path
 from icha.surfaces.measured.scan import load_scan
 from icha.surfaces.measured.settings import Preparation, UnfitTopography
-from icha.surfaces.measured.steps import bounded, cropped, detrended, filled, refuse_flat, squared, without_short_waves
+from icha.surfaces.measured.steps import (
+    crop_square,
+    fill_missing_points,
+    filter_short_waves,
+    refuse_flat,
+    remove_trend,
+    resample_to_square_pixels,
+    treat_edges,
+)
 from icha.surfaces.surface import Surface
 
 
@@ -55,7 +63,7 @@ class PreparedTopography:
         return self.surface.rms_slope
 
 
-def prepared_topography(path: str | os.PathLike, preparation: Mapping) -> PreparedTopography:
+def prepare_topography(path: str | os.PathLike, preparation: Mapping) -> PreparedTopography:
     """Read a topography and make the surface that the settings describe.
 
     Parameters
@@ -68,17 +76,17 @@ def prepared_topography(path: str | os.PathLike, preparation: Mapping) -> Prepar
     UnfitTopography
         A ValueError with the setting (`key`) that does not fit the file, the reason, and what is expected.
     """
-    file, how = Path(path), Preparation(**preparation)
+    file, settings = Path(path), Preparation(**preparation)
     if problem := problem_with_path(file):
         raise UnfitTopography("path", f"{problem}; expected a file of heights")
-    scan = load_scan(file, how)
-    touching = scan.heights if how.touches_first == "high" else -scan.heights
-    square = cropped(scan.after(touching, f"{how.touches_first} numbers touch first"), how)
+    scan = load_scan(file, settings)
+    touching = scan.heights if settings.touches_first == "high" else -scan.heights
+    square = crop_square(scan.after(touching, f"{settings.touches_first} numbers touch first"), settings)
     prepared = square
-    for step in (detrended, filled, squared, without_short_waves):
-        prepared = step(prepared, how)
-    refuse_flat(prepared, square, how)
-    surface, steps = bounded(prepared, how)
+    for step in (remove_trend, fill_missing_points, resample_to_square_pixels, filter_short_waves):
+        prepared = step(prepared, settings)
+    refuse_flat(prepared, square, settings)
+    surface, steps = treat_edges(prepared, settings)
     return PreparedTopography(
         surface=surface,
         source_file=file.name,

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from icha import Material, SelfAffineSpectrum
-from icha.boundary_elements import nearby
+from icha.boundary_elements import tiles as module
 from icha.boundary_elements.contact import contact_of
-from icha.boundary_elements.kernel import HalfSpace
-from icha.boundary_elements.nearby import REACH, TILE, Tiles
+from icha.boundary_elements.half_space import HalfSpace
+from icha.boundary_elements.tiles import REACH, TILE, TiledGrid
 from icha.contact.model import PRESSURE
 from icha.support import parallel
 
@@ -27,8 +27,8 @@ def test_sums_nearby_are_those_of_cells_one_by_one(grid):
     kernel = np.exp(-np.hypot(way[:, None], way) / 5) * (np.hypot(way[:, None], way) < REACH)
     cells = patches(grid, rng, 6)
     values = rng.normal(size=len(cells))
-    tiles = Tiles.of(cells, grid)
-    assert 1 < tiles.count and sum(len(which) for which, _ in tiles.reaching.parts) > len(cells)
+    tiles = TiledGrid.of(cells, grid)
+    assert 1 < tiles.count and sum(len(which) for which, _ in tiles.sources.batches) > len(cells)
     found = tiles.sums(values, np.fft.rfft2(kernel).real)
 
     row, column = np.divmod(cells, grid)
@@ -44,16 +44,16 @@ def test_displacements_are_those_of_the_whole_to_the_error_that_is_told(grid, al
     rng = np.random.default_rng(grid)
     cells = patches(grid, rng, 6)
     pressure = (np.ones(len(cells)) if all_at_once else rng.normal(size=len(cells))).astype(np.float32)
-    tiles, exact = Tiles.of(cells, grid), HalfSpace.of(grid).displacement(cells, pressure, cells)
+    tiles, exact = TiledGrid.of(cells, grid), HalfSpace.of(grid).displacement(cells, pressure, cells)
     assert np.abs(tiles.displacement(pressure) - exact).max() < tiles.error * np.abs(exact).max()
 
 
 def test_where_cells_are_everywhere_there_are_no_tiles():
-    assert Tiles.of(np.arange(0, 700**2, 97), 700) is None
+    assert TiledGrid.of(np.arange(0, 700**2, 97), 700) is None
 
 
 def test_a_grid_that_the_coarse_one_does_not_fit_has_no_tiles():
-    assert Tiles.of(np.arange(10), 1001) is None
+    assert TiledGrid.of(np.arange(10), 1001) is None
 
 
 @pytest.mark.parametrize("adhesion", [0.0, 0.05])
@@ -61,11 +61,11 @@ def test_contacts_are_the_same_with_tiles_and_without(adhesion, monkeypatch):
     spectrum = SelfAffineSpectrum(100e-6, 20e-6, short_wavelength=2e-6, hurst=0.8, rms_slope=1.0)
     surface, material = spectrum.realise(800, seed=5), Material(25e6, adhesion, 2e-9)
     results, used = [], []
-    of = Tiles.of
+    of = TiledGrid.of
     monkeypatch.setattr(parallel, "LARGE_GRID", 800)
-    monkeypatch.setattr(Tiles, "of", lambda *given: used.append(of(*given)) or used[-1])
-    for part in (nearby._LARGE_PART, 0.0):
-        monkeypatch.setattr(nearby, "_LARGE_PART", part)
+    monkeypatch.setattr(TiledGrid, "of", lambda *given: used.append(of(*given)) or used[-1])
+    for part in (module._LARGEST_COVER_LARGE, 0.0):
+        monkeypatch.setattr(module, "_LARGEST_COVER_LARGE", part)
         contact = contact_of(surface, material)
         state = contact.untouched()
         for closer in (0.1, 0.3, 0.45):

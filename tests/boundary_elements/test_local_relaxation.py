@@ -4,13 +4,12 @@ import numpy as np
 import pytest
 from scipy.ndimage import maximum_filter
 
-from icha.boundary_elements import windows as module
+from icha.boundary_elements import local_relaxation as module
 from icha.boundary_elements.contact import contact_of
-from icha.boundary_elements.elastic_equilibrium import held
-from icha.boundary_elements.elasticity import Contact
-from icha.boundary_elements.front import COMPLIANCE, neighbour_weights, neighbours
-from icha.boundary_elements.kernel import HalfSpace
-from icha.boundary_elements.newton import moving
+from icha.boundary_elements.elastic_contact import Contact, solve_adhesive_fractions
+from icha.boundary_elements.front import mean_around, neighbour_weights
+from icha.boundary_elements.front_solver import find_active_cells
+from icha.boundary_elements.half_space import HalfSpace
 from validation.rough_contacts import SOFT, rough
 
 GRID = 160
@@ -23,12 +22,12 @@ def test_displacements_in_a_window_are_those_of_the_whole_surface(around):
     rng = np.random.default_rng(1)
     whole = HalfSpace.of(320)
     count = 0
-    for cells, free in module._Places.around(np.flatnonzero(restless), 320, around).windows(320):
-        small = HalfSpace(cells.shape, *module._kernel(320, cells.shape[-1]))
+    for cells, free in module.Places.around(np.flatnonzero(restless), 320, around).windows(320):
+        small = HalfSpace(cells.shape, *module.window_kernel(320, cells.shape[-1]))
         pressure = rng.normal(size=np.count_nonzero(free))
         own = np.flatnonzero(free)
-        found = small.on_grid(own, small.displacement(own, pressure, own))
-        values = small.on_grid(own, pressure)
+        found = small.field(own, small.displacement(own, pressure, own))
+        values = small.field(own, pressure)
         for window, inside, displaced, pressed in zip(cells, free, found, values, strict=True):
             order = np.argsort(window[inside])
             at = window[inside][order]
@@ -44,7 +43,7 @@ def test_every_cell_near_a_restless_one_may_move_in_one_window_however_wide_the_
     restless = np.zeros((grid, grid), dtype=bool)
     restless[300, :] = restless[100:460, 240] = restless[650, 20] = True
     times = np.zeros(restless.size, int)
-    for cells, free in module._Places.around(np.flatnonzero(restless), grid, 4).windows(grid):
+    for cells, free in module.Places.around(np.flatnonzero(restless), grid, 4).windows(grid):
         assert cells.shape == free.shape and cells.shape[-1] in (64, 128)
         np.add.at(times, cells[free], 1)
     assert times.max() == 1
@@ -59,7 +58,7 @@ def test_weights_between_cells_are_those_of_the_stencil(shape):
     rng = np.random.default_rng(2)
     cells = np.sort(rng.choice(space.size, 900, replace=False))
     fraction = rng.random(900)
-    expected = neighbours(space, cells, fraction).ravel()[cells]
+    expected = mean_around(space.field(cells, fraction)).ravel()[cells]
     np.testing.assert_allclose(neighbour_weights(cells, shape) @ fraction, expected, rtol=0, atol=1e-6)
 
 
@@ -67,7 +66,7 @@ def test_a_front_disturbed_in_one_place_comes_to_rest_there_and_nothing_else_mov
     contact = contact_of(rough(GRID, waves=GRID // 8), SOFT)
     separation = 2.0 * contact.rms_height
     state = contact.equilibrium(contact.untouched(), separation)
-    reach, u = COMPLIANCE * contact.front.strength, separation / contact.spacing
+    tolerance, u = 1e-9 * contact.front.critical_opening, separation / contact.spacing
     pressure = state.pressure / contact.contact_modulus
 
     # Cells of the front, around one of them, are closed.
@@ -75,13 +74,14 @@ def test_a_front_disturbed_in_one_place_comes_to_rest_there_and_nothing_else_mov
     apart = np.abs(np.stack(np.divmod(state.cells, GRID)) - np.stack(np.divmod(place, GRID))[:, None])
     near = np.all(np.minimum(apart, GRID - apart) <= 2, axis=0)
     fraction = np.where(near, 1.0, state.fraction)
-    disturbed = held(contact.space, contact.topography, u, Contact(state.cells, fraction, pressure), 1e-9 * reach)
-    before = moving(contact.front, disturbed)
-    restless = before.cells[before.free & (np.abs(before.intensity - 1) > 0.03)]
-    assert len(restless) and before.error > 0.1
+    start = Contact(state.cells, fraction, pressure)
+    disturbed = solve_adhesive_fractions(contact.space, contact.topography, u, start, tolerance)
+    active = find_active_cells(contact.front, disturbed)
+    moving = active.cells[active.residuals > 0.03]
+    assert len(moving) and active.residual > 0.1
 
-    mended = module.relaxed_in_windows(contact.space, contact.front, u, disturbed, disturbed.gap, restless)
-    np.testing.assert_array_equal(mended.cells, state.cells)
+    relaxed = module.relax_in_windows(contact.space, contact.front, u, disturbed, disturbed.gap, moving)
+    np.testing.assert_array_equal(relaxed.cells, state.cells)
     far = np.all(np.minimum(apart, GRID - apart) > 26, axis=0)
-    np.testing.assert_array_equal(mended.fraction[far], state.fraction[far])
-    assert np.abs(mended.fraction - state.fraction).max() < 0.05 < np.abs(fraction - state.fraction).max()
+    np.testing.assert_array_equal(relaxed.fraction[far], state.fraction[far])
+    assert np.abs(relaxed.fraction - state.fraction).max() < 0.05 < np.abs(fraction - state.fraction).max()

@@ -1,0 +1,141 @@
+"""Observables of a contact of cells: residuals, events, distributions, patches and maps."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from icha.boundary_elements.patches import CellState, free_edges, label_patches, labels_at, patch_centres
+from icha.contact.model import (
+    COALESCENCE,
+    JUMP_IN,
+    JUMP_OFF,
+    PRESSURE_BINS,
+    SPLIT,
+    Events,
+    count_summits,
+    gap_bins,
+    largest_tension,
+)
+from icha.surfaces.moments import LEAST_CELLS_PER_WAVE, cells_per_short_wave
+from icha.surfaces.surface import Surface
+
+if TYPE_CHECKING:
+    from icha.boundary_elements.contact import BoundaryElements
+
+
+@dataclass(frozen=True, eq=False)
+class PatchObservables:
+    """`icha.contact.model.Observables` of a contact of cells and its surface."""
+
+    contact: BoundaryElements
+    surface: Surface
+
+    def of_contact(self) -> dict:
+        """Values that all states have in common."""
+        return count_summits(self.contact.asperities)
+
+    def of_step(self, state: CellState) -> dict:
+        """Residuals of the equilibrium, events so far, and the share of summits outside the range of Wu's formula."""
+        contact = self.contact
+        touched = np.isin(contact.summits.cell, state.cells)
+        verified = contact.law.is_jump_in_verified(contact.asperities.radius_of_curvature[touched])
+        outside = np.count_nonzero(~verified) / max(len(verified), 1)
+        events = Events.concatenate(state.history)
+        counts = {
+            name: events.count(kind)
+            for name, kind in (
+                ("jump_in_count", JUMP_IN),
+                ("jump_off_count", JUMP_OFF),
+                ("coalescence_count", COALESCENCE),
+                ("split_count", SPLIT),
+            )
+        }
+        return counts | {
+            "residual": state.gap_residual / contact.rms_height,
+            "front_residual": state.front_residual,
+            "gap_residual": state.gap_residual / contact.rms_height,
+            "pending_count": state.pending,
+            "outside_wu_fraction": outside if contact.adhesive else 0.0,
+        }
+
+    def of_snapshot(self, state: CellState) -> dict:
+        """Distributions of gap and pressure, patches, and maps of contact and pressure."""
+        cells = self.contact.area_of_cells(state)
+        gap = self._gap_density(state, cells)
+        pressure, mean = self._pressure_density(state, cells)
+        field = self.contact.space.field
+        return {
+            "overlap_fraction": 0.0,
+            "area_beyond_edges": 0.0,
+            "gap_density": gap,
+            "pressure_density": pressure,
+            "pressure_bin_mean": mean,
+            "contact_map": field(state.cells, state.fraction, np.float32),
+            "contact_pressure": field(state.cells, state.pressure, np.float32),
+            **self._patches(state, cells),
+        }
+
+    def reasons_against(self, separations: Iterable[float], pressed: CellState | None) -> list[str]:
+        """Reason why the grid does not resolve the surface: too few cells for its shortest waves."""
+        asperities, grid = self.contact.asperities, self.surface.grid
+        cells = cells_per_short_wave(grid, len(asperities) + len(asperities.unsupported_height))
+        if cells >= LEAST_CELLS_PER_WAVE:
+            return []
+        return [f"about {cells:.2g} grid cells for the shortest waves (at least {LEAST_CELLS_PER_WAVE:g} expected)"]
+
+    @property
+    def largest_tension(self) -> float:
+        """Tension of all summits at their pull-off at once, Pa."""
+        contact = self.contact
+        return largest_tension(contact.asperities, contact.law.material.surface_energy, contact.area)
+
+    def _gap_density(self, state, cells):
+        """Density of the gap over the nominal area outside contact; with the contact area it sums up to one."""
+        edges_of_bins = gap_bins(self.surface)
+        gap = np.clip(self.contact.gap(state), 0.0, edges_of_bins[-1])
+        outside = 1 - self.contact.space.field(state.cells, cells)
+        content, _ = np.histogram(gap, edges_of_bins, weights=outside)
+        return content / gap.size / np.diff(edges_of_bins)
+
+    def _pressure_density(self, state, cells):
+        """Density of the pressure over the nominal area, and its mean in each bin."""
+        edges_of_bins = PRESSURE_BINS * self.contact.pressure_unit
+        # The force of a cell acts on its fraction in contact, scaled by one factor to the contact area.
+        weight = state.fraction * (np.sum(cells) / (np.sum(state.fraction) or 1.0))
+        pressure = state.pressure / weight
+        counted = np.clip(pressure, edges_of_bins[0], edges_of_bins[-1])
+        content, _ = np.histogram(counted, edges_of_bins, weights=weight)
+        force, _ = np.histogram(counted, edges_of_bins, weights=weight * pressure)
+        mean = np.divide(force, content, out=np.zeros(len(content)), where=content > 0)
+        return content / self.contact.heights.size / np.diff(edges_of_bins), mean
+
+    def _patches(self, state, cells):
+        """Patches: centre of area, area, perimeter, force, summits, and the curvature of the highest summit."""
+        contact, h = self.contact, self.contact.spacing
+        grid = contact.space.grid
+        labels, count = label_patches(state.cells, grid)
+
+        def sums(weight):
+            return np.bincount(labels, weight, count + 1)[1:]
+
+        area = sums(cells) * h**2
+        of_summit = labels_at(contact.summits.cell, state.cells, labels)
+        order = np.argsort(contact.asperities.height, kind="stable")
+        # A patch without a summit counts as a cap of the surface's mean curvature.
+        radius = np.full(count + 1, 1 / self.surface.rms_curvature)
+        radius[of_summit[order]] = contact.asperities.radius_of_curvature[order]
+        centre = patch_centres(state.cells, grid, labels, count, state.fraction) * h
+        return {
+            "spot_x": centre[:, 0],
+            "spot_y": centre[:, 1],
+            "spot_radius": np.sqrt(area / np.pi),
+            "spot_area": area,
+            "spot_perimeter": np.pi / 4 * sums(free_edges(state.cells, grid)) * h,
+            "spot_force": sums(state.pressure) * h**2,
+            "spot_curvature_radius": radius[1:],
+            "spot_members": np.bincount(of_summit, minlength=count + 1)[1:],
+        }

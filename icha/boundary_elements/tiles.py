@@ -1,0 +1,236 @@
+"""Half-space for cells in contact on large grids: tiles for short distances, a coarse grid for long ones.
+
+The kernel is split as in `icha.half_space.ewald`: 2/q = (2/q) erf(q/2a) + (2/q) erfc(q/2a). The first term is short in
+range, and is summed tile by tile. The second is smooth, and is computed on a coarser grid, with splines for transfer
+(R. W. Hockney & J. W. Eastwood, Computer Simulation Using Particles, 1988, ch. 8). The inverse of the kernel is short
+in range. Little contact needs few tiles, and no transform is that of the whole grid.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+import scipy.fft
+from scipy.interpolate import BSpline
+from scipy.special import erf, erfc
+
+from icha.boundary_elements.transforms import filter_by_blocks, reusable_field
+from icha.support import parallel
+from icha.support.parallel import blocks, on_cores
+
+# Cells along a side of a tile, and range of the short kernel, which is the margin of a tile.
+TILE, REACH = 128, 16
+# Spacing of the coarse grid in cells, and order of its splines; their support is at most REACH.
+COARSENING, _ORDER = 4, 4
+_NODES = TILE // COARSENING
+# Ewald parameter per cell: what is cut off and what the coarse grid misses are then both below `error`.
+_ALPHA = 2.3 / REACH
+# Largest area of all tiles over the grid's for which they are faster; on grids whose transforms run on several cores.
+_LARGEST_COVER, _LARGEST_COVER_LARGE = 0.6, 1.2
+# Tiles that are transformed together, in the cache.
+_BATCH = 8
+
+
+@dataclass(frozen=True, eq=False)
+class TiledGrid:
+    """`icha.boundary_elements.half_space.Operator` of k cells of a periodic grid, by the square tiles around them.
+
+    Parameters
+    ----------
+    grid : cells along a side.
+    count : number of tiles, t.
+    sources : cells within each tile and its margin.
+    targets : cells within each tile without its margin.
+    nodes : (m,) int, nodes of the coarse grid that tiles cover, ascending.
+    covered : (t, _NODES, _NODES) int, which of these each tile covers.
+    """
+
+    grid: int
+    count: int
+    sources: _CellsByTile
+    targets: _CellsByTile
+    nodes: np.ndarray
+    covered: np.ndarray
+
+    # Largest error of a displacement, over the largest displacement.
+    error = 1e-3
+
+    @classmethod
+    def of(cls, cells: np.ndarray, grid: int) -> TiledGrid | None:
+        """Return the tiles of cells (k,), ascending; None if they would not be faster than the whole grid."""
+        if grid % COARSENING:
+            return None
+        many = -(-grid // (TILE - 2 * REACH))
+        starts = COARSENING * (np.arange(many + 1) * (grid // COARSENING) // many)
+        tile_of = np.searchsorted(starts, np.arange(grid), "right") - 1
+        occupied = np.zeros((many, many), dtype=bool)
+        occupied[tuple(tile_of[along] for along in np.divmod(cells, grid))] = True
+        tiles = np.argwhere(occupied)
+        cover = _LARGEST_COVER if grid < parallel.LARGE_GRID else _LARGEST_COVER_LARGE
+        if not 0 < len(tiles) * TILE**2 <= cover * grid**2:
+            return None
+        corner, coarse = starts[tiles] - REACH, grid // COARSENING
+        sources, targets = _cells_by_tile(cells, grid, corner, starts[tiles + 1] - starts[tiles])
+        row, column = ((first[:, None] // COARSENING + np.arange(_NODES)) % coarse for first in corner.T)
+        covered = row[:, :, None] * coarse + column[:, None, :]
+        number = np.zeros(coarse**2, int)
+        number[covered] = 1
+        nodes = np.flatnonzero(number)
+        number[nodes] = np.arange(len(nodes))
+        return cls(grid, len(tiles), sources, targets, nodes, number[covered])
+
+    def sums(self, values: np.ndarray, modes: np.ndarray) -> np.ndarray:
+        """Convolve values (k,) on the cells with a kernel of range REACH, given by its modes (TILE, TILE//2 + 1)."""
+        result = np.empty_like(values)
+        self._convolve(modes, values, result)
+        return result
+
+    def approximate_inverse(self, displacement: np.ndarray) -> np.ndarray:
+        """Pressures (k,) for displacements (k,), approximately."""
+        return self.sums(displacement, _inverse_modes())
+
+    def displacement(self, pressure: np.ndarray) -> np.ndarray:
+        """Displacements (k,) under pressures (k,), in single precision."""
+        near, far = _displacement_modes(self.grid)
+        result, shares = np.empty_like(pressure), np.empty((self.count, _NODES, _NODES), np.float32)
+
+        def restrict(batch):
+            shares[batch] = _restrict(self.targets.field(batch, pressure))
+
+        on_cores(restrict, blocks(self.count, _BATCH))
+        coarse = np.bincount(self.covered.ravel(), shares.ravel()).astype(np.float32)
+        smooth = filter_by_blocks(self.grid // COARSENING, self.nodes, coarse, far, self.nodes)
+        self._convolve(near, pressure, result, smooth[self.covered])
+        return result
+
+    def _convolve(self, modes, values, result, coarse=None):
+        """Write into `result` the convolution with a short kernel, plus the interpolated values of coarse nodes."""
+
+        def convolve(batch):
+            field = scipy.fft.rfft2(self.sources.field(batch, values), workers=1)
+            field *= modes
+            field = scipy.fft.irfft2(field, s=(TILE, TILE), overwrite_x=True, workers=1)
+            if coarse is not None:
+                field += _interpolate(coarse[batch])
+            numbers, places = self.targets.of_batch(batch)
+            result[numbers] = field.ravel()[places]
+
+        on_cores(convolve, blocks(self.count, _BATCH))
+
+
+@dataclass(frozen=True, eq=False)
+class _CellsByTile:
+    """Numbers of cells in their list, and their places in the tiles, by batches of tiles."""
+
+    batches: tuple[tuple[np.ndarray, np.ndarray], ...]
+
+    def of_batch(self, batch):
+        """Numbers and places of the cells in a batch of tiles."""
+        return self.batches[batch.start // _BATCH]
+
+    def field(self, batch, values):
+        """Values (k,) of the cells in a batch of tiles, (t, TILE, TILE)."""
+        field = np.zeros((batch.stop - batch.start, TILE, TILE), values.dtype)
+        numbers, places = self.of_batch(batch)
+        field.ravel()[places] = values[numbers]
+        return field
+
+
+def _cells_by_tile(cells, grid, corner, size):
+    """Assign cells (k,) to tiles with given corners (t, 2): those within the margins, and those without.
+
+    size : (t, 2) int, rows and columns of each tile without its margin.
+    """
+    number = reusable_field((grid, grid), np.dtype(np.int32))  # zeros before and after
+    number.ravel()[cells] = np.arange(1, len(cells) + 1)
+
+    def assign(batch):
+        with_margin = np.stack([_window(number, *at) for at in corner[batch].tolist()])
+        without = np.zeros_like(with_margin)
+        for source, target, (rows, columns) in zip(with_margin, without, size[batch].tolist(), strict=True):
+            inner = slice(REACH, REACH + rows), slice(REACH, REACH + columns)
+            target[inner] = source[inner]
+        return _numbers_and_places(with_margin), _numbers_and_places(without)
+
+    try:
+        sources, targets = zip(*on_cores(assign, blocks(len(corner), _BATCH)), strict=True)
+    finally:
+        number.ravel()[cells] = 0
+    return _CellsByTile(sources), _CellsByTile(targets)
+
+
+def _window(field, row, column):
+    """Return the part of a periodic field, (TILE, TILE), whose corner is at a row and column."""
+    grid, along = len(field), np.arange(TILE)
+    if min(row, column) >= 0 and max(row, column) <= grid - TILE:
+        return field[row : row + TILE, column : column + TILE]
+    return field[np.ix_((row + along) % grid, (column + along) % grid)]
+
+
+def _numbers_and_places(windows):
+    """Numbers, less 1, and places of the numbered cells in tiles (t, TILE, TILE)."""
+    places = np.flatnonzero(windows)
+    return windows.ravel()[places].astype(int) - 1, places
+
+
+# Spline of one node of the coarse grid on the cells around it, and splines of all coarse nodes of a tile on its cells.
+_HALF = _ORDER * COARSENING // 2
+_SPLINE = BSpline.basis_element(np.arange(_ORDER + 1) - _ORDER / 2)(np.arange(-_HALF, _HALF) / COARSENING)
+_SPLINES = np.zeros((TILE + 2 * _HALF, _NODES), np.float32)
+for _node in range(_NODES):
+    _SPLINES[COARSENING * _node : COARSENING * _node + 2 * _HALF, _node] = _SPLINE
+_SPLINES = _SPLINES[_HALF:-_HALF]
+
+
+# The matrices are so small that no library splits their products among threads, which could change bits.
+def _restrict(field):
+    """Transfer values on the cells of tiles, (t, TILE, TILE), to coarse nodes, (t, _NODES, _NODES)."""
+    rows = (field.reshape(-1, _NODES, TILE) @ _SPLINES).reshape(-1, TILE, _NODES)
+    return _SPLINES.T @ rows
+
+
+def _interpolate(coarse):
+    """Interpolate values of coarse nodes, (t, _NODES, _NODES), on the cells of tiles, (t, TILE, TILE)."""
+    rows = _SPLINES @ coarse
+    return (rows.reshape(-1, _NODES, _NODES) @ _SPLINES.T).reshape(-1, TILE, TILE)
+
+
+@cache
+def _inverse_modes():
+    """Modes of the inverse kernel q/2, cut off at REACH; all of them are larger than 0.03."""
+    along = scipy.fft.fftfreq(TILE) * TILE
+    table = scipy.fft.irfft2(_wave_numbers(TILE) / 2)
+    return scipy.fft.rfft2(np.where(np.hypot(along[:, None], along) <= REACH, table, 0.0)).real.astype(np.float32)
+
+
+@cache
+def _displacement_modes(grid):
+    """Modes of the short kernel on a tile, and of the smooth one on the coarse grid with its splines."""
+    many = 8 * TILE
+    q = _wave_numbers(many)
+    q[0, 0] = 1.0
+    modes = 2 / q * erf(q / (2 * _ALPHA))
+    modes[0, 0] = at_zero = 2 / (np.sqrt(np.pi) * _ALPHA)
+    along = scipy.fft.fftfreq(TILE) * TILE
+    table = scipy.fft.irfft2(modes)[np.ix_(along.astype(int), along.astype(int))]
+    near = scipy.fft.rfft2(np.where(np.hypot(along[:, None], along) <= REACH, table, 0.0)).real.astype(np.float32)
+
+    coarse = grid // COARSENING
+    q = _wave_numbers(coarse) / COARSENING
+    q[0, 0] = 1.0
+    far = 2 / q * erfc(q / (2 * _ALPHA))
+    far[0, 0] = -at_zero
+    spline = np.zeros(grid)
+    spline[np.arange(-_HALF, _HALF)] = _SPLINE
+    # Correct for the splines' effect on each wave of the coarse grid and on its aliases.
+    waves = (scipy.fft.fft(spline).real ** 2).reshape(COARSENING, coarse)
+    nearest = np.rint(scipy.fft.fftfreq(coarse) * coarse).astype(int)
+    of_wave = (scipy.fft.fft(spline).real ** 2)[nearest] / waves.sum(axis=0) ** 2 * COARSENING
+    return near, (far * np.outer(of_wave, of_wave[: coarse // 2 + 1])).astype(np.float32)
+
+
+def _wave_numbers(grid):
+    """Wave numbers q of a grid, (n, n//2 + 1), per cell."""
+    return 2 * np.pi * np.hypot(scipy.fft.fftfreq(grid)[:, None], scipy.fft.rfftfreq(grid))
