@@ -60,7 +60,7 @@ def group_by_contact(campaign: xr.DataTree, runs: Iterable[tuple[RunLabels, xr.D
     return list(found.values())
 
 
-def study_runs(
+def select_runs(
     campaign: xr.DataTree, study: str, *, ragged: bool = True, model: str | None = None
 ) -> list[tuple[RunLabels, xr.Dataset]]:
     """Return all complete runs of a study with a model.
@@ -218,14 +218,14 @@ class Snapshots(NamedTuple):
     truths: list[tuple[xr.Dataset, int]]
 
 
-def snapshots_of_materials(
+def select_snapshots(
     campaign: xr.DataTree, study: str, kind: str | None = None, target: float | None = None
 ) -> list[Snapshots]:
     """Return a snapshot of every run of the `shown_model` on the first surface and slope of a study."""
     from icha.datasets.campaign import find_snapshot
 
-    groups = group_by_contact(campaign, study_runs(campaign, study))
-    reference = [] if groups[0].labels.model == REFERENCE_MODEL else study_runs(campaign, study, model=REFERENCE_MODEL)
+    groups = group_by_contact(campaign, select_runs(campaign, study))
+    reference = [] if groups[0].labels.model == REFERENCE_MODEL else select_runs(campaign, study, model=REFERENCE_MODEL)
     found = []
     for group in groups:
         if group.contact[1:] == groups[0].contact[1:]:

@@ -32,8 +32,8 @@ from icha.figures import (
     fig11_distribution_error,
 )
 from icha.figures.looks import Scale, material_colours, materials_scale, place_markers, places_scale
-from icha.figures.maps import block_means, circles_in_cell
-from icha.figures.select import NothingToDraw, branches, path_steps, study_runs
+from icha.figures.maps import average_blocks, wrap_circles
+from icha.figures.select import NothingToDraw, branches, path_steps, select_runs
 from icha.figures.style import (
     BLACK,
     choose_unit,
@@ -166,8 +166,8 @@ def test_fig4_refuses_another_surface_or_state(tmp_path, surface):
 def test_fig4_draws_means_of_large_topographies():
     n = 3000
     heights = np.add.outer(np.arange(n) ** 2.0, np.arange(n) * 10.0)
-    drawn = block_means(heights)
-    assert drawn.shape == (1024, 1024) and block_means(heights[:7, :7]).shape == (7, 7)
+    drawn = average_blocks(heights)
+    assert drawn.shape == (1024, 1024) and average_blocks(heights[:7, :7]).shape == (7, 7)
     # A block of nodes from 3000 k/1024 to the next.
     rows, columns = np.arange(2929, 2932), np.arange(1464, 1467)
     assert drawn[1000, 500] == pytest.approx(np.add.outer(rows**2.0, columns * 10.0).mean())
@@ -191,11 +191,11 @@ def test_fig4_enlarges_small_spots_more(tmp_path):
 
 
 def test_circles_continue_across_borders():
-    circles = list(circles_in_cell([0.02, 0.5], [0.97, 0.5], [0.1, 0.1], 1.0, "periodic"))
+    circles = list(wrap_circles([0.02, 0.5], [0.97, 0.5], [0.1, 0.1], 1.0, "periodic"))
     centres = sorted((round(x, 9), round(y, 9)) for x, y, _ in circles)
     assert centres == [(0.02, -0.03), (0.02, 0.97), (0.5, 0.5), (1.02, -0.03), (1.02, 0.97)]
     # A free square has no opposite border.
-    assert len(circles_in_cell([0.02, 0.5], [0.97, 0.5], [0.1, 0.1], 1.0, "free")) == 2
+    assert len(wrap_circles([0.02, 0.5], [0.97, 0.5], [0.1, 0.1], 1.0, "free")) == 2
 
 
 def test_fig5_draws_measurements_over_the_curves(tmp_path):
@@ -485,7 +485,7 @@ def test_only_complete_runs_are_drawn():
     runs = [(labels, run) for labels, run in small.runs() if labels.study == "slopes"]
     ended = [(labels, run.assign_attrs(incomplete="no equilibrium at the third stop")) for labels, run in runs]
     tree = campaign_tree([ended[0], *runs[1:]])
-    assert {labels for labels, _ in study_runs(tree, "slopes")} == {labels for labels, _ in runs[1:]}
+    assert {labels for labels, _ in select_runs(tree, "slopes")} == {labels for labels, _ in runs[1:]}
     with pytest.raises(NothingToDraw, match="study slopes: no run is complete"):
         fig5_multi_slope.figure(campaign_tree(ended), study="slopes")
 

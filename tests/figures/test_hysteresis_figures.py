@@ -13,7 +13,7 @@ from icha.datasets.labels import RunLabels
 from icha.figures import fig13_loops, fig14_pull_off, fig15_loss, fig16_snap_map
 from icha.figures.ensembles import Points
 from icha.figures.fig15_loss import PARTS, linear_fit, shares
-from icha.figures.hysteresis import unloaded_runs
+from icha.figures.hysteresis import select_unloaded_runs
 from icha.figures.select import ContactRuns
 
 MODULES = (fig13_loops, fig14_pull_off, fig15_loss, fig16_snap_map)
@@ -108,7 +108,7 @@ def test_loops_of_free_squares_are_along_the_mean_separation():
     ((labels, run), *_) = separate.study("one", materials=("sticky",), slopes=(0.5,), seeds=(1,))
     gap = (run["mean_separation"] + run["rms_height"]).assign_attrs(run["mean_gap"].attrs)
     free = run.assign(boundary=run["boundary"].copy(data="free"), mean_gap=gap)
-    ((_, shown),) = unloaded_runs(campaign_tree([(labels, free)]), "one")
+    ((_, shown),) = select_unloaded_runs(campaign_tree([(labels, free)]), "one")
     np.testing.assert_allclose(shown["reduced_separation"], run["reduced_separation"])
 
 

@@ -12,7 +12,7 @@ from icha.figures.registry import DECLARATIONS, figure_module, figure_number
 
 MODULE = """
 from icha.figures.declaration import Declaration, StudyFigure
-from icha.figures.select import study_runs
+from icha.figures.select import select_runs
 from icha.figures.style import in_style, new_figure
 
 DECLARATION = Declaration(
@@ -25,7 +25,7 @@ DECLARATION = Declaration(
 def figure(campaign, *, study):
     drawing = new_figure(3, 2)
     axes = drawing.subplots()
-    for _, run in study_runs(campaign, study, ragged=False):
+    for _, run in select_runs(campaign, study, ragged=False):
         axes.plot(run["reduced_pressure"], run["contact_area_fraction"])
     return drawing
 """
