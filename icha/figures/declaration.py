@@ -106,7 +106,7 @@ class TruthFigure(StudyFigure):
 
     boundary_elements: Name | None = Field(
         default=None,
-        description="Name of a study whose runs with boundary elements are also drawn. Left out: the study itself, if "
+        description="Name of a study whose runs with boundary elements are also drawn. Default: the study itself, if "
         "it has such runs.",
     )
 
@@ -129,9 +129,7 @@ class TruthFigure(StudyFigure):
 class SnapshotFigure(StudyFigure):
     """A figure of one snapshot of a study."""
 
-    snapshot: Snapshot | None = Field(
-        default=None, description="Which of the study's snapshots. Left out: the first one."
-    )
+    snapshot: Snapshot | None = Field(default=None, description="Snapshot of the study. Default: the first one.")
 
     def study_problems(self, campaign: Campaign, study: Any) -> Iterator[Problem]:
         """Yield in addition the problem of a study without the snapshot."""
@@ -155,11 +153,11 @@ class SnapshotFigure(StudyFigure):
 class RunFigure(StudyFigure):
     """A figure of one run; what is left out is the study's first."""
 
-    surface: Label | None = Field(default=None, description="Surface that is shown.")
-    seed: Seed | None = Field(default=None, description="Seed that is shown.")
+    surface: Label | None = Field(default=None, description="Surface to show.")
+    seed: Seed | None = Field(default=None, description="Seed to show.")
     rms_slope: Positive | None = Field(default=None, description="Rms slope that is shown.")
     material: Label | None = Field(
-        default=None, description="Material that is shown. Left out: the first one with adhesion, if there is any."
+        default=None, description="Material to show. Default: the first one with adhesion, if there is any."
     )
 
     def arguments(self) -> dict[str, Any]:

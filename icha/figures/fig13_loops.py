@@ -37,8 +37,8 @@ if TYPE_CHECKING:
 class LoopsFigure(TruthFigure):
     """A figure of the runs of a study in loading and unloading, on one topography."""
 
-    surface: Label | None = Field(default=None, description="Surface that is shown. Left out: the study's first.")
-    seed: Seed | None = Field(default=None, description="Seed that is shown. Left out: the study's first.")
+    surface: Label | None = Field(default=None, description="Surface to show. Default: the first of the study.")
+    seed: Seed | None = Field(default=None, description="Seed to show. Default: the first of the study.")
 
     def problems(self, campaign: Campaign) -> Iterator[Problem]:
         """Yield in addition the problem of a study that does not unload."""

@@ -23,9 +23,9 @@ if TYPE_CHECKING:
 class SlopesFigure(StudyFigure):
     """A figure of the spots of all slopes, at the same load and at the same area."""
 
-    surface: Label | None = Field(default=None, description="Surface that is shown. Left out: the study's first.")
-    seed: Seed | None = Field(default=None, description="Seed that is shown. Left out: the study's first.")
-    material: Label | None = Field(default=None, description="Material that is shown. Left out: the study's first.")
+    surface: Label | None = Field(default=None, description="Surface to show. Default: the first of the study.")
+    seed: Seed | None = Field(default=None, description="Seed to show. Default: the first of the study.")
+    material: Label | None = Field(default=None, description="Material to show. Default: the first of the study.")
 
     def study_problems(self, campaign: Campaign, study: Any) -> Iterator[Problem]:
         """Yield in addition the problem of a study without snapshots of both kinds."""

@@ -1,4 +1,4 @@
-"""The model as a choice: what a run by boundary elements is to a path, a file, a campaign and its checks."""
+"""Choice of the model: runs with boundary elements in paths, files, campaigns and checks."""
 
 import importlib
 
