@@ -206,7 +206,7 @@ def finite_range_error(campaign: Campaign, study: str, files: results.ResultFile
     return {"model_error": files.path(results.MODEL_ERROR)} if is_solved_at_finite_range(campaign, study) else {}
 
 
-def not_unloaded(campaign: Campaign, location: tuple, name: str, *, partly: bool) -> Iterator[Problem]:
+def unloading_problems(campaign: Campaign, location: tuple, name: str, *, partly: bool) -> Iterator[Problem]:
     """Yield the problem of a study that does not unload completely, or if `partly` not at all."""
     study = campaign.studies.get(name)
     if study is not None and not (study.unload or (partly and study.turning_points)):
@@ -217,7 +217,7 @@ def studies_problems(campaign: Campaign, key: str, names: Iterable[str]) -> Iter
     """Yield the problems of a list of studies that must unload completely."""
     for index, name in enumerate(names):
         yield from unknown((key, index), name, campaign.studies)
-        yield from not_unloaded(campaign, (key, index), name, partly=False)
+        yield from unloading_problems(campaign, (key, index), name, partly=False)
 
 
 def campaign_and_model_error(campaign: Campaign, options: ComparedFigure, files: results.ResultFiles) -> Inputs:
