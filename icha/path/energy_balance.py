@@ -17,6 +17,10 @@ from icha.contact.model import COALESCENCE, JUMP_IN, JUMP_OFF, SPLIT, ContactMod
 from icha.path.targets import BETWEEN, Target
 
 
+# In these functions width is the change of the separation in a step, m; slope and end_slope are dp/du at its ends,
+# Pa/m.
+
+
 def pressure_jump(width, change, slope, end_slope):
     """Return the part of a change of pressure that the tangents at both ends of the step do not explain, Pa."""
     return change - 0.5 * width * (slope + end_slope)
