@@ -270,11 +270,11 @@ def test_the_step_does_not_matter(monkeypatch):
 @pytest.mark.slow
 def test_next_to_no_adhesion_is_no_more_work_than_a_little():
     """Where jumps set next to nothing free, it need not be known where they happen to more than the work is known."""
-    surface = icha.SelfAffineSpectrum(1e-4, 5e-5, 2e-5, 0.8, 1.0).realise(40, 1)
+    surface = icha.SelfAffineSpectrum(1e-4, 5e-5, 2.5e-5, 0.8, 1.0).realise(32, 1)
     steps = {}
     for adhesion in (1e-14, 1e-5):
         material = Material(25e6, adhesion, max(1e-3 * adhesion, 1e-18))
-        run = icha.simulate(surface, material, Path([3e-3], unload=True, max_step=0.5))
+        run = icha.simulate(surface, material, Path([1e-3], unload=True, max_step=0.5))
         steps[adhesion] = run.sizes["step"]
         assert float(run.hysteresis_loss) < 1e-4 * np.abs(run.work.values).max()
     assert steps[1e-14] <= steps[1e-5]
