@@ -37,8 +37,8 @@ settings.register_profile("fast", max_examples=40, deadline=None, derandomize=Tr
 settings.register_profile("thorough", settings.get_profile("fast"), max_examples=400)
 settings.load_profile("fast")
 
-# Files with the longest tests, the longest first; at the end they would keep one core waiting. With "worksteal" one worker
-# begins with them, and so with the campaign, while another begins in the middle.
+# Files with the longest tests, the longest first; at the end they would keep one core waiting. With "worksteal" one
+# worker begins with them, and so with the campaign, while another begins in the middle.
 LONG = ("every_case_ends", "slurm", "reruns", "faults", "workflow", "finite_range", "make", "energy_balance")
 
 
