@@ -109,8 +109,10 @@ def write_crate(
     _add_jobs(crate, jobs, files, f"Campaign {campaign}", publication.title)
     _set(crate.root_dataset, mainEntity=files[_WORKFLOW])
     _set(files[README], about=crate.root_dataset)
-    with whole_file(Path(folder) / CRATE) as part:
-        part.write_text(json.dumps(crate.metadata.generate(), indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    with whole_file(Path(folder) / CRATE) as temporary:
+        temporary.write_text(
+            json.dumps(crate.metadata.generate(), indent=1, ensure_ascii=False) + "\n", encoding="utf-8"
+        )
     Path(folder, CRATE).chmod(0o644)
 
 

@@ -199,7 +199,7 @@ def readme(
         size=sum(sizes.values()),
         computed=sum(size for path, size in sizes.items() if path.split("/")[0] in COMPUTED),
         errors=_model_errors(model_error) if model_error is not None else [],
-        **_asked(campaign),
+        **_settings(campaign),
         **_outcome(publication, dataset, checks),
     )
     return text.rstrip() + "\n"
@@ -228,7 +228,7 @@ def _template() -> jinja2.Template:
     return environment.get_template(_TEMPLATE)
 
 
-def _asked(campaign: Campaign) -> dict:
+def _settings(campaign: Campaign) -> dict:
     """Return the facts of the configuration, without the variants that studies make of surfaces and materials."""
     surfaces, materials = (
         {name: each for name, each in getattr(campaign, section).items() if campaign.origin(section, name) == name}

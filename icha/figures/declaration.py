@@ -21,7 +21,7 @@ from icha.contact.models import MODELS, REFERENCE_MODEL, first_model
 from icha.datasets import results
 from icha.datasets.labels import RunLabels
 from icha.path.states import Snapshot
-from icha.support.values import Label, Name, Positive, Problem, Section, Seed, listed, unknown
+from icha.support.values import Label, Name, Positive, Problem, Section, Seed, list_names, unknown
 
 # A configuration (`icha.configuration.campaign.Campaign`), which stands above this folder.
 Campaign = Any
@@ -98,7 +98,7 @@ class StudyFigure(FigureOptions):
         ):
             value = getattr(self, key, None)
             if value is not None and value not in present:
-                yield (key,), value, f"is not in study {self.study!r}; expected one of {listed(present)}"
+                yield (key,), value, f"is not in study {self.study!r}; expected one of {list_names(present)}"
 
 
 class TruthFigure(StudyFigure):
@@ -138,7 +138,7 @@ class SnapshotFigure(StudyFigure):
         if snapshots == []:
             yield ("study",), self.study, "keeps no snapshot to draw; expected a study with `snapshots`"
         elif self.snapshot is not None and self.snapshot.target not in (snapshots or []):
-            kept = listed(f"{kind} {value:g}" for kind, value in snapshots or []) or "none, because it names none"
+            kept = list_names(f"{kind} {value:g}" for kind, value in snapshots or []) or "none, because it names none"
             kind, value = self.snapshot.target
             yield ("snapshot",), f"{kind} {value:g}", f"is not kept by study {self.study!r}; expected one of: {kept}"
 
@@ -206,7 +206,7 @@ def finite_range_error(campaign: Campaign, study: str, files: results.ResultFile
     return {"model_error": files.path(results.MODEL_ERROR)} if is_solved_at_finite_range(campaign, study) else {}
 
 
-def not_unloaded(campaign: Campaign, location: tuple, name: str, *, partly: bool) -> Iterator[Problem]:
+def unloading_problems(campaign: Campaign, location: tuple, name: str, *, partly: bool) -> Iterator[Problem]:
     """Yield the problem of a study that does not unload completely, or if `partly` not at all."""
     study = campaign.studies.get(name)
     if study is not None and not (study.unload or (partly and study.turning_points)):
@@ -217,7 +217,7 @@ def studies_problems(campaign: Campaign, key: str, names: Iterable[str]) -> Iter
     """Yield the problems of a list of studies that must unload completely."""
     for index, name in enumerate(names):
         yield from unknown((key, index), name, campaign.studies)
-        yield from not_unloaded(campaign, (key, index), name, partly=False)
+        yield from unloading_problems(campaign, (key, index), name, partly=False)
 
 
 def campaign_and_model_error(campaign: Campaign, options: ComparedFigure, files: results.ResultFiles) -> Inputs:

@@ -13,9 +13,9 @@ from icha.datasets import results
 from icha.datasets.labels import ContactLabels
 from icha.datasets.variables.model_error import FINITE_RANGE, SHORT_RANGE
 from icha.figures.curves import AREA_LABEL, PRESSURE_LABEL, SEPARATION_LABEL
-from icha.figures.declaration import Campaign, Declaration, Inputs, TruthFigure, not_unloaded
+from icha.figures.declaration import Campaign, Declaration, Inputs, TruthFigure, unloading_problems
 from icha.figures.ensembles import draw_scatter, lines_handles, mark_fewer
-from icha.figures.hysteresis import ROUNDING, Leg, mean_legs, pull_off_step, unloaded_runs
+from icha.figures.hysteresis import ROUNDING, Leg, average_legs, pull_off_step, select_unloaded_runs
 from icha.figures.legends import legend_below, words_handle
 from icha.figures.looks import BRANCH_DASHES, MODEL_MARKERS, UNLOADING_MARKERS, looks_of_studies
 from icha.figures.select import (
@@ -23,7 +23,7 @@ from icha.figures.select import (
     branches,
     group_by_contact,
     pick,
-    study_runs,
+    select_runs,
     unloading_legs,
 )
 from icha.figures.style import GREY, in_style, legend_handle, new_panels, slope_label
@@ -43,7 +43,7 @@ class LoopsFigure(TruthFigure):
     def problems(self, campaign: Campaign) -> Iterator[Problem]:
         """Yield in addition the problem of a study that does not unload."""
         yield from super().problems(campaign)
-        yield from not_unloaded(campaign, ("study",), self.study, partly=True)
+        yield from unloading_problems(campaign, ("study",), self.study, partly=True)
 
 
 def inputs(campaign: Campaign, options: LoopsFigure, files: results.ResultFiles) -> Inputs:
@@ -134,9 +134,9 @@ def figure(
 
 def _loops(campaign, study, other_study, loops, surface, seed):
     """Return the loops of a surface and seed, and which surface and seed (None: all) these are."""
-    runs = unloaded_runs(campaign, study)
+    runs = select_unloaded_runs(campaign, study)
     surface = pick("surface", surface, [labels.surface for labels, _ in runs])
-    others = study_runs(campaign, other_study, ragged=False, model=REFERENCE_MODEL)
+    others = select_runs(campaign, other_study, ragged=False, model=REFERENCE_MODEL)
     truths = _truths(study, runs, [*(run for _, run in others if unloading_legs(run)), *loops])
     runs = [(labels, run) for labels, run in runs if labels.surface == surface]
     if seed is None:
@@ -145,7 +145,7 @@ def _loops(campaign, study, other_study, loops, surface, seed):
         pick("seed", seed, [labels.seed for labels, _ in runs])
     found = []
     for group in group_by_contact(campaign, [each for each in runs if seed in (None, each[0].seed)]):
-        legs = mean_legs([list(branches(run)) for run in group.runs.values()])
+        legs = average_legs([list(branches(run)) for run in group.by_seed.values()])
         group = group if seed is None else group._replace(asked=1)
         found.append(_Loop(group, legs, truths.get(group.labels, [])))
     return found, surface, seed
@@ -195,7 +195,7 @@ def _draw(ax, loop, look, axis, *, turn, lines):
         if leg.members:
             members = leg.members.get(axis.x, x), leg.members[axis.y]
             draw_scatter(ax, *members, colour, positive=False, lines=lines, ls=dashes)
-    runs = loop.runs.runs.values()
+    runs = loop.runs.by_seed.values()
     marked = []
     if turn or len(runs) < loop.runs.asked:
         ends = [run.isel(step=int(np.flatnonzero(run["leg"].values == 0)[-1])) for run in runs]
@@ -238,8 +238,7 @@ def _enlarge(left, right, loops):
         inset = ax.inset_axes((*corner, 0.46, 0.33 if ax is right else 0.48))
         for loop, look in loops:
             _draw(inset, loop, look, axis, turn=False, lines=len(loops))
-        inset.set_xlim(limits[0])
-        inset.set_ylim(limits[1])
+        inset.set(xlim=limits[0], ylim=limits[1])
         inset.axhline(0, color=GREY, lw=0.5, zorder=1)
         inset.tick_params(labelsize=6.5, pad=2)
         inset.ticklabel_format(style="sci", scilimits=(-2, 3), useMathText=True)
@@ -253,8 +252,8 @@ def _handles(looks, loops, *, marked):
     handles = looks.handles(**_LOOP, **({} if marked else {"marker": "none"}))
     for branch, dashes in BRANCH_DASHES.items():
         handles[branch] = legend_handle(color=GREY, ls=dashes, **_LOOP)
-    handles |= lines_handles(len(loop.runs.runs) for loop in loops)
-    if any(pull_off_step(run) is not None for loop in loops for run in loop.runs.runs.values()):
+    handles |= lines_handles(len(loop.runs.by_seed) for loop in loops)
+    if any(pull_off_step(run) is not None for loop in loops for run in loop.runs.by_seed.values()):
         handles["pull-off"] = legend_handle(marker="o", mfc=GREY, **_PULL_OFF)
     for name in dict.fromkeys(_truth_name(truth) for loop in loops for truth in loop.truths):
         for branch, markers in _CROSSES.items():

@@ -11,7 +11,7 @@ from pydantic import Field
 from icha.figures.curves import drop_rounding_errors
 from icha.figures.declaration import Campaign, Declaration, FigureOptions, studies_problems
 from icha.figures.ensembles import Points, points_handles
-from icha.figures.hysteresis import detached_lines, name_model
+from icha.figures.hysteresis import name_model, select_detached_lines
 from icha.figures.legends import legend_below
 from icha.figures.looks import looks_of_studies
 from icha.figures.select import ContactRuns, NothingToDraw
@@ -84,7 +84,7 @@ def figure(campaign: xr.DataTree, *, studies: Sequence[str], over_surface_energy
     from matplotlib.patches import Patch
 
     studies = list(dict.fromkeys(studies))
-    runs = detached_lines(campaign, studies)
+    runs = select_detached_lines(campaign, studies)
     looks = looks_of_studies(campaign, studies, [contact for contact, _ in runs])
     sticky = {key: line for key, line in runs.items() if looks.adhesive(key[0][0])}
     if over_surface_energy and not sticky:
@@ -126,8 +126,8 @@ def _draw_losses(ax, campaign, runs, looks, over_surface_energy):
     ):
         logarithmic_axes(ax)
     ax.axhline(0, color=GREY, lw=0.6, zorder=1)
-    ax.set_xlabel(r"contact area at the largest load  $A/A_0$")
-    ax.set_ylabel(r"hysteresis loss over $\Delta\gamma$" if over_surface_energy else f"hysteresis loss ({unit})")
+    loss = r"hysteresis loss over $\Delta\gamma$" if over_surface_energy else f"hysteresis loss ({unit})"
+    ax.set(xlabel=r"contact area at the largest load  $A/A_0$", ylabel=loss)
     return handles, [count for line in drawn.values() for count in line.counts]
 
 
@@ -160,7 +160,7 @@ def shares(line: Sequence[ContactRuns]) -> dict[str, float]:
     """Return the parts of the loss at the largest load of a line, means over the seeds, over their total magnitude."""
 
     def mean(point, name):
-        return np.mean([float(run[name]) for run in point.runs.values()])
+        return np.mean([float(run[name]) for run in point.by_seed.values()])
 
     top = max(line, key=lambda point: mean(point, "largest_reduced_pressure"))
     found = {name: mean(top, name) for name in PARTS}
@@ -182,8 +182,6 @@ def _draw_parts(ax, runs, looks):
         look = looks.look(contact, applicable=applicable)
         ax.plot(position, -0.055, transform=ax.get_xaxis_transform(), clip_on=False, **look | {"ls": "none"})
     ax.axhline(0, color="black", lw=0.6)
-    ax.set_xlim(-0.7, len(bars) - 0.3)
-    ax.set_xticks([])
+    ax.set(xlim=(-0.7, len(bars) - 0.3), xticks=[], ylabel="share of the loss (%)")
     ax.set_xlabel("lines of (a), at their largest load", labelpad=14)
-    ax.set_ylabel("share of the loss (%)")
     return shown
