@@ -6,12 +6,10 @@ import h5py
 import netCDF4
 import numpy as np
 import pytest
-import SurfaceTopography
 from scans import COLUMNS, HEIGHTS, NM, ROWS, SIZE, UM, assert_read, centred, preparation, refused, scan, write_xyz
 from scipy.io import savemat
 from SurfaceTopography.Exceptions import CorruptFile
 
-from icha.surfaces.measured import text_tables
 from icha.surfaces.measured.resolution import examine_scan
 from icha.surfaces.measured.settings import UnfitTopography
 from icha.surfaces.measured.topography import prepare_topography
@@ -29,13 +27,6 @@ def test_matrix_of_text(tmp_path, separator, first_axis, stored):
     lines = [separator.join(f"{height:.4f}" for height in row) for row in stored]
     (tmp_path / "scan.txt").write_text("# a remark\n\n" + "\n".join(lines) + "\n")
     assert_read(scan(tmp_path / "scan.txt", height_unit=NM, size=SIZE, first_axis=first_axis))
-
-
-@pytest.mark.parametrize("text", ["0,1, 0,2, 0,3, 0,4", "0,1 0,2 0,3"])
-def test_decimal_commas_are_not_taken_for_columns(tmp_path, text):
-    (tmp_path / "scan.txt").write_text("\n".join([text] * 9))
-    with pytest.raises(UnfitTopography, match="decimal"):
-        scan(tmp_path / "scan.txt", format="matrix", height_unit=NM, size=SIZE)
 
 
 @pytest.mark.parametrize("separator", [" ", ","])
@@ -68,12 +59,6 @@ def test_text_files_of_the_challenge(tmp_path):
         surface = prepare_topography(tmp_path / name, settings).surface
         np.testing.assert_allclose(surface.heights, -1e-4 * centred(heights), atol=1e-18)
         assert surface.period == pytest.approx(1e-4, rel=1e-12)
-
-
-def test_xyz_without_some_points(tmp_path):
-    path = write_xyz(tmp_path / "scan.xyz", np.setdiff1d(np.arange(HEIGHTS.size), [0, 37]))
-    heights = scan(path, height_unit=NM).heights
-    assert np.isnan(heights[0, 0]) and np.isnan(heights[2, 5]) and np.count_nonzero(np.isnan(heights)) == 2
 
 
 def test_xyz_written_with_few_digits(tmp_path):
@@ -266,21 +251,6 @@ def test_a_damaged_text_of_an_instrument_is_refused_as_one(tmp_path, monkeypatch
             scan(tmp_path / "scan.txt", height_unit=NM, size=SIZE)
         assert raised.value.key == "path" and "library" not in str(raised.value)
         monkeypatch.setattr("SurfaceTopography.open_topography", corrupt)
-
-
-def test_of_a_text_every_part_is_read_once(tmp_path, monkeypatch):
-    opened = []
-
-    def counted(function):
-        return lambda *arguments: opened.append(function.__name__) or function(*arguments)
-
-    monkeypatch.setattr(text_tables, "open_text", counted(text_tables.open_text))
-    monkeypatch.setattr("SurfaceTopography.open_topography", counted(SurfaceTopography.open_topography))
-    rows = [" ".join(f"{height:.4f}" for height in row) for row in HEIGHTS]
-    (tmp_path / "scan.txt").write_text("\n".join(["Unit: nm", "Scan size: 4 um x 2.5 um", *rows]) + "\n")
-    assert_read(scan(tmp_path / "scan.txt"))
-    # The beginning, for delimiter and heading; the numbers; and by SurfaceTopography, which knows other headings.
-    assert sorted(opened) == ["open_text", "open_text", "open_topography"]
 
 
 # As Gwyddion writes them, with its labels in the language of its menus.

@@ -30,8 +30,7 @@ def read(path, **keys):
     """Surface and description of a text, of which nothing is removed but the mean."""
     given = {"height_unit": NM, "size": (SIDE, SIDE)} | keys
     settings = Preparation(format="auto", boundary="periodic", missing="fill", **given)
-    prepared = prepare_topography(path, vars(settings))
-    return prepared
+    return prepare_topography(path, vars(settings))
 
 
 def written(tmp_path, content, name="scan.csv", encoding="utf-8"):
@@ -293,17 +292,13 @@ def test_wide_characters_without_a_mark(tmp_path, encoding):
 
 def test_what_is_wrong_with_a_file_is_named(tmp_path):
     content = text(rows(), " ").encode()
+    labelled = text([[f"L{k}", *row] for k, row in enumerate(rows())])
+    below_heading = text([["x" * 3, *row] for row in rows()], heading=["a,b", ""])
     for damaged, words in (
         (gzip.compress(content)[:-200], "damaged or cut off"),
         (bz2.compress(content), "compressed by bzip2"),
-        (
-            text([[f"L{k}", *row] for k, row in enumerate(rows())]).encode(),
-            "labels in the first column.*'L0' in line 1",
-        ),
-        (
-            text([["x" * 3, *row] for row in rows()], heading=["a,b", ""]).encode(),
-            "labels in the first column.* line 3",
-        ),
+        (labelled.encode(), "labels in the first column.*'L0' in line 1"),
+        (below_heading.encode(), "labels in the first column.* line 3"),
         (text(rows()).replace("\n", "]\n").encode(), r"\]' in line 1, column 24"),
     ):
         (tmp_path / "scan.txt").write_bytes(damaged)
@@ -335,6 +330,7 @@ def test_what_is_given_instead_of_what_the_file_says_is_printed(tmp_path):
 
 # --- two hundred tables, damaged at random -------------------------------------------------------------------------
 
+WRITE = ("{:.3f}".format, "{:.6e}".format, '"{:.3f}"'.format, lambda height: f"{height:.9E}".replace("E", "D"))
 WORDS = ("", "BAD", "none", "NaN", "-", "*", "#N/A", "null")
 
 
@@ -342,12 +338,7 @@ def damaged_table(number):
     """A table with several damages: its bytes, the number of missing points, and whether a row is broken."""
     random = np.random.default_rng(number)
     delimiter = random.choice([",", ";", "\t", " "])
-    write = [
-        "{:.3f}".format,
-        "{:.6e}".format,
-        '"{:.3f}"'.format,
-        lambda height: f"{height:.9E}".replace("E", "D"),
-    ][random.integers(4)]
+    write = WRITE[random.integers(4)]
     fields = rows(write=write)
     holes = random.choice(GRID**2, random.choice([0, 1, 20]), replace=False)
     for hole in holes:
@@ -356,13 +347,8 @@ def damaged_table(number):
     broken = random.random() < 0.2
     if broken:
         row = fields[random.integers(GRID)]
-        match random.integers(3):
-            case 0:
-                row[random.integers(GRID)] = "1.2.3"
-            case 1:
-                del row[-1]
-            case 2:
-                row.append("3.1")
+        changes = (lambda: row.__setitem__(random.integers(GRID), "1.2.3"), row.pop, lambda: row.append("3.1"))
+        changes[random.integers(3)]()
     heading = random.choice(["", "# remark\n", "Sample: A1\nUnit: nm\n", "x;y;z\n\n"])
     if random.random() < 0.3:
         fields = [[str(k), *row] for k, row in enumerate(fields)]
