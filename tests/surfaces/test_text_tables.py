@@ -8,7 +8,7 @@ import pytest
 from scans import refused
 
 from icha.surfaces.measured.settings import Preparation, UnfitTopography
-from icha.surfaces.measured.topography import prepare_topography
+from icha.surfaces.measured.topography import prepared_topography
 from icha.surfaces.spectrum import SelfAffineSpectrum
 
 NM, UM = 1e-9, 1e-6
@@ -30,7 +30,7 @@ def read(path, **keys):
     """Surface and description of a text, of which nothing is removed but the mean."""
     given = {"height_unit": NM, "size": (SIDE, SIDE)} | keys
     settings = Preparation(format="auto", boundary="periodic", missing="fill", **given)
-    return prepare_topography(path, vars(settings))
+    return prepared_topography(path, vars(settings))
 
 
 def written(tmp_path, content, name="scan.csv", encoding="utf-8"):
@@ -81,7 +81,9 @@ def test_a_plane_is_no_table_with_numbered_rows(tmp_path):
     plane = np.add.outer(np.arange(GRID), 2.0 * np.arange(GRID))
     with pytest.raises(UnfitTopography, match="all the same but for the trend"):
         path = written(tmp_path, text(rows(plane)))
-        prepare_topography(path, vars(Preparation("auto", "window", height_unit=NM, size=(SIDE, SIDE), detrend="tilt")))
+        prepared_topography(
+            path, vars(Preparation("auto", "window", height_unit=NM, size=(SIDE, SIDE), detrend="tilt"))
+        )
 
 
 HEADINGS = {

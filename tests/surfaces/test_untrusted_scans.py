@@ -18,7 +18,7 @@ from scans import COLUMNS, HEIGHTS, NM, ROWS, SIZE, refused, scan, write_xyz
 from icha.datasets.format import SURFACE, UnknownFile, identify_file
 from icha.surfaces.measured.array_files import read_height_map
 from icha.surfaces.measured.settings import UnfitTopography
-from icha.surfaces.measured.topography import prepare_topography
+from icha.surfaces.measured.topography import prepared_topography
 
 HUGE = 200_000  # nodes a side: 320 GB as floats
 LINES = {"height_unit": NM, "size": SIZE}
@@ -275,7 +275,7 @@ def test_paths_that_are_no_files_are_not_opened(tmp_path, monkeypatch):
             ("x" * 5000, "cannot be read"),
         ):
             with refused("path", f"{flaw}.*; expected a file of heights"):
-                prepare_topography(path, settings)
+                prepared_topography(path, settings)
 
 
 @pytest.mark.parametrize("size", [2, 8, 128, 8192, 100_000])
@@ -362,7 +362,7 @@ def test_damaged_and_changed_files_are_read_or_refused(whole, name, data):
         "detrend": "tilt",
     }
     try:
-        surface = prepare_topography(path, settings).surface
+        surface = prepared_topography(path, settings).surface
     except UnfitTopography as error:
         assert re.search("expected|allowed: |leave it out", str(error))
     else:

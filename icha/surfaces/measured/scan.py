@@ -70,7 +70,7 @@ class Scan:
 
 
 def load_scan(path: Path, settings: Preparation) -> Scan:
-    """Read a file of any format; raises errors as `icha.surfaces.measured.topography.prepare_topography`."""
+    """Read a file of any format; raises errors as `icha.surfaces.measured.topography.prepared_topography`."""
     if not path.stat().st_size:
         raise UnfitTopography("path", "is empty; expected a file of heights")
     name, found = _read(path, settings)
