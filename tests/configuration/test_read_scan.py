@@ -1,4 +1,4 @@
-"""A measured surface in a script is that of a campaign."""
+"""`icha.read_scan` prepares a measured surface as a campaign does."""
 
 import subprocess
 import sys

@@ -269,9 +269,8 @@ def test_where_coordinates_tell_the_size_their_unit_is_doubted(tmp_path):
     crop = {"x": 0.0, "y": 0.0, "side": 2000 * UM}
     with refused("crop", "units of 1 nm, see `lateral_unit`"):
         prepared_topography(path, preparation(height_unit=NM, crop=crop))
-    assert (
-        prepared_topography(path, preparation(height_unit=NM, lateral_unit=UM, crop=crop)).surface.period == 4000 * UM
-    )
+    given = preparation(height_unit=NM, lateral_unit=UM, crop=crop)
+    assert prepared_topography(path, given).surface.period == 4000 * UM
     # Not where the size was given.
     with pytest.raises(UnfitTopography) as raised:
         prepared_topography(path, preparation(height_unit=NM, size=SIZE, crop=crop))

@@ -283,7 +283,7 @@ def test_heading_of_points_that_gwyddion_exports(tmp_path, encoding):
     assert_read(scan(path))
     path.write_text(units.format("µm", "nm") + text, encoding=encoding)
     np.testing.assert_allclose(scan(path).size, np.multiply(SIZE, 1000))
-    # What is said goes before what the file says.
+    # Given units replace those of the file.
     assert_read(scan(path, lateral_unit=NM))
     assert_read(scan(path, lateral_unit=NM, height_unit=UM), UM)
 
@@ -332,7 +332,7 @@ def test_a_heading_alone_is_refused(tmp_path, kind):
         scan(tmp_path / "scan.txt", format=kind, height_unit=NM, size=SIZE)
 
 
-# --- arrays and channels: none is taken without a word, and MATLAB's are the right way round ---
+# --- arrays and channels: the chosen one is reported, and those of MATLAB have the right orientation ---
 
 LINES = {"height_unit": NM, "size": SIZE}
 
@@ -355,7 +355,7 @@ def test_of_several_arrays_one_must_be_named(tmp_path, name, write):
     read = scan(path, data="Z", **LINES)
     assert_read(read)
     assert read.data == "Z" and "data Z of several" in read.steps[0]
-    # Of a single map among numbers nothing is asked.
+    # A single map among numbers needs no name.
     write(path, Z=HEIGHTS, a=np.ones((1, 1)))
     read = scan(path, **LINES)
     assert_read(read)
@@ -400,15 +400,15 @@ def test_units_that_no_microscope_writes_are_no_lengths(tmp_path, unit):
 
 
 @pytest.mark.parametrize("share", [0.02, 0.3])
-def test_share_of_filled_points_is_said(tmp_path, share):
+def test_share_of_filled_points_is_described(tmp_path, share):
     heights = np.random.default_rng(4).normal(size=(20, 20))
     count = round(share * 400)
     heights.ravel()[np.random.default_rng(5).choice(400, count, replace=False)] = np.nan
     np.save(tmp_path / "scan.npy", heights)
     settings = preparation(boundary="free", missing="fill", height_unit=NM, size=(5e-6, 5e-6))
-    said = prepared_topography(tmp_path / "scan.npy", settings).description
-    assert f"{count} missing points filled, {share:.2g}".split(", ")[0] in said
-    assert f"{100 * share:.0f} % of the points" in said
+    description = prepared_topography(tmp_path / "scan.npy", settings).description
+    assert f"{count} missing points filled, {share:.2g}".split(", ")[0] in description
+    assert f"{100 * share:.0f} % of the points" in description
     resolution = examine_scan(tmp_path / "scan.npy", settings)
     assert (resolution.filled, resolution.points) == (count, 400)
 

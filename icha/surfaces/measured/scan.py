@@ -101,7 +101,7 @@ def load_scan(path: Path, settings: Preparation) -> Scan:
 
 
 def _describe_replaced(settings, found):
-    """Describe the size and unit of the file that given ones replace; empty if there are none."""
+    """Describe the size and unit of the file that given ones replace; empty without them."""
     replaced = []
     if settings.size and found.size and not np.allclose(settings.size, found.size, rtol=1e-3, atol=0):
         replaced.append(f"its size {' x '.join(map(formatting.length, found.size))}")
