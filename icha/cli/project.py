@@ -124,8 +124,7 @@ def reports_errors(command: Callable) -> Callable:
 
 def find_project() -> Path | None:
     """Return the clone: the folder with the Snakefile, at or above the working directory."""
-    here = Path.cwd()
-    for folder in (here, *here.parents):
+    for folder in (Path.cwd(), *Path.cwd().parents):
         if (folder / "Snakefile").is_file() and (folder / "workflow/rules/runs.smk").is_file():
             return folder
     return None

@@ -45,7 +45,7 @@ class NothingToExplore(ValueError):
     """Results from which no page can be made; the message gives the reason."""
 
 
-class Written(NamedTuple):
+class PageSummary(NamedTuple):
     """Summary of a page.
 
     Attributes
@@ -64,7 +64,7 @@ class Written(NamedTuple):
 
 def write_explorer(
     folder: str | os.PathLike, page: str | os.PathLike, *, only: Mapping[str, Collection] = {}, largest: float
-) -> Written:
+) -> PageSummary:
     """Write the page of a campaign.
 
     The first seed of each contact precedes the others, so that a small page contains all kinds of contacts.
@@ -112,7 +112,7 @@ def write_explorer(
     text = _filled(campaign, data, library=library, largest=largest, left_out=left_out, without_steps=without_steps)
     with whole_file(page) as temporary:
         temporary.write_text(text, encoding="utf-8")
-    return Written(len(text.encode()), len(included), left_out, without_steps)
+    return PageSummary(len(text.encode()), len(included), left_out, without_steps)
 
 
 def _dataset(folder: Path) -> Path:

@@ -10,7 +10,7 @@ import small_campaign as small
 from typer.testing import CliRunner
 
 from icha.cli import app
-from icha.cli.live import Job, error_of, last_line
+from icha.cli.live import JobRecord, error_of, last_line
 from icha.cli.project import UserError, echo, markup, reports_errors
 from icha.datasets.files import write_dataset
 from icha.datasets.surface_file import write_surface
@@ -51,7 +51,7 @@ def test_commands_say_nothing_else(capsys):
 
 def test_messages_of_jobs_are_printable(tmp_path):
     (tmp_path / "log").write_text(f"working\nError: {EVIL}\nmore \x1b[1A\n", encoding="utf-8")
-    job = Job("run", "title", ("out",), ("log",), 0.0)
+    job = JobRecord("run", "title", ("out",), ("log",), 0.0)
     assert all(map(is_printable, [*error_of(job, tmp_path), last_line(job, tmp_path)]))
     assert any(r"\x1b[2J" in line for line in error_of(job, tmp_path))
 
