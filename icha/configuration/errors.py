@@ -96,7 +96,7 @@ def _without_tags(location: tuple) -> tuple:
 
 
 def _section_at(location: tuple, content: Any) -> type[BaseModel] | None:
-    """Return the model of the section at a location; None if there is no section."""
+    """Return the model of the section at a location; None if it is not a section."""
     model: Any = Campaign
     for key in location:
         content = content[key]

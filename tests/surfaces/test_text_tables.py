@@ -1,4 +1,4 @@
-"""Texts as people and instruments write them: the heights that they hold, or the line and what to do."""
+"""Heights in texts of people and instruments; or a message with the line and what to do."""
 
 import bz2
 import gzip
@@ -8,7 +8,7 @@ import pytest
 from scans import refused
 
 from icha.surfaces.measured.settings import Preparation, UnfitTopography
-from icha.surfaces.measured.topography import prepare_topography
+from icha.surfaces.measured.topography import prepared_topography
 from icha.surfaces.spectrum import SelfAffineSpectrum
 
 NM, UM = 1e-9, 1e-6
@@ -27,10 +27,10 @@ def text(fields, delimiter=",", heading=()):
 
 
 def read(path, **keys):
-    """Surface and description of a text, of which nothing is removed but the mean."""
+    """Prepare the surface of a text without removing a trend."""
     given = {"height_unit": NM, "size": (SIDE, SIDE)} | keys
     settings = Preparation(format="auto", boundary="periodic", missing="fill", **given)
-    return prepare_topography(path, vars(settings))
+    return prepared_topography(path, vars(settings))
 
 
 def written(tmp_path, content, name="scan.csv", encoding="utf-8"):
@@ -40,7 +40,7 @@ def written(tmp_path, content, name="scan.csv", encoding="utf-8"):
 
 
 def assert_heights(prepared, missing=0):
-    """The heights are those that were written, but for the mean and for what is missing."""
+    """Check the heights, except for their mean and missing points."""
     assert prepared.filled == missing
     difference = prepared.surface.heights / NM - HEIGHTS
     # Filled points shift the mean.
@@ -77,11 +77,11 @@ def test_numbers_and_coordinates_of_rows_and_columns_are_no_heights(tmp_path, st
     assert "left out" in prepared.description or corner == "y/x"
 
 
-def test_a_plane_is_no_table_with_numbered_rows(tmp_path):
+def test_a_plane_is_not_a_table_with_numbered_rows(tmp_path):
     plane = np.add.outer(np.arange(GRID), 2.0 * np.arange(GRID))
+    settings = Preparation("auto", "window", height_unit=NM, size=(SIDE, SIDE), detrend="tilt")
     with pytest.raises(UnfitTopography, match="all the same but for the trend"):
-        path = written(tmp_path, text(rows(plane)))
-        prepare_topography(path, vars(Preparation("auto", "window", height_unit=NM, size=(SIDE, SIDE), detrend="tilt")))
+        prepared_topography(written(tmp_path, text(rows(plane))), vars(settings))
 
 
 HEADINGS = {
