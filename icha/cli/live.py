@@ -164,7 +164,7 @@ class Progress:
         expected: dict[str, list[float]] = {}
         for output, seconds in self.expected.items():
             if output not in outputs:
-                expected.setdefault(rule_of(output), []).append(seconds)
+                expected.setdefault(find_rule(output), []).append(seconds)
         waiting = Counter(self.total) - Counter(job.rule for job in begun)
         work = 0.0
         for rule, count in waiting.items():
@@ -178,13 +178,13 @@ class Progress:
         return "time left unknown" if seconds is None else f"about {formatting.duration(seconds)} left"
 
 
-def rule_of(output: str) -> str:
+def find_rule(output: str) -> str:
     """Return the rule that makes a file under `results/<campaign>/`."""
     path = "/".join(Path(output).parts[2:])
     return next((rule for beginning, rule in RULES.items() if path.startswith(beginning)), "")
 
 
-def error_of(job: JobRecord, folder: Path) -> list[str]:
+def read_error(job: JobRecord, folder: Path) -> list[str]:
     """Return why a job failed: the lines of its log from the last one that begins with `Error:`.
 
     Empty if the log has no such line, for example because the job was killed.
@@ -201,7 +201,7 @@ def error_of(job: JobRecord, folder: Path) -> list[str]:
     return []
 
 
-def last_line(job: JobRecord, folder: Path) -> str:
+def read_last_line(job: JobRecord, folder: Path) -> str:
     """Return the last complete line in the log of a running job."""
     for log in job.logs:
         try:
@@ -238,7 +238,7 @@ class PlainView(AbstractContextManager):
         ended, total = len(progress.done) + len(progress.failed), str(progress.job_count)
         title = f"failed: {job.title}" if failed else job.title
         echo(f"[{ended:>{len(total)}}/{total}, {progress.time_left()}] {title} ({formatting.duration(job.seconds)})")
-        for line in error_of(job, self.folder)[:3] if failed else ():
+        for line in read_error(job, self.folder)[:3] if failed else ():
             echo(f"    {line}")
 
     def print(self, text: str) -> None:
@@ -272,7 +272,7 @@ class LiveView(PlainView):
         """Print a job if it failed."""
         if failed:
             self._console.print(Text(f"failed: {job.title}", style="red"))
-            for line in error_of(job, self.folder)[:3]:
+            for line in read_error(job, self.folder)[:3]:
                 self._console.print(Text(f"    {line}", style="red"), overflow="fold")
 
     def print(self, text: str) -> None:
@@ -314,7 +314,7 @@ class LiveView(PlainView):
         for job in sorted(progress.running.values(), key=lambda job: job.started)[:MOST_JOBS]:
             duration = formatting.duration(progress.clock() - job.started)
             lines.append(Text(f"▸ {duration:>8}  {job.title}", no_wrap=True))
-            if message := last_line(job, self.folder):
+            if message := read_last_line(job, self.folder):
                 lines.append(Text(f"            {message}", style="dim", no_wrap=True))
         if len(progress.running) > MOST_JOBS:
             lines.append(Text(f"  and {len(progress.running) - MOST_JOBS} more", style="dim"))
