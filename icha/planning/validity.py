@@ -104,9 +104,9 @@ def surface_facts(campaign: Campaign, name: str) -> dict[str, float]:
 def _read(section):
     # These imports load SciPy, which campaigns without such a surface do not need.
     if isinstance(section, MeasuredSurface):
-        from icha.surfaces.measured.topography import prepare_topography
+        from icha.surfaces.measured.topography import prepared_topography
 
-        return prepare_topography(section.path, section.preparation).surface
+        return prepared_topography(section.path, section.preparation).surface
     from icha.surfaces.measured.array_files import read_height_map
     from icha.surfaces.surface import Surface
 

@@ -31,7 +31,7 @@ _FEW_DIGITS = 1e-6
 
 
 def format_of_text(file: SourceFile) -> str | None:
-    """Find the format of a text by its columns; None if it is no table of numbers, or a format of an instrument."""
+    """Find the format of a text by its columns; None for an instrument, or without a table of numbers."""
     layout = file.layout
     if layout is not None and _titles(layout):
         return "xyz"
