@@ -37,7 +37,7 @@ from scipy.optimize import brentq
 import icha
 from icha import Material, Path
 from icha.contact.model import JUMP_IN, JUMP_OFF, Events
-from icha.path import cycle
+from icha.path import step_accuracy
 from icha.path.energy_balance import EnergyBalance, Step
 from icha.path.targets import DEFAULT_STEP
 
@@ -260,7 +260,7 @@ def test_the_step_does_not_matter(monkeypatch):
     coarse = united_run()
     assert int(coarse.coalescence_count[-1]) > 0
     for name in ("UNRESOLVED_LOSS", "UNRESOLVED_WORK", "UNION_STEP"):
-        monkeypatch.setattr(cycle, name, 0.5 * getattr(cycle, name))
+        monkeypatch.setattr(step_accuracy, name, 0.5 * getattr(step_accuracy, name))
     fine = icha.simulate(*small(), Path([5e-2], unload=True, max_step=0.5 * DEFAULT_STEP))
     assert fine.sizes["step"] > coarse.sizes["step"]
     for name in ("pull_off_pressure", "hysteresis_loss"):
