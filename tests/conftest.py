@@ -34,7 +34,7 @@ LESS = {
 # Number of random cases of a test; --hypothesis-profile thorough tries more. They are the same each time, so that no
 # change fails by chance.
 settings.register_profile("fast", max_examples=40, deadline=None, derandomize=True, database=None)
-settings.register_profile("thorough", settings.get_profile("fast"), max_examples=400)
+settings.register_profile("thorough", settings.get_profile("fast"), max_examples=300)
 settings.load_profile("fast")
 
 # Files with the longest tests, the longest first; at the end they would keep one core waiting. With "worksteal" one
