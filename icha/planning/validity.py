@@ -55,7 +55,7 @@ def _moments(section) -> SpectralMoments:
 
 
 def expected_summits(campaign: Campaign, name: str) -> float:
-    """Number of summits of a surface: by the spectrum of a random one, counted on one from a file."""
+    """Return number of summits of a surface: by the spectrum of a random one, counted on one from a file."""
     section = campaign.surfaces[name]
     if isinstance(section, SelfAffineSurface):
         moments = _moments(section)

@@ -85,7 +85,6 @@ def write_report(
     citations : further sources to cite, such as those of measurements.
     further_software : packages that this campaign needs besides `SOFTWARE`.
     """
-
     link = partial(_link, Path(path).parent)
     pictures = _pictures(figures, campaign, link)
     studies = [summarise_study(campaign, name, comparison) for name in campaign.children]

@@ -102,7 +102,7 @@ def conversion_factor(unit: str, si_unit: str) -> Decimal:
 
 
 def _letters(unit):
-    """A unit in lower case, without blanks and signs of a power."""
+    """Return a unit in lower case, without blanks and signs of a power."""
     return re.sub(r"[\s^*]", "", unicodedata.normalize("NFKC", unit)).replace("\u03bc", "u").lower()
 
 

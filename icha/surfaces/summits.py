@@ -94,7 +94,7 @@ class Asperities:
         return cell_of(self.period, self.free)
 
     def __len__(self) -> int:
-        """Number of asperities."""
+        """Return number of asperities."""
         return len(self.height)
 
 

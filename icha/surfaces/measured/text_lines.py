@@ -70,7 +70,7 @@ class Notation:
 
     Attributes
     ----------
-    delimiter : "\\t", ";", "," or None for blanks.
+    delimiter : tab, semicolon, comma or None for blanks.
     decimal_comma : whether numbers have decimal commas.
     """
 
