@@ -69,7 +69,7 @@ class ConvergenceError(RuntimeError):
         self.dataset = dataset
 
     def __reduce__(self):
-        """Keep the dataset when the error is pickled."""
+        """Pickle the error together with its dataset."""
         return type(self), (self.args[0], self.dataset)
 
 
@@ -160,7 +160,7 @@ def empty_run(
 ) -> xr.Dataset:
     """Return the dataset of a run that could not be computed: no step, and the reason in the attribute `incomplete`.
 
-    The arguments are those of `simulate`.
+    The arguments are the same as those of `simulate`.
     """
     record, summits = _PathRecord(reason), locate_summits(surface)
     coverage = SummitCoverage.of(surface, summits)

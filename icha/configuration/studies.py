@@ -267,7 +267,7 @@ class Study(Section):
         return settings
 
     def problems(self, snapshots: list[tuple[str, float]] | None) -> Iterator[Problem]:
-        """Report why the study cannot be run with these snapshots (`Campaign.snapshots_of`)."""
+        """Yield the reasons why the study cannot run with these snapshots (`Campaign.snapshots_of`)."""
         # The smallest slope makes the largest reduced pressure.
         slope = min((slope for slope in self.rms_slopes if slope != MEASURED), default=math.inf)
         most = MAX_REDUCED_PRESSURE * slope

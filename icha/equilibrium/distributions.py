@@ -14,8 +14,8 @@ from icha.surfaces.surface import Surface
 def contact_cover(surface: Surface, spots: Spots) -> np.ndarray:
     """Return the fraction of every node's cell that is in contact, (n, n) float, exact for discs.
 
-    Its mean is the contact area fraction up to rounding, because spots are disjoint; on a free square without the area
-    beyond the edges.
+    The mean over the grid is the contact area fraction up to rounding, because spots are disjoint. On a free square the
+    mean does not include the area beyond the edges.
     """
     cover, _ = _cover_grid(surface.period, surface.grid, spots.position, spots.contact_radius, surface.free)
     return cover
