@@ -178,7 +178,10 @@ class BoundaryElements:
             return self.full_contact(self.opening_pressure)
         weakest = self.full_contact_pressure.ravel() <= self.full_contact_pressure.min() + _ROUNDING * self.pressure_unit
         closed = np.flatnonzero(~weakest)
-        opened = CellState(0.0, closed, state.fraction[closed], state.pressure[closed], state.around[closed])
+        # Around the first gap the pressure is that of a front, not that which opened it.
+        pressure = self.full_contact_pressure.ravel() - self.full_contact_pressure.min()
+        pressure -= self.front.strength * self.contact_modulus
+        opened = CellState(0.0, closed, state.fraction[closed], pressure[closed], state.around[closed])
         return self._next_equilibrium(opened, max(separation, self.smallest_gap), control)
 
     @property
