@@ -1,6 +1,6 @@
-"""Run the benchmarks one process at a time and keep what they measured in benchmarks/results. Standard library only.
+"""Run the benchmarks one process at a time and save the measurements in benchmarks/results. Standard library only.
 
-On Linux a process inherits the peak memory of the one that starts it, so whoever measures has to stay small.
+On Linux a process inherits the peak memory of its parent, so this process must stay small.
 
 python benchmarks/run.py [--only CODE ...] [--grids N ...] [--threads N] [--limit SECONDS]
 """
@@ -16,17 +16,16 @@ import sys
 import tempfile
 import threading
 import time
-from dataclasses import asdict, dataclass
 from importlib.metadata import version
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
-RESULTS = HERE / "results"
+RESULTS, CODES_FOLDER = HERE / "results", HERE / "codes"
 OTHERS = HERE.parent / ".venv-benchmarks" / "bin" / "python"
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 PACKAGES = ("icha", "numpy", "scipy", "finufft")
 
-# Code, threads, whether with adhesion, and what is given at the stops. ICHA first: its path gives the mean gaps.
+# Code, threads, adhesion, and the given quantity at the stops. ICHA comes first, because its path gives the mean gaps.
 SWEEPS = (
     ("icha", 1, False, "load"),
     ("icha", 1, True, "load"),
@@ -45,19 +44,8 @@ SWEEPS = (
 CODES = tuple(dict.fromkeys(code for code, *_ in SWEEPS))
 
 
-@dataclass(frozen=True)
-class Measurement:
-    """Wall and processor time in s, peak resident memory in bytes, and the end: "complete", "over time" or "failed"."""
-
-    wall: float
-    processor: float
-    peak: int
-    outcome: str
-    last_words: str
-
-
-def measure(command: list[str], threads: int, limit: float) -> Measurement:
-    """Run the command with a number of threads; it is killed after `limit` seconds."""
+def measure(command: list[str], threads: int, limit: float) -> dict:
+    """Run a command, kill it after `limit` seconds; return times (s), peak memory (bytes) and outcome."""
     environment = os.environ | dict.fromkeys(THREADS, str(threads)) | {"OMP_WAIT_POLICY": "passive"}
     start = time.perf_counter()
     output = {"stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE, "text": True}
@@ -74,40 +62,33 @@ def measure(command: list[str], threads: int, limit: float) -> Measurement:
     reader.join()
     outcome = "complete" if process.returncode == 0 else "over time" if wall >= limit else "failed"
     last_words = "".join(lines[-1:]).strip() if outcome == "failed" else ""
-    return Measurement(wall, usage.ru_utime + usage.ru_stime, usage.ru_maxrss * 1024, outcome, last_words)
+    spent = {"wall": wall, "processor": usage.ru_utime + usage.ru_stime, "peak": usage.ru_maxrss * 1024}
+    return spent | {"outcome": outcome, "last_words": last_words}
 
 
-def interpreter(code: str) -> str:
-    return sys.executable if code.startswith("icha") else str(OTHERS)
-
-
-def script(name: str) -> str:
-    return str(HERE / "codes" / f"{name}.py")
-
-
-def keep(name: str, record: dict) -> None:
+def save(name: str, record: dict) -> None:
     """Write a result."""
     (RESULTS / f"{name}.json").write_text(json.dumps(record, indent=1) + "\n")
 
 
 def run(name: str, command: list[str], answer: Path, threads: int, limit: float, about: dict) -> dict:
-    """Measure a command that writes its answer to a file, and keep both."""
+    """Measure a command that writes its answer to a file, and save both."""
     print(f"{name} ...", end=" ", flush=True)
     measured = measure([*command, str(answer), str(threads)], threads, limit)
     found = json.loads(answer.read_text()) if answer.exists() else {}
     about = about | {"threads": threads, "limit": limit, "machine": machine()["processor"]}
-    record = about | asdict(measured) | found
-    keep(name, record)
-    spent = f"{measured.wall:.1f} s ({measured.processor:.1f} s of processor), {measured.peak / 2**20:.0f} MiB"
-    print(f"{measured.outcome}, {spent}", measured.last_words, flush=True)
+    record = about | measured | found
+    save(name, record)
+    times = f"{measured['wall']:.1f} s ({measured['processor']:.1f} s of processor)"
+    print(measured["outcome"], times, f"{measured['peak'] / 2**20:.0f} MiB", measured["last_words"], flush=True)
     return record
 
 
 def sweep(scratch: Path, grid: int, codes: set[str], most_threads: int, limit: float) -> None:
-    """One sweep of 20 stops on the same heights by every code."""
+    """Measure one sweep of 20 stops on the same heights with every code."""
     folder = scratch / f"sweep-{grid}"
     folder.mkdir()
-    subprocess.run([sys.executable, script("make_task"), folder, str(grid)], check=True)
+    subprocess.run([sys.executable, CODES_FOLDER / "make_task.py", folder, str(grid)], check=True)
     task = json.loads((folder / "task.json").read_text())
     saved = RESULTS / f"task-{grid}.json"
     gaps = json.loads(saved.read_text())["mean_gaps"] if saved.exists() else None
@@ -117,22 +98,24 @@ def sweep(scratch: Path, grid: int, codes: set[str], most_threads: int, limit: f
         settings = task if adhesion else task | {"surface_energy": 0.0}
         if control == "gap":
             if gaps is None:
-                raise SystemExit(f"no mean gaps for grid {grid}: run icha first")
+                raise SystemExit(f"no mean gaps for grid {grid}; run first with --only icha")
             settings = settings | {"mean_gaps": gaps}
         (folder / "task.json").write_text(json.dumps(settings))
         name = f"sweep-{code}-{'adhesion' if adhesion else 'hard'}-{control}-{grid}-{threads}"
         about = {"code": code, "grid": grid, "adhesion": adhesion, "control": control}
-        own = ["solve_icha", code] if code.startswith("icha") else [f"solve_{code}"]
-        command = [interpreter(code), script(own[0]), *own[1:], str(folder)]
+        if code.startswith("icha"):
+            command = [sys.executable, str(CODES_FOLDER / "solve_icha.py"), code, str(folder)]
+        else:
+            command = [str(OTHERS), str(CODES_FOLDER / f"solve_{code}.py"), str(folder)]
         record = run(name, command, folder / f"{name}.json", threads, limit, about)
         if (code, adhesion, control) == ("icha", True, "load") and (gaps is None or codes == set(CODES)):
-            # Rounded, and kept, so that one code can be measured again at the same stops.
+            # Saved, so that one code can be measured again at the same stops.
             gaps = [float(f"{stop['mean_gap']:.6g}") for stop in record["stops"]]
-            keep(saved.stem, task | {"mean_gaps": gaps})
+            save(saved.stem, task | {"mean_gaps": gaps})
 
 
 def machine() -> dict:
-    """What the numbers were taken on, without names."""
+    """Return the machine and the versions of packages, without names."""
     lines = Path("/proc/cpuinfo").read_text().splitlines() if Path("/proc/cpuinfo").exists() else []
     models = [line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")]
     return {
@@ -152,7 +135,7 @@ def main() -> None:
     parser.add_argument("--threads", type=int, default=2, help="leave out sweeps with more threads than this")
     parser.add_argument("--limit", type=float, default=1200.0, help="seconds that one process may take")
     options = parser.parse_args()
-    keep("machine", machine())
+    save("machine", machine())
     with tempfile.TemporaryDirectory() as scratch:
         scratch = Path(scratch)
         for grid in options.grids:

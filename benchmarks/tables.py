@@ -1,4 +1,4 @@
-"""Tables and the figure of docs/benchmarks.md from what benchmarks/run.py kept; nothing is measured here."""
+"""Tables and the figure of docs/benchmarks.md, from the measurements of benchmarks/run.py."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ WITH = {False: "without adhesion", True: "with adhesion"}
 
 
 def read_results() -> dict[str, dict]:
-    """All results by name."""
+    """Read all results by name."""
     return {path.stem: json.loads(path.read_text()) for path in sorted(RESULTS.glob("*.json"))}
 
 
-def chosen(results, prefix, **wanted) -> list[dict]:
-    """The results whose name starts so and whose entries are those."""
+def select(results, prefix, **wanted) -> list[dict]:
+    """Return the results with a prefix of the name and given entries."""
     return [
         result
         for name, result in results.items()
@@ -34,8 +34,8 @@ def chosen(results, prefix, **wanted) -> list[dict]:
 
 
 def grids(results) -> list[int]:
-    """The grids of the sweeps."""
-    return sorted({result["grid"] for result in chosen(results, "sweep-")})
+    """Return the grids of the sweeps."""
+    return sorted({result["grid"] for result in select(results, "sweep-")})
 
 
 def seconds(value: float) -> str:
@@ -54,7 +54,7 @@ def mib(value: float) -> str:
 
 
 def surfaces(results) -> Table:
-    """The surfaces of the sweeps."""
+    """Table of the surfaces of the sweeps."""
     rows = [
         [
             f"{task['grid']}²",
@@ -63,26 +63,26 @@ def surfaces(results) -> Table:
             f"{task['interaction_range'] * 1e9:.3g} nm",
             f"{task['tabor_parameter']:.2f}",
         ]
-        for task in sorted(chosen(results, "task-"), key=lambda task: task["grid"])
+        for task in sorted(select(results, "task-"), key=lambda task: task["grid"])
     ]
     return Table(["grid", "shortest wave", "h_rms", "range ρ", "Tabor parameter"], rows, numbers=True)
 
 
-def rival(results, result) -> dict:
-    """ICHA's sweep with the stops of another code's."""
+def same_sweep_of_icha(results, result) -> dict:
+    """Return ICHA's sweep with the stops of another code."""
     same = {key: result[key] for key in ("grid", "adhesion", "control")}
-    (found,) = chosen(results, "sweep-icha-", code="icha", outcome="complete", **same)
+    (found,) = select(results, "sweep-icha-", code="icha", outcome="complete", **same)
     return found
 
 
 def computation(result) -> float:
-    """Seconds from the end of the imports to the last stop that was reached."""
+    """Return the seconds from the end of the imports to the last stop."""
     return result["stops"][-1]["seconds"]
 
 
 def differences(results, result) -> list[str]:
-    """ICHA's area and gap, or load, against another code's, over their common stops: median and range."""
-    pairs = list(zip(rival(results, result)["stops"], result["stops"], strict=False))
+    """Format median and range of the differences of area and gap, or load, between ICHA and another code."""
+    pairs = list(zip(same_sweep_of_icha(results, result)["stops"], result["stops"], strict=False))
 
     def spread(name):
         values = np.array([mine[name] / theirs[name] - 1 for mine, theirs in pairs])
@@ -97,10 +97,10 @@ def differences(results, result) -> list[str]:
 
 
 def sweep(results, grid, adhesion) -> Table:
-    """A row per code, ICHA first; of one that was stopped at its limit, what it took at least."""
+    """Table with a row per code, ICHA first; a code that was stopped at its limit has lower bounds."""
     rows = []
     order = sorted(
-        chosen(results, "sweep-", grid=grid, adhesion=adhesion),
+        select(results, "sweep-", grid=grid, adhesion=adhesion),
         key=lambda r: (r["code"] != "icha", r["code"] not in OWN, r["control"] != "load", r["code"], r["threads"]),
     )
     for result in order:
@@ -113,7 +113,7 @@ def sweep(results, grid, adhesion) -> Table:
         compute = f"{len(result['stops'])} stops in " if more else ""
         ratios = ["1", "1", "1", "", ""]
         if result["code"] != "icha":
-            icha = rival(results, result)
+            icha = same_sweep_of_icha(results, result)
             ratios = [
                 more + times(result["processor"] / icha["processor"]),
                 more + times(computation(result) / computation(icha)),
@@ -130,13 +130,13 @@ def sweep(results, grid, adhesion) -> Table:
 
 
 def draw_sweep(results, path: Path) -> None:
-    """Processor time of a sweep over the nodes along a side, one line per code."""
+    """Draw processor time of a sweep over the nodes along a side, one line per code."""
     figure, axes = plt.subplots(1, 2, figsize=(9, 4.4), sharey=True, layout="constrained")
-    others = sorted({run["code"] for run in chosen(results, "sweep-")} - {"icha"})
+    others = sorted({run["code"] for run in select(results, "sweep-")} - {"icha"})
     colours = {"icha": "black"} | {code: f"C{number}" for number, code in enumerate(others)}
     lines = {}
     for axis, adhesion in zip(axes, (False, True), strict=True):
-        runs = chosen(results, "sweep-", adhesion=adhesion, threads=1, outcome="complete")
+        runs = select(results, "sweep-", adhesion=adhesion, threads=1, outcome="complete")
         for code, control in sorted({(run["code"], run["control"]) for run in runs}):
             line = sorted(
                 (run["grid"], run["processor"]) for run in runs if (run["code"], run["control"]) == (code, control)
@@ -156,7 +156,7 @@ def draw_sweep(results, path: Path) -> None:
 
 
 def tables(results) -> dict[str, Table]:
-    """All tables of the page."""
+    """Return all tables of the page."""
     found = {"surfaces": surfaces(results)}
     for grid in grids(results):
         found |= {f"{grid}_{'adhesive' if energy else 'bare'}": sweep(results, grid, energy) for energy in WITH}

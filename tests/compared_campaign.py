@@ -65,7 +65,7 @@ def solutions(entry="truth", keep=lambda labels: True, *, area=lambda labels: 1.
 
 
 def own_patches(run, *, area=1.0, separation=1.0):
-    """A run by boundary elements made of one by asperities: area and separation multiplied, its spots as maps."""
+    """Return a run of boundary elements made from one of asperities: area and separation multiplied, spots as maps."""
     maps = [contact_of_spots(run, k, GRID) for k in range(run.sizes["snapshot"])]
     step = xr.zeros_like(run["reduced_pressure"])
     return run.assign(
@@ -79,7 +79,7 @@ def own_patches(run, *, area=1.0, separation=1.0):
 
 
 def patches(keep=lambda labels: True, **factors):
-    """Runs by boundary elements beside those by asperities that `keep` names."""
+    """Return runs of boundary elements for those runs of asperities that `keep` selects."""
     return [
         (labels._replace(model="boundary_elements"), own_patches(run, **factors))
         for labels, run in runs().items()

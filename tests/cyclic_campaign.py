@@ -1,4 +1,4 @@
-"""Runs that are unloaded, made of loading runs: what a way back adds to a dataset, with works that are known."""
+"""Runs with unloading, made from loading runs, whose works are known."""
 
 from functools import cache
 
@@ -19,10 +19,11 @@ _UNKNOWN = {"units": "1", "long_name": "test"}
 
 
 def unloaded(run, between=0):
-    """A run with a way back to complete separation.
+    """Return a run with unloading to complete separation.
 
-    Without adhesion the way back is the way in. With it the pressure is less by `TENSION` of the largest one, up to the
-    jump off that ends all contact. Nothing has coalesced. Between the last two stops there are `between` more steps.
+    Without adhesion unloading follows the loading curve. With it the pressure is less by `TENSION` of the largest one,
+    up to the jump-off that ends all contact. Nothing coalesces. There are `between` more steps between the last two
+    targets.
     """
     adhesive = float(run["surface_energy"]) > 0
     run = run.drop_vars(["leg", "split_count", "control"]).reset_coords(_COORDINATES)
@@ -61,8 +62,8 @@ def unloaded(run, between=0):
     columns["jump_in_count"] = np.where(leg == 0, spots[np.maximum(at, 0).astype(int)], spots[-1])
     columns["jump_off_count"] = np.where(np.arange(len(at)) == len(at) - 1, spots[-1], 0)
 
-    # The first contact is met without a load; the last step is the jump off, before which the work is the area between
-    # both ways. Everything else is stored.
+    # First contact has no load. Before the last step, the jump-off, the work is the area between both curves; all other
+    # work is stored.
     p, u = columns["nominal_pressure"], columns["mean_separation"]
     work = np.concatenate([[0.0], np.cumsum(-0.5 * (p[1:] + p[:-1]) * np.diff(u))])
     if not adhesive:
@@ -113,7 +114,7 @@ def run(seed=1, material="soft", between=0):
 
 @cache
 def runs():
-    """Of a study with ways back of different lengths, and of one that only loads."""
+    """Return the runs of a study with unloading of different lengths, and of a study that only loads."""
     between = {(1, "soft"): 1, (1, "hertz"): 0, (2, "soft"): 4, (2, "hertz"): 3}
     loops = {
         RunLabels("loops", "asperities", "rough", seed, 1.0, material): run(seed, material, count)

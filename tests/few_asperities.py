@@ -1,6 +1,6 @@
 """A few asperities of radius 1, pressed and pulled off, in units in which modulus and surface energy are 1 as well.
 
-In a cell so large that its images do not matter, unless a test says so.
+The cell is so large that its images do not matter, unless a test has another period.
 """
 
 from functools import cache

@@ -7,7 +7,7 @@ from icha.half_space.grid_displacement import DisplacementField
 
 
 def displacement_field(*args, free=False):
-    """Displacement (n, n) at all nodes; arguments as of `DisplacementField`."""
+    """Return the displacement (n, n) at all nodes; arguments as of `DisplacementField`."""
     return np.concatenate(DisplacementField(*args, free=free).map_blocks(lambda _, w: w))
 
 
@@ -24,5 +24,5 @@ def gap(law, surface, state):
 
 
 def covered_nodes(surface, spots):
-    """Whether each node lies inside a spot (n, n)."""
+    """Return whether each node lies inside a spot, (n, n) bool."""
     return nodes_in_discs(surface.period, surface.grid, spots.position, spots.contact_radius, surface.free)

@@ -1,4 +1,4 @@
-"""Contact mechanics written down a second time, by other means than the package's, for the tests to compare with.
+"""Independent contact mechanics to which tests compare the package.
 
 Lengths, loads and moduli in any consistent units; `adhesion` is surface energy over contact modulus.
 """

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from icha.deposit.verify import Damaged, whole_deposit
+from icha.deposit.verify import DamagedDeposit, whole_deposit
 
 REPOSITORY = Path(__file__).parents[1]
 PYTHON = REPOSITORY / ".venv-validators/bin/python"
@@ -39,7 +39,7 @@ def problems_with(deposit, **options):
     try:
         with whole_deposit(deposit, **options):
             return []
-    except Damaged as damaged:
+    except DamagedDeposit as damaged:
         return list(damaged.args)
 
 

@@ -1,4 +1,4 @@
-"""In the place of boundary elements: asperities with all that a run by boundary elements has besides, quickly."""
+"""Fast substitute for boundary elements: asperities with the additional variables of boundary elements."""
 
 from dataclasses import dataclass
 
@@ -30,7 +30,7 @@ class Stand(InteractingAsperities):
 
 
 def stand_in(monkeypatch):
-    """Let the model `boundary_elements` be asperities that say they were it."""
+    """Replace the model `boundary_elements` by asperities."""
 
     def contact_of(surface, material):
         return Stand(JKR(material), find_summits(surface), surface.rms_height)

@@ -1,4 +1,4 @@
-"""Contacts at random, from ordinary to odd: surfaces, materials and paths of both models, and what may come of them."""
+"""Random contacts from ordinary to odd: surfaces, materials and paths of both models, and their possible outcomes."""
 
 import re
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from icha.checks.run import check_run
 from icha.contact.models import DEFAULT_MODEL, REFERENCE_MODEL
 from icha.datasets.format import RUN, problems_with_file
 
-# What an error of an argument begins with: the argument's name.
+# Beginning of an error about an argument: the name of the argument.
 _ARGUMENTS = "heights|period|boundary|contact_modulus|surface_energy|interaction_range|path|reduced_pressures"
 _ARGUMENTS += "|area_fractions|mean_separations|snapshots|turning_points|max_step"
 NAMED = re.compile(rf"({_ARGUMENTS})(\[\d+\])?: ")
@@ -92,7 +92,7 @@ SHAPES = {function.__name__.strip("_"): function for function in _ALL}
 
 @dataclass(frozen=True)
 class Topography:
-    """A surface, by what it is made of; lengths in m. What it prints makes it again."""
+    """Parameters of a surface; lengths in m. Its repr makes it again."""
 
     shape: str
     grid: int
@@ -104,14 +104,14 @@ class Topography:
 
     @property
     def heights(self) -> np.ndarray:
-        """Of rms height `height`."""
+        """Heights with the rms height `height`, m."""
         heights = SHAPES[self.shape](np.random.default_rng(self.seed), self.grid, self.size)
         return heights * (self.height / heights.std())
 
 
 @dataclass(frozen=True)
 class Case:
-    """A run, by its arguments. What it prints makes it again."""
+    """Arguments of a run. Its repr makes it again."""
 
     topography: Topography
     material: tuple[float, float, float]
@@ -119,7 +119,7 @@ class Case:
     model: str
 
     def run(self):
-        """What comes of it."""
+        """Simulate the case."""
         of = self.topography
         surface = icha.Surface(of.heights, of.period, of.boundary)
         return icha.simulate(surface, icha.Material(*self.material), icha.Path(**self.path), model=self.model)
@@ -180,7 +180,7 @@ def _paths(draw, height):
 
 @st.composite
 def cases(draw):
-    """Runs of every kind; one in three by boundary elements."""
+    """Draw a run of any kind; one in three with boundary elements."""
     topography = draw(_topographies())
     return Case(
         topography,
@@ -191,7 +191,7 @@ def cases(draw):
 
 
 def refused(error: ValueError) -> bool:
-    """Whether it names an argument."""
+    """Return whether an error names an argument."""
     return NAMED.match(str(error)) is not None
 
 
@@ -202,17 +202,17 @@ def lacking(case: Case, run) -> set[tuple[str, float]]:
     return {(stop.kind, stop.value) for stop in icha.Path(**case.path).targets} - {(str(k), float(v)) for k, v in met}
 
 
-# What holds for every step by itself, and so for those that a run reached before it failed.
+# Checks of single steps, which also hold for the steps before a failure.
 _OF_STEPS = ("finite", "residual", "front", "gap", "converged", "targets")
 
-# What unions on sticky surfaces may break, because their rule is not conservative: such a run is marked.
+# Checks that unions on sticky surfaces may fail, because their rule is not conservative; such a run is marked.
 OF_UNIONS = ("loop loses energy", "unions lose energy", "separation falls where spots unite")
 # Where full contact has the lower energy, jumps into contact that unite spots at once may gain energy as well.
 OF_STICKY_SURFACES = (*OF_UNIONS, "jumps lose energy", "jumps in lose energy")
 
 
 def wrong(run) -> list[str]:
-    """What of a run's dataset is not as it should be; of one that ended early, of the stops that it reached."""
+    """Return the failures of the dataset of a run; if it ended early, of the targets that it reached."""
     ended, marked = "incomplete" in run.attrs, run.attrs.get("failed_checks", "")
     found = [check for check in check_run(run) if not check.passed and not (ended and check.name not in _OF_STEPS)]
     assert ended or all(f"{check.name}: " in marked for check in found)

@@ -1,4 +1,4 @@
-"""Runs both ways of asperities that do not feel each other: JKR's law of every one of them, in closed form.
+"""Loading and unloading of asperities that do not interact: the JKR law of each, in closed form.
 
 They have the variables of a simulated run that is unloaded; their pressure, area, work and losses are exact.
 """

@@ -1,4 +1,4 @@
-"""A campaign small enough to be simulated anew in every test process."""
+"""Campaign so small that every test process simulates it."""
 
 from functools import cache
 

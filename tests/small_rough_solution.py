@@ -1,4 +1,4 @@
-"""A small rough surface, with and without adhesion, solved by boundary elements; the digest of a solution."""
+"""Small rough surface with and without adhesion, solved with boundary elements; digest of a solution."""
 
 import hashlib
 

@@ -1,7 +1,7 @@
 """Asperities on surfaces with steps, pits, spikes and plateaus: right within a factor, or marked as not applicable.
 
-Boundary elements, which know nothing of summits, say what is right. A smooth random surface is damaged in one of nine
-ways; some have a window. Ten series have six hundred cases (`--series 0-9`); `make test-all` takes one,
+Boundary elements, which do not use summits, are the reference. A smooth random surface gets one of nine kinds of
+damage; some surfaces have a window. Ten series have six hundred cases (`--series 0-9`); `make test-all` runs one,
 `make test` a part of the first.
 """
 

@@ -1,4 +1,4 @@
-"""Every run ends: with results that pass their checks, with an argument refused by its name, or with its reason.
+"""Every run ends: with results that pass their checks, with an error that names an argument, or with a reason.
 
 Two thousand random cases, and as many loops without adhesion, in twenty series: `make random-cases` computes them all.
 Otherwise one series is (--series, the first if it is left out), of which `make test` takes the beginning.
@@ -21,16 +21,16 @@ from icha.equilibrium.interacting_asperities import InteractingAsperities
 
 PERIOD = 100e-6
 CASES_IN_SERIES = 100
-# Of loops with adhesion, which take seconds each, fewer: fifteen series have three hundred.
+# Number of loops with adhesion, which take seconds each; fifteen series have three hundred.
 STICKY_LOOPS_IN_SERIES = 20
 # Equilibria of one run, with those of its search for stops and events.
 MOST_EQUILIBRIA = 20_000
-# Of the cases of a series, the part that reaches its end at least: odd ones (a third does), and loops (nearly all do).
+# Smallest part of the cases of a series that completes: odd ones (a third does), and loops (nearly all do).
 ODD_COMPLETED, LOOPS_COMPLETED = 0.1, 0.5
-# How a run says where it ended.
+# Text in the reason of a run that ended early.
 ENDED = re.compile(r"after \d+ of \d+ stops|values of \w+ that are not finite")
 
-# No equilibrium is found on its way back while nothing touches.
+# No equilibrium is found on unloading while nothing touches.
 WITHOUT_A_SPOT_TO_LET_GO = Case(
     Topography("rough", grid=8, size=0.0, seed=0, period=PERIOD, height=1e-6, boundary="periodic"),
     (1e6, 0.07245618100960849, 1e-6),
@@ -46,7 +46,7 @@ FRONT_THAT_JUMPS_WITHIN_ITS_PATCH = Case(
     "boundary_elements",
 )
 
-# One of its steps in is two on the way back.
+# One step of loading is two steps of unloading.
 LOOP_WITH_A_STEP_IN_TWO = Case(
     Topography("spike", grid=16, size=0.0, seed=0, period=PERIOD, height=1e-5, boundary="periodic"),
     (1e6, 0.0, 1e-9),
@@ -76,7 +76,7 @@ UPHILL_AND_DOWNHILL = Case(
     "asperities",
 )
 
-# Of a union that came apart the two spots overlap again as they settle, where the tension is largest.
+# The two spots of a union that has split overlap again during the iteration, at the largest tension.
 PARTED_SPOTS_THAT_OVERLAP = Case(
     Topography("step", grid=8, size=0.3, seed=0, period=PERIOD, height=1e-6, boundary="periodic"),
     (1e6, 0.11231294684902415, 1e-6),
@@ -171,7 +171,7 @@ def loops(draw):
 
 
 def assert_loop_is_sound(case):
-    """Whether it comes back; if it does, as it must."""
+    """Assert that a completed loop passes its checks; return whether it is completed."""
     surface, path = case
     try:
         run = simulate(surface, Material(1e6, 0.0, 1e-9), path)

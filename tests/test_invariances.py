@@ -1,4 +1,4 @@
-"""What must change nothing, of both models, on random contacts: units, place and direction, range, steps, threads."""
+"""Invariances of both models on random contacts: units, position and direction, range, steps, threads."""
 
 import hashlib
 
@@ -16,7 +16,7 @@ from icha.support import parallel
 PERIOD, MODULUS = 100e-6, 25e6
 # Grid and shortest waves along its side: some fifty asperities, and eight cells for each wave.
 SIZE = {DEFAULT_MODEL: (64, 16), REFERENCE_MODEL: (32, 4)}
-# By how much two equilibria may differ, relatively, and in h_rms. Asperities rest to 1e-9 h_rms, fronts of boundary
+# Largest difference of two equilibria, relative and in h_rms. Asperities rest to 1e-9 h_rms, fronts of boundary
 # elements to 1e-9 of sqrt(G/dgamma); loads and areas change by up to a hundred times themselves per h_rms, and next to
 # a jump by more.
 SAME = {DEFAULT_MODEL: 1e-7, REFERENCE_MODEL: 1e-5}
@@ -31,7 +31,7 @@ ANY = st.one_of(NONE, ADHERING)
 BOTH = pytest.mark.parametrize("model", [DEFAULT_MODEL, REFERENCE_MODEL])
 
 
-# Of the random cases of other tests one in so many: each of these computes two runs and more.
+# One in so many of the random cases of other tests: each case here computes two runs or more.
 OFTEN, SELDOM = 10, 20
 
 
@@ -69,7 +69,7 @@ def pressed(surface, material, model, **path):
 
 
 def assert_same(one, other, bound, counts=COUNTS):
-    """Whether two runs are the same without their units, as accurately as their equilibria are known."""
+    """Assert that two runs are the same without their units, as accurately as their equilibria are known."""
     assert one.sizes["step"] == other.sizes["step"], (one.attrs.get("incomplete"), other.attrs.get("incomplete"))
     for name in ("contact_area_fraction", "reduced_pressure"):
         np.testing.assert_allclose(other[name], one[name], rtol=bound, err_msg=name)

@@ -1,4 +1,4 @@
-"""Loading sweeps as a whole: identities, symmetries, scaling, refinement, bytes, and failures that say so."""
+"""Loading sweeps as a whole: identities, symmetries, scaling, refinement, bytes, and reported failures."""
 
 import hashlib
 import os

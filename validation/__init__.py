@@ -1,1 +1,1 @@
-"""What ICHA is held against for the pages of its documentation: closed forms, other codes, variants of the model."""
+"""Comparisons of the models with closed forms, other codes and variants, for the documentation; not in the wheel."""

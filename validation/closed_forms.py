@@ -1,10 +1,10 @@
-"""Adhesive contacts in the limit of short range whose solution is known in closed form.
+"""Closed forms of adhesive contacts in the limit of short range.
 
-All are of one kind: a contact that is known without adhesion, and a tension on top that acts as on flat punches of the
-same contact area (K. L. Johnson, Contact Mechanics, Cambridge 1985). At the front the pressure then has the stress
-intensity K, and the front stands where the energy release rate G = K^2/(2 E*) is the surface energy (D. Maugis,
-Contact, Adhesion and Rupture of Elastic Solids, Springer 2000), E* being the modulus of both sides together.
-Separations are mean gaps; gap = separation - heights + displacement, with a displacement of zero mean.
+Each superposes a known contact without adhesion and a tension that acts as on flat punches of the same contact area
+(K. L. Johnson, Contact Mechanics, Cambridge 1985). At the front the pressure then has the stress intensity K, and the
+front is in equilibrium if the energy release rate G = K^2/(2 E*) is the surface energy (D. Maugis, Contact, Adhesion
+and Rupture of Elastic Solids, Springer 2000), where E* is the composite modulus. Separations are mean gaps; gap =
+separation - heights + displacement, with a displacement of zero mean.
 """
 
 import math
@@ -28,29 +28,25 @@ def intensity_at_equilibrium(material: Material) -> float:
 
 @dataclass(frozen=True)
 class RoundPunch:
-    """A flat punch of circular face, alone (K. Kendall, J. Phys. D: Appl. Phys. 4 (1971) 1186).
-
-    radius : of the face, m.
-    """
+    """A single flat punch with a circular face of a radius in m (K. Kendall, J. Phys. D: Appl. Phys. 4 (1971) 1186)."""
 
     material: Material
     radius: float
 
     @property
     def pull_off_force(self) -> float:
-        """sqrt(8 pi E* dgamma a^3), N: where K = F/(2 sqrt(pi) a^(3/2)) all along its edge is that of equilibrium."""
+        """sqrt(8 pi E* dgamma a^3), N: K = F/(2 sqrt(pi) a^(3/2)) along the edge is that of equilibrium."""
         E, gamma = self.material.contact_modulus, self.material.surface_energy
         return math.sqrt(8 * math.pi * E * gamma * self.radius**3)
 
     def displacement(self, force: float) -> float:
-        """F/(2 E* a) of the punch, m; of the sign of the force."""
+        """Return F/(2 E* a), m, with the sign of the force."""
         return force / (2 * self.material.contact_modulus * self.radius)
 
     def displacement_in_cell(self, force: float, period: float) -> float:
-        """The same with periodic images and without mean displacement, m, to the third order in a/period.
+        """Return the displacement with periodic images and zero mean displacement, m, to third order in a/period.
 
-        The pressure has the mean square radius 2 a^2/3, on the punch as under it: images act by their force and by
-        their second moments, a quarter of that.
+        Images act by their force and by their second moments. The mean square radius of the pressure is 2 a^2/3.
         """
         by_images = IMAGES / period + 2 * IMAGES_CUBED / period**3 * self.radius**2 / 6
         return self.displacement(force) + force * by_images / (math.pi * self.material.contact_modulus)
@@ -58,10 +54,10 @@ class RoundPunch:
 
 @dataclass(frozen=True)
 class Strips:
-    """Flat strips side by side, infinitely long: what is between them are cracks in a row.
+    """A row of infinitely long flat strips, with half-width a and period L (m).
 
-    half_width : a of the strips, m. period : L, from one to the next, m. Source: W. T. Koiter, Ing.-Arch. 28 (1959)
-    168, K^2 = sigma^2 L cot(pi a/L) under the nominal tension sigma.
+    Source: W. T. Koiter, Ing.-Arch. 28 (1959) 168, for the row of cracks between them: K^2 = sigma^2 L cot(pi a/L)
+    under the nominal tension sigma.
     """
 
     material: Material
@@ -87,13 +83,11 @@ class Strips:
 
 @dataclass(frozen=True)
 class Sinusoid:
-    """A wave h = amplitude cos(2 pi x/wavelength) pressed on (K. L. Johnson, Int. J. Solids Struct. 32 (1995) 423).
+    """Contact of a wave h = amplitude cos(2 pi x/L) in m (K. L. Johnson, Int. J. Solids Struct. 32 (1995) 423).
 
     Without adhesion H. M. Westergaard's solution (J. Appl. Mech. 6 (1939) A49), p = p* sin^2(pi a/L) with p* = pi E*
-    amplitude/L, of which the mean gap follows by integrating du = -compliance of strips dp; with it a tension as on
-    `Strips` comes on top. Functions are of psi = pi a/L between 0 and pi/2, a half the width of contact, any shape.
-
-    amplitude : of the wave from its mean, m. wavelength : L, m.
+    amplitude/L; its mean gap follows by integrating du = -compliance of strips dp. Adhesion adds a tension as on
+    `Strips`. Methods take psi = pi a/L between 0 and pi/2, with a half the width of contact, of any shape.
     """
 
     material: Material
@@ -102,7 +96,7 @@ class Sinusoid:
 
     @property
     def full_contact_pressure(self) -> float:
-        """p* = pi E* amplitude/L: the least that makes contact everywhere without adhesion, Pa."""
+        """p* = pi E* amplitude/L, the least pressure of full contact without adhesion, Pa."""
         return math.pi * self.material.contact_modulus * self.amplitude / self.wavelength
 
     @property
@@ -111,22 +105,22 @@ class Sinusoid:
         return intensity_at_equilibrium(self.material) / math.sqrt(self.wavelength) / self.full_contact_pressure
 
     def tension(self, psi):
-        """What adhesion takes off the mean pressure at the same contact, Pa."""
+        """Return the reduction of the mean pressure by adhesion at the same contact, Pa."""
         return self.full_contact_pressure * self.alpha * np.sqrt(np.tan(psi))
 
     def pressure(self, psi):
-        """Mean pressure p* (sin^2 psi - alpha sqrt(tan psi)), Pa."""
+        """Return the mean pressure p* (sin^2 psi - alpha sqrt(tan psi)), Pa."""
         return self.full_contact_pressure * np.sin(psi) ** 2 - self.tension(psi)
 
     def separation(self, psi):
-        """Mean gap, m: amplitude (cos^2 psi + s ln s - alpha sqrt(tan psi) ln s) with s = sin^2 psi."""
+        """Return the mean gap, m: amplitude (cos^2 psi + s ln s - alpha sqrt(tan psi) ln s), s = sin^2 psi."""
         s = np.sin(psi) ** 2
         return self.amplitude * (1 - s + s * np.log(s)) + self.tension(psi) * self._compliance(psi)
 
     def stored_energy(self, psi):
-        """Elastic energy less that of adhesion over the nominal area, J/m^2; 0 out of contact.
+        """Return elastic minus adhesive energy over the nominal area, J/m^2; 0 out of contact.
 
-        Of Westergaard's contact, of the tension that is put on it then, and of the contact area 2 psi/pi.
+        The terms are those of Westergaard's contact, of the tension, and of the contact area 2 psi/pi.
         """
         s = np.sin(psi) ** 2
         pressed = self.full_contact_pressure * self.amplitude * s**2 / 4 * (1 - 2 * np.log(s))
@@ -140,15 +134,13 @@ class Sinusoid:
 
 @dataclass(frozen=True)
 class CrackInTrough:
-    """The round gap in the trough of h = amplitude (cos qx + cos qy)/2, q = 2 pi/L, left before contact is full.
+    """The last round gap in the trough of h = amplitude (cos qx + cos qy)/2, q = 2 pi/L, before full contact.
 
-    In full contact the pressure is p + p0 (cos qx + cos qy)/2 with p0 = E* q amplitude/2, which tears at the trough;
-    its mean around it is p - p0 J0(qr). A crack under such a tension t(r) has K = 2/sqrt(pi c) int t r/sqrt(c^2 - r^2)
-    dr (I. N. Sneddon, Proc. R. Soc. Lond. A 187 (1946) 229) and, by reciprocity with an even tension, the volume
-    8/E* int t r sqrt(c^2 - r^2) dr. Cracks of neighbouring cells, and what tension has no symmetry about the trough,
-    are left out: both are of the order of (c/L)^3 or less.
-
-    amplitude : of the wave from its mean, m. period : L, m.
+    In full contact the pressure is p + p0 (cos qx + cos qy)/2 with p0 = E* q amplitude/2, which is tensile at the
+    trough; its mean around the trough is p - p0 J0(qr). A crack under such a tension t(r) has K = 2/sqrt(pi c)
+    int t r/sqrt(c^2 - r^2) dr (I. N. Sneddon, Proc. R. Soc. Lond. A 187 (1946) 229) and, by reciprocity with an even
+    tension, the volume 8/E* int t r sqrt(c^2 - r^2) dr. Cracks of neighbouring cells, and the tension without symmetry
+    about the trough, are left out: both are of the order of (c/L)^3 or less. Lengths in m.
     """
 
     material: Material
@@ -156,7 +148,7 @@ class CrackInTrough:
     period: float
 
     def _moments(self, c):
-        """Integrals of J0(qr) r/sqrt(c^2 - r^2) and J0(qr) r sqrt(c^2 - r^2) up to c."""
+        """Return the integrals of J0(qr) r/sqrt(c^2 - r^2) and J0(qr) r sqrt(c^2 - r^2) up to c."""
         q = 2 * math.pi / self.period
         return math.sin(q * c) / q, (math.sin(q * c) - q * c * math.cos(q * c)) / q**3
 
@@ -166,35 +158,23 @@ class CrackInTrough:
         return math.pi * self.material.contact_modulus * self.amplitude / self.period
 
     def pressure(self, c: float) -> float:
-        """Mean pressure that holds a crack of radius c (m) open, Pa; negative in tension."""
+        """Return the mean pressure at which a crack of radius c (m) is in equilibrium, Pa; negative in tension."""
         root, _ = self._moments(c)
         return (self.tearing * root - intensity_at_equilibrium(self.material) * math.sqrt(math.pi * c) / 2) / c
 
     def separation(self, c: float) -> float:
-        """Mean gap, m, the volume of the crack over the cell."""
+        """Return the mean gap, m: the volume of the crack over the area of the cell."""
         _, cubed = self._moments(c)
         volume = 8 / self.material.contact_modulus * (self.tearing * cubed - self.pressure(c) * c**3 / 3)
         return volume / self.period**2
 
-    def radius(self, separation: float) -> float:
-        """Radius (m) of the crack at a mean gap (m).
-
-        Raises
-        ------
-        ValueError
-            If it is not within a quarter of the period.
-        """
-        return brentq(lambda c: self.separation(c) - separation, 1e-6 * self.period, self.period / 4, xtol=1e-15)
-
 
 @dataclass(frozen=True)
 class SphereInCell:
-    """A paraboloid under Johnson, Kendall & Roberts' law in the middle of a square cell that is repeated periodically.
+    """A paraboloid of radius of curvature R (m) with the law of Johnson, Kendall & Roberts in a periodic square cell.
 
-    Its images displace its centre and bend the half-space under it; both are proportional to its force, and known to
-    the fifth order of contact radius over period (of the fourth-order term of the images' field nothing is taken).
-
-    radius_of_curvature : R, m. period : side of the cell, m.
+    Its images displace its centre and bend the half-space under it, in proportion to its force. The error is of fifth
+    order in contact radius over period (m), because the fourth-order term of the field of the images is left out.
     """
 
     material: Material
@@ -206,20 +186,20 @@ class SphereInCell:
         return JKR(self.material)
 
     def _curvature_radius(self, a):
-        """R of the sphere less the half-space that its images bend, m, for contact radii a."""
+        """Return R of the sphere relative to the half-space that its images bend, m, for contact radii a."""
         law, R = self._law, self.radius_of_curvature
         bend = IMAGES_CUBED / (2 * math.pi * self.material.contact_modulus * self.period**3)
-        # The force is linear in the curvature, and that in the force.
+        # The force is linear in the curvature, and the curvature in the force.
         slope = law.repulsive_force(a, 1.0)
         force = (slope / R - law.adhesive_force(a)) / (1 - slope * bend)
         return 1 / (1 / R + bend * force)
 
     def force(self, a):
-        """Contact force, N, of contact radii a (m)."""
+        """Return the contact force (N) at contact radii a (m)."""
         return self._law.force(a, self._curvature_radius(a))
 
     def approach(self, a):
-        """Approach of the summit to the mean plane of the cell, m: its height less the mean separation."""
+        """Return the approach of the summit to the mean plane of the cell, m."""
         R, modulus = self._curvature_radius(a), math.pi * self.material.contact_modulus
         images = IMAGES / self.period * self._law.force(a, R)
         images = images + IMAGES_CUBED / self.period**3 * self._law.second_moment(a, R)
@@ -227,34 +207,22 @@ class SphereInCell:
 
     @property
     def jump_off_radius(self) -> float:
-        """Contact radius at which contact is lost at given separation, where the approach is least, m."""
-        alone = float(self._law.jump_off_radius(self.radius_of_curvature))
-        if alone == 0:
+        """Contact radius at jump-off under separation control, where the approach is least, m."""
+        single = float(self._law.jump_off_radius(self.radius_of_curvature))
+        if single == 0:
             return 0.0
         return float(
-            minimize_scalar(self.approach, bounds=(0.3 * alone, 3 * alone), options={"xatol": 1e-10 * alone}).x
+            minimize_scalar(self.approach, bounds=(0.3 * single, 3 * single), options={"xatol": 1e-10 * single}).x
         )
 
     def contact_radius(self, approach: float) -> float:
-        """Contact radius of the stable contact at an approach, m.
-
-        Raises
-        ------
-        ValueError
-            If there is none, or a radius beyond a quarter of the period.
-        """
+        """Return the radius of the stable contact at an approach, m; ValueError if there is none below period/4."""
         return brentq(
             lambda a: float(self.approach(a)) - approach, self.jump_off_radius, self.period / 4, xtol=1e-14, rtol=1e-14
         )
 
     def loaded_radius(self, force: float) -> float:
-        """The larger contact radius under a force (N), m.
-
-        Raises
-        ------
-        ValueError
-            If there is none: the force is a larger tension than that of pull-off.
-        """
+        """Return the larger contact radius at a force (N), m; ValueError if the tension exceeds pull-off."""
         least = float(np.cbrt(9 * np.pi / 8 * self.material.adhesion_length * self.radius_of_curvature**2))
         if least:
             bounds = (0.5 * least, 2 * least)
@@ -263,7 +231,7 @@ class SphereInCell:
 
     @property
     def pull_off_force(self) -> float:
-        """Largest tension, N; that of a sphere alone is 3/2 pi dgamma R."""
-        alone = float(np.cbrt(9 * np.pi / 8 * self.material.adhesion_length * self.radius_of_curvature**2))
-        bounds = (0.5 * alone, 2 * alone)
-        return -float(minimize_scalar(self.force, bounds=bounds, options={"xatol": 1e-10 * alone}).fun)
+        """Largest tension, N; 3/2 pi dgamma R for a single sphere."""
+        single = float(np.cbrt(9 * np.pi / 8 * self.material.adhesion_length * self.radius_of_curvature**2))
+        bounds = (0.5 * single, 2 * single)
+        return -float(minimize_scalar(self.force, bounds=bounds, options={"xatol": 1e-10 * single}).fun)

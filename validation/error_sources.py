@@ -1,32 +1,31 @@
-"""Where the model's error comes from: between ICHA and boundary elements, one thing is changed at a time.
+"""Find the causes of the model's error: change one thing at a time between the model and boundary elements.
 
-Boundary elements can be given, instead of the topography, the surface that the model assumes. A chain of variants then
-leads from the model to the truth, every link changing one thing:
+Boundary elements can solve, instead of the topography, the surface that the model assumes. So a chain of variants leads
+from the model to boundary elements, each of which changes one thing:
 
     icha                      the model;
-    without_unions            overlapping spots stay as they are; their area is that of the union of the discs;
-    field_shape               moreover the displacement w by the other spots has a slope and a curvature across a spot:
-                              there the summit stands higher by R |grad w|^2/2 and is sharper, 1/R + laplacian(w)/2;
+    without_unions            overlapping spots do not unite; their area is that of the union of the discs;
+    field_shape               in addition the displacement w by other spots has a slope and a curvature across a spot:
+                              the summit is raised by R |grad w|^2/2 and sharpened to 1/R + laplacian(w)/2;
     circular_paraboloids      boundary elements on the upper envelope of the paraboloids z - r^2/(2R) of all summits;
     elliptic_paraboloids      the same with both principal curvatures, of which 1/R is the geometric mean;
-    boundary_elements         boundary elements on the topography itself.
+    boundary_elements         boundary elements on the topography.
 
-What the last link changes is the shape of the summits beyond their paraboloids. Beside the chain stand
+The last step changes the shape of the summits beyond their paraboloids. Three more variants are compared:
 
-    independent               Hertz's summits that do not interact;
+    independent               Hertz's summits without interaction;
     icha_fine_grid            the model on a grid twice as fine;
     boundary_elements_coarse  boundary elements on a grid half as fine.
 
-How a summit goes on beyond its paraboloid shows in single patches: on the profile r^2/(2R) - b r^4 a contact of radius
-a carries F = 4 E* a^3/(3R) (1 - 16/5 b R a^2) (I. N. Sneddon, Int. J. Eng. Sci. 3 (1965) 47-57,
+Single patches show the shape of a summit beyond its paraboloid: on the profile r^2/(2R) - b r^4 a contact of radius a
+carries F = 4 E* a^3/(3R) (1 - 16/5 b R a^2) (I. N. Sneddon, Int. J. Eng. Sci. 3 (1965) 47-57,
 doi:10.1016/0020-7225(65)90019-4), with b the bi-Laplacian of the heights at the summit over 64.
 
-`python -m validation.error_sources` solves the middle of campaign validation, half an hour, and writes the tables and
-the figure of docs/error_sources.md. What was solved is kept in results/error_sources.
+`python -m validation.error_sources` solves the middle of campaign validation in half an hour, saves the solutions in
+results/error_sources, and writes the tables and the figure of docs/error_sources.md.
 """
 
 import itertools
-from collections.abc import Callable
 from pathlib import Path as FilePath
 from typing import NamedTuple
 
@@ -39,7 +38,7 @@ from icha.asperity.material import Material
 from icha.equilibrium.interacting_asperities import InteractingAsperities
 from icha.path.follow import follow
 from icha.path.targets import Path
-from icha.references.finite_range import DEFAULT_TOLERANCE, NodalState, contact_state, perimeter_correction
+from icha.references.finite_range import NodalState, contact_state, perimeter_correction
 from icha.surfaces.spectrum import SelfAffineSpectrum
 from icha.surfaces.summits import find_summits
 from icha.surfaces.surface import Surface
@@ -47,8 +46,8 @@ from validation.paraboloids import circular_curvatures, fourth_order_terms, para
 from validation.spot_by_spot import CATEGORIES, split
 from validation.without_unions import discs_apart, independent_discs, union_area_fraction
 
-# From the model to the truth, and what changes from one to the next. With adhesion the model is not solved without its
-# unions.
+# Variants from the model to boundary elements, with the change of each step. With adhesion the model is not solved
+# without unions.
 CHAIN = {
     "icha": "",
     "without_unions": "unions",
@@ -65,6 +64,10 @@ ADHESIVE_CHAIN = {
 }
 
 
+# Boundary elements per cell of the grid of the surface, along a side; even, because half of it is solved as well.
+_REFINEMENT = 2
+
+
 class State(NamedTuple):
     """Contact area fraction, and mean separation in m."""
 
@@ -76,22 +79,15 @@ def error_sources(
     surface: Surface,
     material: Material,
     reduced_pressures,
-    *,
-    refinement: int = 2,
-    tolerance: float = DEFAULT_TOLERANCE,
     seed: int = -1,
-    progress: Callable[[str], None] = print,
 ) -> xr.Dataset:
     """Solve all variants for one surface, and split the model's error spot by spot.
 
     Parameters
     ----------
-    surface, material : as for `icha.simulate`; a range of attraction must be resolved on the coarser grid, too.
+    surface, material : as for `icha.simulate`; the surface's own grid must resolve the range of attraction.
     reduced_pressures : p/(E* h'_rms) with the rms slope of the surface itself, increasing, (n,).
-    refinement : boundary elements per cell of the surface's grid along a side, even, so that half of it can be tried.
-    tolerance : of the boundary elements.
     seed : recorded in the dataset.
-    progress : called with a line of text for every variant.
 
     Returns
     -------
@@ -99,20 +95,18 @@ def error_sources(
     (category, reduced_pressure), whose sums are the total areas and loads of `icha` and `boundary_elements`, and along
     `pair` every single spot and its patch.
     """
-    if refinement % 2:
-        raise ValueError(f"refinement: {refinement!r} must be even")
     path = Path(reduced_pressures=reduced_pressures)
     pressures = [target.value for target in path.targets]
-    states, parts = {}, None
+    states, splits = {}, None
 
     def keep(name, solved):
         states[name] = list(solved)
-        progress(f"{name}: A/A0 = {', '.join(f'{state.area:.4e}' for state in states[name])}")
+        print(f"{name}: A/A0 = {', '.join(f'{state.area:.4e}' for state in states[name])}", flush=True)
 
-    def solved(surface, refinement):
-        return [contact_state(surface, material, p, refinement=refinement, tolerance=tolerance) for p in pressures]
+    def solve(refinement):
+        return [contact_state(surface, material, p, refinement=refinement) for p in pressures]
 
-    # One thread for linear algebra: the order of sums, and with it every bit, is then the same everywhere.
+    # One thread for linear algebra, so that the order of sums, and every bit, does not depend on the machine.
     with threadpool_limits(1):
         contact, model = _model(surface, material, path)
         keep("icha", (State(contact.area_fraction(state), state.separation) for state in model))
@@ -125,26 +119,26 @@ def error_sources(
             ("circular_paraboloids", circular_curvatures(contact.asperities)),
             ("elliptic_paraboloids", summit_curvatures(surface, contact.asperities)),
         ):
-            heights = paraboloids(contact.asperities, curvatures, refinement * surface.grid)
-            keep(name, (_solve_paraboloids(heights, surface, material, p, tolerance) for p in pressures))
-        keep("boundary_elements_coarse", map(_state_at_nodes, solved(surface, refinement // 2)))
-        truth = solved(surface, refinement)
+            heights = paraboloids(contact.asperities, curvatures, _REFINEMENT * surface.grid)
+            keep(name, (_solve_paraboloids(heights, surface, material, p) for p in pressures))
+        keep("boundary_elements_coarse", map(_state_at_nodes, solve(_REFINEMENT // 2)))
+        truth = solve(_REFINEMENT)
         keep("boundary_elements", map(_state_at_nodes, truth))
         if not contact.adhesive:
             fourth = fourth_order_terms(surface, contact.asperities)
-            parts = [split(contact, state, true, fourth) for state, true in zip(model, truth, strict=True)]
-    return _dataset(surface, material, pressures, states, parts).assign(seed=seed, refinement=refinement)
+            splits = [split(contact, state, true, fourth) for state, true in zip(model, truth, strict=True)]
+    return _dataset(surface, material, pressures, states, splits).assign(seed=seed, refinement=_REFINEMENT)
 
 
 def _model(surface, material, path):
-    """The contact problem, and the model's states at the stops of the path."""
+    """Return the contact problem and the states of the model at the targets of the path."""
     contact = InteractingAsperities(JKR(material), find_summits(surface), surface.rms_height, surface.rms_slope)
     met = {waypoint.target: waypoint.state for waypoint in follow(contact, path)}
     return contact, [met[target] for target in path.targets]
 
 
 def _without_unions(contact, surface, reduced_pressures):
-    """Names of the variants without unions and adhesion, and their discs at every pressure."""
+    """Yield the variants without unions and adhesion: name, and discs at each pressure."""
     law, summits = contact.law, contact.asperities
     loads = [p * contact.contact_modulus * surface.rms_slope for p in reduced_pressures]
     yield "independent", (independent_discs(summits, law, p) for p in loads)
@@ -156,15 +150,15 @@ def _state_at_nodes(state: NodalState) -> State:
     return State(perimeter_correction(state.contact)[0], state.mean_separation)
 
 
-def _solve_paraboloids(heights, surface, material, reduced_pressure, tolerance):
-    """The same load on another surface; its separation is measured from the mean plane of the true one."""
+def _solve_paraboloids(heights, surface, material, reduced_pressure):
+    """Solve the same load on other heights; the separation is that of the mean plane of the surface."""
     other = Surface(heights, surface.period)
     reduced_pressure = reduced_pressure * surface.rms_slope / other.rms_slope
-    state = _state_at_nodes(contact_state(other, material, reduced_pressure, tolerance=tolerance))
+    state = _state_at_nodes(contact_state(other, material, reduced_pressure))
     return state._replace(separation=state.separation + float(np.mean(heights)))
 
 
-def _dataset(surface, material, pressures, states, parts):
+def _dataset(surface, material, pressures, states, splits):
     along = ("variant", "reduced_pressure")
     variables = {
         "contact_area_fraction": (along, [[state.area for state in solved] for solved in states.values()]),
@@ -174,12 +168,12 @@ def _dataset(surface, material, pressures, states, parts):
         **{name: getattr(surface, name) for name in ("rms_slope", "rms_height", "rms_curvature", "period", "grid")},
     }
     coordinates = {"variant": list(states), "reduced_pressure": pressures}
-    if parts is not None:
+    if splits is not None:
         coordinates["category"] = list(CATEGORIES)
-        repeated = np.repeat(pressures, [len(part["pair_spot_area"]) for part in parts])
+        repeated = np.repeat(pressures, [len(one["pair_spot_area"]) for one in splits])
         variables["pair_reduced_pressure"] = ("pair", repeated)
-        for name in parts[0]:
-            of_states = [part[name] for part in parts]
+        for name in splits[0]:
+            of_states = [one[name] for one in splits]
             if name.startswith("pair_"):
                 variables[name] = ("pair", np.concatenate(of_states))
             else:
@@ -188,14 +182,14 @@ def _dataset(surface, material, pressures, states, parts):
 
 
 def chain(sources: xr.Dataset) -> dict[str, str]:
-    """The variants from the model to the truth, and what changes from the one before."""
+    """Return the variants from the model to boundary elements, with the change of each step."""
     return ADHESIVE_CHAIN if float(sources["surface_energy"]) > 0 else CHAIN
 
 
 def effects(sources: xr.Dataset) -> xr.DataArray:
-    """What every link of the chain adds to ln(A/A_truth) of the model, along (source, reduced_pressure).
+    """Return the contribution of each step to ln(A/A_BEM) of the model, along (source, reduced_pressure).
 
-    The sum over the sources is the logarithm of the model's area over the boundary elements'.
+    The sum over the sources is the logarithm of the area of the model over that of the boundary elements.
     """
     links = chain(sources)
     names = list(links)
@@ -208,13 +202,13 @@ def effects(sources: xr.Dataset) -> xr.DataArray:
 
 
 def shape_ratio(sources: xr.Dataset) -> xr.DataArray:
-    """Area of every pair's patch over Hertz's area at the patch's own force: 1 for a lone paraboloid."""
+    """Return the area of the patch of each pair over Hertz's area at its force: 1 for a single paraboloid."""
     radius = np.cbrt(0.75 * sources["pair_patch_force"] * sources["pair_curvature_radius"] / sources["contact_modulus"])
     return sources["pair_patch_area"] / (np.pi * radius**2)
 
 
 def shape_ratio_of_fourth_order(sources: xr.Dataset) -> xr.DataArray:
-    """The same as the summit's fourth-order term gives it, (1 - 16/5 b R a^2)^(-2/3); NaN beyond where that can be."""
+    """Return this ratio from the fourth-order term of the summit, (1 - 16/5 b R a^2)^(-2/3); NaN outside its range."""
     reduction = (
         3.2 / np.pi * sources["pair_fourth_order"] * sources["pair_curvature_radius"] * sources["pair_patch_area"]
     )
@@ -222,19 +216,19 @@ def shape_ratio_of_fourth_order(sources: xr.Dataset) -> xr.DataArray:
 
 
 def relative_radius(sources: xr.Dataset) -> xr.DataArray:
-    """Radius of every pair's patch times the wave number sqrt(<q^4>/<q^2>) of the surface's curvature over slope."""
+    """Return the radius of the patch of each pair times the wave number sqrt(<q^4>/<q^2>) of the surface."""
     wave_number = sources["rms_curvature"] * np.sqrt(8 / 3) / sources["rms_slope"]
     return np.sqrt(sources["pair_patch_area"] / np.pi) * wave_number
 
 
-# The surface in the middle of campaign validation.
+# The surface `middle` of campaign validation.
 SPECTRUM = SelfAffineSpectrum(100e-6, 20e-6, 1.5625e-6, 0.8, 1.0)
 HARD, STICKY = Material(25e6, 0.0, 40e-9), Material(25e6, 0.05, 40e-9)
 
 
 def main() -> None:
-    """Solve what was not solved before, and write tables and figure."""
-    from validation.error_sources_shown import write
+    """Solve all surfaces without a saved solution, and write tables and figure."""
+    from validation.error_source_tables import write
 
     def solved(name, seed, material, reduced_pressures):
         file = FilePath("results/error_sources", f"{name}_seed{seed}.nc")

@@ -1,9 +1,9 @@
-"""Jump into contact of one paraboloid whose attraction has a range: the exact counterpart of Wu's formula.
+"""Jump into contact of a paraboloid with an attraction of finite range: the exact counterpart of Wu's formula.
 
-A paraboloid of radius R faces an elastic half-space. Between points at a gap h acts the traction of Lennard and Jones,
-8 gamma/(3 epsilon) ((epsilon/h)^3 - (epsilon/h)^9). As the undeformed gap falls, the surfaces bulge towards each other,
-up to a smallest gap at which no equilibrium without contact exists any more: there the paraboloid jumps into contact.
-Gaps are divided by epsilon and distances from the axis by sqrt(R epsilon); only the Tabor parameter is left then.
+A paraboloid of radius R faces an elastic half-space. The traction between points at a gap h is that of Lennard and
+Jones, 8 gamma/(3 epsilon) ((epsilon/h)^3 - (epsilon/h)^9). As the undeformed gap falls, the surfaces bulge towards each
+other, down to a smallest gap, below which no equilibrium without contact exists: there the paraboloid jumps into
+contact. Gaps are divided by epsilon and distances from the axis by sqrt(R epsilon); only the Tabor parameter remains.
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ from icha.asperity.jkr import wu_gap
 
 # Nodes along the radius, and of each of the two quadratures.
 _NODES, _QUADRATURE = 60, 80
-# Gaps at the axis at which equilibria are sought, over Wu's distance, until the undeformed gap grows again. At gaps
-# below the range the axis repels.
+# Gaps at the axis, over Wu's distance, at which equilibria are solved until the undeformed gap increases. Gaps below
+# the range are left out, because the traction is repulsive.
 _GAPS = np.geomspace(3.0, 0.5, 60)
 _TOLERANCE, _STEPS = 1e-8, 60
 
 
 def jump_in_gap(tabor_parameter: float) -> float:
-    """Undeformed gap, over the range of attraction, at which a paraboloid jumps into contact.
+    """Return the undeformed gap, over the range of attraction, at which a paraboloid jumps into contact.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ def jump_in_gap(tabor_parameter: float) -> float:
     Raises
     ------
     ValueError
-        If there is no jump: at Tabor parameters of less than about 0.69 contact forms continuously.
+        If contact forms continuously, at Tabor parameters below about 0.69.
     """
     scale = wu_gap(tabor_parameter)
     problem = _Problem(tabor_parameter, scale)
@@ -49,11 +49,11 @@ def jump_in_gap(tabor_parameter: float) -> float:
                 method="bounded",
                 options={"xatol": 1e-6 * scale},
             ).fun
-    raise ValueError(f"tabor_parameter: {tabor_parameter!r}: such a paraboloid does not jump into contact")
+    raise ValueError(f"tabor_parameter: {tabor_parameter!r} must be at least 0.69; below, contact forms without a jump")
 
 
 class _Problem:
-    """Equilibria of one Tabor parameter: gaps at the nodes (n,) less the paraboloid, and then the undeformed gap."""
+    """Equilibria of one Tabor parameter; states: bulge of the gaps at the nodes (n,), then the undeformed gap."""
 
     def __init__(self, tabor_parameter, scale):
         self.compliance = 8 / 3 * tabor_parameter**1.5
@@ -62,12 +62,12 @@ class _Problem:
         self.at_axis = _weights_at_axis()
 
     def equilibrium(self, gap, start):
-        """State with this gap at the axis, by Newton's method."""
+        """Return the state with a given gap at the axis, by Newton's method."""
         paraboloid, n = self.radius**2 / 2, len(self.radius)
         if start is None:
             state = np.full(n + 1, gap)
         else:
-            # What bulges hardly changes.
+            # The deformation hardly changes.
             state = start + (gap - self.at_axis @ start[:-1])
         jacobian = np.zeros((n + 1, n + 1))
         jacobian[:-1, -1] = -1
@@ -85,31 +85,31 @@ class _Problem:
             state = state + shortest * step
             if np.abs(step).max() < _TOLERANCE * gap:
                 return state
-        raise RuntimeError(f"no equilibrium at a gap of {gap:g} was found in {_STEPS} steps of Newton's method")
+        raise RuntimeError(f"no convergence at a gap of {gap:g} in {_STEPS} steps of Newton's method")
 
 
 def nodes() -> np.ndarray:
-    """Distances from the axis (n,), Chebyshev's nodes in (r^2 - 1)/(r^2 + 1): dense near the axis, few far away."""
+    """Return distances from the axis (n,), Chebyshev's nodes in (r^2 - 1)/(r^2 + 1)."""
     x, _ = _chebyshev()
     return np.sqrt((1 + x) / (1 - x))
 
 
 def _weights_at_axis():
-    """Weights (n,) that extrapolate a function of r^2 from the nodes to the axis."""
+    """Return weights (n,) that extrapolate a function of r^2 from the nodes to the axis."""
     x, weights = _chebyshev()
     to_axis = weights / (-1 - x)
     return to_axis / to_axis.sum()
 
 
 def _chebyshev():
-    """Chebyshev's nodes of the first kind (n,) and the weights (n,) of barycentric interpolation between them."""
+    """Return Chebyshev's nodes of the first kind (n,) and the weights (n,) of barycentric interpolation."""
     angle = np.pi * (np.arange(_NODES) + 0.5) / _NODES
     return np.cos(angle), (-1.0) ** np.arange(_NODES) * np.sin(angle)
 
 
 @cache
 def displacement_matrix() -> np.ndarray:
-    """Displacement at the nodes, over 1/E*, by an axisymmetric traction that is given there and falls as 1/r^6, (n, n).
+    """Return the displacement at the nodes (in 1/E*) by an axisymmetric traction that falls as 1/r^6, (n, n).
 
     Source: the two Abel transforms of an axisymmetric load, K. L. Johnson, Contact Mechanics (1985), section 3.8, with
     their singularities removed: u(r) = 4/(pi E*) int_0^(pi/2) int_0^inf p(sqrt(r^2 sin^2 theta + y^2)) dy dtheta.

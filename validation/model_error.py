@@ -1,4 +1,4 @@
-"""Tables of docs/validation.md: how far the model is from boundary elements, from the results of campaign validation.
+"""Tables of docs/validation.md: error of the asperity model, from the results of campaign validation.
 
 Run the campaign first; then: python -m validation.model_error
 """
@@ -19,17 +19,17 @@ from icha.datasets.campaign import run_labels, select_run
 from icha.datasets.files import read_campaign, read_dataset
 from validation.tables import Table, copy_figures, means, pressures, write_tables
 
-# Entries of the campaign's boundary elements on other grids, and their cells per cell of the surface's grid.
+# Entries with boundary elements on other grids, and their cells per cell of the grid of the surface.
 _GRIDS = {"adhesionless": "2 cells", "coarse": "1 cell", "fine": "4 cells"}
 
 
-def of_energy(errors: xr.Dataset, adhesive: bool) -> xr.Dataset:
-    """The part of an entry with materials that have surface energy, or that have none."""
+def select_adhesion(errors: xr.Dataset, adhesive: bool) -> xr.Dataset:
+    """Return the materials of an entry with surface energy, or those without."""
     return errors.isel(material=np.flatnonzero((errors["surface_energy"].values > 0) == adhesive))
 
 
 def summary(entries: Mapping[str, xr.Dataset]) -> Table:
-    """What every entry covers, and the median and the range of its errors' means over the seeds."""
+    """Table of the median and range, over all states of each entry, of the mean errors over the seeds."""
 
     def over_all(errors, name):
         values = 100 * errors[f"{name}_mean"].values
@@ -44,7 +44,7 @@ def summary(entries: Mapping[str, xr.Dataset]) -> Table:
         area, energetic, separation = (
             over_all(errors, name) for name in ("area_error", "energetic_area_error", "separation_error")
         )
-        # Without a range of attraction there is one area.
+        # Without a range of attraction both areas are equal.
         cells = [area, "–" if energetic == area else energetic, separation]
         rows.append([words, states, f"{pressure.min():g} to {pressure.max():g}", *cells])
     head = ["", "states", "p\\*", "contact area, %", "against the energetic area, %", "mean separation, %"]
@@ -52,7 +52,7 @@ def summary(entries: Mapping[str, xr.Dataset]) -> Table:
 
 
 def _lines(errors: xr.Dataset) -> Iterator[tuple[str, xr.Dataset]]:
-    """Every surface, slope and material of an entry, with what tells it apart."""
+    """Yield a label and the errors of every surface, slope and material of an entry."""
     for surface in errors["surface"].values:
         for slope in errors["rms_slope"].values:
             for material in errors["material"].values:
@@ -66,7 +66,7 @@ def _lines(errors: xr.Dataset) -> Iterator[tuple[str, xr.Dataset]]:
 
 
 def errors_by_load(errors: xr.Dataset, name: str) -> Table:
-    """An error of one entry in per cent, a row for every surface, a column for every load."""
+    """Table of an error of one entry in per cent, a row for each surface and a column for each load."""
     rows = [
         [words, *means(100 * own[name].transpose("seed", "reduced_pressure").values, "{:+.1f}")]
         for words, own in _lines(errors)
@@ -75,7 +75,7 @@ def errors_by_load(errors: xr.Dataset, name: str) -> Table:
 
 
 def distances(errors: xr.Dataset) -> Table:
-    """Distances of the distributions and the overlap of the maps: P(p), P(u), overlap in every cell."""
+    """Table of the distances of the distributions P(p) and P(u) and the overlap of the contact maps."""
     quantities = {
         "pressure_distribution_distance": "P(p)",
         "gap_distribution_distance": "P(u)",
@@ -90,9 +90,9 @@ def distances(errors: xr.Dataset) -> Table:
 
 
 def short_range_over_tamaas(short_range: xr.Dataset, finite_range: xr.Dataset) -> Table:
-    """Boundary elements in the limit of a short range over those of Tamaas, without adhesion, in per cent less 100.
+    """Table of the difference in per cent between boundary elements in the limit of short range and Tamaas's.
 
-    Both entries are of the same surfaces, and of the loads of the first those are shown that the second has.
+    Both are without adhesion on the same surfaces, at the loads of the second entry.
     """
     rows = []
     for words, other in _lines(finite_range):
@@ -106,9 +106,9 @@ def short_range_over_tamaas(short_range: xr.Dataset, finite_range: xr.Dataset) -
 
 
 def bounds_and_limit(short_range: xr.Dataset, finite_range: xr.Dataset) -> Table:
-    """Errors of the contact area with adhesion in per cent: against a finite range, and in the limit of a short one.
+    """Table of errors of the contact area with adhesion in per cent, at a finite range and in the limit of short range.
 
-    Means over the seeds, at the loads that both entries have.
+    Means over the seeds, at the loads of both entries.
     """
     columns = [p for p in finite_range["reduced_pressure"].values if p in short_range["reduced_pressure"].values]
     rows = []
@@ -125,7 +125,7 @@ def bounds_and_limit(short_range: xr.Dataset, finite_range: xr.Dataset) -> Table
 
 
 def other_grids(entries: Mapping[str, xr.Dataset]) -> Table:
-    """Area and mean gap of boundary elements on other grids over those of the first of `_GRIDS`."""
+    """Table of area and mean gap of boundary elements on other grids, relative to the first of `_GRIDS`."""
     (reference, own), *others = _GRIDS.items()
     rows = []
     for entry, words in others:
@@ -141,7 +141,7 @@ def other_grids(entries: Mapping[str, xr.Dataset]) -> Table:
 
 
 def effect_of_range(entries: Mapping[str, xr.Dataset], reference: str, varied: Sequence[str]) -> Table:
-    """Areas and separations with adhesion over those without, for every range of attraction."""
+    """Table of areas and separations with adhesion over those without, for each range of attraction."""
     bare = entries[reference].isel(material=0)
     rows = []
     for errors in (entries[entry] for entry in varied):
@@ -167,8 +167,8 @@ def effect_of_range(entries: Mapping[str, xr.Dataset], reference: str, varied: S
     return Table(["range", "with over without adhesion", *pressures(columns)], rows)
 
 
-def both_ways(campaign: xr.DataTree, study: str, loops: Sequence[xr.Dataset]) -> Table:
-    """Pull-off and loss by boundary elements of a finite range, and by the study's runs of the same contact."""
+def loops_of_all_models(campaign: xr.DataTree, study: str, loops: Sequence[xr.Dataset]) -> Table:
+    """Table of pull-off and loss with boundary elements at a finite range and with both models of the same contact."""
     rows = []
     runs = {labels: select_run(campaign, labels) for labels in run_labels(campaign) if labels.study == study}
     for solved in loops:
@@ -196,16 +196,15 @@ def both_ways(campaign: xr.DataTree, study: str, loops: Sequence[xr.Dataset]) ->
 def tables(
     entries: Mapping[str, xr.Dataset], campaign: xr.DataTree, study: str, loops: Sequence[xr.Dataset]
 ) -> dict[str, Table]:
-    """All tables of the page.
+    """Return all tables of the page.
 
     Parameters
     ----------
-    entries : errors of the model by entry (`icha.analysis.model_error`), those in the limit of a short range as
-        `short_range`.
+    entries : errors of the model by entry (`icha.analysis.model_error`); `short_range` is the limit of short range.
     campaign : the campaign dataset.
-    study, loops : the study that is loaded and unloaded, and boundary elements of a finite range beside it.
+    study, loops : the study that unloads, and loops of boundary elements at a finite range.
     """
-    bare, adhesive = (of_energy(entries["short_range"], energy) for energy in (False, True))
+    bare, adhesive = (select_adhesion(entries["short_range"], energy) for energy in (False, True))
     covered = {
         "without adhesion": bare,
         "with adhesion": adhesive,
@@ -224,24 +223,19 @@ def tables(
         "short_range_over_tamaas": short_range_over_tamaas(bare, entries["adhesionless"]),
         "other_grids": other_grids(entries),
         "ranges": effect_of_range(entries, "adhesionless", ["ranges", "shortest_range"]),
-        "both_ways": both_ways(campaign, study, loops),
+        "both_ways": loops_of_all_models(campaign, study, loops),
     }
     return {f"validation_{name}": table for name, table in found.items()}
 
 
 def main() -> None:
     """Write the tables, and copy the figures of the page, from the results of the campaign."""
-    campaign, results = (
-        load_configuration(Path("config/campaigns/validation.yaml")).campaign,
-        Path("results/validation"),
-    )
+    campaign = load_configuration(Path("config/campaigns/validation.yaml")).campaign
+    results = Path("results/validation")
     errors = read_campaign(results / "aggregated/model_error.nc")
     ((entry, section),) = campaign.boundary_element_loops.items()
-    loops = [
-        read_dataset(results / f"references/loops/{case.path}.nc")
-        for case in loop_cases(campaign)
-        if case.entry == entry
-    ]
+    cases = [case for case in loop_cases(campaign) if case.entry == entry]
+    loops = [read_dataset(results / f"references/loops/{case.path}.nc") for case in cases]
     dataset = read_campaign(results / "dataset/validation.nc")
     entries = {name: one.to_dataset() for name, one in errors.children.items()}
     write_tables(tables(entries, dataset, section.study, loops))

@@ -1,20 +1,19 @@
-"""One asperity in its periodic cell by the model and by boundary elements, where the two have to agree.
+"""One asperity in its periodic cell: the model against boundary elements.
 
 The asperity is a paraboloid of radius of curvature R = 1 m, and E* = 1 Pa. With adhesion dgamma = 1 J/m^2, so that
 lengths are in (dgamma^2 R/E*^2)^(1/3), forces in dgamma R, and the range of attraction is one over the Tabor parameter.
 Approaches are those of the summit to the mean plane of the cell.
 
-The law of Johnson, Kendall and Roberts (K. L. Johnson, K. Kendall and A. D. Roberts, Proc. R. Soc. Lond. A 324 (1971)
-301, doi:10.1098/rspa.1971.0141) is the limit of a vanishing range, that is of a large Tabor parameter (D. Tabor, J.
-Colloid Interface Sci. 58 (1977) 2). At a finite one boundary elements have two areas, that of zero gap and the
-energetic one (see `icha.references.finite_range`), and the law's area is compared with both. Hertz's law has no
-such parameter.
+The law of Johnson, Kendall and Roberts (Proc. R. Soc. Lond. A 324 (1971) 301, doi:10.1098/rspa.1971.0141) is the limit
+of a vanishing range, that is of a large Tabor parameter (D. Tabor, J. Colloid Interface Sci. 58 (1977) 2). At a finite
+range boundary elements have two areas, that of zero gap and the energetic one (see `icha.references.finite_range`); the
+area of the law is compared with both.
 
 `python -m validation.one_asperity` takes some ten minutes and writes the tables of docs/validation.md, "One asperity".
 """
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 import scipy.fft
@@ -23,25 +22,25 @@ import xarray as xr
 from icha.asperity.cohesive_zone import is_resolved, strength_number
 from icha.asperity.jkr import JKR
 from icha.asperity.material import Material
-from icha.contact.model import Control
+from icha.contact.model import PRESSURE, Control
 from icha.equilibrium.interacting_asperities import InteractingAsperities
 from icha.half_space.interaction import displacement_at
-from icha.references.finite_range import NodalState, contact_state, perimeter_correction
+from icha.references.finite_range import GapContact, NodalState, contact_state, perimeter_correction, refine
 from icha.surfaces.summits import find_summits
 from icha.surfaces.surface import Surface
-from validation.mean_gaps import states_at_mean_separations
+from validation.single_contacts import force_and_area
 from validation.surfaces import paraboloid
 from validation.tables import Table, write_tables
 
-# Forces and areas have settled to a few parts in 1e5.
-DEFAULT_TOLERANCE = 1e-6
-# However long the range, contact itself has to span some nodes.
+# Relative tolerance of the boundary elements, with which forces and areas are right to a few parts in 1e5.
+_TOLERANCE = 1e-6
+# Least nodes along a side, so that the contact spans some nodes at any range.
 _LEAST_GRID = 64
 _PULL_OFF = 1.5 * math.pi
 
 
 def resolving_grid(material: Material, period: float) -> int:
-    """Fewest nodes along a side of a cell (m) that resolve the attraction, of a number that is quick to transform."""
+    """Return the least number of nodes along a period (m) that resolves the attraction and is fast to transform."""
     grid = _LEAST_GRID
     while not is_resolved(material, period / grid):
         grid = scipy.fft.next_fast_len(grid + 1, real=True)
@@ -49,107 +48,65 @@ def resolving_grid(material: Material, period: float) -> int:
 
 
 def one_asperity(
-    tabor_parameter: float,
-    *,
-    approaches: Sequence[float] = (3.0, 2.0, 1.0),
-    period: float = 12.0,
-    tolerance: float = DEFAULT_TOLERANCE,
-    progress: Callable[[str], None] = print,
+    tabor_parameter: float, *, approaches: Sequence[float] = (3.0, 2.0, 1.0), period: float = 12.0
 ) -> xr.Dataset:
-    """Press an adhesive asperity into contact and draw it off, by the model and by boundary elements.
+    """Load an adhesive asperity and unload it, with the model and with boundary elements.
 
     Parameters
     ----------
     tabor_parameter : positive.
-    approaches : in m, that is in (dgamma^2 R/E*^2)^(1/3), falling. That of the model's pull-off force is added: there
-        boundary elements have their largest tension, too, and take longest.
+    approaches : m, that is (dgamma^2 R/E*^2)^(1/3), falling. The approach at the pull-off force of the model is added.
     period : of the cell, m.
-    tolerance : relative error at which the boundary elements' solver may stop.
-    progress : called with lines of text.
 
     Returns
     -------
-    xarray.Dataset: along `approach` both sides at the same approach, the last that of pull-off; along `given_load` the
-    model at the forces that boundary elements have at the approaches asked for, where the model can carry them.
+    xarray.Dataset: along `approach` both sides at the same approach; along `given_load` the model at the forces of the
+    boundary elements at the given approaches, if the model can carry them.
     """
     material = Material(1.0, 1.0, 1 / tabor_parameter)
     surface = paraboloid(resolving_grid(material, period), period)
-    asked = (*approaches, pull_off_approach(JKR(material), period))
-    separations = [surface.heights.max() - approach for approach in asked]
-    states = states_at_mean_separations(surface, material, separations, tolerance=tolerance, progress=progress)
-    return _comparison(surface, material, states, len(approaches), progress)
+    all_approaches = (*approaches, pull_off_approach(JKR(material), period))
+    tamaas = GapContact(refine(surface, material, 1), material, _TOLERANCE)
+    states = (tamaas.solve(surface.heights.max() - approach) for approach in all_approaches)
+    return _comparison(surface, material, states, len(approaches))
 
 
-def hertz_asperity(
-    *,
-    contact_radii: Sequence[float] = (1.0, 0.5),
-    period: float = 16.0,
-    grid: int = 512,
-    tolerance: float = DEFAULT_TOLERANCE,
-    progress: Callable[[str], None] = print,
-) -> xr.Dataset:
-    """The same without adhesion, at the loads that have given contact radii (m, falling) by Hertz's law alone."""
+def hertz_asperity() -> xr.Dataset:
+    """Compare without adhesion, at the loads of the contact radii 1 m and 0.5 m by Hertz's law."""
     material = Material(1.0, 0.0, 1.0)
-    surface = paraboloid(grid, period)
+    surface = paraboloid(512, 16.0)
     unit = surface.rms_slope * surface.period**2
-    loads = [float(JKR(material).force(radius, 1.0)) / unit for radius in contact_radii]
-    states = (contact_state(surface, material, load, tolerance=tolerance) for load in loads)
-    return _comparison(surface, material, states, len(loads), progress)
+    loads = [float(JKR(material).force(radius, 1.0)) / unit for radius in (1.0, 0.5)]
+    states = (contact_state(surface, material, load, tolerance=_TOLERANCE) for load in loads)
+    return _comparison(surface, material, states, len(loads))
 
 
 def pull_off_approach(law: JKR, period: float) -> float:
-    """Approach of the asperity, with its images, where its tension is largest, m.
+    """Return the approach of the asperity with its images at the largest tension, m.
 
-    At the radius (9 pi dgamma R^2/(8 E*))^(1/3), where dF/da = 0.
+    The radius is (9 pi dgamma R^2/(8 E*))^(1/3), where dF/da = 0.
     """
     summit, R = np.zeros((1, 2)), np.ones(1)
     a = np.cbrt(9 * np.pi / 8 * law.material.adhesion_length * R**2)
     return float(displacement_at(law, period, summit, summit, a, R)[0])
 
 
-class _Model:
-    """The model's one spot, moved from state to state."""
-
-    def __init__(self, surface, material):
-        self.contact = InteractingAsperities(JKR(material), find_summits(surface), surface.rms_height)
-        self.top = float(surface.heights.max())
-        self.state = self.contact.untouched()
-
-    def at(self, approach):
-        """Force (N) and area (m^2) at an approach (m), on from the last."""
-        self.state = self.contact.equilibrium(self.state, self.top - approach)
-        return self._force_and_area(self.state)
-
-    def carrying(self, force):
-        """Area (m^2) and approach (m) at a force (N), from where it is."""
-        pressure = Control("pressure", force / self.contact.area)
-        loaded = self.contact.equilibrium(self.state, self.state.separation, pressure)
-        return self._force_and_area(loaded)[1], self.top - loaded.separation
-
-    def _force_and_area(self, state):
-        if len(state.spots) != 1:
-            raise RuntimeError(f"one asperity: {len(state.spots)} spots instead of one")
-        nominal = self.contact.area
-        return self.contact.pressure(state) * nominal, self.contact.area_fraction(state) * nominal
-
-
-def _comparison(
-    surface: Surface, material: Material, states: Iterable[NodalState], loaded: int, progress: Callable[[str], None]
-) -> xr.Dataset:
-    """The model at the approaches of the boundary elements' states, and at the loads of the first `loaded` of them."""
+def _comparison(surface: Surface, material: Material, states: Iterable[NodalState], loaded: int) -> xr.Dataset:
+    """Compare at the approaches of the boundary elements' states, and at the loads of the first `loaded` of them."""
     pull_off = _PULL_OFF * material.surface_energy
     nominal, top = surface.period**2, float(surface.heights.max())
-    model = _Model(surface, material)
+    contact = InteractingAsperities(JKR(material), find_summits(surface), surface.rms_height)
+    model = contact.untouched()
     rows, at_load = [], []
     for index, state in enumerate(states):
         approach, force = top - state.mean_separation, state.nominal_pressure * nominal
         zero_gap = perimeter_correction(state.contact)[0] * nominal
         energetic = state.energetic_area_fraction(material) * nominal
-        force_icha, area_icha = model.at(approach)
-        rows.append((approach, force, zero_gap, energetic, force_icha, area_icha))
+        model = contact.equilibrium(model, state.mean_separation)
+        rows.append((approach, force, zero_gap, energetic, *force_and_area(contact, model)))
         if index < loaded and force > -pull_off:
-            at_load.append((index, *model.carrying(force)))
-        progress(f"approach {approach:.4g} m: force {force:.6g} N, by ICHA {force_icha:.6g} N")
+            at_given_load = contact.equilibrium(model, model.separation, Control(PRESSURE, force / nominal))
+            at_load.append((index, force_and_area(contact, at_given_load)[1], top - at_given_load.separation))
     approach, force, zero_gap, energetic, force_icha, area_icha = np.array(rows).T
     at = [index for index, *_ in at_load]
     area_at_load, approach_at_load = np.array([solved for _, *solved in at_load]).reshape(-1, 2).T
@@ -191,7 +148,7 @@ _ERRORS = {
 
 
 def _range(error, digits):
-    """Least to largest of an error, in per cent; one number if they are the same as written, a dash without values."""
+    """Return the range of an error in per cent, one number if both ends are equal as printed, a dash if empty."""
     if not error.size:
         return "–"
     ends = [f"{100 * float(end):+.{digits}f}" for end in (error.min(), error.max())]
@@ -199,7 +156,7 @@ def _range(error, digits):
 
 
 def tables(adhesive: Sequence[xr.Dataset], hertz: xr.Dataset) -> dict[str, Table]:
-    """Errors with adhesion, a row for every Tabor parameter, and without."""
+    """Return the tables of errors with adhesion, a row for each Tabor parameter, and without."""
     rows = [
         [
             f"{float(one['tabor_parameter']):g}",

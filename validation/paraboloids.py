@@ -1,4 +1,4 @@
-"""Surfaces between the model's and the true one: the summits' paraboloids, and how the summits go on beyond them."""
+"""The paraboloids of the summits as a surface, and the shape of summits beyond their paraboloids."""
 
 import numpy as np
 import scipy.fft
@@ -10,26 +10,26 @@ from icha.surfaces.surface import Surface
 
 
 def summit_curvatures(surface: Surface, summits: Asperities) -> np.ndarray:
-    """Second derivatives xx, xy, yy of the heights at the summits, (n, 3), 1/m, by the spectrum."""
+    """Return the second derivatives xx, xy, yy of the heights at the summits, (n, 3), 1/m, from the spectrum."""
     return np.stack(
         [_at(summits, derivative) for derivative in _derivatives(surface, ((2, 0), (1, 1), (0, 2)))], axis=1
     )
 
 
 def circular_curvatures(summits: Asperities) -> np.ndarray:
-    """The same of paraboloids of revolution, (n, 3), 1/m."""
-    none = np.zeros(len(summits))
-    return np.stack([-1 / summits.radius_of_curvature, none, -1 / summits.radius_of_curvature], axis=1)
+    """Return the second derivatives of paraboloids of revolution, (n, 3), 1/m."""
+    curvature = -1 / summits.radius_of_curvature
+    return np.stack([curvature, np.zeros(len(summits)), curvature], axis=1)
 
 
 def fourth_order_terms(surface: Surface, summits: Asperities) -> np.ndarray:
-    """b of the mean profile h0 - r^2/(2R) + b r^4 around the summits: their bi-Laplacian over 64, (n,), m^-3."""
+    """Return b of the mean profile h0 - r^2/(2R) + b r^4 of the summits, their bi-Laplacian over 64, (n,), m^-3."""
     xxxx, xxyy, yyyy = (_at(summits, one) for one in _derivatives(surface, ((4, 0), (2, 2), (0, 4))))
     return (xxxx + 2 * xxyy + yyyy) / 64
 
 
 def _derivatives(surface, orders):
-    """Derivatives of the heights, of orders (along x, along y) whose sum is even, at the nodes."""
+    """Yield derivatives of the heights at the nodes, of orders (along x, along y) whose sum is even."""
     modes = scipy.fft.rfft2(surface.heights)
     n, unit = surface.grid, 2 * np.pi / surface.period
     ky, kx = scipy.fft.fftfreq(n, 1 / n)[:, None] * unit, np.arange(n // 2 + 1) * unit
@@ -39,15 +39,15 @@ def _derivatives(surface, orders):
 
 
 def _at(summits, field):
-    """A periodic field (n, n) at the summits, by a quintic spline."""
+    """Return a periodic field (n, n) at the summits, by a quintic spline."""
     spacing = summits.period / len(field)
     return scipy.ndimage.map_coordinates(field, summits.position.T[::-1] / spacing, order=5, mode="grid-wrap")
 
 
 def paraboloids(summits: Asperities, curvatures: np.ndarray, grid: int) -> np.ndarray:
-    """Upper envelope (grid, grid) of the summits' paraboloids, m; curvatures (n, 3) as of `summit_curvatures`.
+    """Return the upper envelope (grid, grid) of paraboloids with given curvatures (n, 3), m.
 
-    Of every paraboloid only the nearest image counts.
+    Only the nearest image of each paraboloid counts.
     """
     x = np.arange(grid) * (summits.period / grid)
     xx, xy, yy = curvatures.T

@@ -1,9 +1,9 @@
-"""Boundary elements in the limit of short range against all that is known: tables of docs/short_range.md.
+"""Compare boundary elements in the limit of short range with everything known: tables of docs/short_range.md.
 
-python -m validation.short_range [--parts PART ...] [--tables]
+    python -m validation.short_range [--parts PART ...] [--tables]
 
-Each part is one kind of contact (`validation.single_contacts`, `validation.rough_contacts`). What was measured is kept
-in validation/results/short_range; the tables are written from there, with `--tables` without measuring anything.
+Each part is one kind of contact (`validation.single_contacts`, `validation.rough_contacts`). Measurements are saved in
+validation/results/short_range, and the tables are written from them; with `--tables` nothing is measured.
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ from validation.tables import Table, percent, write_tables
 
 RESULTS = Path(__file__).resolve().parent / "results/short_range"
 _OFFSETS = tuple(single.offsets(5))
-# Grids and ranges (m) of Tamaas: waves of 50 um to 6.25 um and dgamma/E* = 20 nm, so that attraction can be resolved.
+# Ranges (m) and refinements for Tamaas, which resolve the attraction for dgamma/E* = 20 nm and waves from 6.25 um on.
 _RANGES = ((400e-9, 1), (283e-9, 2), (200e-9, 2), (141e-9, 4), (100e-9, 8))
 
 
 def _all(solve: Callable, *lists: Iterable):
-    """Rows of all combinations of some arguments."""
+    """Yield the rows of all combinations of the arguments."""
     for arguments in itertools.product(*lists):
         rows = solve(*arguments)
         yield from [rows] if isinstance(rows, dict) else rows
@@ -51,7 +51,7 @@ def _punch(square, grid_and_cells):
 
 
 PARTS: dict[str, Callable] = {
-    "sphere": lambda: _all(single.sphere_there_and_back, (40, 64, 100, 140), _OFFSETS),
+    "sphere": lambda: _all(single.sphere_loop, (40, 64, 100, 140), _OFFSETS),
     "load": lambda: _all(single.sphere_under_load, (40, 64, 100), _OFFSETS[:3]),
     "pull_off": lambda: _all(single.sphere_pull_off, (40, 64, 100), _OFFSETS[:3]),
     "jump_in": lambda: _all(single.sphere_jump_in, (40, 64, 100), (0.2, 0.5)),
@@ -71,12 +71,9 @@ PARTS: dict[str, Callable] = {
 
 
 def measured(part: str) -> dict:
-    """The rows of a part, and the time that it took, s."""
+    """Return the rows of a part and the time of its measurement, s."""
     clock = time.perf_counter()
-    rows = [
-        {name: value.item() if isinstance(value, np.generic) else value for name, value in row.items()}
-        for row in PARTS[part]()
-    ]
+    rows = list(PARTS[part]())
     return {"seconds": round(time.perf_counter() - clock, 1), "rows": rows}
 
 
@@ -84,24 +81,24 @@ def measured(part: str) -> dict:
 
 
 def _worst(rows: Iterable[dict], *names: str) -> float:
-    """Largest error of these names."""
+    """Return the largest error of these names."""
     return max(abs(row[name]) for row in rows for name in names)
 
 
 def _within(rows: Iterable[dict], low: float, high: float) -> list[dict]:
-    """Rows whose contact radius has from `low` to less than `high` cells."""
+    """Return the rows with a contact radius from `low` to less than `high` cells."""
     return [row for row in rows if low <= row["cells"] < high]
 
 
 def bounds(rows: dict[str, list[dict]]) -> Table:
-    """Everything that is asked for with a number, against what was measured."""
+    """Table of all targets with the measured errors."""
     lines = []
 
     def add(what, error, bound, share=""):
         verdict = "met" if error <= bound else "**missed**"
         lines.append([what, f"{100 * error:.3g} %", share, f"{100 * bound:.3g} %", verdict])
 
-    asked = (
+    targets = (
         ("area at given approach", "sphere", "area_error"),
         ("force at given approach", "sphere", "force_error"),
         ("area under given load", "load", "area_error"),
@@ -111,14 +108,19 @@ def bounds(rows: dict[str, list[dict]]) -> Table:
     for low, high, bound in ((4, 8, 0.025), (8, math.inf, 0.01)):
         cells = f"{low} to {high} cells" if math.isfinite(high) else f"{low} cells and more"
         for symmetric, place in ((False, "elsewhere in a cell"), (True, "with the symmetry of the grid")):
-            for what, part, name in asked:
-                own = [
+            for what, part, name in targets:
+                rows_at_place = [
                     row
                     for row in _within(rows[part], low, high)
                     if all(shift in (0.0, 0.5) for shift in row["offset"]) == symmetric
                 ]
-                share = sum(abs(row[name]) <= bound for row in own) / len(own)
-                add(f"sphere of {cells}, centre {place}: {what}", _worst(own, name), bound, f"{100 * share:.0f} %")
+                share = sum(abs(row[name]) <= bound for row in rows_at_place) / len(rows_at_place)
+                add(
+                    f"sphere of {cells}, centre {place}: {what}",
+                    _worst(rows_at_place, name),
+                    bound,
+                    f"{100 * share:.0f} %",
+                )
     add("turned elliptic paraboloids, short axis of 8 cells and more", _turned_error(rows["ellipse"]), 0.01)
     add("without adhesion, mean gap against Tamaas", _worst(rows["tamaas"], "separation_error"), 1e-3)
     add("without adhesion, gap everywhere (rms, over h_rms)", _worst(rows["tamaas"], "gap_error"), 1e-3)
@@ -131,26 +133,26 @@ def bounds(rows: dict[str, list[dict]]) -> Table:
     errors = ("pressure_error", "area_error")
     add("shifted, reflected, turned by 90°: load and area", _worst(rows["symmetry"], *errors), 1e-4)
     add("5 against 50 steps to one stop: load and area", _worst(rows["steps"], *errors), 1e-4)
-    return Table(["what", "largest error", "states within the bound", "asked for", ""], lines)
+    return Table(["what", "largest error", "states within the target", "target", ""], lines)
 
 
 def by_radius(rows: list[dict], names: dict[str, str]) -> Table:
-    """Mean, and least to largest, of errors in classes of the contact radius."""
+    """Table of the mean and range of errors in classes of the contact radius."""
 
-    def spread(own, name):
-        values = np.array([row[name] for row in own])
+    def spread(members, name):
+        values = np.array([row[name] for row in members])
         return f"{percent(values.mean())} ({percent(values.min())} to {percent(values.max())})"
 
     lines = []
     for low, high in ((4, 8), (8, 12), (12, 20), (20, math.inf)):
-        if own := _within(rows, low, high):
+        if members := _within(rows, low, high):
             label = f"{low} to {high}" if math.isfinite(high) else f"over {low}"
-            lines.append([label, str(len(own)), *(spread(own, name) for name in names)])
+            lines.append([label, str(len(members)), *(spread(members, name) for name in names)])
     return Table(["cells in the radius", "states", *names.values()], lines)
 
 
 def convergence(rows: list[dict]) -> Table:
-    """Order of convergence: slope of the root mean square of an error over offsets and approaches, with the spacing."""
+    """Table of the order of convergence of the rms error over offsets and approaches with the spacing."""
     grids = sorted({row["grid"] for row in rows})
     lines = []
     for name, what in (("area_error", "area"), ("force_error", "force")):
@@ -161,7 +163,7 @@ def convergence(rows: list[dict]) -> Table:
 
 
 def by(rows: list[dict], columns: dict[str, tuple[str, str]]) -> Table:
-    """A line for every row: what it is, and its numbers. Columns: heading, and format; `%` for errors in per cent."""
+    """Table with a line for each row; columns give heading and format, `%` for errors in per cent."""
 
     def written(value, form):
         return percent(value) if form == "%" else format(value, form)
@@ -174,16 +176,16 @@ def by(rows: list[dict], columns: dict[str, tuple[str, str]]) -> Table:
 
 
 def turned(rows: list[dict]) -> Table:
-    """Areas, forces and pull-off of the elliptic paraboloid at every angle, over the mean of the finest grid."""
+    """Table of areas, forces and pull-off of elliptic paraboloids, relative to the mean of the finest grid."""
     approaches = sorted({row["approach"] for row in rows}, reverse=True)
     lines = []
     for grid, angle in sorted({(row["grid"], row["angle"]) for row in rows}):
-        own = {row["approach"]: row for row in rows if (row["grid"], row["angle"]) == (grid, angle)}
+        by_approach = {row["approach"]: row for row in rows if (row["grid"], row["angle"]) == (grid, angle)}
         cells = [
-            " / ".join(percent(_over_finest(rows, own[approach], name)) for name in ("area", "force"))
+            " / ".join(percent(_over_finest(rows, by_approach[approach], name)) for name in ("area", "force"))
             for approach in approaches
         ]
-        cells.append(percent(_over_finest(rows, own[approaches[-1]], "pull_off")))
+        cells.append(percent(_over_finest(rows, by_approach[approaches[-1]], "pull_off")))
         lines.append([f"{grid}²", f"{angle:g}°", *cells])
     head = [f"approach {approach:g}: area / force" for approach in approaches]
     return Table(["grid", "angle", *head, "pull-off"], lines)
@@ -192,22 +194,22 @@ def turned(rows: list[dict]) -> Table:
 def _over_finest(rows, row, name):
     finest = max(other["grid"] for other in rows)
     wanted = np.mean([r[name] for r in rows if r["grid"] == finest and r["approach"] == row["approach"]])
-    # Forces change sign: they are over the largest tension where that is more.
+    # Forces change sign, so their error is over the pull-off force if that is larger.
     unit = max(abs(wanted), row["pull_off"]) if name == "force" else wanted
     return float((row[name] - wanted) / unit)
 
 
 def _turned_error(rows):
-    """Largest error of area and force of the turned paraboloids whose short axis has at least 8 cells."""
+    """Return the largest error of area and force of paraboloids whose short axis has at least 8 cells."""
     finest = max(row["grid"] for row in rows)
-    own = [
+    resolved = [
         row for row in rows if row["grid"] < finest and math.sqrt(row["area"] / math.pi) / row["spacing"] / 2**0.25 >= 8
     ]
-    return max(abs(_over_finest(rows, row, name)) for row in own for name in ("area", "force"))
+    return max(abs(_over_finest(rows, row, name)) for row in resolved for name in ("area", "force"))
 
 
 def by_grid(rows: list[dict]) -> Table:
-    """Areas and loads of one rough surface on finer and finer grids, over those of the finest."""
+    """Table of areas and loads of one rough surface on several grids, relative to the finest."""
     finest = {row["separation"]: row for row in rows if row["cells"] == max(other["cells"] for other in rows)}
     lines = []
     for row in sorted(rows, key=lambda row: (-row["separation"], row["cells"])):
@@ -220,7 +222,7 @@ def by_grid(rows: list[dict]) -> Table:
 
 
 def towards_zero(rows: list[dict]) -> Table:
-    """Load and areas at falling ranges, what a straight line through the two shortest gives at zero, and the limit."""
+    """Table of load and areas at falling ranges, their linear extrapolation to zero, and the limit."""
     names = {"pressure": "p\\*", "zero_gap_area": "area of zero gap", "energetic_area": "energetic area"}
     lines = []
     for separation in sorted({row["separation"] for row in rows}, reverse=True):
@@ -238,13 +240,13 @@ _SAME = {"pressure_error": ("load", ".2g"), "area_error": ("area", ".2g")}
 _SAME |= {"fraction_error": ("largest difference of a cell", ".2g")}
 _JUMP_IN = {"approach": ("approach", ".6g"), "approach_exact": ("Wu", ".6g")}
 _JUMP_IN |= {"spots_before": ("spots before", "g"), "spots_after": ("after", "g")}
-_WAVE = {"alpha": ("α", "g"), "grid": ("grid", "g"), "branch": ("way", "s"), "psi": ("ψ", "g")}
+_WAVE = {"alpha": ("α", "g"), "grid": ("grid", "g"), "branch": ("branch", "s"), "psi": ("ψ", "g")}
 _WAVE |= {"cells": ("half-width in cells", ".3g"), "width_error": ("width", "%"), "pressure": ("p/p\\*", ".4g")}
 _WAVE |= {"pressure_exact": ("exact", ".4g"), "pressure_error": ("pressure", "%"), "energy_error": ("energy", "%")}
 _LOOP = {"with": ("adhesion", "s"), "step": ("longest step/h_rms", "g"), "steps": ("equilibria", "g")}
-_LOOP |= {"largest_work": ("most work", ".4g"), "work": ("work of the loop", ".2e"), "jump_in": ("jumps in", ".2e")}
-_LOOP |= {"jump_off": ("jumps off", ".2e"), "coalescence": ("joins and splits", ".2e")}
-_LOOP |= {"unattributed": ("no event", ".2e"), "not_closed": ("not accounted for", ".2e")}
+_LOOP |= {"largest_work": ("largest work", ".4g"), "work": ("work of the loop", ".2e"), "jump_in": ("jumps in", ".2e")}
+_LOOP |= {"jump_off": ("jumps off", ".2e"), "coalescence": ("merging and splitting", ".2e")}
+_LOOP |= {"unattributed": ("no event", ".2e"), "not_closed": ("imbalance", ".2e")}
 _GRID = {"grid": ("grid", "g")}
 _ERRORS = {"area_error": ("area", "%"), "force_error": ("force", "%")}
 _CELLS = "cells in the radius"
@@ -288,7 +290,7 @@ _BY_ROW = {
 
 
 def tables(rows: dict[str, list[dict]]) -> dict[str, Table]:
-    """All tables of the page, from the rows of all parts."""
+    """Return all tables of the page from the rows of all parts."""
     for row in rows["loops"]:
         row["with"] = "with" if row["adhesion"] else "without"
     found = {
@@ -305,24 +307,26 @@ def tables(rows: dict[str, list[dict]]) -> dict[str, Table]:
     return {f"short_range_{name}": table for name, table in found.items()}
 
 
-def kept() -> dict[str, list[dict]]:
-    """The rows of all parts as they were measured."""
+def read_measurements() -> dict[str, list[dict]]:
+    """Read the rows of all parts."""
     return {part: json.loads((RESULTS / f"{part}.json").read_text(encoding="utf-8"))["rows"] for part in PARTS}
 
 
 def main() -> None:
-    """Measure parts, keep their numbers, and write the tables."""
+    """Measure parts, save their numbers, and write the tables."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--parts", nargs="+", choices=PARTS, default=PARTS, metavar="PART", help=", ".join(PARTS))
-    parser.add_argument("--tables", action="store_true", help="write the tables of what was measured before")
+    parser.add_argument("--tables", action="store_true", help="write the tables from saved measurements")
     options = parser.parse_args()
     for part in () if options.tables else options.parts:
         print(f"{part} ...", end=" ", flush=True)
         with threadpool_limits(1):
             found = measured(part)
-        (RESULTS / f"{part}.json").write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
+        (RESULTS / f"{part}.json").write_text(
+            json.dumps(found, indent=1, default=lambda number: number.item()) + "\n", encoding="utf-8"
+        )
         print(f"{len(found['rows'])} rows in {found['seconds']:.0f} s", flush=True)
-    write_tables(tables(kept()))
+    write_tables(tables(read_measurements()))
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
-"""Boundary elements in the limit of short range held against closed forms: spheres, punches, waves, cracks, pairs.
+"""Boundary elements in the limit of short range against closed forms: spheres, punches, waves, cracks, pairs.
 
-In units E* = 1 Pa and dgamma = 1 J/m^2; spheres have radius 1 m, so that lengths are in (dgamma R^2/E*^2)^(1/3). Every
-function returns rows of numbers, dictionaries that JSON can hold; errors are relative, less one, unless they say else.
+Units: E* = 1 Pa and dgamma = 1 J/m^2; spheres have radius 1 m, so that lengths are in (dgamma R^2/E*^2)^(1/3). The
+functions give rows, dictionaries of numbers for JSON. Errors are ratios minus one unless their description differs.
 """
 
 import itertools
@@ -19,108 +19,100 @@ from icha.surfaces.summits import find_summits
 from validation.closed_forms import CrackInTrough, RoundPunch, Sinusoid, SphereInCell, Strips
 from validation.surfaces import bump, punch, strips, two_bumps, wave
 
-# Tabor parameter 5: a range that counts at the jump into contact alone.
+# Tabor parameter 5: the range affects only the jump into contact.
 MATERIAL = Material(1.0, 1.0, 0.2)
 _PERIOD = 12.0
 _PULL_OFF = 1.5 * math.pi
-# Approaches of a sphere between a strong contact and the pull-off at given separation.
+# Approaches of a sphere (m) from a strong contact to just before jump-off.
 APPROACHES = (3.0, 2.0, 1.0, 0.0, -0.6, -1.0, -1.2)
 
 
 def disc(grid: int, period: float, radius: float, offset=(0.0, 0.0)) -> np.ndarray:
-    """Nodes within a distance (m) of a place near the middle of the cell, (n, n) of bool; offset: (x, y) in cells."""
+    """Return the nodes (n, n) within a radius (m) of the centre, which is shifted by (x, y) cells from the middle."""
     x, y = ((np.arange(grid) - grid // 2 - shift) * period / grid for shift in offset)
     return np.hypot(y[:, None], x) <= radius
 
 
 def force_and_area(contact: BoundaryElements, state) -> tuple[float, float]:
-    """Of a state, N and m^2."""
+    """Return force (N) and area (m^2) of a state."""
     return contact.pressure(state) * contact.area, contact.area_fraction(state) * contact.area
 
 
-def sphere_there_and_back(
+def sphere_loop(
     grid: int, offset=(0.0, 0.0), approaches: Sequence[float] = APPROACHES, material: Material = MATERIAL
-) -> list[dict]:
-    """A sphere drawn off from a strong contact and pressed on again, at given approaches (m, falling).
+) -> Iterator[dict]:
+    """Unload a sphere from a strong contact and load it again, at given approaches (m, falling).
 
-    cells: the radius of contact over the spacing, of the closed form.
+    `cells` is the contact radius of the closed form in cells.
     """
     surface, top = bump(grid, _PERIOD, offset)
     contact, exact = contact_of(surface, material), SphereInCell(material, 1.0, _PERIOD)
     radius = exact.contact_radius(approaches[0])
     state = contact.released(disc(grid, _PERIOD, radius, offset), top - approaches[0])
-    rows = []
     for branch, approach in itertools.chain(
-        (("off", one) for one in approaches), (("on", one) for one in approaches[-2::-1])
+        (("unloading", one) for one in approaches), (("loading", one) for one in approaches[-2::-1])
     ):
         state = contact.equilibrium(state, top - approach)
         force, area = force_and_area(contact, state)
         radius = exact.contact_radius(approach)
         wanted = float(exact.force(radius))
-        rows.append(
-            {
-                "grid": grid,
-                "offset": list(offset),
-                "branch": branch,
-                "approach": approach,
-                "cells": radius / surface.spacing,
-                "area_error": area / (math.pi * radius**2) - 1,
-                "force_error": (force - wanted) / max(abs(wanted), _PULL_OFF),
-            }
-        )
-    return rows
+        yield {
+            "grid": grid,
+            "offset": list(offset),
+            "branch": branch,
+            "approach": approach,
+            "cells": radius / surface.spacing,
+            "area_error": area / (math.pi * radius**2) - 1,
+            "force_error": (force - wanted) / max(abs(wanted), _PULL_OFF),
+        }
 
 
-def sphere_under_load(grid: int, offset=(0.0, 0.0), forces: Sequence[float] = (8.0, 4.0, 0.0, -4.0)) -> list[dict]:
-    """A sphere under given forces (N, falling): errors of area, and of the approach over the unit of length."""
+def sphere_under_load(grid: int, offset=(0.0, 0.0), forces: Sequence[float] = (8.0, 4.0, 0.0, -4.0)) -> Iterator[dict]:
+    """Unload a sphere under given forces (N, falling); the error of the approach is over the unit of length."""
     surface, top = bump(grid, _PERIOD, offset)
     contact, exact = contact_of(surface, MATERIAL), SphereInCell(MATERIAL, 1.0, _PERIOD)
     radius = exact.loaded_radius(forces[0])
     start = top - float(exact.approach(radius))
     state = contact.released(disc(grid, _PERIOD, radius, offset), start)
-    rows = []
     for force in forces:
         state = contact.equilibrium(state, state.separation, Control(PRESSURE, force / contact.area))
         radius = exact.loaded_radius(force)
-        rows.append(
-            {
-                "grid": grid,
-                "offset": list(offset),
-                "force": force,
-                "cells": radius / surface.spacing,
-                "area_error": force_and_area(contact, state)[1] / (math.pi * radius**2) - 1,
-                "approach_error": top - state.separation - float(exact.approach(radius)),
-            }
-        )
-    return rows
+        yield {
+            "grid": grid,
+            "offset": list(offset),
+            "force": force,
+            "cells": radius / surface.spacing,
+            "area_error": force_and_area(contact, state)[1] / (math.pi * radius**2) - 1,
+            "approach_error": top - state.separation - float(exact.approach(radius)),
+        }
 
 
 def largest_tension(contact: BoundaryElements, state, step: float) -> tuple[float, object]:
-    """Largest tension (N) on the way out from a state, by steps (m), and the last state in contact.
+    """Return the largest tension (N) of an unloading by steps (m), and its last state in contact.
 
-    The top is that of the parabola through the largest and its neighbours; where contact breaks, steps become as short
-    as a hundredth.
+    The maximum is that of the parabola through the largest tension and its neighbours. At the end of contact the step
+    is halved down to a hundredth.
     """
-    way, shortest = [state], step / 100
+    states, shortest = [state], step / 100
     while step >= shortest:
-        new = contact.equilibrium(way[-1], way[-1].separation + step)
+        new = contact.equilibrium(states[-1], states[-1].separation + step)
         if contact.spot_count(new):
-            way.append(new)
+            states.append(new)
         else:
             step /= 2
-    tension = -np.array([force_and_area(contact, one)[0] for one in way])
-    u = np.array([one.separation for one in way])
+    tension = -np.array([force_and_area(contact, one)[0] for one in states])
+    u = np.array([one.separation for one in states])
     k = int(np.argmax(tension))
-    if not 0 < k < len(way) - 1:
-        return float(tension[k]), way[-1]
+    if not 0 < k < len(states) - 1:
+        return float(tension[k]), states[-1]
     left, right = ((tension[k] - tension[k + side]) / (u[k] - u[k + side]) for side in (-1, 1))
     bend = (right - left) / ((u[k + 1] - u[k - 1]) / 2)
     slope = left + (right - left) * (u[k] - u[k - 1]) / (u[k + 1] - u[k - 1])
-    return float(tension[k] - slope**2 / (2 * bend)), way[-1]
+    return float(tension[k] - slope**2 / (2 * bend)), states[-1]
 
 
 def sphere_pull_off(grid: int, offset=(0.0, 0.0), step: float = 0.05) -> dict:
-    """The largest tension of a sphere that is drawn off, and where contact ends, by steps of the approach (m)."""
+    """Pull-off of a sphere, and the approach at jump-off, by steps of the approach (m)."""
     surface, top = bump(grid, _PERIOD, offset)
     contact, exact = contact_of(surface, MATERIAL), SphereInCell(MATERIAL, 1.0, _PERIOD)
     first = -0.5
@@ -138,7 +130,7 @@ def sphere_pull_off(grid: int, offset=(0.0, 0.0), step: float = 0.05) -> dict:
 
 
 def sphere_jump_in(grid: int, range_: float = MATERIAL.interaction_range) -> dict:
-    """Where a sphere jumps into contact, against Wu's distance, and whether the contact there is that of the law."""
+    """Approach of a sphere at jump-in against Wu's distance, and force and area of the contact after it."""
     material = Material(1.0, 1.0, range_)
     surface, top = bump(grid, _PERIOD)
     contact, exact = contact_of(surface, material), SphereInCell(material, 1.0, _PERIOD)
@@ -161,7 +153,7 @@ def sphere_jump_in(grid: int, range_: float = MATERIAL.interaction_range) -> dic
 
 
 def ellipse(grid: int, angle: float, approaches: Sequence[float] = (2.0, 1.0, 0.0)) -> list[dict]:
-    """An elliptic paraboloid of radii of curvature sqrt(1/2) and sqrt(2), turned by an angle (degrees)."""
+    """An elliptic paraboloid with radii of curvature sqrt(1/2) and sqrt(2), turned by an angle (degrees)."""
     radii = (math.sqrt(2), math.sqrt(1 / 2))
     surface, top = bump(grid, _PERIOD, (0.3, 0.1), radii, math.radians(angle))
     contact = contact_of(surface, MATERIAL)
@@ -177,9 +169,9 @@ def ellipse(grid: int, angle: float, approaches: Sequence[float] = (2.0, 1.0, 0.
 
 
 def flat_punch(grid: int, cells: float, square: bool = False) -> dict:
-    """Pull-off of a punch of a radius, or half side, of so many cells, and the compliance of its unbroken contact.
+    """Pull-off of a flat punch with a radius, or half side, in cells, and the compliance of its unbroken contact.
 
-    The closed form is that of the round one of the given radius; a square one's force is over that of the circle in it.
+    Both are over the closed form of a round punch; for a square punch this is that of the inscribed circle.
     """
     period = _PERIOD
     spacing = period / grid
@@ -223,11 +215,11 @@ def row_of_strips(grid: int, half_width: float) -> dict:
     }
 
 
-def sinusoid(grid: int, alpha: float, psi: Sequence[float] = (0.3, 0.5, 0.8, 1.1, 1.3)) -> list[dict]:
-    """A wave in one dimension from a narrow to a wide contact and back, at the separations of given psi = pi a/L.
+def sinusoid(grid: int, alpha: float, psi: Sequence[float] = (0.3, 0.5, 0.8, 1.1, 1.3)) -> Iterator[dict]:
+    """Load and unload a wave in one dimension at the separations of given psi = pi a/L.
 
-    alpha : Johnson's parameter. Errors: of the width, of the pressure over the full contact's or its own if larger, and
-    of the energy over that of full contact.
+    `alpha` is Johnson's parameter. The error of the pressure is over that of full contact, the error of the energy over
+    the elastic energy of full contact.
     """
     period = 1.0
     amplitude = 0.02
@@ -239,30 +231,25 @@ def sinusoid(grid: int, alpha: float, psi: Sequence[float] = (0.3, 0.5, 0.8, 1.1
     start = np.broadcast_to(np.abs(x) <= psi[0] / math.pi, (grid, grid))
     state = contact.released(start, float(exact.separation(psi[0])))
     unit = exact.full_contact_pressure
-    rows = []
-    for branch, one in (*(("on", one) for one in psi), *(("off", one) for one in psi[-2::-1])):
+    for branch, one in (*(("loading", one) for one in psi), *(("unloading", one) for one in psi[-2::-1])):
         state = contact.equilibrium(state, float(exact.separation(one)))
         wanted = float(exact.pressure(one))
-        rows.append(
-            {
-                "grid": grid,
-                "alpha": alpha,
-                "branch": branch,
-                "psi": one,
-                "cells": one * grid / math.pi,
-                "width_error": contact.area_fraction(state) / (2 * one / math.pi) - 1,
-                "pressure": contact.pressure(state) / unit,
-                "pressure_exact": wanted / unit,
-                "pressure_error": (contact.pressure(state) - wanted) / unit,
-                "energy_error": (contact.stored_energy(state) - float(exact.stored_energy(one)))
-                / (unit * amplitude / 4),
-            }
-        )
-    return rows
+        yield {
+            "grid": grid,
+            "alpha": alpha,
+            "branch": branch,
+            "psi": one,
+            "cells": one * grid / math.pi,
+            "width_error": contact.area_fraction(state) / (2 * one / math.pi) - 1,
+            "pressure": contact.pressure(state) / unit,
+            "pressure_exact": wanted / unit,
+            "pressure_error": (contact.pressure(state) - wanted) / unit,
+            "energy_error": (contact.stored_energy(state) - float(exact.stored_energy(one))) / (unit * amplitude / 4),
+        }
 
 
-def crack(grid: int, radii: Sequence[float] = (0.2, 0.16, 0.12), amplitude: float = 0.02) -> list[dict]:
-    """The last gap in the trough of a wave in two dimensions, of given radii over the period, falling.
+def crack(grid: int, radii: Sequence[float] = (0.2, 0.16, 0.12), amplitude: float = 0.02) -> Iterator[dict]:
+    """The last gap in the trough of a wave in two dimensions, at given radii over the period (falling).
 
     Errors of the pressure are over that of full contact at the trough.
     """
@@ -272,27 +259,23 @@ def crack(grid: int, radii: Sequence[float] = (0.2, 0.16, 0.12), amplitude: floa
     x = np.minimum(np.arange(grid), grid - np.arange(grid)) / grid  # from the trough, at the cell's corner
     distance = np.hypot(x[:, None], x)
     state = contact.released(distance > radii[0], exact.separation(radii[0]))
-    rows = []
     for c in radii:
         state = contact.equilibrium(state, exact.separation(c))
         area = 1 - contact.area_fraction(state)
-        rows.append(
-            {
-                "grid": grid,
-                "radius": c,
-                "cells": c * grid,
-                "radius_error": math.sqrt(area / math.pi) / c - 1 if area > 0 else -1.0,
-                "pressure": contact.pressure(state) / exact.tearing,
-                "pressure_error": (contact.pressure(state) - exact.pressure(c)) / exact.tearing,
-            }
-        )
-    return rows
+        yield {
+            "grid": grid,
+            "radius": c,
+            "cells": c * grid,
+            "radius_error": math.sqrt(area / math.pi) / c - 1 if area > 0 else -1.0,
+            "pressure": contact.pressure(state) / exact.tearing,
+            "pressure_error": (contact.pressure(state) - exact.pressure(c)) / exact.tearing,
+        }
 
 
-def pair(grid: int, distance: float = 6.0, approaches: Sequence[float] = (1.5, 0.5, -0.5)) -> list[dict]:
-    """Two equal spheres beside each other, against the model of asperities, which is exact where they are far apart.
+def pair(grid: int, distance: float = 6.0, approaches: Sequence[float] = (1.5, 0.5, -0.5)) -> Iterator[dict]:
+    """Two equal spheres against the asperity model, which is exact if they are far apart.
 
-    asymmetry: largest difference between the fractions of the two spots, mirrored.
+    `asymmetry` is the largest difference between the fractions of one spot and the mirror image of the other.
     """
     period = 2 * _PERIOD
     surface, top = two_bumps(grid, period, distance)
@@ -302,7 +285,6 @@ def pair(grid: int, distance: float = 6.0, approaches: Sequence[float] = (1.5, 0
     half = distance / 2 / surface.spacing
     region = disc(grid, period, radius, (-half, 0.0)) | disc(grid, period, radius, (half, 0.0))
     state, spots = contact.released(region, top - approaches[0]), asperities.untouched()
-    rows = []
     for approach in approaches:
         state = contact.equilibrium(state, top - approach)
         spots = asperities.equilibrium(spots, top - approaches[0])
@@ -311,23 +293,19 @@ def pair(grid: int, distance: float = 6.0, approaches: Sequence[float] = (1.5, 0
         other = asperities.pressure(spots) * contact.area
         fraction = contact.fractions(state)
         mirrored = np.roll(fraction[:, ::-1], 1, axis=1)
-        rows.append(
-            {
-                "grid": grid,
-                "approach": approach,
-                "spots": contact.spot_count(state),
-                "asymmetry": float(np.abs(mirrored - fraction).max()),
-                "area_error": area / (asperities.area_fraction(spots) * contact.area) - 1,
-                "force_error": (force - other) / max(abs(other), 2 * _PULL_OFF),
-            }
-        )
-    return rows
+        yield {
+            "grid": grid,
+            "approach": approach,
+            "spots": contact.spot_count(state),
+            "asymmetry": float(np.abs(mirrored - fraction).max()),
+            "area_error": area / (asperities.area_fraction(spots) * contact.area) - 1,
+            "force_error": (force - other) / max(abs(other), 2 * _PULL_OFF),
+        }
 
 
 def offsets(count: int) -> Iterator[tuple[float, float]]:
-    """Places of a centre within its cell: a node, a middle between four, and others (a quasi-random sequence)."""
-    yield (0.0, 0.0)
-    yield (0.5, 0.5)
+    """Yield offsets of a centre in cells: a node, the middle between four nodes, and a quasi-random sequence."""
+    yield from ((0.0, 0.0), (0.5, 0.5))
     # R. Roberts' sequence with the plastic number.
     for k in range(1, count - 1):
         yield ((0.5 + 0.7548776662 * k) % 1 - 0.5, (0.5 + 0.5698402910 * k) % 1 - 0.5)

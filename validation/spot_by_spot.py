@@ -1,4 +1,4 @@
-"""The model's error spot by spot: its spots beside the contact patches of the boundary elements."""
+"""The model's error spot by spot: its spots compared with the contact patches of boundary elements."""
 
 from typing import NamedTuple
 
@@ -11,7 +11,7 @@ from icha.equilibrium.interacting_asperities import InteractingAsperities
 from icha.equilibrium.sites import ContactState
 from icha.references.finite_range import NodalState, perimeter_correction
 
-# What a group of spots and patches is that lie on each other.
+# Categories of groups of overlapping spots and patches.
 CATEGORIES = {
     "single": "one spot of one summit, one patch",
     "several": "spots of one summit each, with a patch in common or several patches under one spot",
@@ -22,7 +22,14 @@ CATEGORIES = {
 
 
 class Patches(NamedTuple):
-    """Connected contact patches. label (n, n): of every node, 0 outside; area (m^2), force (N) and nodes (k,)."""
+    """Connected contact patches.
+
+    Attributes
+    ----------
+    label : (n, n), patch of every node, 0 outside.
+    area, force : (k,), m^2, N.
+    nodes : (k,), number of nodes.
+    """
 
     label: np.ndarray
     area: np.ndarray
@@ -31,10 +38,12 @@ class Patches(NamedTuple):
 
 
 class Match(NamedTuple):
-    """Groups of spots and patches that lie on each other.
+    """Groups of overlapping spots and patches.
 
-    spot_group (s,) and patch_group (k,): to which group each belongs; category (g,): of every group, a key of
-    `CATEGORIES`.
+    Attributes
+    ----------
+    spot_group, patch_group : (s,), (k,), the group of each spot and patch.
+    category : (g,), a key of `CATEGORIES` for each group.
     """
 
     spot_group: np.ndarray
@@ -43,14 +52,14 @@ class Match(NamedTuple):
 
 
 def contact_patches(state: NodalState) -> Patches:
-    """The connected patches of a state without adhesion; areas are corrected by their perimeters."""
+    """Return the connected patches of a state without adhesion, with areas corrected by their perimeters."""
     contact, period = state.contact, state.surface.period
     label, count = scipy.ndimage.label(contact)
-    # Patches go on across the edges of the cell.
+    # Patches are periodic.
     seam = np.concatenate([np.stack([label[0], label[-1]]), np.stack([label[:, 0], label[:, -1]])], axis=1)
     seam = seam[:, np.all(seam > 0, axis=0)]
     _, whole = connected_components(coo_array((np.ones(seam.shape[1]), seam), shape=(count + 1, count + 1)))
-    label, count = whole[label], int(whole.max())  # the background, the first of all, stays 0
+    label, count = whole[label], int(whole.max())  # the background has label 0 and comes first
     nodes = np.bincount(label.ravel(), minlength=count + 1)
     edges = np.zeros(count + 1)
     for axis in (0, 1):
@@ -65,10 +74,14 @@ def contact_patches(state: NodalState) -> Patches:
 
 
 def match(position, contact_radius, united, patches: Patches, period: float) -> Match:
-    """Spots and patches that lie on each other, in groups.
+    """Group overlapping spots and patches.
 
-    position (s, 2) and contact_radius (s,), m: the spots; a spot lies on the patches of all nodes inside it, or of the
-    nearest one. united (s,): whether the spot stands for several summits.
+    A spot overlaps the patches of all nodes inside it, or of the nearest node.
+
+    Parameters
+    ----------
+    position, contact_radius : (s, 2), (s,), m, of the spots.
+    united : (s,), whether a spot consists of several summits.
     """
     spots, count = len(position), len(patches.area)
     spot, patch = [], []
@@ -80,10 +93,10 @@ def match(position, contact_radius, united, patches: Patches, period: float) -> 
     total = spots + count
     groups, group = connected_components(coo_array((np.ones(len(spot)), (spot, patch)), shape=(total, total)))
     spot_group, patch_group = group[:spots], group[spots:]
-    own, other = np.bincount(spot_group, minlength=groups), np.bincount(patch_group, minlength=groups)
+    spot_count, patch_count = (np.bincount(group, minlength=groups) for group in (spot_group, patch_group))
     with_united = np.bincount(spot_group, united, minlength=groups) > 0
     category = np.select(
-        [own == 0, other == 0, with_united, (own == 1) & (other == 1)],
+        [spot_count == 0, patch_count == 0, with_united, (spot_count == 1) & (patch_count == 1)],
         ["missed", "extra", "united", "single"],
         "several",
     )
@@ -91,7 +104,7 @@ def match(position, contact_radius, united, patches: Patches, period: float) -> 
 
 
 def _nodes_in_disc(centre, radius, grid, period):
-    """Rows and columns of the nodes inside a disc, and of the one nearest to its centre."""
+    """Return rows and columns of the nodes inside a disc, and of the node nearest to its centre."""
     spacing = period / grid
     column, row = np.rint(centre / spacing).astype(int)
     reach = int(radius / spacing) + 1
@@ -106,28 +119,28 @@ def _nodes_in_disc(centre, radius, grid, period):
 def split(
     contact: InteractingAsperities, state: ContactState, truth: NodalState, fourth: np.ndarray
 ) -> dict[str, list | np.ndarray]:
-    """One state without adhesion, split along category and pair, by the names of the variables.
+    """Split one state without adhesion by category and pair; return values by the names of the variables.
 
-    fourth (n,): fourth-order terms of the summits, m^-3. Categories are in the order of `CATEGORIES`.
+    `fourth` (n,) are the fourth-order terms of the summits, m^-3. Categories are in the order of `CATEGORIES`.
     """
     spots, law, period = state.spots, contact.law, contact.asperities.period
     patches = contact_patches(truth)
     found = match(spots.position, spots.contact_radius, spots.members > 1, patches, period)
     area = np.pi * spots.contact_radius**2
     force = law.force(spots.contact_radius, spots.radius_of_curvature)
-    own = [found.category[found.spot_group] == category for category in CATEGORIES]
-    other = [found.category[found.patch_group] == category for category in CATEGORIES]
+    of_spots = [found.category[found.spot_group] == category for category in CATEGORIES]
+    of_patches = [found.category[found.patch_group] == category for category in CATEGORIES]
     single = np.flatnonzero(found.category[found.spot_group] == "single")
     of_group = np.full(len(found.category), -1)
     of_group[found.patch_group] = np.arange(len(patches.area))
     patch = of_group[found.spot_group[single]]
     return {
-        "spot_count": [np.count_nonzero(part) for part in own],
-        "patch_count": [np.count_nonzero(part) for part in other],
-        "spot_area_fraction": [np.sum(area[part]) / contact.area for part in own],
-        "patch_area_fraction": [np.sum(patches.area[part]) / contact.area for part in other],
-        "spot_load_share": [np.sum(force[part]) / np.sum(force) for part in own],
-        "patch_load_share": [np.sum(patches.force[part]) / np.sum(patches.force) for part in other],
+        "spot_count": [np.count_nonzero(members) for members in of_spots],
+        "patch_count": [np.count_nonzero(members) for members in of_patches],
+        "spot_area_fraction": [np.sum(area[members]) / contact.area for members in of_spots],
+        "patch_area_fraction": [np.sum(patches.area[members]) / contact.area for members in of_patches],
+        "spot_load_share": [np.sum(force[members]) / np.sum(force) for members in of_spots],
+        "patch_load_share": [np.sum(patches.force[members]) / np.sum(patches.force) for members in of_patches],
         "pair_spot_area": area[single],
         "pair_patch_area": patches.area[patch],
         "pair_spot_force": force[single],
@@ -139,11 +152,11 @@ def split(
 
 
 def _summit_of_spots(contact, state):
-    """The summit (s,) that every spot of one summit is at; summits under it are in its hand as well."""
+    """Return the summit (s,) at the centre of each spot, or -1; a spot may contain covered summits as well."""
     spots, asperities = state.spots, contact.asperities
-    held = np.flatnonzero(state.spot_of_asperity >= 0)
-    there = np.mod(asperities.position[held], asperities.period)
-    at_summit = np.all(spots.position[state.spot_of_asperity[held]] == there, axis=1)
+    owned = np.flatnonzero(state.spot_of_asperity >= 0)
+    position = np.mod(asperities.position[owned], asperities.period)
+    at_summit = np.all(spots.position[state.spot_of_asperity[owned]] == position, axis=1)
     summit = np.full(len(spots), -1)
-    summit[state.spot_of_asperity[held[at_summit]]] = held[at_summit]
+    summit[state.spot_of_asperity[owned[at_summit]]] = owned[at_summit]
     return summit

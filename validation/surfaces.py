@@ -4,23 +4,20 @@ import numpy as np
 
 from icha.surfaces.surface import Surface
 
-# A summit there has to be, and it must not count: faces of punches are domes of this height over their radius, and what
-# goes on along y for ever has a wave of the second part of its height there.
+# Flat faces need a summit without effect on the contact: punches are domes of this height over their radius, and faces
+# that are infinite along y have a wave of the second fraction of their height.
 _DOME = 1e-9
 _ALONG = 2e-5
 
 
 def _from_centre(grid, spacing, centre):
-    """Ways (n, 1) and (1, n) to all nodes along y and x, m, the shortest, from a place `centre` (x, y) in cells."""
+    """Return the shortest offsets (n, 1) and (1, n) of all nodes from a centre (x, y) in cells, along y and x, m."""
     x, y = ((np.arange(grid) - place + grid / 2) % grid - grid / 2 for place in centre)
     return y[:, None] * spacing, x[None, :] * spacing
 
 
 def paraboloid(grid: int, period: float, offset: float = 0.0) -> Surface:
-    """A bump of radius of curvature 1 m in a periodic cell of side `period` (m), whose edges are valleys.
-
-    offset : of the summit from a node, in cells.
-    """
+    """Return a paraboloid of radius 1 m in a periodic cell of side `period` (m); `offset` from a node in cells."""
     x = (np.arange(grid) - grid // 2 - offset) * (period / grid)
     return Surface(-(x[:, None] ** 2 + x**2) / 2, period)
 
@@ -28,10 +25,12 @@ def paraboloid(grid: int, period: float, offset: float = 0.0) -> Surface:
 def bump(
     grid: int, period: float, offset=(0.0, 0.0), radii_of_curvature=(1.0, 1.0), angle: float = 0.0
 ) -> tuple[Surface, float]:
-    """An elliptic paraboloid in a cell, and the height of its summit, m.
+    """Return an elliptic paraboloid in a cell, and the height of its summit, m.
 
-    offset : (x, y) of its summit from a node near the middle of the cell, in cells. radii_of_curvature : m, along the
-    axes, which are turned by `angle`, rad.
+    Parameters
+    ----------
+    offset : (x, y) of its summit from a node near the middle of the cell, in cells.
+    radii_of_curvature : m, along the axes, which are turned by `angle`, rad.
     """
     y, x = _from_centre(grid, period / grid, (grid // 2 + offset[0], grid // 2 + offset[1]))
     along, across = np.cos(angle) * x + np.sin(angle) * y, np.cos(angle) * y - np.sin(angle) * x
@@ -40,7 +39,7 @@ def bump(
 
 
 def two_bumps(grid: int, period: float, distance: float) -> tuple[Surface, float]:
-    """The upper envelope of two paraboloids of radius 1 m side by side along x, and the height of their summits, m."""
+    """Return the upper envelope of two paraboloids of radius 1 m along x, and the height of their summits, m."""
     half = distance / (2 * period / grid)
     heights = []
     for side in (-half, half):
@@ -51,9 +50,9 @@ def two_bumps(grid: int, period: float, distance: float) -> tuple[Surface, float
 
 
 def punch(grid: int, period: float, radius: float, depth: float, square: bool = False) -> tuple[Surface, np.ndarray]:
-    """A flat punch, and its face, (n, n) of bool; round, or square with sides of twice the radius.
+    """Return a flat punch, round or square with sides of twice the radius, and its face, (n, n) of bool.
 
-    depth : by which all else lies lower, m. Its centre is the middle between nodes.
+    The rest lies lower by `depth` (m). The centre is the middle between four nodes.
     """
     y, x = _from_centre(grid, period / grid, (grid / 2 - 0.5,) * 2)
     face = (np.maximum(np.abs(x), np.abs(y)) if square else np.hypot(x, y)) < radius
@@ -62,7 +61,7 @@ def punch(grid: int, period: float, radius: float, depth: float, square: bool = 
 
 
 def strips(grid: int, period: float, half_width: float, depth: float) -> tuple[Surface, np.ndarray]:
-    """A flat strip in the direction of y, one a period, and its face, (n, n) of bool."""
+    """Return a flat strip along y, one per period, and its face, (n, n) of bool."""
     y, x = _from_centre(grid, period / grid, (grid / 2 - 0.5, grid // 2))
     face = np.broadcast_to(np.abs(x) < half_width, (grid, grid))
     along = _ALONG * depth * np.cos(2 * np.pi * y / period)
@@ -70,7 +69,7 @@ def strips(grid: int, period: float, half_width: float, depth: float) -> tuple[S
 
 
 def wave(grid: int, period: float, amplitude: float, dimensions: int = 1) -> Surface:
-    """amplitude cos(2 pi x/L), or its mean with that along y, with a crest in the middle of the cell."""
+    """Return amplitude cos(2 pi x/L), or its mean with the same along y, with a crest in the middle of the cell."""
     along = np.cos(2 * np.pi * (np.arange(grid) - grid // 2) / grid)
     other = 1.0 if dimensions == 2 else _ALONG
     return Surface(amplitude * (along + other * along[:, None]) / (1 + other), period)

@@ -14,54 +14,53 @@ DOCS = Path(__file__).resolve().parents[1] / "docs"
 
 
 class Table(NamedTuple):
-    """Headings of the columns, and rows of cells; as text, Markdown."""
+    """Headings and rows of cells of a table; `numbers` aligns all columns but the first to the right."""
 
     head: list[str]
     rows: list[list[str]]
     numbers: bool = False
-    """Whether all columns but the first are aligned to the right."""
 
     def __str__(self) -> str:
-        """The table in Markdown."""
+        """Return the table as Markdown."""
         rule = ["---"] + ["---:" if self.numbers else "---"] * (len(self.head) - 1)
         return "".join(f"| {' | '.join(line)} |\n" for line in (self.head, rule, *self.rows))
 
 
 def write_tables(tables: Mapping[str, Table]) -> None:
-    """Write tables by name, for the pages to include."""
+    """Write tables by name to docs/tables."""
     for name, table in tables.items():
         (DOCS / "tables" / f"{name}.md").write_text(str(table), encoding="utf-8")
 
 
 def percent(value: float, digits: int = 2) -> str:
-    """A relative error in per cent; zero without a minus sign."""
+    """Format a relative error in per cent, zero without a minus sign."""
     text = f"{100 * value:+.{digits}f}"
     return text.replace("-", "+") if float(text) == 0 else text
 
 
 def means(values: Sequence[np.ndarray], form: str) -> list[str]:
-    """Mean ± standard deviation of several rows of numbers, number by number; the mean alone if there is one row.
+    """Format mean ± standard deviation over rows of numbers, or the mean of a single row.
 
-    `form` writes a number, such as `"{:+.1f}"`; deviations go without its sign.
+    `form` formats a number, such as `"{:+.1f}"`; deviations have no sign.
     """
 
-    def written(value):
+    def formatted(value):
         text = form.format(value)
         return text.replace("-", "+") if float(text) == 0 else text
 
     mean = np.mean(values, axis=0)
     if len(values) == 1:
-        return [written(m) for m in mean]
+        return [formatted(m) for m in mean]
     deviation = np.std(values, axis=0, ddof=1)
-    return [f"{written(m)} ± {form.replace('+', '').format(d)}" for m, d in zip(mean, deviation, strict=True)]
+    return [f"{formatted(m)} ± {form.replace('+', '').format(d)}" for m, d in zip(mean, deviation, strict=True)]
 
 
 def pressures(values: np.ndarray) -> list[str]:
-    """Headings of columns, one for each reduced pressure."""
+    """Return a heading for each reduced pressure."""
     return [f"p\\* = {p:.3g}" for p in values]
 
 
 def copy_figures(page: str, results: Path) -> None:
-    """Copy the figures that a page shows from the results of the campaign that drew them."""
+    """Copy the figures of a page from the results of their campaign."""
     for figure in re.findall(r"\]\(images/(.*?\.png)\)", (DOCS / f"{page}.md").read_text(encoding="utf-8")):
         shutil.copyfile(results / "figures" / figure, DOCS / "images" / figure)

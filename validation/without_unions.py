@@ -1,4 +1,4 @@
-"""The model without unions: Hertzian spots that may overlap, interacting or each as if it were alone."""
+"""The model without unions: Hertzian spots that may overlap, with and without interaction."""
 
 from dataclasses import dataclass
 
@@ -15,19 +15,19 @@ from icha.half_space.interaction import Interaction, displacement_at
 from icha.surfaces.summits import Asperities
 from icha.surfaces.surface import Surface
 
-# Equilibrium error in h_rms and relative error of the load; relative change of radii of curvature.
+# Tolerances: equilibrium error in h_rms and relative error of the load; relative change of radii of curvature.
 _TOLERANCE = 1e-9
 _SAME_CURVATURE = 1e-6
 _MAX_NEWTON_STEPS = 60
 _MAX_HALVINGS = 10
 _MAX_ROUNDS = 100
 _LINEAR_TOLERANCE = 1e-6
-# How far below a first guess the separation may end up, in h_rms.
+# Largest decrease of the separation from its first guess, in h_rms.
 _FALL = 0.3
 _KRYLOV = 60
-# Where the field of the others is looked at: on a ring of so many of the spot's own contact radii.
+# Radius of the ring on which the field of other spots is evaluated, in contact radii.
 _RING = 0.5
-# Cells per cell of the surface's grid, along a side, for the area of overlapping discs.
+# Cells per cell of the grid of the surface, along a side, for the area of overlapping discs.
 _DISC_REFINEMENT = 4
 
 
@@ -35,7 +35,11 @@ _DISC_REFINEMENT = 4
 class Discs:
     """Hertzian contacts that may overlap.
 
-    position (m, 2), contact_radius (m,), radius_of_curvature (m,) and separation from the mean plane: m.
+    Attributes
+    ----------
+    position : (m, 2), m.
+    contact_radius, radius_of_curvature : (m,), m.
+    separation : from the mean plane, m.
     """
 
     position: np.ndarray
@@ -45,7 +49,7 @@ class Discs:
 
 
 def independent_discs(summits: Asperities, law: JKR, pressure: float) -> Discs:
-    """Hertz's contacts of the summits with a plane, each as if it were alone, at a nominal pressure in Pa."""
+    """Return Hertz's contacts of the summits with a plane, without interaction, at a nominal pressure (Pa)."""
     modulus, R = law.material.contact_modulus, summits.radius_of_curvature
 
     def excess(separation):
@@ -57,9 +61,9 @@ def independent_discs(summits: Asperities, law: JKR, pressure: float) -> Discs:
     while excess(bottom) < 0:
         bottom -= step
     separation = brentq(excess, bottom, top, xtol=1e-15 * step, rtol=1e-14)
-    part = summits.height > separation
-    R, approach = R[part], summits.height[part] - separation
-    return Discs(summits.position[part], law.contact_radius(approach, R), R, separation)
+    touching = summits.height > separation
+    R, approach = R[touching], summits.height[touching] - separation
+    return Discs(summits.position[touching], law.contact_radius(approach, R), R, separation)
 
 
 def discs_apart(
@@ -70,57 +74,60 @@ def discs_apart(
     *,
     field_shape: bool = False,
 ) -> Discs:
-    """The model without unions, at a nominal pressure in Pa, without adhesion.
+    """Solve the model without unions and adhesion at a nominal pressure (Pa).
 
-    A summit that lies in the contact of a larger one is under it and takes no part.
+    A summit within the contact of a larger one is removed.
 
     Parameters
     ----------
     rms_height : m, the unit of the equilibrium error.
-    field_shape : the slope of the others' displacement across a spot raises its summit, the curvature sharpens it.
+    field_shape : whether the displacement by other spots raises a summit by its slope and sharpens it by its curvature.
 
     Raises
     ------
     NotConverged
-        If no equilibrium was found.
+        If no equilibrium is found.
     """
     start = independent_discs(summits, law, pressure)
-    separation, part = start.separation, np.arange(len(summits))
+    separation, sites = start.separation, np.arange(len(summits))
     approach = summits.height - separation
     lift, R = np.zeros(len(summits)), summits.radius_of_curvature.copy()
     half_space = None
-    for turn in range(_MAX_ROUNDS):
-        position = summits.position[part]
+    for iteration in range(_MAX_ROUNDS):
+        position = summits.position[sites]
         if half_space is None:
             half_space = PointHalfSpace.at(position, summits.period, law.material.contact_modulus)
-        height = (summits.height + lift)[part]
-        problem = _Apart.around(law, half_space, height, R[part], pressure, rms_height, separation)
+        height = (summits.height + lift)[sites]
+        # Constant windows for the largest possible radii, because the equations must be continuous.
+        largest = law.contact_radius(height - separation + _FALL * rms_height, R[sites])
+        interaction = Interaction.between(law, half_space, R[sites], largest)
+        problem = _Apart(law, half_space, height, R[sites], pressure, rms_height, interaction)
         approach, separation, error = problem.solve(approach, separation)
-        a = law.contact_radius(approach, R[part])
+        a = law.contact_radius(approach, R[sites])
         touching = np.flatnonzero(a > 0)
-        there, radius = position[touching], a[touching]
-        under = covering_spot(there, there, radius, summits.period, larger_than=radius) >= 0
-        if under.any():
-            free = np.delete(np.arange(len(part)), touching[under])
-            part, approach, half_space = part[free], approach[free], None
+        centres, radius = position[touching], a[touching]
+        covered = covering_spot(centres, centres, radius, summits.period, larger_than=radius) >= 0
+        if covered.any():
+            free = np.delete(np.arange(len(sites)), touching[covered])
+            sites, approach, half_space = sites[free], approach[free], None
             continue
         if error > _TOLERANCE:
             raise NotConverged(f"without unions: error {error:.2g} with {len(touching)} spots at {pressure:.4g} Pa")
-        discs = Discs(there, radius, R[part][touching], separation)
+        discs = Discs(centres, radius, R[sites][touching], separation)
         if not field_shape:
             return discs
-        new_lift, new_R = _reshaped(summits, law, part[touching], discs)
+        new_lift, new_R = _reshaped(summits, law, sites[touching], discs)
         change = max(np.max(np.abs(new_R / R - 1)), np.max(np.abs(new_lift - lift)) / rms_height)
         if change < _SAME_CURVATURE:
             return discs
-        # Averaged with the last one when the iteration has not ended at once, since spots may come and go.
-        share = 1.0 if turn < 5 else 0.5
+        # Later iterations are damped, because spots may appear and disappear in turn.
+        share = 1.0 if iteration < 5 else 0.5
         lift, R = lift + share * (new_lift - lift), R + share * (new_R - R)
-    raise NotConverged(f"without unions: no end of the iteration at {pressure:.4g} Pa")
+    raise NotConverged(f"without unions: no convergence at {pressure:.4g} Pa after {_MAX_ROUNDS} iterations")
 
 
 def _reshaped(summits, law, touching, discs):
-    """How much higher all summits stand (n,), m, and their radii of curvature (n,), m, for the field of the others."""
+    """Return the rise (n,) of all summits, m, and their radii of curvature (n,), m, due to the field of other spots."""
     raised, sharpness = _shape_of_field(law, summits.period, discs)
     lift, R = np.zeros(len(summits)), summits.radius_of_curvature.copy()
     lift[touching] = 0.5 * R[touching] * raised
@@ -140,16 +147,8 @@ class _Apart:
     rms_height: float
     interaction: Interaction
 
-    @classmethod
-    def around(cls, law, half_space, height, R, pressure, rms_height, separation):
-        """The equations for separations not much below the given one."""
-        # Windows that stay, or the equations would jump: as wide as the radii can be.
-        largest = law.contact_radius(height - separation + _FALL * rms_height, R)
-        interaction = Interaction.between(law, half_space, R, largest)
-        return cls(law, half_space, height, R, pressure, rms_height, interaction)
-
     def solve(self, approach, separation):
-        """Approaches (m), separation (m) and what is left of the error, from first guesses of the former."""
+        """Return approaches (m), separation (m) and the remaining error, from first guesses."""
         point = self._evaluate(approach, separation)
         for _ in range(_MAX_NEWTON_STEPS):
             size = self._size(point)
@@ -157,13 +156,13 @@ class _Apart:
                 break
             step = self._newton_step(approach, separation, point)
             for halving in range(_MAX_HALVINGS):
-                tried = approach + 0.5**halving * step[:-1], separation + 0.5**halving * step[-1]
-                there = self._evaluate(*tried)
-                if self._size(there) < size:
+                candidate = approach + 0.5**halving * step[:-1], separation + 0.5**halving * step[-1]
+                new = self._evaluate(*candidate)
+                if self._size(new) < size:
                     break
             else:
                 break
-            (approach, separation), point = tried, there
+            (approach, separation), point = candidate, new
         return approach, separation, self._size(point)
 
     def _size(self, point):
@@ -171,7 +170,7 @@ class _Apart:
         return max(float(np.max(np.abs(error))), abs(miss))
 
     def _evaluate(self, approach, separation):
-        """Errors of the approaches in h_rms, and the load's relative error."""
+        """Return the errors of the approaches in h_rms, and the relative error of the load."""
         a = self.law.contact_radius(approach, self.R)
         force = self.law.force(a, self.R)
         w = self.interaction.displacement(a)
@@ -197,24 +196,24 @@ class _Apart:
 
 
 def _shape_of_field(law, period, discs):
-    """Squared slope and Laplacian (1/m) of the displacement by the other spots at every spot, each (m,).
+    """Return squared slope and Laplacian (1/m) of the displacement by other spots at every spot, each (m,).
 
-    Where spots overlap the field of the other is flat enough; it does not blunt.
+    A negative Laplacian, which overlapping spots may cause, counts as zero.
     """
     a, R = discs.contact_radius, discs.radius_of_curvature
     ring = _RING * a
-    ways = np.array([[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1]])
-    points = discs.position[:, None] + ring[:, None, None] * ways
-    w = displacement_at(law, period, points.reshape(-1, 2), discs.position, a, R).reshape(-1, len(ways))
-    w -= law.displacement(ring[:, None] * np.hypot(*ways.T), a[:, None], R[:, None])
+    directions = np.array([[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1]])
+    points = discs.position[:, None] + ring[:, None, None] * directions
+    w = displacement_at(law, period, points.reshape(-1, 2), discs.position, a, R).reshape(-1, len(directions))
+    w -= law.displacement(ring[:, None] * np.hypot(*directions.T), a[:, None], R[:, None])
     slope = ((w[:, 1] - w[:, 2]) ** 2 + (w[:, 3] - w[:, 4]) ** 2) / (2 * ring) ** 2
     return slope, np.maximum((w[:, 1:].sum(axis=1) - 4 * w[:, 0]) / ring**2, 0.0)
 
 
 def union_area_fraction(discs: Discs, surface: Surface) -> float:
-    """Area of the union of discs over the nominal one, exact where they are apart.
+    """Return the area of the union of discs over the nominal area, exact for separate discs.
 
-    Where they overlap it is cut off cell by cell, on a finer grid than the surface's.
+    Overlaps are subtracted cell by cell on a finer grid than that of the surface.
     """
     cover = contact_cover(surface.refined(_DISC_REFINEMENT), discs)
     return float(np.mean(np.minimum(cover, 1.0)))

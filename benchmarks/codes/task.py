@@ -1,9 +1,9 @@
-"""What every code is given and what it hands back. Needs NumPy only: it runs in the codes' environment.
+"""Task and answer of every code. Needs only NumPy, because it runs in the environment of the codes.
 
 A task is a folder with heights.npy (m, towards the elastic body) and task.json: period (m), contact_modulus (Pa),
 rms_slope, rms_height (m), surface_energy (J/m^2), interaction_range (m), and the stops, pressures (Pa) or mean_gaps
-(m). The answer is a JSON file with one entry per stop, written anew after each, so that a code that is stopped at its
-time limit leaves the stops that it reached.
+(m). The answer is a JSON file with one entry per stop. It is rewritten after each stop, so that a code that is killed
+at its time limit leaves the stops that it reached.
 """
 
 import json
@@ -34,7 +34,7 @@ class Task:
         return cls(folder, Path(answer), int(threads), json.loads((folder / "task.json").read_text()))
 
     def __getattr__(self, name):
-        """Settings of the task as attributes."""
+        """Return settings of the task as attributes."""
         try:
             return self.settings[name]
         except KeyError:
@@ -46,12 +46,12 @@ class Task:
         return np.load(self.folder / "heights.npy")
 
     def start(self, package, how):
-        """Start the clock of the computation; `package` is the code, `how` the settings used, in words."""
+        """Start the clock of the computation; `how` describes the settings of the code `package`."""
         self.about = {"version": version(package), "settings": how}
         self.clock = time.perf_counter()
 
     def answer_stop(self, *, pressure, area_fraction, mean_gap, **more):
-        """Record a stop: nominal pressure in Pa, A/A0, mean gap in m, and counts of the code's own."""
+        """Record a stop: nominal pressure (Pa), A/A0, mean gap (m), and counts of the code."""
         seconds = time.perf_counter() - self.clock
         row = {"pressure": pressure, "area_fraction": area_fraction, "mean_gap": mean_gap, "seconds": seconds, **more}
         self.rows.append({key: value if isinstance(value, int) else float(value) for key, value in row.items()})
@@ -59,7 +59,7 @@ class Task:
 
 
 def area_on_grid(contact):
-    """A/A0 of a map of contact nodes, corrected by its perimeter.
+    """Return A/A0 of a map of contact nodes, corrected by its perimeter.
 
     Yastrebov, Anciaux & Molinari, Tribol. Int. 114 (2017) 161-171: nodes along the edge of a contact overestimate its
     area by (pi - 1 + ln 2)/24 of the perimeter times the spacing.

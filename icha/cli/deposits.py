@@ -14,7 +14,7 @@ from typing import Annotated
 
 import typer
 
-from icha.cli.project import FAILED, Anyway, Cores, Large, UserError, confirm, echo, option, shown
+from icha.cli.project import FAILED, Anyway, Cores, Large, UserError, confirm, echo, option, short_path
 from icha.cli.run import run
 from icha.support import formatting
 from icha.support.formatting import format_count, printable
@@ -34,12 +34,12 @@ def verify(deposit: Deposit, large: Large = False) -> None:
     Exit status: 0 if it is intact, 1 if not (the first hundred problems are printed), 2 if the file or folder does
     not exist.
     """
-    from icha.deposit.verify import Damaged
+    from icha.deposit.verify import DamagedDeposit
 
     try:
         with _intact(deposit, large) as folder:
             echo(f"{printable(deposit)}: intact: {_contents(folder)}")
-    except Damaged as damaged:
+    except DamagedDeposit as damaged:
         echo(_listed(damaged.args))
         echo(f"{printable(deposit)}: damaged: {format_count(len(damaged.args), 'problem')}", err=True, fg="red")
         raise typer.Exit(FAILED) from None
@@ -102,8 +102,8 @@ def reproduce(
     the deposit is damaged or missing, or cannot be computed again.
     """
     from icha.deposit.compare import compare_folders, write_json
-    from icha.deposit.reproduce import Refused, campaign_name, find_runs, prepare, with_surfaces
-    from icha.deposit.verify import Damaged
+    from icha.deposit.reproduce import RerunError, add_surfaces, campaign_name, find_runs, prepare_rerun
+    from icha.deposit.verify import DamagedDeposit
 
     try:
         with _intact(deposit, large) as original:
@@ -112,7 +112,7 @@ def reproduce(
             _introduce(deposit, original, folder)
             target = (folder or Path(tempfile.mkdtemp(prefix="icha-reproduce-"))).resolve()
             try:
-                copy = prepare(target, original)
+                copy = prepare_rerun(target, original)
                 status = _run(copy, [f"results/{name}/{path}" for path in runs] or ["all"], cores, anyway)
                 results = copy / "results" / name
                 if not results.is_dir():
@@ -122,18 +122,18 @@ def reproduce(
                 if folder is None:
                     shutil.rmtree(target)
                 raise
-            comparison = compare_folders(original, results, with_surfaces(runs, original) if runs else None)
-    except Damaged as damaged:
+            comparison = compare_folders(original, results, add_surfaces(runs, original) if runs else None)
+    except DamagedDeposit as damaged:
         raise UserError(f"{printable(deposit)}: the deposit is damaged:\n{_listed(damaged.args)}") from None
-    except Refused as refused:
+    except RerunError as refused:
         raise UserError(f"{printable(deposit)}: {refused}") from None
     reproduced = _print_comparison(comparison)
     if status:
-        echo(f"Some jobs did not run; to continue, add --folder {shown(target)} to the same command.", fg="yellow")
+        echo(f"Some jobs did not run; to continue, add --folder {short_path(target)} to the same command.", fg="yellow")
     if folder is None and reproduced:
         shutil.rmtree(target)
     else:
-        echo(f"new results: {shown(results)}")
+        echo(f"new results: {short_path(results)}")
     if json:
         write_json(comparison, json)
     if not reproduced:
@@ -143,27 +143,27 @@ def reproduce(
 def _introduce(deposit: Path, original: Path, folder: Path | None) -> None:
     """Print what a deposit contains and its metadata; refuse it if it was made with other versions."""
     from icha.deposit.metadata import read_zenodo_metadata, summary_of
-    from icha.deposit.reproduce import Refused, changed_files, other_versions
+    from icha.deposit.reproduce import RerunError, count_changed_files, other_versions
     from icha.deposit.verify import ZENODO
 
     try:
         metadata = summary_of(read_zenodo_metadata(original)) if (original / ZENODO).is_file() else {}
     except ValueError as error:
-        raise Refused(str(error)) from None
+        raise RerunError(str(error)) from None
     echo(f"deposit:    {printable(deposit)}, {_contents(original)}")
     echo("its metadata, which ICHA cannot verify:" if metadata else "it has no metadata on title and authors")
     for name, text in metadata.items():
         if text:
             echo(f"  {name + ':':<10}{printable(textwrap.shorten(text, 200, placeholder=' …'))}")
     if differences := other_versions(original):
-        raise Refused(
+        raise RerunError(
             "was made with other versions than those installed; expected the same versions. Run `make environment` in "
             "a clone of that version, or in a copy of the deposit's source:\n" + "\n".join(differences)
         )
     echo(f"program:    the installed ICHA {version('icha')}; nothing in the deposit is executed")
-    if changed := changed_files(original):
+    if changed := count_changed_files(original):
         echo(f"            (the deposit's source differs from it in {format_count(changed, 'file')})", fg="yellow")
-    echo(f"writes to:  {shown(folder) if folder else 'a temporary folder'}")
+    echo(f"writes to:  {short_path(folder) if folder else 'a temporary folder'}")
 
 
 def _run(project: Path, targets: list[str], cores: str | None, anyway: bool) -> int:
@@ -230,7 +230,7 @@ def upload(
     """
     from icha.deposit.metadata import read_zenodo_metadata, summary_of
     from icha.deposit.upload import SANDBOX, ZENODO, Zenodo, server_address
-    from icha.deposit.verify import CRATE, README, Damaged
+    from icha.deposit.verify import CRATE, README, DamagedDeposit
 
     if (sandbox and url) or (draft and new_version_of):
         raise UserError("--sandbox and --url, and --draft and --new-version-of, exclude each other; use one of them")
@@ -256,7 +256,7 @@ def upload(
                 echo("Nothing was sent.")
                 raise typer.Exit(FAILED)
             _send(server, files, metadata, draft, new_version_of, publish, yes)
-    except Damaged as damaged:
+    except DamagedDeposit as damaged:
         raise UserError(f"{archive}: the deposit is damaged; nothing was sent:\n{_listed(damaged.args)}") from None
     except ValueError as error:
         raise UserError(str(error)) from None
@@ -323,7 +323,7 @@ def _send(server, files, metadata, number, new_version_of, publish, yes) -> None
             server_option = "" if server.address == ZENODO else f" --url {server.address}"
             echo(
                 f"A draft remains: {draft.page}\n"
-                f"To continue it:  icha upload {shown(files[0])}{server_option} --draft {draft.number}",
+                f"To continue it:  icha upload {short_path(files[0])}{server_option} --draft {draft.number}",
                 err=True,
             )
         raise typer.Exit(FAILED) from None

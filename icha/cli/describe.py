@@ -19,7 +19,7 @@ from icha.cli.project import (
     profile_settings,
     project,
     read_configuration,
-    shown,
+    short_path,
     workflow_folder,
 )
 from icha.cli.scans import about_scan
@@ -105,7 +105,7 @@ def print_plan(path: Path, campaign, workflow: Path, home: Path, cores: int, *, 
         console.print(f"[{style}]{name}:[/] {markup(text)}", soft_wrap=True)
 
     console.print(f"[bold]{campaign.name}[/]: {markup(campaign.title)}")
-    console.print(f"configuration: {markup(shown(path))}\n")
+    console.print(f"configuration: {markup(short_path(path))}\n")
     if runs:
         _print_files(console, items)
     _print_sums(console, items)
@@ -119,8 +119,8 @@ def print_plan(path: Path, campaign, workflow: Path, home: Path, cores: int, *, 
         print_line("bold", statement.about, statement.text)
     problem = licence_problem(campaign)
     obstacles = {
-        "cannot be run": find_conflict(shown(results), campaign.name, path, workflow),
-        "cannot be published": problem and f"{shown(path)}: {': '.join(problem)}",
+        "cannot be run": find_conflict(short_path(results), campaign.name, path, workflow),
+        "cannot be published": problem and f"{short_path(path)}: {': '.join(problem)}",
         "missing": missing_software(campaign),
     }
     for name, reason in obstacles.items():

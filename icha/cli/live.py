@@ -82,7 +82,7 @@ class Progress:
     total : number of jobs by rule.
     running, done, failed : the jobs; running ones by their number.
     cores : cores in use; on a cluster, jobs at a time.
-    started : time of the first plan; None before.
+    started, called : times of the first plan (None before) and of the call.
     """
 
     expected: Mapping[str, float] = field(default_factory=dict)
@@ -93,11 +93,8 @@ class Progress:
     failed: list[Job] = field(default_factory=list)
     cores: int = 1
     started: float | None = None
+    called: float = field(default_factory=time.monotonic)
     lock: threading.RLock = field(default_factory=threading.RLock)
-
-    def __post_init__(self):
-        """Record the time of the call."""
-        self.called = self.clock()
 
     def update(self, event: Mapping) -> Job | None:
         """Apply an event of the logger plugin; return the job that it ended, if any."""
@@ -120,15 +117,12 @@ class Progress:
                         self.clock(),
                         threads=event.get("threads") or 1,
                     )
-                case "job_finished" if event["job_id"] in self.running:
-                    return self._end(event["job_id"], self.done)
-                case "job_error" if event["jobid"] in self.running:
-                    return self._end(event["jobid"], self.failed)
+                case "job_finished" | "job_error" as name:
+                    jobs, key = (self.done, "job_id") if name == "job_finished" else (self.failed, "jobid")
+                    if job := self.running.pop(event[key], None):
+                        jobs.append(replace(job, ended=self.clock()))
+                        return jobs[-1]
         return None
-
-    def _end(self, number: int, jobs: list[Job]) -> Job:
-        jobs.append(replace(self.running.pop(number), ended=self.clock()))
-        return jobs[-1]
 
     @property
     def job_count(self) -> int:
@@ -236,7 +230,7 @@ class PlainView(AbstractContextManager):
         self._progress, self._campaign, self.folder = progress, campaign, folder
 
     def __exit__(self, *error):
-        """End."""
+        """Nothing remains to be done."""
 
     def print_job(self, job: Job, failed: bool) -> None:
         """Print how many jobs have ended, the job, and why it failed."""

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from icha.cli.project import CAMPAIGNS, Plot, UserError, campaigns, echo, option, project, shown, workflow_folder
+from icha.cli.project import CAMPAIGNS, Plot, UserError, campaigns, echo, option, project, short_path, workflow_folder
 from icha.cli.scans import MeasuredSection, about_scan, measured_section
 
 TEMPLATE = Path(__file__).parent / "templates/campaign.yaml"
@@ -43,9 +43,9 @@ def new(
     if not re.fullmatch(NAME_PATTERN, name) or name.startswith("-"):
         raise UserError(f"{name!r} is not a name; expected lower-case letters, digits, '_' and '-'")
     if file.exists():
-        raise UserError(f"{shown(file)} exists already; choose another name, or remove it")
+        raise UserError(f"{short_path(file)} exists already; choose another name, or remove it")
     if name in campaigns():
-        raise UserError(f"{name} is the campaign of {shown(campaigns()[name])}; choose another name")
+        raise UserError(f"{name} is the campaign of {short_path(campaigns()[name])}; choose another name")
     for names, value in (("--data", data), ("--plot", plot)):
         if value is not None and measured is None:
             raise UserError(f"{names} needs a measured file; use it with --measured FILE")
@@ -63,7 +63,7 @@ def new(
     problems = [] if section is None else _problems(file, section)
     if problems:
         _write(file, values, f"once `icha describe {name}` reports no more problems")
-    echo(f"{shown(file)} written")
+    echo(f"{short_path(file)} written")
     if section is not None:
         _print_section(section, problems)
         if plot is not None:

@@ -180,11 +180,11 @@ def configuration_path(config: str | None) -> Path:
     if config is None:
         if not (project() / DEFAULT).is_file():
             raise UserError(f"no {DEFAULT} in this folder; {listed}")
-        return shown(project() / DEFAULT)
+        return short_path(project() / DEFAULT)
     if Path(config).is_file():
         return Path(config)
     if config in files:
-        return shown(files[config])
+        return short_path(files[config])
     raise UserError(f"{config}: {problem_with_path(config)}, and not the name of a campaign; {listed}")
 
 
@@ -216,7 +216,7 @@ def profile_settings(folder: Path) -> dict:
     return yaml.safe_load(file.read_text(encoding="utf-8")) or {} if file.is_file() else {}
 
 
-def shown(path: Path) -> Path:
+def short_path(path: Path) -> Path:
     """Shorten a path for printing: relative to the working directory if it lies inside."""
     path = Path(path)
     return path.relative_to(Path.cwd()) if path.is_absolute() and path.is_relative_to(Path.cwd()) else path

@@ -7,11 +7,11 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
-from icha.cli.project import echo, shown
+from icha.cli.project import echo, short_path
 from icha.datasets.campaign import reduced_gap
 from icha.datasets.format import RUN, SURFACE
 from icha.datasets.labels import LABELS
-from icha.datasets.surface_file import as_measured
+from icha.datasets.surface_file import measured_scale
 from icha.figures.curves import AREA_LABEL, PRESSURE_LABEL, gap_label
 from icha.figures.style import (
     COLOURS,
@@ -45,7 +45,7 @@ def draw_scans(scans: Mapping, path: Path) -> None:
 def _save(figure: Figure, path: Path) -> None:
     with whole_file(path) as temporary:
         figure.savefig(temporary, format=path.suffix[1:], dpi=150)
-    echo(f"plot: {shown(path)}")
+    echo(f"plot: {short_path(path)}")
 
 
 @in_style
@@ -103,7 +103,7 @@ def _surface(surface: xr.Dataset) -> Figure:
     figure = new_figure(TWO_COLUMNS if spectrum else ONE_COLUMN, 3.2)
     axes = figure.subplots(1, 2) if spectrum else [figure.subplots()]
     state = "as measured" if "measured_rms_slope" in surface else "as stored"
-    _draw_map(axes[0], surface["height"].values * as_measured(surface), float(surface["period"]), f"height {state}")
+    _draw_map(axes[0], surface["height"].values * measured_scale(surface), float(surface["period"]), f"height {state}")
     if spectrum:
         _draw_spectrum(axes[1], surface["psd_wavevector"].values, surface["power_spectrum"].values)
     return figure

@@ -30,7 +30,7 @@ from icha.cli.project import (
     profile_settings,
     project,
     read_configuration,
-    shown,
+    short_path,
     workflow_folder,
 )
 from icha.support import formatting
@@ -134,15 +134,17 @@ def run(
     if not set(targets) - {"all", "report", "publish"}:
         _print_checks(campaign, results)
     if "publish" in targets:
-        echo(f"deposit: {shown(results / 'publish' / f'{campaign.name}-{campaign.deposit_metadata().version}.zip')}")
+        echo(
+            f"deposit: {short_path(results / 'publish' / f'{campaign.name}-{campaign.deposit_metadata().version}.zip')}"
+        )
 
 
 def _refuse_obstacles(folder: Path, results: Path, name: str, path: Path, workflow: Path) -> None:
     from icha.planning.ownership import find_conflict
 
-    if reason := find_conflict(shown(results), name, path, workflow):
+    if reason := find_conflict(short_path(results), name, path, workflow):
         raise UserError(f"{reason} Nothing was started")
-    if obstacle := find_obstacle(shown(folder / ".snakemake")):
+    if obstacle := find_obstacle(short_path(folder / ".snakemake")):
         raise UserError(f"{obstacle}: Snakemake needs this folder for its records. Remove it or repair it")
 
 
@@ -156,13 +158,7 @@ def _profile_folder(profile: str | None, workflow: Path) -> Path:
 
 
 def _confirm_if_too_large(items, targets: list[str], cores: int, results: Path, profile: dict) -> None:
-    """Ask whether to start if memory or disk space is probably too small.
-
-    Raises
-    ------
-    UserError
-        If the answer is no, or without a terminal.
-    """
+    """Ask whether to start if memory or disk space is probably too small; without a terminal, refuse."""
     from icha.planning.requirements import find_shortages
 
     if "surfaces" in targets:
@@ -250,13 +246,7 @@ def _log_file(folder: Path, campaign: str) -> Path:
 
 
 def _run_snakemake(command: list[str], workflow: Path, log: Path, progress, view) -> tuple[int, bool]:
-    """Run Snakemake; pass its events to `progress` and ended jobs to `view`.
-
-    Returns
-    -------
-    status : exit status of Snakemake.
-    stopped : whether a signal stopped it.
-    """
+    """Run Snakemake with its events passed to `progress` and `view`; return its status, and whether it was stopped."""
     stopped = []
     reading, writing = os.pipe()
     # The plugins of this workflow precede installed ones.
@@ -317,22 +307,13 @@ def _listen(reading: int, progress, view, stopped: list) -> None:
 
 
 def _print_outcome(status: int, stopped: bool, progress, campaign, folder: Path, log: Path, expected) -> None:
-    """Print how the call ended: jobs done and failed with reasons, and where results and log are.
-
-    Parameters
-    ----------
-    status, stopped : as returned by `_run_snakemake`.
-    progress : the jobs.
-    folder : the folder that holds results/.
-    log : output of Snakemake; removed if all went well, since Snakemake keeps it too.
-    expected : estimated duration of the call in s; None if unknown.
-    """
+    """Print the jobs done and failed with reasons, and where results and log are; `expected` is the duration in s."""
     from icha.support.atomic_files import probe_folder
 
     results = folder / "results" / campaign.name
     ended = len(progress.done) + len(progress.failed)
     if status == 0:
-        log.unlink(missing_ok=True)
+        log.unlink(missing_ok=True)  # Snakemake has its own copy
     if status == 0 and progress.started is None:
         echo("Nothing to do: all requested results exist and are up to date.")
     elif ended:
@@ -345,7 +326,8 @@ def _print_outcome(status: int, stopped: bool, progress, campaign, folder: Path,
     if status and results.is_dir() and (reason := probe_folder(results)):
         # Logs are in this folder, so jobs may have been unable to report it.
         echo(
-            f"cannot write to {shown(results)}: {reason.strerror}. Repeat the command when this is repaired.", fg="red"
+            f"cannot write to {short_path(results)}: {reason.strerror}. Repair this and repeat the command.",
+            fg="red",
         )
     if stopped or status < 0:
         echo("Stopped before the end. Repeat the command to continue.", fg="red")
@@ -358,9 +340,9 @@ def _print_outcome(status: int, stopped: bool, progress, campaign, folder: Path,
         files = {"figures": "figures", "dataset": f"dataset/{campaign.name}.nc", "report": "report.html"}
         for name, file in files.items():
             if (results / file).exists():
-                echo(f"{name + ':':<9}{shown(results / file)}")
+                echo(f"{name + ':':<9}{short_path(results / file)}")
     if status:
-        echo(f"log:     {shown(log)}")
+        echo(f"log:     {short_path(log)}")
 
 
 def _print_failures(status: int, stopped: bool, progress, campaign, folder: Path, log: Path) -> None:
@@ -378,7 +360,7 @@ def _print_failures(status: int, stopped: bool, progress, campaign, folder: Path
     if failed:
         echo(f"{format_count(len(failed), 'job')} failed:", fg="red")
         for job in failed:
-            logs = ", ".join(str(shown(folder / name)) for name in job.logs)
+            logs = ", ".join(str(short_path(folder / name)) for name in job.logs)
             # The verdict repeats the runs without a result.
             reason = [line for line in error_of(job, folder) if not any(line.startswith(path) for path in incomplete)]
             unknown = f"it ended without a message, perhaps killed (out of memory?); see {logs or log}"

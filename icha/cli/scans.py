@@ -127,7 +127,6 @@ class MeasuredSection:
     lines : keys that the file determines, and keys to fill in.
     to_fill_in : reason for each key to fill in.
     filled_in : guessed values of these keys, with which the other keys can be checked.
-    periodic : whether it is a Fourier series.
     advice : recommended keys, as written in a configuration.
     scan : its `icha.surfaces.measured.resolution.ScanResolution`.
     """
@@ -137,7 +136,6 @@ class MeasuredSection:
     lines: list[str]
     to_fill_in: dict[str, str]
     filled_in: dict[str, str]
-    periodic: bool
     advice: dict[str, str]
     scan: Any
 
@@ -182,7 +180,7 @@ def measured_section(path: Path, data: str | None, folder: Path) -> MeasuredSect
     guessed = GUESSED_TEXT | {"size": [f"{columns} um", f"{rows} um"]}
     filled_in = {key: guessed[key] for key in missing}
     path = Path(os.path.relpath(path.resolve(), folder.resolve())).as_posix()
-    return MeasuredSection(name, path, lines, missing, filled_in, periodic, advice, resolution)
+    return MeasuredSection(name, path, lines, missing, filled_in, advice, resolution)
 
 
 def _check_file(path: Path) -> None:
@@ -194,14 +192,10 @@ def _check_file(path: Path) -> None:
 
 
 def _load(path: Path, data: str | None):
-    """Load a scan; guess keys that the file lacks.
+    """Load a scan, with guesses for keys that the file lacks.
 
-    Returns
-    -------
-    scan : the scan.
-    assumed : guessed values of missing keys, in SI units.
-    missing : reason for each missing key.
-    sides : sides in the coordinates of the file; None if their unit is known, or without coordinates.
+    Returns the scan, the guesses in SI units, the reason for each missing key, and the sides in the coordinates of the
+    file if their unit is missing.
     """
     from icha.surfaces.measured.scan import load_scan
     from icha.surfaces.measured.settings import Preparation, UnfitTopography

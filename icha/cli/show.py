@@ -97,7 +97,7 @@ def print_run(run, file: Path) -> None:
 
 def _print_surface(surface, file: Path) -> None:
     """Print attributes and statistics of a surface; those of a scan as measured, too."""
-    from icha.datasets.surface_file import as_measured
+    from icha.datasets.surface_file import measured_scale
     from icha.figures.style import format_quantity
 
     echo(f"{file}: {printable(surface.attrs.get('title', 'surface'))}")
@@ -105,7 +105,7 @@ def _print_surface(surface, file: Path) -> None:
         if key in surface.attrs:
             echo(f"{key.replace('_', ' ')}: {printable(surface.attrs[key])}")
     echo("")
-    scale = as_measured(surface)
+    scale = measured_scale(surface)
     if scale != 1:
         height, slope = (float(surface[name]) * scale for name in ("rms_height", "rms_slope"))
         echo(f"as measured: rms height {format_quantity(height, 'm')}, rms slope {slope:.4g}")

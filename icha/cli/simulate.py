@@ -179,7 +179,7 @@ def _cutoffs(period, rolloff, short, grid):
 def _read_surface(file: Path, period: float, rms_slope: float | None):
     """Read a surface file, or heights in m from an .npy file; scale it to an rms slope if one is given."""
     from icha.datasets.format import SURFACE, identify_file
-    from icha.datasets.surface_file import as_measured, surface_of
+    from icha.datasets.surface_file import measured_scale, surface_of
     from icha.surfaces.measured.array_files import read_height_map
     from icha.surfaces.surface import Surface
 
@@ -194,7 +194,7 @@ def _read_surface(file: Path, period: float, rms_slope: float | None):
             raise ValueError(f"{file}: {kind}; expected a {SURFACE}, or heights as .npy")
         surface = surface_of(data, file)
         if rms_slope is None:  # files contain scans at rms slope 1
-            rms_slope = as_measured(data) * surface.rms_slope
+            rms_slope = measured_scale(data) * surface.rms_slope
     return surface if rms_slope is None else surface.scaled_to_rms_slope(rms_slope)
 
 

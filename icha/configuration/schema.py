@@ -81,7 +81,7 @@ def _table(heading: str, section: dict) -> str:
     lines = [f"### {heading}", "", section.get("description", ""), "", "| key | default | meaning |", "|---|---|---|"]
     for key, value in section["properties"].items():
         if key in required:
-            default = "needed"
+            default = "required"
         elif value.get("default") is None:
             default = "none"
         elif isinstance(value["default"], dict):

@@ -441,7 +441,7 @@ class _RaggedVariables:
         if not self.runs:
             return
         for name, variable in self.variables.items():
-            joined = np.concatenate([run[name] for run in self.runs])
-            variable[self.written : self.written + len(joined)] = joined
-        self.written += len(joined)
+            values = np.concatenate([run[name] for run in self.runs])
+            variable[self.written : self.written + len(values)] = values
+        self.written += len(values)
         self.runs, self.pending = [], 0

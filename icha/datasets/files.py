@@ -100,8 +100,8 @@ def _refuse_values_not_finite(dataset: xr.Dataset, where: str) -> None:
             may_lack = excused.all([dim for dim in excused.dims if dim not in variable.dims]).variable
             may_lack = may_lack.set_dims(dict(zip(variable.dims, variable.shape, strict=True))).values
             if "step" in variable.dims:
-                beyond = dataset["step"] >= dataset["step_count"]
-                may_lack = may_lack | beyond.transpose(*variable.dims).values
+                padding = dataset["step"] >= dataset["step_count"]
+                may_lack = may_lack | padding.transpose(*variable.dims).values
             bad &= ~(may_lack & np.isnan(variable.values))
         if bad.any():
             raise ValueError(f"{where}: variable {not_finite(name, variable.dims, bad)}")

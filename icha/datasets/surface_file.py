@@ -77,7 +77,7 @@ def write_surface(
     write_dataset(build_dataset(SURFACE, values, attributes | origin | dict(attrs)), path)
 
 
-def as_measured(surface: xr.Dataset) -> float:
+def measured_scale(surface: xr.Dataset) -> float:
     """Return the factor from the heights of a surface file to the measured heights; 1 if it was not measured.
 
     All topographies are stored at rms slope 1.

@@ -22,7 +22,7 @@ from rocrate.rocrate import ROCrate
 from icha.configuration.publication import Author, Publication
 from icha.contact.models import MODEL_PAPER
 from icha.datasets.results import CONFIGURATION
-from icha.deposit.metadata import TABLES, known_licence, web_address
+from icha.deposit.metadata import TABLES, find_licence, web_address
 from icha.deposit.verify import CRATE, README, SOURCE
 from icha.support.atomic_files import whole_file
 
@@ -109,8 +109,10 @@ def write_crate(
     _add_jobs(crate, jobs, files, f"Campaign {campaign}", publication.title)
     _set(crate.root_dataset, mainEntity=files[_WORKFLOW])
     _set(files[README], about=crate.root_dataset)
-    with whole_file(Path(folder) / CRATE) as part:
-        part.write_text(json.dumps(crate.metadata.generate(), indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    with whole_file(Path(folder) / CRATE) as temporary:
+        temporary.write_text(
+            json.dumps(crate.metadata.generate(), indent=1, ensure_ascii=False) + "\n", encoding="utf-8"
+        )
     Path(folder, CRATE).chmod(0o644)
 
 
@@ -126,7 +128,7 @@ def _steps(jobs: Sequence[Job]) -> list[Job]:
 
 def _describe(crate: ROCrate, publication: Publication, campaign: str) -> None:
     """Describe the deposit as a whole."""
-    licence = known_licence(publication.license)
+    licence = find_licence(publication.license)
     _set(
         crate.root_dataset,
         name=publication.title,

@@ -18,7 +18,7 @@ from icha.configuration.campaign import Campaign
 from icha.configuration.cases import campaign_sha256, run_sha256
 from icha.datasets.files import read_campaign
 from icha.deposit.crate import Job, write_crate
-from icha.deposit.metadata import citation_cff, datacite_metadata, known_licence, zenodo_metadata
+from icha.deposit.metadata import citation_cff, datacite_metadata, find_licence, zenodo_metadata
 from icha.deposit.program import Source
 from icha.deposit.readme import data_dictionary, dictionary_csv, readme
 from icha.deposit.verify import CHECKSUMS, CRATE, README, SOURCE, ZENODO, files_of, problem_with_name
@@ -69,30 +69,30 @@ def make_deposit(
     files, publication = sorted(files), campaign.deposit_metadata()
     refuse_unknown_failures(read_checks(results / "checks.json"), [each.run for each in publication.known_failures])
     _refuse_changed(results, files)
-    part = folder.with_name(f".{folder.name}.part")
-    shutil.rmtree(part, ignore_errors=True)
+    staging = folder.with_name(f".{folder.name}.part")
+    shutil.rmtree(staging, ignore_errors=True)
     try:
         for file in files:
-            (part / file).parent.mkdir(parents=True, exist_ok=True)
-            shutil.copyfile(results / file, part / file)
-            (part / file).chmod(0o644)
-        source.export(part / SOURCE)
-        _refuse_names(files_of(part))
-        _describe(part, files, campaign, source.revision, cost)
-        checksums = {path: sha256_of(part / path) for path in files_of(part)}
-        write_crate(part, publication, jobs, campaign=campaign.name, revision=source.revision, checksums=checksums)
-        checksums[CRATE] = sha256_of(part / CRATE)
-        _write(part / CHECKSUMS, "".join(f"{checksums[path]}  {path}\n" for path in sorted(checksums)))
+            (staging / file).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(results / file, staging / file)
+            (staging / file).chmod(0o644)
+        source.export(staging / SOURCE)
+        _refuse_names(files_of(staging))
+        _describe(staging, files, campaign, source.revision, cost)
+        checksums = {path: sha256_of(staging / path) for path in files_of(staging)}
+        write_crate(staging, publication, jobs, campaign=campaign.name, revision=source.revision, checksums=checksums)
+        checksums[CRATE] = sha256_of(staging / CRATE)
+        _write(staging / CHECKSUMS, "".join(f"{checksums[path]}  {path}\n" for path in sorted(checksums)))
         with whole_file(archive) as temporary:
-            _write_zip(temporary, part, folder.name)
-            sync_folder(part)
+            _write_zip(temporary, staging, folder.name)
+            sync_folder(staging)
             with moving():
                 # Remove an earlier deposit at once, with its checksums.
                 archive.unlink(missing_ok=True)
                 _remove(folder)
-                part.rename(folder)
+                staging.rename(folder)
     finally:
-        shutil.rmtree(part, ignore_errors=True)
+        shutil.rmtree(staging, ignore_errors=True)
 
 
 def _refuse_names(files: Iterable[str]) -> None:
@@ -142,28 +142,28 @@ def refuse_mixed(results: Path, campaign: Campaign, recorded: Mapping[str, str])
         )
 
 
-def _describe(part: Path, files: Sequence[str], campaign: Campaign, revision: str, cost: Cost) -> None:
+def _describe(staging: Path, files: Sequence[str], campaign: Campaign, revision: str, cost: Cost) -> None:
     """Write licence, citation, metadata, data dictionary and page of the deposit."""
-    publication, dictionary = campaign.deposit_metadata(), data_dictionary(part, files)
-    _write(part / "LICENSE.txt", known_licence(publication.license).page())
-    _write(part / "CITATION.cff", citation_cff(publication, revision))
+    publication, dictionary = campaign.deposit_metadata(), data_dictionary(staging, files)
+    _write(staging / "LICENSE.txt", find_licence(publication.license).page())
+    _write(staging / "CITATION.cff", citation_cff(publication, revision))
     for name, metadata in ((ZENODO, zenodo_metadata(publication)), ("datacite.json", datacite_metadata(publication))):
-        _write(part / name, json.dumps(metadata, indent=1, ensure_ascii=False, allow_nan=False) + "\n")
-    _write(part / "data_dictionary.csv", dictionary_csv(dictionary))
-    error = part / "aggregated/model_error.nc"
+        _write(staging / name, json.dumps(metadata, indent=1, ensure_ascii=False, allow_nan=False) + "\n")
+    _write(staging / "data_dictionary.csv", dictionary_csv(dictionary))
+    error = staging / "aggregated/model_error.nc"
     # Opened and not loaded, because the dataset may be large and the page shows little of it.
-    with xr.open_datatree(part / f"dataset/{campaign.name}.nc", engine="netcdf4") as dataset:
+    with xr.open_datatree(staging / f"dataset/{campaign.name}.nc", engine="netcdf4") as dataset:
         page = readme(
             campaign,
             revision=revision,
             dataset=dataset,
-            checks=read_checks(part / "checks.json"),
+            checks=read_checks(staging / "checks.json"),
             model_error=read_campaign(error) if error.is_file() else None,
             dictionary=dictionary,
-            sizes={path: (part / path).stat().st_size for path in files_of(part)},
+            sizes={path: (staging / path).stat().st_size for path in files_of(staging)},
             cost=cost,
         )
-    _write(part / README, page)
+    _write(staging / README, page)
 
 
 def _write(path: Path, text: str) -> None:

@@ -44,7 +44,7 @@ class Licence(NamedTuple):
         return f"{statement}\n{'-' * 72}\n\n{self.text}" if self.text else statement
 
 
-def known_licence(identifier: str) -> Licence:
+def find_licence(identifier: str) -> Licence:
     """Return the licence with an SPDX identifier.
 
     Raises
@@ -73,7 +73,7 @@ def licence_problem(campaign: Campaign) -> tuple[str, str] | None:
     """Return key and text of a problem with the licence of a campaign's data; None if a deposit can have it."""
     licence = campaign.deposit_metadata().license
     try:
-        known_licence(licence)
+        find_licence(licence)
     except ValueError as error:
         return "publication.license" if campaign.publication.license else "license", f"{licence!r} {error}"
     return None
@@ -120,7 +120,7 @@ def citation_cff(publication: Publication, revision: str) -> str:
     publication : complete metadata (`icha.configuration.publication.missing_metadata`).
     revision : that of the program that made the data.
     """
-    licence = known_licence(publication.license)
+    licence = find_licence(publication.license)
     paper = {
         "type": "article",
         "title": MODEL_PAPER.title,
@@ -188,7 +188,7 @@ def zenodo_metadata(publication: Publication) -> dict[str, Any]:
         "version": publication.version,
         "creators": creators,
         "access_right": "open",
-        "license": known_licence(publication.license).identifier.lower(),
+        "license": find_licence(publication.license).identifier.lower(),
         "language": "eng",
         "doi": publication.doi,
         "keywords": publication.keywords,
@@ -229,7 +229,7 @@ def datacite_metadata(publication: Publication) -> dict[str, Any]:
 
     Without a DOI the publisher is unknown, and `:tba`, DataCite's word for values that will be known later.
     """
-    licence = known_licence(publication.license)
+    licence = find_licence(publication.license)
     paper = RelatedIdentifier(identifier=f"arXiv:{MODEL_PAPER.arxiv}", relation="Cites", resource="Preprint")
     rights = {
         "rights": licence.name,

@@ -205,7 +205,7 @@ def refuse_other_environment(project: Path, results: Path) -> None:
         or if results may have been made with other versions (`note_versions`).
     """
     lock = (project / "uv.lock").read_text(encoding="utf-8")
-    wrong = differences(lock)
+    wrong = version_differences(lock)
     expected, imported = package_of(project.resolve()), Path(importlib.util.find_spec("icha").origin).resolve().parent
     if imported != expected:
         wrong.insert(0, f"  icha: imported from {imported}; expected from {expected}")
@@ -229,7 +229,7 @@ def refuse_other_environment(project: Path, results: Path) -> None:
         )
 
 
-def differences(lock: str) -> list[str]:
+def version_differences(lock: str) -> list[str]:
     """List the packages that are installed in another version than locked; `lock` is the text of uv.lock.
 
     Packages that are locked but not installed are left out, since no environment has all optional packages.

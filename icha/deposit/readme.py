@@ -26,7 +26,7 @@ from icha.datasets.campaign import run_place, runs_of_status
 from icha.datasets.labels import LABELS, RunLabels, slopes_of
 from icha.datasets.results import LOOP, RUN, SOLUTION, SURFACE, THEORIES
 from icha.datasets.variables.campaign import COMPLETE, FAILED_CHECKS, INCOMPLETE, NOT_IN_DESIGN, STATUS_MEANINGS
-from icha.deposit.metadata import TABLES, acknowledgement, known_licence, paragraphs, web_address
+from icha.deposit.metadata import TABLES, acknowledgement, find_licence, paragraphs, web_address
 from icha.deposit.verify import COMPUTED
 from icha.planning.costs import Cost
 from icha.planning.requirements import further_software
@@ -189,7 +189,7 @@ def readme(
         citation=f"{authors} ({publication.date[:4]}): {publication.title}. Version {publication.version}. Data set.",
         paper=MODEL_PAPER,
         summary=paragraphs(publication.summary),
-        licence=known_licence(publication.license),
+        licence=find_licence(publication.license),
         revision=revision,
         variables=_short_dictionary(dictionary, campaign.name),
         cost=cost,
@@ -199,7 +199,7 @@ def readme(
         size=sum(sizes.values()),
         computed=sum(size for path, size in sizes.items() if path.split("/")[0] in COMPUTED),
         errors=_model_errors(model_error) if model_error is not None else [],
-        **_asked(campaign),
+        **_settings(campaign),
         **_outcome(publication, dataset, checks),
     )
     return text.rstrip() + "\n"
@@ -228,7 +228,7 @@ def _template() -> jinja2.Template:
     return environment.get_template(_TEMPLATE)
 
 
-def _asked(campaign: Campaign) -> dict:
+def _settings(campaign: Campaign) -> dict:
     """Return the facts of the configuration, without the variants that studies make of surfaces and materials."""
     surfaces, materials = (
         {name: each for name, each in getattr(campaign, section).items() if campaign.origin(section, name) == name}

@@ -17,7 +17,7 @@ from icha.configuration.load import INPUTS, load_configuration
 from icha.configuration.yaml_files import read_yaml
 from icha.datasets.attributes import why_no_result
 from icha.datasets.results import CONFIGURATION
-from icha.deposit.program import PROGRAM, differences, program_files
+from icha.deposit.program import PROGRAM, program_files, version_differences
 from icha.deposit.verify import CHECKSUMS, COMPUTED, SOURCE, files_of, read_text
 from icha.support.checksums import sha256_of
 from icha.support.formatting import format_count
@@ -33,24 +33,24 @@ _BEGUN, _PROJECT = "rerun-of.sha256", "data"
 _RUN = re.compile(r"runs(/[^/]+){4}/[^/]+\.nc")
 
 
-class Refused(ValueError):
-    """A rerun cannot begin; the message gives the reason."""
+class RerunError(ValueError):
+    """A rerun cannot begin; the message is the reason."""
 
 
 def campaign_name(deposit: Path) -> str:
-    """Return the name of the campaign in a deposit; `Refused` if it lacks what a rerun needs."""
+    """Return the name of the campaign in a deposit; `RerunError` if it lacks what a rerun needs."""
     for file in (CONFIGURATION, _PYPROJECT, _LOCK):
         if not (deposit / file).is_file():
-            raise Refused(f"the deposit has no {file}, so it cannot be computed again")
+            raise RerunError(f"the deposit has no {file}, so it cannot be computed again")
     if not any((deposit / name).exists() for name in COMPUTED):
-        raise Refused("the deposit has no results to compare with")
+        raise RerunError("the deposit has no results to compare with")
     try:
         read_text(deposit, CONFIGURATION)  # refuses a file that is too large
         name = read_yaml(deposit / CONFIGURATION).get("name")
     except ValueError as error:
-        raise Refused(str(error).replace(f"{deposit}/", "")) from None
+        raise RerunError(str(error).replace(f"{deposit}/", "")) from None
     if not (isinstance(name, str) and re.fullmatch(NAME_PATTERN, name)):
-        raise Refused(f"{CONFIGURATION}: name: {name!r} is not the name of a campaign")
+        raise RerunError(f"{CONFIGURATION}: name: {name!r} is not the name of a campaign")
     return name
 
 
@@ -59,18 +59,18 @@ def other_versions(deposit: Path) -> list[str]:
     try:
         made_by = tomllib.loads(read_text(deposit, _PYPROJECT))["project"]["version"]
     except (ValueError, KeyError, TypeError, RecursionError):
-        raise Refused(f"{_PYPROJECT}: has no version of the program") from None
+        raise RerunError(f"{_PYPROJECT}: has no version of the program") from None
     try:
-        wrong = differences(read_text(deposit, _LOCK))
+        wrong = version_differences(read_text(deposit, _LOCK))
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
-        raise Refused(f"{_LOCK}: is not a lock file of uv") from None
+        raise RerunError(f"{_LOCK}: is not a lock file of uv") from None
     installed = version("icha")
     if made_by != installed:
         wrong.insert(0, f"  icha: {installed} is installed, {made_by} made the deposit")
     return wrong
 
 
-def changed_files(deposit: Path) -> int:
+def count_changed_files(deposit: Path) -> int:
     """Count the files of package and workflow that differ between the deposit's source and what is installed."""
     lines = read_text(deposit, CHECKSUMS).splitlines()
     listed = {name.removeprefix(f"{SOURCE}/"): digest for digest, name in (line.split("  ", 1) for line in lines)}
@@ -89,7 +89,7 @@ def find_runs(only: Iterable[str], deposit: Path) -> list[str]:
 
     Raises
     ------
-    Refused
+    RerunError
         If the deposit has no such run.
     """
     runs = [name for name in files_of(deposit) if _RUN.fullmatch(name)]
@@ -101,7 +101,7 @@ def find_runs(only: Iterable[str], deposit: Path) -> list[str]:
         path = f"runs/{name.removeprefix('runs/').removesuffix('.nc')}.nc"
         if path not in runs:
             such_as = f", such as {runs[0].removeprefix('runs/').removesuffix('.nc')}" if runs else ""
-            raise Refused(
+            raise RerunError(
                 f"--only {name}: the deposit has no such run; expected {SMALLEST}, or one of its "
                 f"{format_count(len(runs), 'run')}{such_as}"
             )
@@ -111,11 +111,11 @@ def find_runs(only: Iterable[str], deposit: Path) -> list[str]:
 
 def _smallest(deposit: Path, runs: list[str]) -> str:
     """Return the complete run that, together with its surface, has the fewest bytes."""
-    sizes = {run: sum((deposit / path).stat().st_size for path in with_surfaces([run], deposit)) for run in runs}
+    sizes = {run: sum((deposit / path).stat().st_size for path in add_surfaces([run], deposit)) for run in runs}
     for run in sorted(runs, key=lambda run: sizes[run]):
         if _is_complete(deposit, run):
             return run
-    raise Refused(f"--only {SMALLEST}: no run of the deposit is complete; expected the name of a run that has steps")
+    raise RerunError(f"--only {SMALLEST}: no run of the deposit is complete; expected the name of a run that has steps")
 
 
 def _is_complete(deposit: Path, run: str) -> bool:
@@ -124,34 +124,34 @@ def _is_complete(deposit: Path, run: str) -> bool:
         with netCDF4.Dataset(deposit / run) as file:
             return "step" in file.dimensions and len(file.dimensions["step"]) > 0 and not why_no_result(file.__dict__)
     except (OSError, ValueError, RuntimeError) as error:  # the last one for what the library cannot read
-        raise Refused(f"{run}: is not a run: {error}") from None
+        raise RerunError(f"{run}: is not a run: {error}") from None
 
 
-def with_surfaces(runs: Iterable[str], deposit: Path) -> list[str]:
+def add_surfaces(runs: Iterable[str], deposit: Path) -> list[str]:
     """Return the paths of runs, and of their surfaces if the deposit has them."""
     surfaces = dict.fromkeys("surfaces/{2}/{3}.nc".format(*run.split("/")) for run in runs)
     return [*runs, *(path for path in surfaces if (deposit / path).is_file())]
 
 
-def prepare(folder: Path, deposit: Path) -> Path:
+def prepare_rerun(folder: Path, deposit: Path) -> Path:
     """Copy configuration and inputs of a deposit to the folder of a rerun, unless it has them; return the copy.
 
     Raises
     ------
-    Refused
+    RerunError
         If the folder has other files or belongs to another deposit, or if the configuration cannot be run, for instance
         because it names files outside the deposit.
     """
     if folder.resolve().is_relative_to(deposit.resolve()):
-        raise Refused(f"--folder {folder}: is in the deposit, which is only read; expected another folder")
+        raise RerunError(f"--folder {folder}: is in the deposit, which is only read; expected another folder")
     digest = f"{sha256_of(deposit / CHECKSUMS)}\n"
     begun, project = folder / _BEGUN, folder / _PROJECT
     if begun.is_file():
         if begun.read_text(encoding="ascii", errors="replace") != digest:
-            raise Refused(f"--folder {folder}: belongs to another deposit; expected a new or empty folder")
+            raise RerunError(f"--folder {folder}: belongs to another deposit; expected a new or empty folder")
     else:
         if folder.is_dir() and any(folder.iterdir()):
-            raise Refused(f"--folder {folder}: has other files in it; expected a new or empty folder")
+            raise RerunError(f"--folder {folder}: has other files in it; expected a new or empty folder")
         project.mkdir(parents=True)
         if (deposit / INPUTS).is_dir():
             shutil.copytree(deposit / INPUTS, project / INPUTS, copy_function=shutil.copyfile)
@@ -159,6 +159,6 @@ def prepare(folder: Path, deposit: Path) -> Path:
     try:
         load_configuration(project / CONFIGURATION, within=project)
     except ConfigurationError as error:
-        raise Refused(f"the configuration of the deposit cannot be run:\n{error}") from None
+        raise RerunError(f"the configuration of the deposit cannot be run:\n{error}") from None
     begun.write_text(digest, encoding="ascii")
     return project

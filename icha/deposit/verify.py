@@ -41,7 +41,7 @@ _LINE = re.compile(r"([0-9a-f]{64})  (.+)")
 _BLOCK = 1 << 20
 
 
-class Damaged(ValueError):
+class DamagedDeposit(ValueError):
     """A deposit that is not whole; the arguments are the problems, one line each."""
 
 
@@ -58,7 +58,7 @@ def whole_deposit(path: str | os.PathLike, *, large: bool = False) -> Iterator[P
 
     Raises
     ------
-    Damaged
+    DamagedDeposit
         If files differ from their checksums, are missing or were added, or if the deposit cannot be read safely.
     OSError
         If a zip cannot be extracted, for instance because the disk is full.
@@ -70,7 +70,7 @@ def whole_deposit(path: str | os.PathLike, *, large: bool = False) -> Iterator[P
             empty = Path(opened.enter_context(tempfile.TemporaryDirectory(prefix="icha-deposit-")))
             folder = _extract(path, empty, large)
         if problems := list(_problems(folder, large)):
-            raise Damaged(*problems)
+            raise DamagedDeposit(*problems)
         yield folder
 
 
@@ -117,15 +117,15 @@ def _extract(path: Path, folder: Path, large: bool) -> Path:
     """
     name = printable(path.name)
     if not path.is_file():
-        raise Damaged(f"{name}: is neither a folder nor a file")
+        raise DamagedDeposit(f"{name}: is neither a folder nor a file")
     try:
         with zipfile.ZipFile(path) as archive:
             entries, packed = archive.infolist(), path.stat().st_size
             unpacked, free = sum(entry.file_size for entry in entries), shutil.disk_usage(folder).free
             if len(entries) > MOST_FILES and not large:
-                raise Damaged(_too_many(len(entries)))
+                raise DamagedDeposit(_too_many(len(entries)))
             if unpacked > MOST_GROWTH * packed + ALLOWANCE and not large:
-                raise Damaged(
+                raise DamagedDeposit(
                     f"{name}: unpacks from {formatting.size(packed)} to {formatting.size(unpacked)}; expected "
                     f"at most {MOST_GROWTH} times its size and {formatting.size(ALLOWANCE)}. Use {LARGE} to accept more"
                 )
@@ -136,11 +136,13 @@ def _extract(path: Path, folder: Path, large: bool) -> Path:
                 )
             archive.extractall(folder)
     except (zipfile.BadZipFile, NotImplementedError, RuntimeError, EOFError, zlib.error) as error:
-        # Damaged, or encrypted, or compressed by an unknown method.
-        raise Damaged(f"{name}: not a readable zip archive: {printable(error)}") from None
+        # Damaged, encrypted, or compressed by an unknown method.
+        raise DamagedDeposit(f"{name}: not a readable zip archive: {printable(error)}") from None
     found = sorted(os.listdir(folder))
     if len(found) != 1 or not (folder / found[0]).is_dir():
-        raise Damaged(f"{name}: contains {printable(', '.join(found[:5]) or 'nothing')}; expected a single folder")
+        raise DamagedDeposit(
+            f"{name}: contains {printable(', '.join(found[:5]) or 'nothing')}; expected a single folder"
+        )
     return folder / found[0]
 
 
@@ -197,5 +199,5 @@ def _inspect(folder: Path, large: bool) -> tuple[set[str], dict[str, str]]:
             else:
                 found.add(name)
             if len(found) + len(problems) > MOST_FILES and not large:
-                raise Damaged(_too_many(len(found) + len(problems)))
+                raise DamagedDeposit(_too_many(len(found) + len(problems)))
     return found, dict(sorted(problems.items()))

@@ -10,7 +10,7 @@ import numpy as np
 from icha.contact.models import MODELS, REFERENCE_MODEL
 from icha.datasets.variables.model_error import SHORT_RANGE
 from icha.figures.ensembles import draw_members, lines_handles, mark_fewer
-from icha.figures.hysteresis import mean_legs
+from icha.figures.hysteresis import average_legs
 from icha.figures.legends import legend_below, model_handle, named_handles, words_handle
 from icha.figures.looks import (
     ASPERITIES_NAME,
@@ -27,9 +27,9 @@ from icha.figures.select import (
     group_by_contact,
     name_of_place,
     path_steps,
+    select_runs,
     shown_model,
     snapshot_label,
-    study_runs,
     unloading_legs,
 )
 from icha.figures.style import legend_handle, logarithmic_axes
@@ -89,7 +89,7 @@ class Curves(NamedTuple):
 
 def study_curves(campaign: xr.DataTree, study: str, boundary_elements: str | None = None) -> Curves:
     """Return the curves of a study, with crosses of boundary elements of this study or another."""
-    groups = group_by_contact(campaign, study_runs(campaign, study, ragged=False))
+    groups = group_by_contact(campaign, select_runs(campaign, study, ragged=False))
     dataset = campaign[study].to_dataset()
     materials = dataset["material"].values.tolist()
     contacts = sorted((group.contact for group in groups), key=lambda contact: materials.index(contact[0]))
@@ -101,7 +101,7 @@ def study_curves(campaign: xr.DataTree, study: str, boundary_elements: str | Non
             look |= {"marker": MODEL_MARKERS[name], "ms": look["ms"] + 2}
         lines.append(Curve(group, look))
     other = boundary_elements or (study if name == ASPERITIES_NAME else None)
-    truths = study_runs(campaign, other, ragged=False, model=REFERENCE_MODEL) if other else []
+    truths = select_runs(campaign, other, ragged=False, model=REFERENCE_MODEL) if other else []
     crosses = [Curve(truth, cross_look(looks, truth.contact)) for truth in group_by_contact(campaign, truths)]
     changed = {"ls": "-" if looks.scale or any(len(group.runs) > 1 for group in groups) else "none"}
     changed |= {} if looks.many_places else {"marker": MODEL_MARKERS[name]}
@@ -239,7 +239,7 @@ def _draw_unloading(panels, line):
 
     runs = line.runs.runs.values()
     slope = next(iter(runs))["rms_slope"]
-    for leg in mean_legs([[("unloading", leg) for leg in unloading_legs(run)] for run in runs]):
+    for leg in average_legs([[("unloading", leg) for leg in unloading_legs(run)] for run in runs]):
         states = xr.Dataset({name: ("step", values) for name, values in leg.values.items()}).assign(rms_slope=slope)
         for axes, points in panels.items():
             load, values = points(states)

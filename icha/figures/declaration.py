@@ -106,7 +106,7 @@ class TruthFigure(StudyFigure):
 
     boundary_elements: Name | None = Field(
         default=None,
-        description="Name of a study whose runs with boundary elements are also drawn. Left out: the study itself, if "
+        description="Name of a study whose runs with boundary elements are also drawn. Default: the study itself, if "
         "it has such runs.",
     )
 
@@ -129,9 +129,7 @@ class TruthFigure(StudyFigure):
 class SnapshotFigure(StudyFigure):
     """A figure of one snapshot of a study."""
 
-    snapshot: Snapshot | None = Field(
-        default=None, description="Which of the study's snapshots. Left out: the first one."
-    )
+    snapshot: Snapshot | None = Field(default=None, description="Snapshot of the study. Default: the first one.")
 
     def study_problems(self, campaign: Campaign, study: Any) -> Iterator[Problem]:
         """Yield in addition the problem of a study without the snapshot."""
@@ -155,11 +153,11 @@ class SnapshotFigure(StudyFigure):
 class RunFigure(StudyFigure):
     """A figure of one run; what is left out is the study's first."""
 
-    surface: Label | None = Field(default=None, description="Surface that is shown.")
-    seed: Seed | None = Field(default=None, description="Seed that is shown.")
+    surface: Label | None = Field(default=None, description="Surface to show.")
+    seed: Seed | None = Field(default=None, description="Seed to show.")
     rms_slope: Positive | None = Field(default=None, description="Rms slope that is shown.")
     material: Label | None = Field(
-        default=None, description="Material that is shown. Left out: the first one with adhesion, if there is any."
+        default=None, description="Material to show. Default: the first one with adhesion, if there is any."
     )
 
     def arguments(self) -> dict[str, Any]:
@@ -208,7 +206,7 @@ def finite_range_error(campaign: Campaign, study: str, files: results.ResultFile
     return {"model_error": files.path(results.MODEL_ERROR)} if is_solved_at_finite_range(campaign, study) else {}
 
 
-def not_unloaded(campaign: Campaign, location: tuple, name: str, *, partly: bool) -> Iterator[Problem]:
+def unloading_problems(campaign: Campaign, location: tuple, name: str, *, partly: bool) -> Iterator[Problem]:
     """Yield the problem of a study that does not unload completely, or if `partly` not at all."""
     study = campaign.studies.get(name)
     if study is not None and not (study.unload or (partly and study.turning_points)):
@@ -219,7 +217,7 @@ def studies_problems(campaign: Campaign, key: str, names: Iterable[str]) -> Iter
     """Yield the problems of a list of studies that must unload completely."""
     for index, name in enumerate(names):
         yield from unknown((key, index), name, campaign.studies)
-        yield from not_unloaded(campaign, (key, index), name, partly=False)
+        yield from unloading_problems(campaign, (key, index), name, partly=False)
 
 
 def campaign_and_model_error(campaign: Campaign, options: ComparedFigure, files: results.ResultFiles) -> Inputs:

@@ -12,7 +12,7 @@ from icha.datasets.variables.model_error import FINITE_RANGE
 from icha.figures.curves import PRESSURE_LABEL
 from icha.figures.ensembles import draw_points, points_handles
 from icha.figures.legends import legend_below, words_handle
-from icha.figures.looks import Looks, interfaces_of
+from icha.figures.looks import Looks, collect_interfaces
 from icha.figures.select import NothingToDraw, asked_of_entry, study_errors
 from icha.figures.style import (
     DASHES,
@@ -114,7 +114,7 @@ def draw_errors(
     curves = _curves(model_error, study, quantities)
     contacts = [curve.contact for curve in curves]
     own_rows = len({tuple(place) for _, *place in contacts}) > _MOST_LINES
-    interfaces = interfaces_of(study_errors(model_error, study).values())
+    interfaces = collect_interfaces(study_errors(model_error, study).values())
     looks = Looks(campaign, interfaces, contacts, by_place=own_rows)
     rows = [[material] for material in looks.materials] if own_rows else [looks.materials]
     fig, panels = new_panels(0.55 + 2.35 * len(rows), len(rows), len(quantities), sharex=True, sharey="col")
@@ -148,7 +148,7 @@ def _curves(model_error, study, quantities):
     entries = study_errors(model_error, study)
     if not entries:
         compared = ", ".join(sorted({str(node.attrs["study"]) for node in model_error.children.values()}))
-        raise ValueError(f"no boundary elements beside study {study!r}; there are some for {compared}")
+        raise ValueError(f"no boundary elements beside study {study!r}; expected one of: {compared}")
     variables = {variable for each in quantities for variable in (each.name, each.other) if variable}
     found = []
     for (name, errors), applicable in itertools.product(entries.items(), (True, False)):
@@ -161,7 +161,7 @@ def _curves(model_error, study, quantities):
             if any(np.isfinite(values[each.name].values).any() for each in quantities):
                 found.append(_Curve(name, values, (material, surface, slope), applicable))
     if not found:
-        raise NothingToDraw(f"study {study}: no run beside boundary elements is complete, so there is nothing to draw")
+        raise NothingToDraw(f"study {study}: no run beside boundary elements is complete")
     return found
 
 

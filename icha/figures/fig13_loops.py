@@ -13,9 +13,9 @@ from icha.datasets import results
 from icha.datasets.labels import ContactLabels
 from icha.datasets.variables.model_error import FINITE_RANGE, SHORT_RANGE
 from icha.figures.curves import AREA_LABEL, PRESSURE_LABEL, SEPARATION_LABEL
-from icha.figures.declaration import Campaign, Declaration, Inputs, TruthFigure, not_unloaded
+from icha.figures.declaration import Campaign, Declaration, Inputs, TruthFigure, unloading_problems
 from icha.figures.ensembles import draw_scatter, lines_handles, mark_fewer
-from icha.figures.hysteresis import ROUNDING, Leg, mean_legs, pull_off_step, unloaded_runs
+from icha.figures.hysteresis import ROUNDING, Leg, average_legs, pull_off_step, select_unloaded_runs
 from icha.figures.legends import legend_below, words_handle
 from icha.figures.looks import BRANCH_DASHES, MODEL_MARKERS, UNLOADING_MARKERS, looks_of_studies
 from icha.figures.select import (
@@ -23,7 +23,7 @@ from icha.figures.select import (
     branches,
     group_by_contact,
     pick,
-    study_runs,
+    select_runs,
     unloading_legs,
 )
 from icha.figures.style import GREY, in_style, legend_handle, new_panels, slope_label
@@ -37,13 +37,13 @@ if TYPE_CHECKING:
 class LoopsFigure(TruthFigure):
     """A figure of the runs of a study in loading and unloading, on one topography."""
 
-    surface: Label | None = Field(default=None, description="Surface that is shown. Left out: the study's first.")
-    seed: Seed | None = Field(default=None, description="Seed that is shown. Left out: the study's first.")
+    surface: Label | None = Field(default=None, description="Surface to show. Default: the first of the study.")
+    seed: Seed | None = Field(default=None, description="Seed to show. Default: the first of the study.")
 
     def problems(self, campaign: Campaign) -> Iterator[Problem]:
         """Yield in addition the problem of a study that does not unload."""
         yield from super().problems(campaign)
-        yield from not_unloaded(campaign, ("study",), self.study, partly=True)
+        yield from unloading_problems(campaign, ("study",), self.study, partly=True)
 
 
 def inputs(campaign: Campaign, options: LoopsFigure, files: results.ResultFiles) -> Inputs:
@@ -134,9 +134,9 @@ def figure(
 
 def _loops(campaign, study, other_study, loops, surface, seed):
     """Return the loops of a surface and seed, and which surface and seed (None: all) these are."""
-    runs = unloaded_runs(campaign, study)
+    runs = select_unloaded_runs(campaign, study)
     surface = pick("surface", surface, [labels.surface for labels, _ in runs])
-    others = study_runs(campaign, other_study, ragged=False, model=REFERENCE_MODEL)
+    others = select_runs(campaign, other_study, ragged=False, model=REFERENCE_MODEL)
     truths = _truths(study, runs, [*(run for _, run in others if unloading_legs(run)), *loops])
     runs = [(labels, run) for labels, run in runs if labels.surface == surface]
     if seed is None:
@@ -145,7 +145,7 @@ def _loops(campaign, study, other_study, loops, surface, seed):
         pick("seed", seed, [labels.seed for labels, _ in runs])
     found = []
     for group in group_by_contact(campaign, [each for each in runs if seed in (None, each[0].seed)]):
-        legs = mean_legs([list(branches(run)) for run in group.runs.values()])
+        legs = average_legs([list(branches(run)) for run in group.runs.values()])
         group = group if seed is None else group._replace(asked=1)
         found.append(_Loop(group, legs, truths.get(group.labels, [])))
     return found, surface, seed

@@ -10,9 +10,9 @@ import numpy as np
 from pydantic import Field
 
 from icha.figures.curves import drop_rounding_errors
-from icha.figures.declaration import Campaign, Declaration, StudyFigure, not_unloaded, studies_problems
+from icha.figures.declaration import Campaign, Declaration, StudyFigure, studies_problems, unloading_problems
 from icha.figures.ensembles import Points, points_handles
-from icha.figures.hysteresis import detached_lines, name_model
+from icha.figures.hysteresis import name_model, select_detached_lines
 from icha.figures.legends import legend_below
 from icha.figures.looks import looks_of_studies
 from icha.figures.style import (
@@ -52,7 +52,7 @@ class PullOffFigure(StudyFigure):
         """Yield in addition the problems of studies that are unknown or do not unload completely."""
         yield from studies_problems(campaign, "load_studies", self.load_studies or ())
         yield from super().problems(campaign)
-        yield from not_unloaded(campaign, ("study",), self.study, partly=False)
+        yield from unloading_problems(campaign, ("study",), self.study, partly=False)
 
 
 DECLARATION = Declaration(
@@ -75,12 +75,12 @@ def figure(
 ) -> Figure:
     """Draw the pull-off of all runs of the studies, averaged over the seeds, against slope and largest load."""
     load_studies = list(dict.fromkeys(load_studies))
-    by_slope = detached_lines(campaign, [study], along_slopes=True)
-    by_load = detached_lines(campaign, load_studies)
+    by_slope = select_detached_lines(campaign, [study], along_slopes=True)
+    by_load = select_detached_lines(campaign, load_studies)
     loaded_slopes = {slope for (*_, slope), _ in by_load}
     if len(loaded_slopes) == 1:
         # The title of the panel names the slope, and lines have the looks of those in (a).
-        by_load = detached_lines(campaign, load_studies, along_slopes=True)
+        by_load = select_detached_lines(campaign, load_studies, along_slopes=True)
     looks = looks_of_studies(campaign, [study, *load_studies], [contact for contact, _ in (*by_slope, *by_load)])
     points = itertools.chain(*by_slope.values(), *by_load.values())
     largest = max(float(run[quantity]) for point in points for run in point.runs.values())

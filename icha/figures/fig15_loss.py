@@ -11,7 +11,7 @@ from pydantic import Field
 from icha.figures.curves import drop_rounding_errors
 from icha.figures.declaration import Campaign, Declaration, FigureOptions, studies_problems
 from icha.figures.ensembles import Points, points_handles
-from icha.figures.hysteresis import detached_lines, name_model
+from icha.figures.hysteresis import name_model, select_detached_lines
 from icha.figures.legends import legend_below
 from icha.figures.looks import looks_of_studies
 from icha.figures.select import ContactRuns, NothingToDraw
@@ -84,7 +84,7 @@ def figure(campaign: xr.DataTree, *, studies: Sequence[str], over_surface_energy
     from matplotlib.patches import Patch
 
     studies = list(dict.fromkeys(studies))
-    runs = detached_lines(campaign, studies)
+    runs = select_detached_lines(campaign, studies)
     looks = looks_of_studies(campaign, studies, [contact for contact, _ in runs])
     sticky = {key: line for key, line in runs.items() if looks.adhesive(key[0][0])}
     if over_surface_energy and not sticky:

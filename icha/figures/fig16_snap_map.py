@@ -9,10 +9,10 @@ import numpy as np
 
 from icha.datasets import results
 from icha.figures.curves import SEPARATION_LABEL
-from icha.figures.declaration import Campaign, Declaration, Inputs, RunFigure, not_unloaded
+from icha.figures.declaration import Campaign, Declaration, Inputs, RunFigure, unloading_problems
 from icha.figures.legends import legend_below, words_handle
 from icha.figures.looks import BRANCH_DASHES, NOT_APPLICABLE_ALONE
-from icha.figures.maps import block_means, draw_whole
+from icha.figures.maps import average_blocks, draw_whole
 from icha.figures.select import NothingToDraw, is_applicable, run_on_topography, unloading_legs
 from icha.figures.style import (
     BLACK,
@@ -38,7 +38,7 @@ class SnapMapFigure(RunFigure):
     def problems(self, campaign: Campaign) -> Iterator[Problem]:
         """Yield the problem of a study that does not unload."""
         yield from super().problems(campaign)
-        yield from not_unloaded(campaign, ("study",), self.study, partly=True)
+        yield from unloading_problems(campaign, ("study",), self.study, partly=True)
 
 
 def inputs(campaign: Campaign, options: SnapMapFigure, files: results.ResultFiles) -> Inputs:
@@ -92,7 +92,7 @@ def figure(campaign: xr.DataTree, surface: xr.Dataset, *, study: str, **which: o
     """Draw the events of one run over its topography, which `surface` must be, and against the separation."""
     labels, run = run_on_topography(campaign, study, surface, **which)
     if not unloading_legs(run):
-        raise NothingToDraw(f"study {study}: no run was unloaded, so unloading cannot be drawn")
+        raise NothingToDraw(f"study {study}: no run was unloaded; expected a study that unloads")
     events = _events(run)
     fig, [(where, when)] = new_panels(3.1, width_ratios=(1.3, 1))
     handles = _draw_places(where, run, surface, events)
@@ -115,7 +115,7 @@ def _draw_places(ax, run, surface, events):
     side = period * length
     # Light, so that the marks show.
     look = {"origin": "lower", "cmap": "gray", "vmin": -2.2 * highest, "vmax": highest}
-    image = draw_whole(ax, block_means(heights) * height, len(heights), side, **look)
+    image = draw_whole(ax, average_blocks(heights) * height, len(heights), side, **look)
     marks = {name: (events["kind"] == name) & (events["branch"] == kind.branch) for name, kind in _KINDS.items()}
     most = max(np.count_nonzero(shown) for shown in marks.values())
     size = max(_LEAST_SIZE, _SIZE * min(1.0, (_FEW / max(most, 1)) ** 0.5))

@@ -13,7 +13,7 @@ from icha.figures.curves import add_snapshot_legend, drop_rounding_errors, snaps
 from icha.figures.declaration import Campaign, Declaration, Inputs, SnapshotFigure, finite_range_error
 from icha.figures.ensembles import draw_members
 from icha.figures.looks import MODEL_MARKERS, TRUTH_LINE
-from icha.figures.select import errors_of_run, finite_range_errors, snapshots_of_materials
+from icha.figures.select import errors_of_run, finite_range_errors, select_snapshots
 from icha.figures.style import BLACK, in_style, logarithmic_axes, new_panels
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ def figure(
     """
     from icha.analysis.model_error import state_of
 
-    lines = snapshots_of_materials(campaign, study, kind, target)
+    lines = select_snapshots(campaign, study, kind, target)
     dataset = campaign[study].to_dataset()
     each_look, looks = snapshot_looks(campaign, study, lines)
     fig, [(left, right)] = new_panels(3.1)

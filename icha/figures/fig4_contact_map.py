@@ -12,7 +12,7 @@ from icha.datasets.labels import SolutionLabels
 from icha.datasets.variables.model_error import FINITE_RANGE, SHORT_RANGE
 from icha.figures.declaration import Campaign, Declaration, Inputs, RunFigure, SnapshotFigure
 from icha.figures.looks import NOT_APPLICABLE_ALONE
-from icha.figures.maps import block_means, circles_in_cell, draw_spots, draw_whole
+from icha.figures.maps import average_blocks, draw_spots, draw_whole, wrap_circles
 from icha.figures.select import is_applicable, run_on_topography
 from icha.figures.style import choose_unit, format_number, in_style, material_label, new_panels
 
@@ -149,7 +149,7 @@ def _solved(labels, run, at, pressure, truth, solution):
     try:
         check_same_contact(run, truth if solution is None else solution)
     except ValueError as error:
-        raise ValueError(f"{labels}: the boundary elements given are of another contact: {error}") from None
+        raise ValueError(f"{labels}: the boundary elements are of another contact: {error}") from None
     if solution is None:
         kind, target = (run[name].values[at] for name in ("snapshot_kind", "snapshot_target"))
         try:
@@ -160,7 +160,7 @@ def _solved(labels, run, at, pressure, truth, solution):
     else:
         solved = float(solution["target_reduced_pressure"])
         if not np.isclose(pressure, solved, rtol=1e-6):
-            raise ValueError(f"{labels}: boundary elements of reduced pressure {solved:g} for one of {pressure:g}")
+            raise ValueError(f"{labels}: boundary elements of reduced pressure {solved:g}; expected {pressure:g}")
         state, contact, name = solution, solution["contact"].transpose("y", "x"), FINITE_RANGE
     return _Solved(contact.values.astype(float), float(state["contact_area_fraction"]), name)
 
@@ -221,7 +221,7 @@ def _view(run, at, surface):
         {"origin": "lower", "cmap": "cividis", "vmin": -highest * height, "vmax": highest * height},
         side,
         length_unit,
-        circles_in_cell(x, y, radius * length, side, str(run["boundary"].values)),
+        wrap_circles(x, y, radius * length, side, str(run["boundary"].values)),
         zoom,
         np.clip(middle - window / 2, 0, side - window),
         window,
@@ -232,12 +232,12 @@ def _draw_spots_over_topography(whole, enlarged, view):
     """Draw the whole map and the enlarged window; return the image of the heights."""
     n, circles, corner, window = len(view.heights), view.circles, view.corner, view.window
     inside = circles[np.all(np.abs(circles[:, :2] - (corner + window / 2)) < window / 2 + circles[:, 2:], axis=1)]
-    image = draw_whole(whole, block_means(view.heights) * view.scale, n, view.side, **view.look)
+    image = draw_whole(whole, average_blocks(view.heights) * view.scale, n, view.side, **view.look)
     outlines = np.minimum(_OUTLINE * _PANEL / view.side * circles[:, 2], _WIDEST_OUTLINE)
     many = len(circles) > _MANY_SPOTS
     draw_spots(whole, circles, facecolor=(*_RED, 0.85), edgecolor="black", lw=outlines, rasterized=many)
     heights, borders = _window(view.heights, view.side / n, corner, window)
-    enlarged.imshow(block_means(heights) * view.scale, extent=borders, interpolation="nearest", **view.look)
+    enlarged.imshow(average_blocks(heights) * view.scale, extent=borders, interpolation="nearest", **view.look)
     draw_spots(enlarged, inside, facecolor=(*_RED, 0.4), edgecolor=(0.75, 0, 0), lw=1.0)
     return image
 
@@ -252,14 +252,14 @@ def _draw_solution(panels, view, run, at, solved):
     (_, solution), (enlarged, compared) = panels
     contact, fine = solved.contact >= 0.5, len(solved.contact)
     spots_cover = contact_of_spots(run, at, fine)
-    draw_whole(solution, block_means(view.heights) * view.scale, len(view.heights), view.side, **view.look)
+    draw_whole(solution, average_blocks(view.heights) * view.scale, len(view.heights), view.side, **view.look)
     red = LinearSegmentedColormap.from_list("contact", [(*_RED, 0.0), (*_RED, 0.9)])
     look = {"origin": "lower", "cmap": red, "vmin": 0, "vmax": 1}
-    draw_whole(solution, block_means(solved.contact), fine, view.side, **look)
+    draw_whole(solution, average_blocks(solved.contact), fine, view.side, **look)
     contour, borders = _window(solved.contact, view.side / fine, view.corner, view.window)
     enlarged.contour(contour, [0.5], extent=borders, origin="lower", colors="black", linewidths=0.9)
     palette = np.array([to_rgb(colour) for _, colour in _STATES])
-    draw_whole(compared, block_means(palette[1 * spots_cover + 2 * contact]), fine, view.side, origin="lower")
+    draw_whole(compared, average_blocks(palette[1 * spots_cover + 2 * contact]), fine, view.side, origin="lower")
     keys = [Patch(fc=colour, label=name) for name, colour in _STATES if name]
     compared.legend(handles=keys, loc="upper center", bbox_to_anchor=(0.5, -0.17), ncols=3, columnspacing=1.0)
     solution.set_title(rf"{solved.name}, $A/A_0$ = {solved.area:.3f}", loc="right")

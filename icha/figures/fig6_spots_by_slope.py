@@ -10,8 +10,8 @@ from pydantic import Field
 from icha.figures.declaration import Campaign, Declaration, StudyFigure
 from icha.figures.legends import legend_below
 from icha.figures.looks import NOT_APPLICABLE_ALONE, Scale
-from icha.figures.maps import circles_in_cell, draw_spots
-from icha.figures.select import is_applicable, pick, snapshot_label, study_runs
+from icha.figures.maps import draw_spots, wrap_circles
+from icha.figures.select import is_applicable, pick, select_runs, snapshot_label
 from icha.figures.style import choose_unit, in_style, new_panels, slope_label
 from icha.support.values import Label, Problem, Seed
 
@@ -23,9 +23,9 @@ if TYPE_CHECKING:
 class SlopesFigure(StudyFigure):
     """A figure of the spots of all slopes, at the same load and at the same area."""
 
-    surface: Label | None = Field(default=None, description="Surface that is shown. Left out: the study's first.")
-    seed: Seed | None = Field(default=None, description="Seed that is shown. Left out: the study's first.")
-    material: Label | None = Field(default=None, description="Material that is shown. Left out: the study's first.")
+    surface: Label | None = Field(default=None, description="Surface to show. Default: the first of the study.")
+    seed: Seed | None = Field(default=None, description="Seed to show. Default: the first of the study.")
+    material: Label | None = Field(default=None, description="Material to show. Default: the first of the study.")
 
     def study_problems(self, campaign: Campaign, study: Any) -> Iterator[Problem]:
         """Yield in addition the problem of a study without snapshots of both kinds."""
@@ -59,7 +59,7 @@ def figure(
     """Draw the spots of all slopes for one surface, seed and material; those left out are the study's first."""
     from matplotlib.patches import Patch
 
-    runs = study_runs(campaign, study)
+    runs = select_runs(campaign, study)
     surface = pick("surface", surface, [labels.surface for labels, _ in runs])
     seed = pick("seed", seed, [labels.seed for labels, _ in runs if labels.surface == surface])
     runs = [(labels, run) for labels, run in runs if (labels.surface, labels.seed) == (surface, seed)]
@@ -102,7 +102,7 @@ def _draw_slopes(ax, runs, kind, colours, length):
         run, look = runs[slope], {"facecolor": colours[slope], "edgecolor": "black", "lw": 0.25}
         side, spots = float(run["period"]) * length, spots_of(run, at[slope])
         places = (spots[f"spot_{name}"].values * length for name in ("x", "y", "radius"))
-        circles = circles_in_cell(*places, side, str(run["boundary"].values))
+        circles = wrap_circles(*places, side, str(run["boundary"].values))
         if kind == "relative_load":
             draw_spots(ax, circles, zorder=2 + order, **look)
         else:

@@ -12,7 +12,7 @@ from icha.figures.curves import add_snapshot_legend, snapshot_looks
 from icha.figures.declaration import Declaration, SnapshotFigure
 from icha.figures.ensembles import draw_members
 from icha.figures.looks import MODEL_MARKERS, TRUTH_LINE
-from icha.figures.select import snapshots_of_materials
+from icha.figures.select import select_snapshots
 from icha.figures.style import choose_unit, in_style, logarithmic_axes, new_panels
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ _CURVE_POINTS = 300
 @in_style
 def figure(campaign: xr.DataTree, *, study: str, kind: str | None = None, target: float | None = None) -> Figure:
     """Draw the patch sizes of every material on the first surface and slope of a study, means over the seeds."""
-    lines = snapshots_of_materials(campaign, study, kind, target)
+    lines = select_snapshots(campaign, study, kind, target)
     dataset = campaign[study].to_dataset()
     each_look, looks = snapshot_looks(campaign, study, lines)
     fig, [(left, right)] = new_panels(3.1, sharex=True)

@@ -12,7 +12,7 @@ from icha.figures.declaration import Campaign, Declaration, SnapshotFigure
 from icha.figures.ensembles import Points, points_handles
 from icha.figures.legends import legend_below, named_handles
 from icha.figures.looks import Looks
-from icha.figures.select import ContactRuns, NothingToDraw, group_by_contact, snapshot_label, study_runs
+from icha.figures.select import ContactRuns, NothingToDraw, group_by_contact, select_runs, snapshot_label
 from icha.figures.style import GREY, in_style, material_label, new_panels
 from icha.support.values import Problem
 
@@ -51,7 +51,7 @@ def figure(campaign: xr.DataTree, *, study: str, kind: str | None = None, target
     from icha.analysis.model_error import state_of
     from icha.datasets.campaign import find_snapshot
 
-    groups = group_by_contact(campaign, study_runs(campaign, study, ragged=False))
+    groups = group_by_contact(campaign, select_runs(campaign, study, ragged=False))
     run = next(iter(groups[-1].runs.values()))
     shown = snapshot_label(run, find_snapshot(run, kind, target))
     # Materials that differ only in their range are one line, which has the name of the first of them.

@@ -14,8 +14,8 @@ from icha.figures.select import (
     ContactRuns,
     NothingToDraw,
     group_by_contact,
+    select_runs,
     shown_model,
-    study_runs,
     unloading_legs,
 )
 
@@ -43,7 +43,7 @@ class Leg(NamedTuple):
     members: dict[str, np.ndarray]
 
 
-def mean_legs(runs: Sequence[Sequence[tuple[str, xr.Dataset]]]) -> list[Leg]:
+def average_legs(runs: Sequence[Sequence[tuple[str, xr.Dataset]]]) -> list[Leg]:
     """Return means over the seeds, at common separations, of the legs of runs, given by branch and steps.
 
     If the runs differ in their number of legs, return all legs.
@@ -64,7 +64,7 @@ def mean_legs(runs: Sequence[Sequence[tuple[str, xr.Dataset]]]) -> list[Leg]:
     return found
 
 
-def unloaded_runs(campaign: xr.DataTree, study: str) -> list[tuple[RunLabels, xr.Dataset]]:
+def select_unloaded_runs(campaign: xr.DataTree, study: str) -> list[tuple[RunLabels, xr.Dataset]]:
     """Return the runs of a study that unload, without their spots and events, along their mean separation.
 
     The load does its work along the mean separation even if that is not the mean gap, as on a free square.
@@ -74,9 +74,9 @@ def unloaded_runs(campaign: xr.DataTree, study: str) -> list[tuple[RunLabels, xr
     NothingToDraw
         If no run is complete, or none was unloaded.
     """
-    runs = [(labels, run) for labels, run in study_runs(campaign, study, ragged=False) if unloading_legs(run)]
+    runs = [(labels, run) for labels, run in select_runs(campaign, study, ragged=False) if unloading_legs(run)]
     if not runs:
-        raise NothingToDraw(f"study {study}: no run was unloaded, so unloading cannot be drawn")
+        raise NothingToDraw(f"study {study}: no run was unloaded; expected a study that unloads")
     return [
         (labels, run.assign(reduced_separation=run["mean_separation"] / run["rms_height"]))
         if str(run["boundary"].values) == "free"
@@ -85,7 +85,7 @@ def unloaded_runs(campaign: xr.DataTree, study: str) -> list[tuple[RunLabels, xr
     ]
 
 
-def detached_lines(
+def select_detached_lines(
     campaign: xr.DataTree, studies: Sequence[str], *, along_slopes: bool = False
 ) -> dict[tuple[Contact, bool], list[ContactRuns]]:
     """Return the runs of some studies that were unloaded to complete separation, as lines of points.
@@ -106,7 +106,7 @@ def detached_lines(
     found, reasons = {}, []
     for study in studies:
         try:
-            runs = [each for each in unloaded_runs(campaign, study) if "hysteresis_loss" in each[1]]
+            runs = [each for each in select_unloaded_runs(campaign, study) if "hysteresis_loss" in each[1]]
         except NothingToDraw as reason:
             reasons.append(str(reason))
             continue

@@ -171,7 +171,7 @@ class Looks:
 def looks_of_studies(campaign: xr.DataTree, studies: Sequence[str], contacts: Iterable[Contact]) -> Looks:
     """Return looks of lines of some studies; lines of a single material have the colours of surfaces and slopes."""
     contacts = list(contacts)
-    interfaces = interfaces_of(campaign[study].to_dataset() for study in studies)
+    interfaces = collect_interfaces(campaign[study].to_dataset() for study in studies)
     return Looks(campaign, interfaces, contacts, by_place=len({material for material, *_ in contacts}) == 1)
 
 
@@ -200,7 +200,7 @@ def place_markers(places: Iterable[tuple[str, float | None]]) -> dict[tuple, str
     return {place: PLACE_MARKERS[k % len(PLACE_MARKERS)] for k, place in enumerate(ordered)}
 
 
-def interfaces_of(datasets: Iterable[xr.Dataset]) -> xr.Dataset:
+def collect_interfaces(datasets: Iterable[xr.Dataset]) -> xr.Dataset:
     """Return modulus, surface energy and range of the materials of several datasets."""
     import xarray as xr
 

@@ -14,7 +14,7 @@ _MOST_CELLS = 1024
 
 
 def draw_whole(axes, means: np.ndarray, n: int, side: float, **look):
-    """Draw a periodic map of n nodes a side, or `block_means` of it.
+    """Draw a periodic map of n nodes a side, or `average_blocks` of it.
 
     Nodes are the centres of the cells of the image. The first row and column are repeated at the opposite border.
     """
@@ -24,7 +24,7 @@ def draw_whole(axes, means: np.ndarray, n: int, side: float, **look):
     return axes.imshow(drawn, extent=borders * 2, interpolation="antialiased", **look)
 
 
-def block_means(nodes: np.ndarray, most: int = _MOST_CELLS) -> np.ndarray:
+def average_blocks(nodes: np.ndarray, most: int = _MOST_CELLS) -> np.ndarray:
     """Return means over blocks of nodes of nearly equal size, if there are more than `most` nodes a side."""
     count = min(len(nodes), most)
     if count == len(nodes):
@@ -35,7 +35,7 @@ def block_means(nodes: np.ndarray, most: int = _MOST_CELLS) -> np.ndarray:
     return (sums.T / np.outer(width, width)).T
 
 
-def circles_in_cell(x, y, radius, period: float, boundary: str) -> np.ndarray:
+def wrap_circles(x, y, radius, period: float, boundary: str) -> np.ndarray:
     """Return centre and radius, (m, 3), of circles and their periodic images that reach into [0, L)²."""
     steps = (-period, 0.0, period) if boundary == "periodic" else (0.0,)
     shifts = np.array([(dx, dy) for dx in steps for dy in steps])

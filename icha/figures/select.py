@@ -60,7 +60,7 @@ def group_by_contact(campaign: xr.DataTree, runs: Iterable[tuple[RunLabels, xr.D
     return list(found.values())
 
 
-def study_runs(
+def select_runs(
     campaign: xr.DataTree, study: str, *, ragged: bool = True, model: str | None = None
 ) -> list[tuple[RunLabels, xr.Dataset]]:
     """Return all complete runs of a study with a model.
@@ -85,7 +85,7 @@ def study_runs(
     wanted = model or shown_model(dataset)
     found = [labels for labels in runs_of_status(dataset, study, (COMPLETE,)) if labels.model == wanted]
     if not found and model is None:
-        raise NothingToDraw(f"study {study}: no run is complete, so there is nothing to draw")
+        raise NothingToDraw(f"study {study}: no run is complete")
     if not ragged:
         campaign = xr.DataTree.from_dict({f"/{study}": dataset.drop_dims(RAGGED, errors="ignore")})
     runs = [(labels, select_run(campaign, labels)) for labels in found]
@@ -112,17 +112,16 @@ def shown_model(study: xr.Dataset) -> str:
 
 def _check_study(campaign, study):
     if study not in campaign.children:
-        raise ValueError(f"no study {study!r} in this campaign; there are {', '.join(campaign.children)}")
+        raise ValueError(f"no study {study!r} in this campaign; expected one of: {', '.join(campaign.children)}")
 
 
 def pick(label: str, wanted, present: Sequence):
-    """Return `wanted` if it is among the values of a label, or the first of them if nothing is wanted."""
+    """Return `wanted` if it is among the values of a label, or the first of them if it is None."""
     if wanted is None:
         return present[0]
     if wanted not in present:
-        raise ValueError(
-            f"no {label} {wanted!r} in this study; there are {', '.join(map(str, dict.fromkeys(present)))}"
-        )
+        expected = ", ".join(map(str, dict.fromkeys(present)))
+        raise ValueError(f"no {label} {wanted!r} in this study; expected one of: {expected}")
     return wanted
 
 
@@ -164,7 +163,7 @@ def pick_run(
     material = pick("material", material, [labels.material for labels in adhesive_first])
     labels = next(labels for labels in runs if labels.material == material)
     if dataset["status"].isel(run_place(dataset, labels)) != COMPLETE:
-        raise NothingToDraw(f"{labels}: this run is not complete, so there is nothing to draw")
+        raise NothingToDraw(f"{labels}: this run is not complete")
     return labels, select_run(campaign, labels)
 
 
@@ -173,11 +172,11 @@ def run_on_topography(
 ) -> tuple[RunLabels, xr.Dataset]:
     """Return the run of `pick_run`; raise ValueError unless a surface file's dataset is its topography."""
     found, run = pick_run(campaign, study, surface=surface_name, **labels)
-    same = np.isclose(float(topography["period"]), float(run["period"]), rtol=1e-9)
-    if not same or int(topography["grid"]) != int(run["grid"]):
-        raise ValueError(f"{found}: the surface given has another period or grid")
+    period, grid = float(run["period"]), int(run["grid"])
+    if not np.isclose(float(topography["period"]), period, rtol=1e-9) or int(topography["grid"]) != grid:
+        raise ValueError(f"{found}: the surface has another period or grid; expected {period:g} m and {grid} nodes")
     if "seed" in topography and int(topography["seed"]) != found.seed:
-        raise ValueError(f"{found}: the surface given has seed {int(topography['seed'])}")
+        raise ValueError(f"{found}: the surface has seed {int(topography['seed'])}; expected {found.seed}")
     return found, run
 
 
@@ -219,14 +218,14 @@ class Snapshots(NamedTuple):
     truths: list[tuple[xr.Dataset, int]]
 
 
-def snapshots_of_materials(
+def select_snapshots(
     campaign: xr.DataTree, study: str, kind: str | None = None, target: float | None = None
 ) -> list[Snapshots]:
     """Return a snapshot of every run of the `shown_model` on the first surface and slope of a study."""
     from icha.datasets.campaign import find_snapshot
 
-    groups = group_by_contact(campaign, study_runs(campaign, study))
-    reference = [] if groups[0].labels.model == REFERENCE_MODEL else study_runs(campaign, study, model=REFERENCE_MODEL)
+    groups = group_by_contact(campaign, select_runs(campaign, study))
+    reference = [] if groups[0].labels.model == REFERENCE_MODEL else select_runs(campaign, study, model=REFERENCE_MODEL)
     found = []
     for group in groups:
         if group.contact[1:] == groups[0].contact[1:]:

@@ -10,7 +10,7 @@ AreaFraction = number(QUANTITIES["area_fraction"].rule)
 
 
 class Snapshot(Section):
-    """A state whose spots and distributions of gap and pressure are kept: exactly one of the four keys."""
+    """A state whose spots and distributions of gap and pressure are saved: exactly one of the four keys."""
 
     reduced_pressure: ReducedPressure | None = Field(  # type: ignore[valid-type]
         default=None, description="At this p/(E* h'rms)."

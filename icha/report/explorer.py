@@ -25,7 +25,7 @@ from icha.datasets.files import read_campaign, read_dataset, readable
 from icha.datasets.labels import RunLabels, path_fields
 from icha.figures.fig3_distributions import gap_densities, joined_pressure_densities, pressure_densities
 from icha.figures.fig8_patch_sizes import patch_areas, patch_density, patches_above
-from icha.figures.maps import block_means
+from icha.figures.maps import average_blocks
 from icha.path.targets import BETWEEN
 from icha.report.template import template
 from icha.support.atomic_files import whole_file
@@ -221,7 +221,7 @@ def floats(values: np.ndarray) -> str:
 def topography(surface: xr.Dataset) -> dict:
     """Return the heights of a surface file over its rms height: means over blocks of nodes, in 256 levels."""
     heights = surface["height"].transpose("y", "x").values / float(surface["rms_height"])
-    means = block_means(heights, MOST_HEIGHTS)
+    means = average_blocks(heights, MOST_HEIGHTS)
     low, high = float(means.min()), float(means.max())
     levels = np.rint((means - low) / (high - low) * LEVELS).astype(np.uint8)
     return {
@@ -297,7 +297,7 @@ def picture(contact: np.ndarray) -> str:
     """
     from PIL import Image
 
-    fraction = block_means(np.asarray(contact, float), MOST_CELLS)[::-1]
+    fraction = average_blocks(np.asarray(contact, float), MOST_CELLS)[::-1]
     levels = np.rint(fraction * LEVELS).astype(np.uint8)
     image = Image.frombytes("P", levels.shape, levels.tobytes())
     image.putpalette(CONTACT_COLOUR * (LEVELS + 1))

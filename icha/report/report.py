@@ -11,6 +11,7 @@ import importlib.metadata
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import xarray as xr
@@ -85,39 +86,34 @@ def write_report(
     further_software : packages that this campaign needs besides `SOFTWARE`.
     """
 
-    def link(target):
-        return None if target is None else Path(os.path.relpath(target, Path(path).parent)).as_posix()
-
+    link = partial(_link, Path(path).parent)
     pictures = _pictures(figures, campaign, link)
     studies = [study_section(campaign, name, comparison) for name in campaign.children]
-    surfaces, checks = list(surfaces), list(checks)
-    entries = list(model_error.children.values()) if model_error is not None else []
+    surfaces = list(surfaces)
     linked = {name: link(target) for name, target in files.items()}
     write_page(
         path,
         "report.html",
         **_campaign_values(campaign, studies),
-        checks=worst(checks),
-        check_count=len(checks),
-        failed=[check for check in checks if not check.passed],
-        surfaces=[surface_row(surface) for surface in surfaces[:MOST_ROWS]],
-        surface_count=len(surfaces),
-        sources=sources(surfaces),
-        spectra=spectra(surfaces),
+        **_check_values(list(checks)),
+        **_surface_values(surfaces),
         figures=pictures,
         graph=provenance(studies, surfaces, pictures, model_error, linked, link(dataset_path)),
-        entries=[error_section(node.to_dataset()) for node in entries],
+        **_source_values(campaign, model_error),
         dataset=link(dataset_path),
-        dataset_name=Path(dataset_path).name if dataset_path is not None else None,
         times=link(times_path),
         results=link(results),
         explorer=link(Path(results, EXPLORER)) if results is not None else None,
         files=linked,
         configuration=configuration,
         citations=citations,
-        references=_references([*campaign.children.values(), *entries]),
         software={name: _version(name) for name in (*SOFTWARE, *further_software)},
     )
+
+
+def _link(folder: Path, target: str | os.PathLike | None) -> str | None:
+    """Return the path of a file relative to the folder of the page."""
+    return None if target is None else Path(os.path.relpath(target, folder)).as_posix()
 
 
 def _campaign_values(campaign: xr.DataTree, studies: list[dict]) -> dict:
@@ -133,6 +129,20 @@ def _campaign_values(campaign: xr.DataTree, studies: list[dict]) -> dict:
         "most_rows": MOST_ROWS,
         "folded": FOLDED_ROWS,
         "paper": MODEL_PAPER.line,
+    }
+
+
+def _check_values(checks: list[Check]) -> dict:
+    failed = [check for check in checks if not check.passed]
+    return {"checks": worst(checks), "check_count": len(checks), "failed": failed}
+
+
+def _surface_values(surfaces: list[xr.Dataset]) -> dict:
+    return {
+        "surfaces": [surface_row(surface) for surface in surfaces[:MOST_ROWS]],
+        "surface_count": len(surfaces),
+        "sources": sources(surfaces),
+        "spectra": spectra(surfaces),
     }
 
 
@@ -156,10 +166,14 @@ def _pictures(figures: Sequence[ReportFigure], campaign: xr.DataTree, link) -> l
     return sorted(pictures, key=lambda picture: [None, *studies].index(picture["study"]))
 
 
-def _references(nodes: Iterable[xr.DataTree]) -> list[str]:
-    """Return the sources that datasets name, each once."""
-    texts = ";".join(node.attrs.get("references", "") for node in nodes)
-    return list(dict.fromkeys(source.strip() for source in texts.split(";") if source.strip()))
+def _source_values(campaign: xr.DataTree, model_error: xr.DataTree | None) -> dict:
+    """Return the error of the model, and the sources that its datasets and those of the campaign name."""
+    entries = list(model_error.children.values()) if model_error is not None else []
+    texts = ";".join(node.attrs.get("references", "") for node in [*campaign.children.values(), *entries])
+    return {
+        "entries": [error_section(node.to_dataset()) for node in entries],
+        "references": list(dict.fromkeys(source.strip() for source in texts.split(";") if source.strip())),
+    }
 
 
 def _version(name: str) -> str | None:

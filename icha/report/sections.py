@@ -13,7 +13,7 @@ import xarray as xr
 
 from icha.analysis.model_error import SUMMARISED
 from icha.datasets.labels import place_of, slopes_of, surfaces_and_slopes
-from icha.datasets.surface_file import as_measured
+from icha.datasets.surface_file import measured_scale
 from icha.datasets.variables.model_error import SHORT_RANGE
 from icha.figures.legends import legend_below, named_handles
 from icha.figures.looks import MOST_COLOURS, Scale
@@ -87,7 +87,7 @@ def read_surface_statistics(path: str | os.PathLike) -> xr.Dataset:
 def surface_row(surface: xr.Dataset) -> dict:
     """Return name, parameters and statistics of a surface file; those of a scan as measured."""
     lengths = ("period", "rolloff_wavelength", "short_wavelength")
-    scale = as_measured(surface)
+    scale = measured_scale(surface)
     return {
         "name": surface.attrs.get("surface", ""),
         "seed": int(surface["seed"]),

@@ -125,7 +125,7 @@ def _run(labels: RunLabels, run: xr.Dataset) -> dict:
 # --- tables of states at the stops of the path ---
 
 
-def own_stops(run: xr.Dataset) -> dict[tuple[str, float], dict[str, float]]:
+def states_at_stops(run: xr.Dataset) -> dict[tuple[str, float], dict[str, float]]:
     """Return reduced pressure, A/A0 and mean gap over h_rms at the stops of a loading, by kind and target."""
     stops = path_steps(run)
     keys = zip(stops["step_kind"].values.tolist(), stops["step_target"].values.tolist(), strict=True)
@@ -138,7 +138,7 @@ def own_stops(run: xr.Dataset) -> dict[tuple[str, float], dict[str, float]]:
     return dict(zip(keys, states, strict=True))
 
 
-def _stops_shown(states) -> dict:
+def _stops_of(states) -> dict:
     """Return the stops and the quantities of a table, from the states of its runs."""
     keys = dict.fromkeys(key for stops in states for key in stops)
     kind = next((kind for kind, _ in keys), "reduced_pressure")
@@ -154,8 +154,8 @@ def _stops_shown(states) -> dict:
 
 def _table(runs) -> dict:
     """Return rows with the states of every run."""
-    states = [(labels, own_stops(run)) for labels, run in runs]
-    table = _stops_shown([stops for _, stops in states])
+    states = [(labels, states_at_stops(run)) for labels, run in runs]
+    table = _stops_of([stops for _, stops in states])
 
     def cell(stops, target):
         state = stops.get((table["kind"], target))
@@ -177,9 +177,9 @@ def _means(dataset: xr.Dataset, complete: list[RunLabels]) -> dict:
     members = []
     for line, labels in list(lines.items())[:MOST_ROWS]:
         runs = [steps.isel(run_place(dataset, each)) for each in labels]
-        states = [own_stops(run.isel(step=slice(0, int(run["step_count"])))) for run in runs]
+        states = [states_at_stops(run.isel(step=slice(0, int(run["step_count"])))) for run in runs]
         members.append((line, _seed_count(len(labels), asked_seeds(dataset, labels[0])), states))
-    table = _stops_shown([stops for *_, states in members for stops in states])
+    table = _stops_of([stops for *_, states in members for stops in states])
 
     def cell(states, target):
         at_stop = [stops[table["kind"], target] for stops in states if (table["kind"], target) in stops]
@@ -205,10 +205,9 @@ def _mean(values: np.ndarray, form) -> Markup:
 
 
 def _range(values: np.ndarray, form) -> Markup | str:
-    """Format the accuracy of a mean: its 95 % interval, or the extremes of fewer than five values.
+    """Format the 95 % interval of a mean, or the extremes of fewer than five values; nothing without scatter.
 
-    If the interval of positive values would reach below zero, it is that of the logarithm. Values without scatter have
-    none.
+    If the interval of positive values would reach below zero, it is that of the logarithm.
     """
     over = ensemble(values)
     # Loads are met exactly, but for rounding errors.
@@ -297,10 +296,9 @@ def _with_unit(values: np.ndarray, unit: str = "") -> Markup:
 
 
 def _spread(comparison: xr.Dataset) -> dict[str, float | None]:
-    """Return the largest differences of the area between materials and between slopes.
+    """Return the largest differences of the area between materials and slopes, at equal pressure and at equal load.
 
-    They are at equal reduced pressure, and at equal load (`_at_load`); None if no two complete runs differ in this
-    label only, or none share a load.
+    None if no two complete runs differ in this label only, or share a load.
     """
     complete = comparison["status"] == COMPLETE
 

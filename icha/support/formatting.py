@@ -1,8 +1,8 @@
-r"""Numbers, bytes, times and lengths as people say them; and text of others, made fit for a terminal, a log or a page.
+r"""Formatting of numbers, bytes, times and lengths, and of untrusted text for a terminal, a log or a page.
 
-In text from files and jobs that are not ours, control characters clear a screen, move its cursor and change its
-colours; overrides of the direction of writing show `exe.txt` for `txt.exe`; line breaks begin lines of their own. They
-are written as Python writes them: `\x1b`, `\u202e`.
+In untrusted text, control characters could clear a screen, move the cursor and change colours; overrides of the writing
+direction could show `exe.txt` for `txt.exe`; line breaks could forge lines. They are printed as Python escapes, such as
+`\x1b` and `\u202e`.
 """
 
 import math
@@ -10,8 +10,8 @@ import re
 
 _PREFIXES = {-12: "p", -9: "n", -6: "u", -3: "m", 0: ""}
 _CONTROLS = r"\x00-\x08\x0b-\x1f\x7f-\x9f"
-# Marks that cannot be seen, overrides and isolates of direction, separators of lines, halves of surrogate pairs, tags.
-# Not the joiners U+200C and U+200D, with which Persian, the languages of India and emoji are written.
+# Invisible marks, overrides and isolates of direction, separators of lines, surrogates, and tags. The joiners U+200C
+# and U+200D are not among them, because Persian, Indian languages and emoji need them.
 _UNSEEN = (
     "\xad\u061c\u180e\u200b\u200e\u200f\u2028-\u202e\u2060-\u206f\ud800-\udfff\ufeff\ufff9-\ufffb\U000e0000-\U000e007f"
 )
@@ -20,17 +20,17 @@ _IN_A_LINE = re.compile(f"[\t\n{_CONTROLS}{_UNSEEN}]")
 
 
 def format_count(number: int, thing: str) -> str:
-    """`1 run`, `3 runs`."""
+    """Format a number of things, such as `1 run` or `3 runs`."""
     return f"{number} {thing}{'' if number == 1 else 's'}"
 
 
 def share(count: int, total: int) -> str:
-    """A part of a whole as a percentage to two digits: `31 %`, `0.024 %`."""
+    """Format a share as a percentage to two digits, such as `31 %` or `0.024 %`."""
     return f"{_digits(100 * count / total, 2)} %"
 
 
 def size(count: float) -> str:
-    """Bytes to three digits: `15 B`, `70.2 kB`, `1.5 GB`."""
+    """Format bytes to three digits, such as `15 B`, `70.2 kB` or `1.5 GB`."""
     for factor, unit in ((1e12, "TB"), (1e9, "GB"), (1e6, "MB"), (1e3, "kB")):
         if count >= factor:
             return f"{_digits(count / factor, 3)} {unit}"
@@ -38,7 +38,7 @@ def size(count: float) -> str:
 
 
 def duration(seconds: float) -> str:
-    """Seconds to two digits: `4.2 s`, `3.3 min`, `14 h`, `5.2 days`."""
+    """Format seconds to two digits, such as `4.2 s`, `3.3 min`, `14 h` or `5.2 days`."""
     for factor, unit, least in ((86400, "days", 100 * 3600), (3600, "h", 3600), (60, "min", 60)):
         if seconds >= least:
             return f"{_digits(seconds / factor, 2)} {unit}"
@@ -46,29 +46,29 @@ def duration(seconds: float) -> str:
 
 
 def _digits(value: float, digits: int) -> str:
-    """A number to so many digits, without a power of ten where it has more before its point."""
+    """Format a number to some digits, in full if it has more before its point."""
     return f"{value:.0f}" if value >= 10.0**digits - 0.5 else f"{value:.{digits}g}"
 
 
 def length(metres: float) -> str:
-    """Metres with a unit as configurations write it, such as `2.5 um`."""
+    """Format metres with a unit as in configurations, such as `2.5 um`."""
     power = 3 * math.floor(math.log10(abs(metres)) / 3 + 1e-9) if metres else 0
     power = min(max(power, min(_PREFIXES)), max(_PREFIXES))
     return f"{metres * 10.0**-power:.6g} {_PREFIXES[power]}m"
 
 
 def printable(text: object) -> str:
-    """The text in a single line, in which nothing acts on a terminal or on the order of what is beside it."""
+    """Escape a text so that it is one line and has no effect on a terminal or on the text around it."""
     return _IN_A_LINE.sub(_escaped, str(text))
 
 
 def printable_lines(text: object) -> str:
-    """The same for text of several lines: line breaks and tabs are kept."""
+    """Escape a text as `printable` does, but for line breaks and tabs."""
     return _IN_LINES.sub(_escaped, str(text))
 
 
 def is_printable(text: str) -> bool:
-    """Whether the text is what `printable` makes of it."""
+    """Return whether `printable` leaves a text unchanged."""
     return not _IN_A_LINE.search(text)
 
 

@@ -1,7 +1,7 @@
-"""Files that others made, as input: which are opened at all, how much memory reading one may take, HDF5 traps, tables.
+"""Input files from unknown sources: which are opened, the memory limit of reading, traps in HDF5 files, tables.
 
-A small file can declare, or unpack to, any size. Readers hold declared sizes against the limit (`require_room`) and
-read within it (`bounded_memory`), whatever library does the reading.
+A small file can declare, or unpack to, any size. Readers compare declared sizes with the limit (`require_room`) and
+read within it (`bounded_memory`), with whatever library.
 """
 
 import csv
@@ -16,14 +16,14 @@ from pathlib import Path
 
 from icha.support import formatting
 
-# Environment variable with the limit in MB, and the limit without it.
+# Environment variable with the memory limit in MB, and the limit without it.
 VARIABLE = "ICHA_INPUT_MB"
-_USUAL_MB = 2000
-# Arrays of the size of a file that reading it may take.
+_DEFAULT_MB = 2000
+# Memory that reading a large file may take, over its size.
 _COPIES = 3
-# Names in an HDF5 file, and groups in one another: to go through more takes minutes.
+# Most names in an HDF5 file, and most nested groups; visiting more takes minutes.
 _MOST_NAMES, _DEEPEST = 100_000, 50
-_WHOLE = "allowed: files that hold all of their data"
+_WHOLE = "expected a file that holds all of its data"
 
 _KINDS = {
     stat.S_IFDIR: "is a folder",
@@ -35,25 +35,25 @@ _KINDS = {
 
 
 class RefusedFile(ValueError):
-    """A file that is not read, for it might do harm; the message says why, and what is allowed."""
+    """A file that is not read because it might do harm; the message says why, and what is expected."""
 
 
 class TooLarge(RefusedFile):
-    """A file that would take more memory than reading one may; the message says how to allow more."""
+    """A file that would take more memory than the limit; the message says how to raise it."""
 
     def __init__(self, needed: str, most: int):
-        """Say what is `needed`, that `most` bytes are allowed, and what allows more."""
+        """Describe the memory `needed`, the limit of `most` bytes, and how to raise it."""
         super().__init__(
-            f"needs {needed} of memory; allowed: {formatting.size(most)}, or what the environment variable {VARIABLE} "
-            f"says, in MB"
+            f"needs {needed} of memory; expected at most {formatting.size(most)}. Set the environment variable "
+            f"{VARIABLE} to allow more, in MB"
         )
 
 
 def problem_with_path(path: str | os.PathLike) -> str | None:
-    """What keeps a path from being opened as a file, None if nothing does; pipes and devices might never end."""
+    """Describe why a path cannot be opened as a file, None if it can; pipes and devices might never end."""
     try:
         kind = stat.S_IFMT(os.stat(path).st_mode)
-    except (FileNotFoundError, NotADirectoryError, ValueError):  # the last one for zero bytes in a path
+    except (FileNotFoundError, NotADirectoryError, ValueError):  # ValueError for zero bytes in a path
         return "no such file"
     except OSError as error:
         return f"cannot be read ({error.strerror})"
@@ -61,29 +61,22 @@ def problem_with_path(path: str | os.PathLike) -> str | None:
 
 
 def most_memory(file: str | os.PathLike | None = None) -> int:
-    """Bytes of memory that reading a file may take.
+    """Memory that reading a file may take, bytes; without an environment variable it grows with the size of `file`.
 
-    Parameters
-    ----------
-    file : which one, if no environment variable sets the limit: one that is large itself may take what it needs.
-
-    Raises
-    ------
-    ValueError
-        If the environment variable is no number.
+    Raises ValueError if the environment variable is not a number.
     """
-    asked = os.environ.get(VARIABLE)
-    if asked is None:
-        # Of a file with holes only what is on the disk; 512 is the unit of st_blocks everywhere.
-        own = 0 if file is None else _COPIES * 512 * os.stat(file).st_blocks
-        return max(_USUAL_MB * 10**6, own)
-    if not re.fullmatch(r"[0-9]{1,9}", asked):
-        raise ValueError(f"{VARIABLE}: {asked!r} is not a number of MB")
-    return int(asked) * 10**6
+    limit = os.environ.get(VARIABLE)
+    if limit is None:
+        # Only what a sparse file has on the disk counts; st_blocks has units of 512 bytes everywhere.
+        needed = 0 if file is None else _COPIES * 512 * os.stat(file).st_blocks
+        return max(_DEFAULT_MB * 10**6, needed)
+    if not re.fullmatch(r"[0-9]{1,9}", limit):
+        raise ValueError(f"{VARIABLE}: {limit!r} is not a number of MB")
+    return int(limit) * 10**6
 
 
 def require_room(needed: float, most: int | None = None) -> None:
-    """Raise `TooLarge` if reading needs more bytes of memory than it may take: `most`, or those of any file."""
+    """Raise `TooLarge` if reading needs more memory than `most` bytes, by default `most_memory`."""
     most = most_memory() if most is None else most
     if needed > most:
         raise TooLarge(f"about {formatting.size(needed)}", most)
@@ -91,20 +84,22 @@ def require_room(needed: float, most: int | None = None) -> None:
 
 @contextmanager
 def bounded_memory(most: int | None = None) -> Iterator[None]:
-    """Let a block allocate no more than `most` bytes, those of any file if left out, whatever libraries it calls.
+    """Limit the memory that a block allocates, in whatever library, to `most` bytes, by default `most_memory`.
 
-    More is `TooLarge`.
-    Libraries in C may have errors of their own for memory that they do not get. Only Linux can bound memory so;
-    elsewhere nothing but declared sizes is checked.
+    Raises `TooLarge`; libraries in C may raise their own errors instead. Only Linux supports the limit; elsewhere only
+    declared sizes are checked.
     """
-    most, taken = most_memory() if most is None else most, _taken()
-    if taken is None:
+    most = most_memory() if most is None else most
+    if sys.platform != "linux":
         yield
         return
     import resource
 
+    import psutil
+
     soft, hard = resource.getrlimit(resource.RLIMIT_DATA)
-    bounds = [bound for bound in (taken + most, soft, hard) if bound != resource.RLIM_INFINITY]
+    used = psutil.Process().memory_info().data
+    bounds = [bound for bound in (used + most, soft, hard) if bound != resource.RLIM_INFINITY]
     resource.setrlimit(resource.RLIMIT_DATA, (min(bounds), hard))
     try:
         yield
@@ -114,27 +109,18 @@ def bounded_memory(most: int | None = None) -> Iterator[None]:
         resource.setrlimit(resource.RLIMIT_DATA, (soft, hard))
 
 
-def _taken() -> int | None:
-    """Bytes of data of this process, None where they cannot be bounded."""
-    if sys.platform != "linux":
-        return None
-    import psutil
-
-    return psutil.Process().memory_info().data
-
-
 def text(attribute: bytes | str | Iterable[bytes | str]) -> str:
-    """A text, however the library that wrote it keeps texts; that of netCDF puts those beyond ASCII into arrays."""
+    """Convert a text attribute to str, as bytes or in an array of one, as netCDF stores non-ASCII texts."""
     if not isinstance(attribute, bytes | str):
         (attribute,) = attribute
     return attribute.decode() if isinstance(attribute, bytes) else str(attribute)
 
 
 def refuse_traps(path: str | os.PathLike) -> None:
-    """Refuse a file whose names lead elsewhere or in circles, or are too many; what is no HDF5 file passes.
+    """Refuse an HDF5 file with links or data in other files, with cyclic groups, or with too many names.
 
-    Names and data that lie in other files could be any of this machine. Groups that are reached in two ways may lie in
-    one another: the library of netCDF is torn apart by them. Links to data of the same file stay.
+    Links to other files could reach any file of this machine. A group with two names may contain itself, which crashes
+    the netCDF library. Links to data in the same file are accepted, and so are files of other formats.
 
     Raises
     ------
@@ -151,22 +137,22 @@ def refuse_traps(path: str | os.PathLike) -> None:
         groups, count = {h5py.h5o.get_info(file.id).addr}, 0
 
         def trap(name, link):
-            """What ends the visit, and is given by it."""
+            """Return a reason to refuse the file, which ends the visit, or None."""
             nonlocal count
             count += 1
             if count > _MOST_NAMES or name.count(b"/") >= _DEEPEST:
-                return f"it has more than {_MOST_NAMES:,} names, or {_DEEPEST} groups in one another; allowed: fewer"
+                return f"it has more than {_MOST_NAMES:,} names, or {_DEEPEST} nested groups; expected fewer"
             if link.type == h5py.h5l.TYPE_EXTERNAL:
                 return f"{_shown(name)} is a link to another file; {_WHOLE}"
             try:
                 node = h5py.h5o.open(file.id, name)
             except (KeyError, RuntimeError, SystemError):  # a link to nothing, or to itself
                 return None
-            if isinstance(node, h5py.h5d.DatasetID) and _lies_elsewhere(node.get_create_plist()):
-                return f"{_shown(name)} has its data elsewhere; {_WHOLE}"
+            if isinstance(node, h5py.h5d.DatasetID) and _is_external(node.get_create_plist()):
+                return f"{_shown(name)} has its data in another file or dataset; {_WHOLE}"
             if isinstance(node, h5py.h5g.GroupID):
                 if (address := h5py.h5o.get_info(node).addr) in groups:
-                    return f"{_shown(name)} is a group that has another name, too; allowed: one name for each"
+                    return f"{_shown(name)} is a group with a second name; expected one name for each group"
                 groups.add(address)
             return None
 
@@ -174,7 +160,7 @@ def refuse_traps(path: str | os.PathLike) -> None:
             raise RefusedFile(found)
 
 
-def _lies_elsewhere(properties):
+def _is_external(properties):
     import h5py
 
     return properties.get_layout() == h5py.h5d.VIRTUAL or (
@@ -187,34 +173,34 @@ def _shown(name):
 
 
 def read_columns(path: str | Path, columns: dict[str, float]) -> list:
-    """Read columns of a CSV file, each an array in the file's own order.
+    """Read columns of a CSV file with a line of headings, each as an array in the order of the file.
 
     Parameters
     ----------
-    path : the file, with a line of headings.
-    columns : headings of the wanted columns, and the factors that their numbers are multiplied with.
+    path : the file.
+    columns : headings of the columns, and the factors that their numbers are multiplied by.
 
     Raises
     ------
     ValueError
         If the file cannot be read, or a column is missing or holds anything but positive numbers.
     """
-    import numpy as np  # which commands that read no table do not wait for
+    import numpy as np  # imported here because most commands read no table
 
     if problem := problem_with_path(path):
-        raise ValueError(f"{problem}; allowed: a CSV file")
+        raise ValueError(f"{problem}; expected a CSV file")
     try:
         with bounded_memory(), Path(path).open(encoding="utf-8-sig", newline="") as file:
             rows = list(csv.DictReader(file, skipinitialspace=True))
     except (OSError, UnicodeDecodeError, csv.Error, TooLarge) as error:
         reason = getattr(error, "strerror", None) or error
-        raise ValueError(f"cannot be read ({reason}); allowed: a CSV file") from None
+        raise ValueError(f"cannot be read ({reason}); expected a CSV file") from None
     if not rows:
-        raise ValueError("holds no values; allowed: a CSV file with a line of headings and at least one of numbers")
+        raise ValueError("holds no values; expected a CSV file with a line of headings and at least one of numbers")
     found = []
     for heading, factor in columns.items():
         if heading not in rows[0]:
-            raise ValueError(f"has no column {heading!r}; allowed: {', '.join(map(str, rows[0]))}")
+            raise ValueError(f"has no column {heading!r}; expected one of {', '.join(map(str, rows[0]))}")
         values = [_positive(row[heading], f"column {heading!r}, row {n}") for n, row in enumerate(rows, start=1)]
         found.append(np.array(values) * factor)
     return found
@@ -226,5 +212,5 @@ def _positive(text, where: str) -> float:
     except (TypeError, ValueError):
         value = math.nan
     if not 0 < value < math.inf:
-        raise ValueError(f"{where}: {text!r}; allowed: numbers greater than 0")
+        raise ValueError(f"{where}: {text!r}; expected a number greater than 0")
     return value

@@ -1,15 +1,15 @@
-"""Work on the cores that the process may use, with results that do not depend on how many there are."""
+"""Parallel work on the cores of the process, with results that do not depend on their number."""
 
 import os
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 
-# Nodes a side of a grid from which on several threads pay.
+# Nodes a side of a grid from which several threads pay.
 LARGE_GRID = 2048
 
 
 def cores() -> int:
-    """Number of threads to work with: OMP_NUM_THREADS if it is set, else the processors that the process may use.
+    """Number of threads: OMP_NUM_THREADS if it is set, otherwise the processors that the process may use.
 
     Snakemake sets OMP_NUM_THREADS to the `threads` of a rule.
     """
@@ -20,10 +20,10 @@ def cores() -> int:
 
 
 def on_cores(function: Callable, items: Iterable) -> list:
-    """Results of `function` for every item, in the order of the items.
+    """Apply `function` to every item in threads; return the results in the order of the items.
 
-    What an item is must not depend on the number of cores: then neither does any bit of the results. Threads help
-    where the function spends its time in NumPy, SciPy or finufft on arrays of some size.
+    The results have the same bits on any number of cores if the items do not depend on it. Threads help if the function
+    spends its time in NumPy, SciPy or finufft.
     """
     items = list(items)
     count = min(cores(), len(items))
@@ -32,7 +32,7 @@ def on_cores(function: Callable, items: Iterable) -> list:
     results, waiting = [None] * len(items), enumerate(items)
 
     def work():
-        # Each thread takes the next item by itself: handing out many short ones would take as long as they do.
+        # Each thread takes the next item by itself, because distributing many short ones would take as long as they do.
         for number, item in waiting:
             results[number] = function(item)
 

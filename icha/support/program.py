@@ -1,6 +1,6 @@
-"""This program on this machine: where its workflow is (in the repository, or installed beside), and its processes.
+"""This program on this machine: the folder of its workflow, in a clone or installed, and its processes.
 
-`python -m icha.support.program` prints where shipped campaigns and example files lie, in config/.
+`python -m icha.support.program` prints the folder of the workflow; shipped campaigns and examples are in its config/.
 """
 
 import ctypes
@@ -8,25 +8,25 @@ import os
 import signal
 from pathlib import Path
 
-# The folder beside the installed package; pyproject.toml puts it there (tool.hatch.build.targets.wheel.hooks).
+# Folder beside the installed package, which the wheel contains (tool.hatch.build.targets.wheel.hooks).
 INSTALLED = "icha_workflow"
 _PACKAGE = Path(__file__).resolve().parent.parent
 _PR_SET_PDEATHSIG = 1  # of prctl(2)
 
 
 def own_workflow() -> Path:
-    """The folder with the Snakefile: the repository of an editable installation, else what was installed."""
+    """Folder with the Snakefile: the repository of an editable installation, otherwise the installed folder."""
     beside = _PACKAGE.parent
     return beside if (beside / "Snakefile").is_file() else beside / INSTALLED
 
 
 def is_installed(workflow: Path) -> bool:
-    """Whether the folder with a Snakefile is what was installed, and no clone of the repository."""
+    """Return whether the folder of a workflow is an installed one, not a clone of the repository."""
     return workflow.name == INSTALLED and not (workflow / "icha").is_dir()
 
 
 def package_of(workflow: Path) -> Path:
-    """The package `icha` that belongs to a workflow: in its folder, or beside it where that is installed."""
+    """Folder of the package `icha` of a workflow: in the folder of a clone, beside an installed one."""
     return (workflow.parent if is_installed(workflow) else workflow) / "icha"
 
 
@@ -35,20 +35,17 @@ if __name__ == "__main__":
 
 
 def beginning_of(process: int) -> str:
-    """When a process began, in the system's own count: with its number it tells the process from all others.
+    """Start time of a process in system ticks, which with its number identifies it.
 
-    Raises
-    ------
-    FileNotFoundError, ProcessLookupError
-        If there is no such process.
+    Raises FileNotFoundError or ProcessLookupError if there is no such process.
     """
-    # The name of the program, in parentheses, may hold anything.
+    # The name of the program, in parentheses, may contain any characters.
     status = Path(f"/proc/{process}/stat").read_text(encoding="utf-8", errors="replace")
     return status.rpartition(")")[2].split()[19]
 
 
 def end_with_parent(parent: int) -> None:
-    """Have the system kill this process when its parent, the process `parent`, ends, however that does."""
+    """Let the system kill this process when its parent, the process `parent`, ends for any reason."""
     ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
     if os.getppid() != parent:
         os._exit(1)

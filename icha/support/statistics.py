@@ -1,20 +1,24 @@
-"""Means over an ensemble of surfaces of the same statistics, and how well they are known."""
+"""Means over an ensemble of surfaces of the same statistics, and their confidence intervals."""
 
 from typing import NamedTuple
 
 import numpy as np
 
-# The part of such bands that hold the mean of infinitely many surfaces.
+# Probability that a confidence interval contains the mean of infinitely many surfaces.
 CONFIDENCE = 0.95
-# Of fewer members the band is wider than their scatter: they are better shown one by one.
+# With fewer members the confidence interval is wider than their scatter, so figures show them one by one.
 ENOUGH = 5
 
 
 class Ensemble(NamedTuple):
-    """Statistics over the members of an ensemble, arrays of one shape; NaN where there are too few members for them.
+    """Statistics over the members of an ensemble, arrays of one shape; NaN where there are too few members.
 
-    `mean` needs one member. `deviation`, the standard deviation of the members (Bessel's correction), and `confidence`,
-    half the width of the 95 % band of the mean, need two. `count` is the number of members.
+    Attributes
+    ----------
+    mean : needs one member.
+    deviation : standard deviation of the members (with Bessel's correction); needs two.
+    confidence : half the width of the 95 % confidence interval of the mean; needs two.
+    count : number of members.
     """
 
     mean: np.ndarray
@@ -23,11 +27,11 @@ class Ensemble(NamedTuple):
     count: np.ndarray
 
     def band(self, *, positive: bool = False) -> tuple[np.ndarray, np.ndarray]:
-        """Lower and upper end of the band of the mean m: m ± c, or of a `positive` quantity m exp(± c/m).
+        """Confidence interval of the mean m: m ± c, or m exp(± c/m) for a `positive` quantity.
 
-        The second is the interval of the logarithm of the mean, whose standard error is that of the mean over the mean
-        to first order (delta method). It stays above zero, and is the first where c is small. Where a mean is not
-        positive it is the first in any case.
+        The second is the interval of the logarithm of the mean, whose standard error is, to first order, that of the
+        mean over the mean (delta method). It stays above zero and tends to the first as c vanishes. It needs a positive
+        mean; the first is used otherwise.
         """
         above = (self.mean > 0) & positive
         factor = np.exp(np.divide(self.confidence, self.mean, out=np.zeros_like(self.mean), where=above))
@@ -36,7 +40,7 @@ class Ensemble(NamedTuple):
 
 
 def ensemble(samples, axis: int = 0) -> Ensemble:
-    """Mean over an axis and its confidence band by Student's t, which holds for normally distributed members.
+    """Mean over an axis and its confidence interval by Student's t, for normally distributed members.
 
     Parameters
     ----------
@@ -44,10 +48,10 @@ def ensemble(samples, axis: int = 0) -> Ensemble:
 
     Notes
     -----
-    The band of n members of standard deviation s is mean ± t s/√n, where t is the quantile of Student's distribution of
-    n - 1 degrees of freedom beyond which (1 - 0.95)/2 of it lies (Student, Biometrika 6 (1908) 1).
+    The interval of n members of standard deviation s is mean ± t s/√n, where t is the 97.5 % quantile of Student's
+    distribution of n - 1 degrees of freedom (Student, Biometrika 6 (1908) 1).
     """
-    from scipy.special import stdtrit  # here, for figures' declarations need not wait for it
+    from scipy.special import stdtrit  # imported here because declarations of figures do not need it
 
     samples = np.moveaxis(np.asarray(samples, float), axis, 0)
     known = np.isfinite(samples)

@@ -1,4 +1,4 @@
-"""Energy of full contact, and what it says of runs of asperities."""
+"""Energy of full contact, and the applicability of the asperity model that follows from it."""
 
 import math
 

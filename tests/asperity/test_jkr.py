@@ -23,6 +23,11 @@ def hertz():
     return JKR(Material(MODULUS, 0.0, RANGE))
 
 
+@pytest.fixture(params=[0.0, ENERGY], ids=["hertz", "jkr"])
+def both(request):
+    return JKR(Material(MODULUS, request.param, RANGE))
+
+
 def units(radius):
     """Units of contact radius, approach and force in which one JKR curve serves all spots."""
     length = ENERGY / MODULUS
@@ -124,9 +129,8 @@ def test_derivatives_by_differences(law):
         np.testing.assert_array_less(np.abs(derivative(a, R) - difference) / scale, 1e-8)
 
 
-@pytest.mark.parametrize("energy", [0.0, ENERGY])
-def test_force_and_second_moment_are_integrals_of_the_pressure(energy):
-    law = JKR(Material(MODULUS, energy, RANGE))
+def test_force_and_second_moment_are_integrals_of_the_pressure(both):
+    law = both
     a = 1.7 * units(R)[0]
 
     def moment(power):
@@ -145,16 +149,15 @@ def test_force_and_second_moment_are_integrals_of_the_pressure(energy):
     assert law.second_moment(a, R) == pytest.approx(moment(2) / 4, rel=1e-7)
 
 
-@pytest.mark.parametrize("energy", [0.0, ENERGY])
 @pytest.mark.parametrize("relative", [0.3, 0.732296, 1.523237, 2.417988, 40.0])
-def test_energy_is_the_work_that_makes_the_spot(energy, relative):
-    """The integral of the force over the approach, from no spot on, over the unstable branch too where there is one."""
-    law = JKR(Material(MODULUS, energy, RANGE))
+def test_energy_is_the_work_that_makes_the_spot(both, relative):
+    """The integral of the force over the approach from a = 0 includes the unstable branch."""
+    law, energy = both, both.material.surface_energy
     a_unit, delta_unit, force_unit = units(R)
 
     def work(x):  # a = x^2 makes the lower end regular
         a = x**2 * a_unit
-        # Not the law's own derivative, which is infinite where there is no spot.
+        # The derivative of the law itself is infinite at a = 0.
         slope = 4 * x**3 - np.sqrt(2 * np.pi) * (energy > 0)
         return float(law.force(a, R)) / force_unit * slope
 
@@ -164,10 +167,9 @@ def test_energy_is_the_work_that_makes_the_spot(energy, relative):
     assert law.energy(0.0, R) == 0
 
 
-@pytest.mark.parametrize("energy", [0.0, ENERGY])
 @pytest.mark.parametrize("relative", [0.7, 2.0, 40.0])
-def test_displacement_against_quadrature_of_the_pressure(energy, relative):
-    law = JKR(Material(MODULUS, energy, RANGE))
+def test_displacement_against_quadrature_of_the_pressure(both, relative):
+    law, energy = both, both.material.surface_energy
     a = relative * units(R)[0]
     s = np.array([0.0, 0.2, 0.9, 0.999, 1.001, 1.1, 2, 7, 19.9, 20.1, 60])
     expected = np.array([displacement_by_quadrature(r, a, R, MODULUS, energy) for r in s * a])
@@ -178,9 +180,8 @@ def test_displacement_against_quadrature_of_the_pressure(energy, relative):
     assert law.displacement(far, a, R) == pytest.approx(law.force(a, R) / (np.pi * MODULUS * far), rel=1e-5)
 
 
-@pytest.mark.parametrize("energy", [0.0, ENERGY])
-def test_displacement_derivative_by_differences(energy):
-    law = JKR(Material(MODULUS, energy, RANGE))
+def test_displacement_derivative_by_differences(both):
+    law = both
     a = 2 * units(R)[0]
     r = a * np.array([0.1, 0.8, 1.2, 3, 15, 50])
     step = 1e-5 * a
@@ -188,15 +189,12 @@ def test_displacement_derivative_by_differences(energy):
     np.testing.assert_allclose(law.displacement_derivative(r, np.full(6, a), R), difference, rtol=1e-6)
 
 
-def test_a_spot_of_no_radius_displaces_nothing(hertz, law):
-    r = np.array([0.0, 1e-9, 1e-3])
-    np.testing.assert_array_equal(hertz.displacement(r, np.zeros(3), R), 0)
-    np.testing.assert_array_equal(law.displacement(r, np.zeros(3), R), 0)
+def test_a_spot_of_no_radius_displaces_nothing(both):
+    np.testing.assert_array_equal(both.displacement(np.array([0.0, 1e-9, 1e-3]), np.zeros(3), R), 0)
 
 
-@pytest.mark.parametrize("energy", [0.0, ENERGY])
-def test_pressure_distribution_by_counting(energy):
-    law = JKR(Material(MODULUS, energy, RANGE))
+def test_pressure_distribution_by_counting(both):
+    law = both
     a = 1.6 * units(R)[0]
     # Rings of equal area, midpoints: the pressure is monotone in r, so the area below p is off by at most one ring.
     rings = 400_000
@@ -210,7 +208,7 @@ def test_pressure_distribution_by_counting(energy):
         if limit >= top:
             assert area == pytest.approx(np.pi * a**2, rel=1e-14)
             assert force == pytest.approx(law.force(a, R), rel=1e-12)
-        elif energy == 0:
+        elif law.material.surface_energy == 0:
             expected = np.sum(p[inside]) * np.pi * a**2 / rings
             assert force == pytest.approx(expected, abs=1e-5 * abs(law.force(a, R)))
 

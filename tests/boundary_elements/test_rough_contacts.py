@@ -90,11 +90,11 @@ from threadpoolctl import threadpool_limits
 from icha.boundary_elements import transforms
 from icha.boundary_elements.contact import BoundaryElements, contact_of
 from icha.support import parallel
-from validation.rough_contacts import SOFT, followed, rough
+from validation.rough_contacts import SOFT, states_at, rough
 
 transforms.CACHE, parallel.LARGE_GRID = 1000, 0
 with threadpool_limits(1):
-    (state,) = followed(contact_of(rough(64, waves=8), SOFT), [2.2])
+    (state,) = states_at(contact_of(rough(64, waves=8), SOFT), [2.2])
 for part in (state.cells, state.fraction, state.pressure, state.around):
     sys.stdout.buffer.write(part.tobytes())
 """

@@ -1,4 +1,4 @@
-"""Paths that are gone on with after they were stopped."""
+"""Interrupted paths resume from their checkpoints."""
 
 import pytest
 from xarray.testing import assert_identical
@@ -11,7 +11,7 @@ from icha.simulation import ConvergenceError
 
 SURFACE = SelfAffineSpectrum(1e-6, 1e-6, 0.5e-6, 0.8).realise(16, 1).scaled_to_rms_slope(0.3)
 PATHS = {
-    "both ways": (Material(1e6, 1e-4, 1e-9), Path(reduced_pressures=[2e-3], unload=True, max_step=0.5)),
+    "unloading": (Material(1e6, 1e-4, 1e-9), Path(reduced_pressures=[2e-3], unload=True, max_step=0.5)),
     "areas": (Material(1e6, 0.01, 1e-8), Path(area_fractions=[0.05, 0.1])),
     # No equilibrium at so little contact can be held.
     "a failure": (Material(1e6, 0.5, 1e-8), Path(area_fractions=[1e-4, 0.2])),
@@ -19,7 +19,7 @@ PATHS = {
 
 
 def followed(monkeypatch, case, folder, most):
-    """What a simulation finds, or how it fails, and how often it sought an equilibrium; it is stopped after `most`."""
+    """Return the dataset of a simulation, also of a failed one, and the number of its solves; stop it after `most`."""
     found, count = BoundaryElements.equilibrium, 0
 
     def equilibrium(*args, **options):
@@ -50,7 +50,7 @@ def test_a_path_that_was_stopped_goes_on_to_the_same_last_bit(monkeypatch, case,
     assert followed(monkeypatch, case, folder, half) == (None, half)
     again, further = followed(monkeypatch, case, folder, None)
     assert_identical(again, whole)
-    # What was being looked for when it was stopped is looked for again, nothing else.
+    # Only the interrupted solve is repeated.
     assert further == needed - half
     assert followed(monkeypatch, case, prepare_checkpoints(folder, "this path"), None)[1] == 0
 

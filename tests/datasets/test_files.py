@@ -117,12 +117,13 @@ def test_damaged_files_are_named(tmp_path, damage):
 
 def test_files_that_are_something_else_are_named(tmp_path):
     write_dataset(simple(), tmp_path / "x.nc")
-    with pytest.raises(ValueError, match="not a run dataset"):
-        read_run(tmp_path / "x.nc")
-    with pytest.raises(ValueError, match="not a surface file"):
-        read_surface(tmp_path / "x.nc")
-    with pytest.raises(ValueError, match="no such file"):
-        read_dataset(tmp_path / "y.nc")
+    for read, name, message in (
+        (read_run, "x.nc", "not a run dataset"),
+        (read_surface, "x.nc", "not a surface file"),
+        (read_dataset, "y.nc", "no such file"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            read(tmp_path / name)
 
 
 def test_surface_round_trip_keeps_heights_and_axes(tmp_path):
@@ -324,15 +325,7 @@ def test_padding_is_missing_and_nothing_else_is(tmp_path):
         lacking = np.isnan(variable.values)
         np.testing.assert_array_equal(lacking, beyond.values if "step" in variable.dims else False, err_msg=name)
     np.testing.assert_array_equal(study["branch"] == "", beyond)
-    assert "branch" in study.coords and set(study.indexes) == {
-        "model",
-        "surface",
-        "seed",
-        "rms_slope",
-        "material",
-        "step",
-        "snapshot",
-    }
+    assert "branch" in study.coords and set(study.indexes) == {*LABELS, "step", "snapshot"}
     with netCDF4.Dataset(tmp_path / "one.nc") as file:
         group = file["loops"]
         assert group["spot_count"].dtype == group["leg"].dtype == np.int32
@@ -369,11 +362,7 @@ def test_events_belong_to_their_runs():
 def test_a_run_that_broke_off_on_its_way_back_has_no_pull_off(tmp_path):
     runs = {labels: run for labels, run in cyclic.runs().items() if labels.study == "loops"}
     broken = next(iter(runs))
-    lost = [
-        name
-        for name, variable in runs[broken].data_vars.items()
-        if name.startswith(("loss_", "hysteresis_", "pull_off_"))
-    ]
+    lost = [name for name in runs[broken].data_vars if name.startswith(("loss_", "hysteresis_", "pull_off_"))]
     short = runs[broken].isel(step=slice(0, 6)).drop_vars(lost).assign_attrs(incomplete="the path ends there")
     # Whichever comes first: what the others have is what the study has.
     for order in (runs | {broken: short}, {broken: short} | runs):

@@ -21,18 +21,21 @@ def files(tmp_path_factory):
     return folder
 
 
+def problems(kind, data):
+    return "\n".join(problems_with_file(kind, data))
+
+
 def test_what_is_written_keeps_to_the_format(files):
     for name, kind in (("run", RUN), ("surface", SURFACE)):
         found, data = identify_file(files / f"{name}.nc")
-        assert found == kind and problems_with_file(kind, data) == []
+        assert found == kind and problems(kind, data) == ""
 
 
 def test_a_campaign_lacks_only_what_the_workflow_adds(files):
     kind, tree = identify_file(files / "campaign.nc")
     assert kind == CAMPAIGN
-    assert {problem.split(": ")[-1] for problem in problems_with_file(kind, tree)} <= {
-        f"attribute {name} is missing" for name in ("config_sha256", "license")
-    }
+    for line in problems(kind, tree).splitlines():
+        assert line.endswith(("attribute config_sha256 is missing", "attribute license is missing")), line
 
 
 def test_the_vocabulary_keeps_what_is_promised():
@@ -74,46 +77,37 @@ def changed(run, name, **attrs):
         ),
     ],
 )
-def test_what_is_spoilt_is_found(spoil, problem):
+def test_changes_of_a_run_are_found(spoil, problem):
     with xr.set_options(keep_attrs=True):
-        found = problems_with_file(RUN, spoil(small.run()))
-    assert any(problem in line for line in found), found
+        assert problem in problems(RUN, spoil(small.run()))
 
 
-def test_spoilt_surfaces_and_campaigns_are_found(files):
+def test_changes_of_surfaces_and_campaigns_are_found(files):
     _, surface = identify_file(files / "surface.nc")
-    assert any(
-        "height: has the shape (31, 32)" in problem
-        for problem in problems_with_file(SURFACE, surface.isel(y=slice(1, None)))
-    )
-    assert any(
-        "boundary: 'round'" in problem
-        for problem in problems_with_file(SURFACE, surface.assign_attrs(boundary="round"))
-    )
+    assert "height: has the shape (31, 32)" in problems(SURFACE, surface.isel(y=slice(1, None)))
+    assert "boundary: 'round'" in problems(SURFACE, surface.assign_attrs(boundary="round"))
     _, tree = identify_file(files / "campaign.nc")
     tree.attrs |= {"creator_name": "A. Maker", "date_created": "today"}
-    refused = [problem for problem in problems_with_file(CAMPAIGN, tree) if "nothing about who made" in problem]
-    assert len(refused) == 1 and refused[0].startswith("attribute date_created is present")
-    study = tree["slopes"].to_dataset()
-    spoilt = study["nominal_pressure"].copy()
-    spoilt[0, 0, 0, 0, 0, 0] = np.nan
-    broken = xr.DataTree.from_dict({"/": tree.to_dataset(), "/slopes": study.assign(nominal_pressure=spoilt)})
-    assert any(
-        "nominal_pressure: 1 values of complete runs" in problem for problem in problems_with_file(CAMPAIGN, broken)
+    assert "attribute date_created is present" in problems(CAMPAIGN, tree) and "creator_name" not in problems(
+        CAMPAIGN, tree
     )
+    study = tree["slopes"].to_dataset()
+    pressure = study["nominal_pressure"].copy()
+    pressure[0, 0, 0, 0, 0, 0] = np.nan
+    broken = xr.DataTree.from_dict({"/": tree.to_dataset(), "/slopes": study.assign(nominal_pressure=pressure)})
+    assert "nominal_pressure: 1 values of complete runs" in problems(CAMPAIGN, broken)
 
 
 def test_other_files_are_refused(tmp_path):
     (tmp_path / "text.nc").write_text("no netCDF")
-    with pytest.raises(UnknownFile, match="not a readable netCDF file"):
-        identify_file(tmp_path / "text.nc")
-    with pytest.raises(UnknownFile, match="is a folder"):
-        identify_file(tmp_path)
     (tmp_path / "empty.nc").touch()
-    with pytest.raises(UnknownFile, match="the file is empty"):
-        identify_file(tmp_path / "empty.nc")
-    with pytest.raises(UnknownFile, match="no such file"):
-        identify_file(tmp_path / "none.nc")
     xr.Dataset({"a": 1}).to_netcdf(tmp_path / "other.nc")
-    with pytest.raises(UnknownFile, match="not a file that ICHA writes"):
-        identify_file(tmp_path / "other.nc")
+    for name, message in (
+        ("text.nc", "not a readable netCDF file"),
+        ("", "is a folder"),
+        ("empty.nc", "the file is empty"),
+        ("none.nc", "no such file"),
+        ("other.nc", "not a file that ICHA writes"),
+    ):
+        with pytest.raises(UnknownFile, match=message):
+            identify_file(tmp_path / name)

@@ -209,7 +209,7 @@ def test_the_page_for_readers_has_the_numbers(published):
 
 
 @pytest.mark.slow
-def test_nothing_tells_where_when_or_by_whom_it_was_made(project, published):
+def test_it_has_no_places_times_or_persons(project, published):
     files = files_of(published)
     own = [path for name, path in files.items() if not name.startswith("source/")]
     public = b"\0".join(path.read_bytes() for name, path in files.items() if name.startswith("source/"))
@@ -338,7 +338,7 @@ def test_results_that_are_not_what_was_written_are_refused(campaign, tmp_path):
     assert not (tmp_path / "out").exists()
 
 
-def test_failures_are_published_only_with_their_reason(campaign, tmp_path):
+def test_failures_are_published_only_with_a_reason(campaign, tmp_path):
     campaign, results = campaign
     runs, out = list(campaign_files(campaign).runs), tmp_path / "out/small-1.0.0"
     (results / "checks.json").write_text(json.dumps([check(runs[0], 1e-3), check(runs[1], 1e-12)]))
@@ -377,14 +377,14 @@ def test_results_that_do_not_belong_together_are_refused(campaign):
     path, case = next(iter(files.runs.items()))
     run = small.run(1, material="hertz").assign_attrs(config_sha256=run_sha256(campaign, case), summary="Older")
     write(results, path, run)
-    with pytest.raises(ValueError, match=f"dataset/small.nc: it was made from another {path}"):
+    with pytest.raises(ValueError, match=f"dataset/small.nc: it was made from another version of {path}"):
         refuse_mixed(results, campaign, recorded)
     write(results, path, run.assign_attrs(config_sha256="a" * 64))
     with pytest.raises(ValueError, match=f"{path}: it was not computed with the settings of this campaign"):
         refuse_mixed(results, campaign, recorded)
 
 
-def test_files_are_kept_with_the_configuration_whatever_names_them(tmp_path):
+def test_files_are_stored_with_the_configuration(tmp_path):
     campaign = yaml.safe_load(CAMPAIGN.format(absolute=tmp_path))
     scans = {"height_unit": "nm", "size": "10 um", "boundary": "mirror"}
     campaign["defaults"] = {"surfaces": {"path": "scan.txt", "kind": "measured"} | scans}

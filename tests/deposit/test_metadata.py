@@ -15,7 +15,7 @@ from icha.deposit.metadata import (
     citation_cff,
     datacite_metadata,
     discovery_attributes,
-    known_licence,
+    find_licence,
     read_zenodo_metadata,
     summary_of,
     web_address,
@@ -122,17 +122,17 @@ def test_texts_are_html_only_where_html_is_asked_for():
 
 def test_licences_are_those_of_spdx():
     for identifier in ("CC-BY-4.0", "CC-BY-SA-4.0", "CC0-1.0", "ODbL-1.0"):
-        licence = known_licence(identifier)
+        licence = find_licence(identifier)
         page = licence.page()
         assert licence.name in page and licence.address in page and len(licence.text) > 1000
         assert page.endswith(licence.text)
-    assert "PDDL-1.0" in known_licence("PDDL-1.0").page() and known_licence("PDDL-1.0").text == ""
+    assert "PDDL-1.0" in find_licence("PDDL-1.0").page() and find_licence("PDDL-1.0").text == ""
     assert "license" not in yaml.safe_load(citation_cff(NEWER, COMMIT))
     for wrong in ("CC-BY", "my own", "MIT OR CC0-1.0", "LicenseRef-mine", "CC-BY-4.0+", ""):
         with pytest.raises(ValueError, match="expected one identifier"):
-            known_licence(wrong)
+            find_licence(wrong)
     with pytest.raises(ValueError, match=r"expected 'CC-BY-4\.0'"):
-        known_licence("cc-by-4.0")
+        find_licence("cc-by-4.0")
 
 
 @pytest.mark.parametrize(

@@ -16,7 +16,7 @@ from outside_validators import problems_with
 from typer.testing import CliRunner
 
 from icha.cli import app, deposits
-from icha.deposit.reproduce import changed_files
+from icha.deposit.reproduce import count_changed_files
 
 SOFT, HARD = "load/plate/seed0/slope0.5/soft", "load/plate/seed0/slope0.5/hard"
 RUNS = (f"runs/{SOFT}.nc", f"runs/{HARD}.nc")
@@ -241,10 +241,10 @@ def test_different_files_of_the_program_are_counted(tmp_path):
     """In the package and in the workflow."""
     ours = {"Snakefile", *(f"icha/{path.name}" for path in (REPOSITORY / "icha").glob("*.py"))}
     (tmp_path / "SHA256SUMS").write_text(f"{64 * '0'}  source/docs/model.md\n{64 * '0'}  README.md\n")
-    everything = changed_files(tmp_path)
+    everything = count_changed_files(tmp_path)
     assert everything > len(ours)
     (tmp_path / "SHA256SUMS").write_text(f"{64 * '0'}  source/Snakefile\n{64 * '0'}  source/workflow/scripts/more.py\n")
-    assert changed_files(tmp_path) == everything + 1
+    assert count_changed_files(tmp_path) == everything + 1
 
 
 @pytest.mark.slow

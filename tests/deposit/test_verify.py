@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 
 from icha.cli import app
 from icha.deposit import verify
-from icha.deposit.verify import Damaged, files_of, problem_with_name, read_text, whole_deposit
+from icha.deposit.verify import DamagedDeposit, files_of, problem_with_name, read_text, whole_deposit
 from icha.support.formatting import is_printable
 
 FILES = {"README.md": "# Tiny\n", "runs/load/soft.nc": bytes(range(256)) * 20, "inputs/Höhen (2).txt": "1 2\n"}
@@ -66,7 +66,7 @@ def test_a_whole_deposit_is_whole(ending, folder):
         (lambda f: (f / "SHA256SUMS").write_bytes(b"\xff"), {"SHA256SUMS": "cannot be read"}),
     ],
 )
-def test_whatever_is_done_to_a_folder_is_found(spoil, problems, folder):
+def test_every_change_of_a_folder_is_found(spoil, problems, folder):
     spoil(folder)
     found = problems_with(folder)
     assert len(found) == len(problems) and all(map(is_printable, found)), found
@@ -97,7 +97,7 @@ def test_a_spoilt_zip_is_found_or_has_the_same_files(folder, tmp_path):
                 assert {name: (other / name).read_bytes() for name in files_of(other)} == {
                     name: (folder / name).read_bytes() for name in files_of(folder)
                 }
-        except (Damaged, OSError):
+        except (DamagedDeposit, OSError):
             found += 1
     assert found > 60
     for _ in range(20):

@@ -1,4 +1,4 @@
-"""The documentation does what it says: configurations load, Python runs, commands exist, links lead somewhere."""
+"""Examples and links of the documentation: configurations load, Python runs, commands exist, links work."""
 
 import os
 import re
@@ -26,14 +26,15 @@ from icha.datasets.files import write_dataset
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
 TUTORIAL = DOCS / "tutorial.md"
-# Pages that people follow; the others explain.
+# Pages with instructions.
 GUIDES = [TUTORIAL, *sorted(DOCS.glob("howto/*.md"))]
 EVERY = pytest.mark.parametrize("page", GUIDES, ids=lambda page: page.stem)
+PAGES = [*sorted(DOCS.rglob("*.md")), ROOT / "README.md", ROOT / "CONTRIBUTING.md"]
 
 
 @cache
 def blocks(page, language):
-    """Blocks of code of one language, with the lines that they begin at."""
+    """Return the code blocks of one language with their first lines."""
     text = page.read_text(encoding="utf-8")
     found = re.finditer(rf"^```{language}\n(.*?)^```$", text, flags=re.DOTALL | re.MULTILINE)
     return [(text[: match.start()].count("\n") + 1, match[1]) for match in found]
@@ -44,33 +45,33 @@ def blocks(page, language):
 
 @cache
 def tutorial_campaign():
-    """The campaign that the tutorial begins with, which other pages add to."""
+    """Return the campaign of the tutorial, to which other pages add sections."""
     (first, *_) = [block for _, block in blocks(TUTORIAL, "yaml") if re.search("^name:", block, re.MULTILINE)]
     return first
 
 
-def with_part(campaign, part):
-    """A configuration with a part in its place: sections are merged, their entries replaced."""
-    together = dict(campaign)
-    for section, entries in part.items():
-        there = together.get(section)
-        together[section] = there | entries if isinstance(there, dict) and isinstance(entries, dict) else entries
-    return together
+def merge_block(campaign, block):
+    """Return a configuration with a block added: sections are merged, their entries replaced."""
+    merged = dict(campaign)
+    for section, entries in block.items():
+        before = merged.get(section)
+        merged[section] = before | entries if isinstance(before, dict) and isinstance(entries, dict) else entries
+    return merged
 
 
 def campaigns(page):
-    """The page's configurations in full: a block with a name is a whole one, others are parts of the one before."""
+    """Yield the full configurations of a page: a block with a name is complete, others add to the one before."""
     current = yaml.safe_load(tutorial_campaign())
     for line, block in blocks(page, "yaml"):
-        part = yaml.safe_load(block)
-        if part is None or not set(part) & set(Campaign.model_fields):
-            continue  # a comment, or part of another file
-        current = dict(part) if "name" in part else with_part(current, part)
+        added = yaml.safe_load(block)
+        if added is None or not set(added) & set(Campaign.model_fields):
+            continue  # a comment, or a section of another file
+        current = dict(added) if "name" in added else merge_block(current, added)
         yield line, current
 
 
 def write_data(folder):
-    """Small files of the names that the pages use, in the units that they give: those of the challenge are 0.1 mm."""
+    """Write small files with the names and units of the pages; those of the challenge are in 0.1 mm."""
     import h5py
 
     spectrum = icha.SelfAffineSpectrum(period=100e-6, rolloff_wavelength=40e-6, short_wavelength=12e-6, hurst=0.8)
@@ -94,7 +95,7 @@ def write_data(folder):
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    """A folder like the project's, with the data that the pages speak of."""
+    """A folder like that of the project, with the data of the pages."""
     folder = tmp_path_factory.mktemp("project")
     write_data(folder / "config/data")
     shutil.copytree(ROOT / "config/topographies", folder / "config/topographies")
@@ -105,7 +106,7 @@ def folder(tmp_path_factory):
 def loaded(folder, campaign):
     for surface in campaign["surfaces"].values():
         if surface.get("format") == "fourier":
-            surface["grid"] = 64  # for the file has few waves
+            surface["grid"] = 64  # the file has few waves
     path = folder / f"config/campaigns/{campaign['name']}.yaml"
     path.write_text(yaml.safe_dump(campaign, sort_keys=False), encoding="utf-8")
     return load_configuration(path).campaign
@@ -182,7 +183,12 @@ def with_results(folder):
     return folder
 
 
-@EVERY
+# The example on hysteresis takes a quarter of an hour.
+@pytest.mark.parametrize(
+    "page",
+    [page for page in PAGES if blocks(page, "python") and page.stem not in ("hysteresis", "README")],
+    ids=lambda page: page.stem,
+)
 def test_every_piece_of_python_runs(page, with_results, monkeypatch, tmp_path):
     monkeypatch.setenv("MPLBACKEND", "agg")
     code = blocks(page, "python")
@@ -219,7 +225,7 @@ def workflow_targets():
 
 
 def check_icha(arguments):
-    """Parse the arguments as `icha` would, without running anything."""
+    """Parse the arguments as `icha` does, without running anything."""
     import click
     import typer
 
@@ -235,9 +241,10 @@ def check_icha(arguments):
         command.make_context(arguments[0], list(arguments[1:]))
 
 
-@EVERY
+@pytest.mark.parametrize("page", [page for page in PAGES if blocks(page, "sh")], ids=lambda page: page.stem)
 def test_every_command_exists(page):
     known = {"git", "cd", "source", "cp", "mkdir", "export", "sudo", "sbatch", "squeue", "scancel", "sinfo"}
+    known |= {"podman", "pre-commit", "pytest"}
     installers = {"pip", "python", "python3", "uv", "uvx", "pipx"}
     for line, (program, *arguments) in commands(page):
         where = f"{page.name}, block at line {line}: {program} {shlex.join(arguments)}"
@@ -264,7 +271,7 @@ def test_every_command_exists(page):
 
 @pytest.mark.slow
 def test_the_site_is_built_without_a_warning_and_needs_no_network(tmp_path):
-    """Sphinx warns of links within the site that lead nowhere, and of pages that nothing leads to."""
+    """Sphinx warns about broken links within the site, and about pages without a link to them."""
     command = [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "-b", "html", "docs", str(tmp_path)]
     built = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, env=os.environ | {"OMP_NUM_THREADS": "1"})
     assert built.returncode == 0, built.stderr
@@ -276,7 +283,7 @@ def test_the_site_is_built_without_a_warning_and_needs_no_network(tmp_path):
 
 
 def test_links_of_the_sources_lead_to_files():
-    """They are read where the repository is browsed, too."""
+    """The sources are also read in the browser of the repository."""
     broken = []
     for page in [*DOCS.rglob("*.md"), ROOT / "README.md", ROOT / "config/README.md"]:
         text = re.sub(r"^```.*?^```$", "", page.read_text(encoding="utf-8"), flags=re.DOTALL | re.MULTILINE)

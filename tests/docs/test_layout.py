@@ -1,4 +1,4 @@
-"""The page on the layout is true, and folders import in its order only."""
+"""The layout page agrees with the code, and folders import only in its order."""
 
 import importlib.util
 import os
@@ -29,7 +29,7 @@ def test_every_folder_has_its_line_in_the_order_of_the_imports():
     assert level == sorted(level)
 
 
-def test_all_that_is_named_is_there():
+def test_all_names_on_the_page_exist():
     code = re.findall(r"`([^`\n]+)`", re.sub(r"^```.*?^```$", "", PAGE, flags=re.DOTALL | re.MULTILINE))
     files = {each for each in code if "<" not in each and re.fullmatch(r"[.\w]+(/[\w.]+)+|\w+\.toml", each)}
     assert len(files) > 30
@@ -42,7 +42,7 @@ def test_all_that_is_named_is_there():
             assert hasattr(importlib.import_module(module), last), name
 
 
-def test_the_page_on_the_model_names_modules_that_are_there():
+def test_modules_on_the_page_on_the_model_exist():
     page = (REPOSITORY / "docs/model.md").read_text(encoding="utf-8")
     named = re.findall(r"`([\w.]+)`", " ".join(re.findall(r" \[(`[^\]]+`)\]", page)))
     assert len(named) > 25
@@ -56,11 +56,11 @@ def test_the_page_on_the_model_names_modules_that_are_there():
         ("simulation.py", "import snakemake", "The physics knows nothing of the workflow"),
     ],
 )
-def test_an_arrow_turned_round_is_refused(module, line, broken, tmp_path):
+def test_a_reversed_import_is_refused(module, line, broken, tmp_path):
     shutil.copytree(REPOSITORY / "icha", tmp_path / "icha", ignore=shutil.ignore_patterns("__pycache__"))
     shutil.copyfile(REPOSITORY / "pyproject.toml", tmp_path / "pyproject.toml")
     with (tmp_path / "icha" / module).open("a", encoding="utf-8") as file:
-        file.write(f"\n\ndef turned_round():\n    {line}\n")
+        file.write(f"\n\ndef reversed_import():\n    {line}\n")
     done = subprocess.run(
         [Path(sys.executable).parent / "lint-imports", "--no-cache"],
         cwd=tmp_path,

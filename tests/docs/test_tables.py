@@ -1,4 +1,4 @@
-"""Tables that pages include: they are there, and those whose measurements are kept are written from them."""
+"""Tables of the pages: each is included once, and is written from the saved measurements if there are any."""
 
 import re
 
@@ -9,21 +9,21 @@ from validation import faults, short_range
 from validation.tables import DOCS
 
 
-def test_every_table_is_shown_by_one_page():
+def test_every_table_is_included_by_one_page():
     pages = "".join(page.read_text(encoding="utf-8") for page in DOCS.glob("*.md"))
-    shown = re.findall(r"^```\{include\} tables/(\w+)\.md\n```$", pages, flags=re.MULTILINE)
-    assert sorted(shown) == sorted(file.stem for file in (DOCS / "tables").iterdir())
+    included = re.findall(r"^```\{include\} tables/(\w+)\.md\n```$", pages, flags=re.MULTILINE)
+    assert sorted(included) == sorted(file.stem for file in (DOCS / "tables").iterdir())
 
 
 @pytest.mark.parametrize(
     "tables",
     [
         lambda: benchmarks.tables(benchmarks.read_results()),
-        lambda: short_range.tables(short_range.kept()),
+        lambda: short_range.tables(short_range.read_measurements()),
         lambda: faults.tables(faults.read_counts()),
     ],
     ids=["benchmarks", "short_range", "faults"],
 )
-def test_tables_are_those_of_what_was_measured(tables):
+def test_tables_agree_with_the_saved_measurements(tables):
     for name, table in tables().items():
         assert (DOCS / "tables" / f"{name}.md").read_text(encoding="utf-8") == str(table), name

@@ -1,4 +1,4 @@
-"""The page on trust names tests that exist, and the limits as they are."""
+"""The page on trust names existing tests, and the limits of the code."""
 
 import re
 
@@ -11,12 +11,12 @@ from icha.deposit.verify import ALLOWANCE, LARGEST_TEXT, MOST_FILES, MOST_GROWTH
 PAGE = (REPOSITORY / "docs/threat_model.md").read_text(encoding="utf-8")
 
 
-def test_every_test_that_is_named_is_there():
-    there = {path.name for path in (REPOSITORY / "tests").rglob("test_*.py")}
-    assert set(re.findall(r"test_\w+\.py", PAGE)) <= there
+def test_every_named_test_exists():
+    existing = {path.name for path in (REPOSITORY / "tests").rglob("test_*.py")}
+    assert set(re.findall(r"test_\w+\.py", PAGE)) <= existing
 
 
-def test_every_command_that_reads_files_has_its_line():
+def test_every_command_that_reads_files_is_listed():
     table = PAGE.partition("| command |")[2].partition("\n\n")[0]
     for name in get_command(app).commands:
         assert f"`{name}`" in table or f"`icha {name}`" in table or name == "simulate", name

@@ -135,7 +135,7 @@ def test_interacting_spots_against_an_independent_solution(count, energy):
     order = [int(np.argmin(np.hypot(*(spots.position - p).T))) for p in contact.asperities.position]
     alone = contact.law.contact_radius(contact.asperities.height - 0.85e-6, contact.asperities.radius_of_curvature)
     expected = independent_solution(contact, 0.85e-6, energy, alone)
-    # The interaction matters, so that agreement says something.
+    # The interaction matters here.
     assert np.max(np.abs(expected / alone - 1)) > 0.005
     np.testing.assert_allclose(spots.contact_radius[order], expected, rtol=1e-6)
     force = np.sum(jkr_force(expected, contact.asperities.radius_of_curvature, MODULUS, energy))
@@ -223,7 +223,7 @@ def test_without_adhesion_the_light_load_limit_is_greenwood_and_williamson():
 
 
 def assert_consistent(contact, state):
-    """What has to hold in every state that is handed out."""
+    """Assert what must hold in every equilibrium."""
     spots, law, period = state.spots, contact.law, contact.asperities.period
     assert state.residual <= RESIDUAL_TOLERANCE
     assert np.all(np.isfinite(spots.contact_radius)) and np.all(spots.contact_radius > 0)

@@ -14,7 +14,7 @@ SURFACE = SelfAffineSpectrum(PERIOD, 40e-6, PERIOD / 7, 0.8, 0.5).realise(grid=3
 
 
 class Only:
-    """What a protocol names of an object, and nothing else."""
+    """Only those attributes of an object that a protocol names."""
 
     def __init__(self, whole, protocol):
         self._whole, self._names = whole, {name for name in vars(protocol) if not name.startswith("_")}

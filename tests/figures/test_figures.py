@@ -1,4 +1,4 @@
-"""Figures can be drawn from small and unusual campaigns, say what is wrong, and have the same bytes every time."""
+"""Figures of small and unusual campaigns: what they show, their messages, and their bytes."""
 
 import itertools
 
@@ -32,8 +32,8 @@ from icha.figures import (
     fig11_distribution_error,
 )
 from icha.figures.looks import Scale, material_colours, materials_scale, place_markers, places_scale
-from icha.figures.maps import block_means, circles_in_cell
-from icha.figures.select import NothingToDraw, branches, path_steps, study_runs
+from icha.figures.maps import average_blocks, wrap_circles
+from icha.figures.select import NothingToDraw, branches, path_steps, select_runs
 from icha.figures.style import (
     BLACK,
     choose_unit,
@@ -49,14 +49,14 @@ from icha.references.theories import reference_dataset
 from icha.support.statistics import ensemble
 from icha.surfaces.moments import spectral_moments
 
+LABELS = RunLabels("one", "asperities", "rough", 1, 1.0, "soft")
+KIND = "reduced_pressure"
+
 
 def solution(pressure=3e-3, shift=0):
-    """Boundary elements of what figure 4 draws of the compared campaign, their contact shifted by some nodes."""
-    own = compared.own_solution(compared.runs()["one", "asperities", "rough", 1, 1.0, "soft"], pressure)
-    return own.assign(contact=own["contact"].roll(x=shift))
-
-
-KIND = "reduced_pressure"
+    """Return boundary elements of the state in figure 4 of the compared campaign, shifted by some nodes."""
+    state = compared.own_solution(compared.runs()[LABELS], pressure)
+    return state.assign(contact=state["contact"].roll(x=shift))
 
 
 # With images, and with circles.
@@ -89,11 +89,9 @@ def test_fig1_passes_through_the_known_points():
 
 def test_branches_begin_where_the_one_before_ends():
     run = cyclic.run(between=2)
-    (one, loading), (other, unloading) = branches(run)
-    assert (one, other) == ("loading", "unloading")
+    (_, loading), (_, unloading) = branches(run)
     assert loading["step"].values[-1] == unloading["step"].values[0] and set(unloading["leg"].values) == {0, 1}
     assert loading.sizes["step"] + unloading.sizes["step"] == run.sizes["step"] + 1
-    # A path that turns again and again has a branch for every turn.
     again = xr.concat([run, run.assign(leg=run["leg"] + 2)], "step", data_vars="minimal")
     assert [name for name, _ in branches(again)] == ["loading", "unloading"] * 2
     assert [name for name, _ in branches(small.run())] == ["loading"]
@@ -134,7 +132,7 @@ def test_the_state_of_pull_off_can_be_drawn():
     run["snapshot_kind"].values[1] = "pull_off"
     run["snapshot_target"].values[1] = 0.0
     run["snapshot_step"].values[1] = run.sizes["step"] - 2
-    tree = campaign_tree([(RunLabels("one", "asperities", "rough", 1, 1.0, "soft"), run)])
+    tree = campaign_tree([(LABELS, run)])
     figure = fig3_distributions.figure(tree, study="one", kind="pull_off")
     assert any("pull-off" in axes.get_title(loc="right") for axes in figure.axes)
     assert "Persson" not in legend(figure)
@@ -142,24 +140,22 @@ def test_the_state_of_pull_off_can_be_drawn():
 
 def test_fig3_points_keep_the_probability():
     run = small.run()
-    for at in range(run.sizes["snapshot"]):
+    for at, step in enumerate(run["snapshot_step"].values.astype(int)):
         edges = run["gap_bin_edges"].values / float(run["rms_height"])
         u, (density,) = fig3_distributions.gap_densities([(run, at)])
         assert np.all(np.diff(u) > 0) and np.all(density > 0)
-        assert u[0] > edges[1] and u[-1] < edges[-1]
+        assert edges[1] < u[0] and u[-1] < edges[-1]
         p, (density,) = fig3_distributions.pressure_densities([(run, at)])
         width = np.diff(run["pressure_bin_edges"].values) / float(run["contact_modulus"] * run["rms_slope"])
-        held = width[run["pressure_density"].values[at] > 0]
-        area = float(run["contact_area_fraction"].values[int(run["snapshot_step"].values[at])])
-        assert np.sum(density * held) == pytest.approx(area, rel=1e-9)
+        filled = width[run["pressure_density"].values[at] > 0]
+        assert np.sum(density * filled) == pytest.approx(run["contact_area_fraction"].values[step], rel=1e-9)
         assert p.min() < 0, "adhesion pulls at the edges"
-    hertz = small.run(material="hertz")
-    assert fig3_distributions.pressure_densities([(hertz, 0)])[0].min() > 0
+    assert fig3_distributions.pressure_densities([(small.run(material="hertz"), 0)])[0].min() > 0
 
 
 def test_fig4_refuses_another_surface_or_state(tmp_path, surface):
     write_surface(tmp_path / "s.nc", small.surface(2), name="rough", seed=2)
-    with pytest.raises(ValueError, match="the surface given has seed 2"):
+    with pytest.raises(ValueError, match="the surface has seed 2"):
         fig4_contact_map.figure(small.tree(), read_dataset(tmp_path / "s.nc"), study="slopes")
     with pytest.raises(ValueError, match="another period or grid"):
         fig4_contact_map.figure(small.tree(), surface.assign(period=surface["period"] * 2), study="slopes")
@@ -170,8 +166,8 @@ def test_fig4_refuses_another_surface_or_state(tmp_path, surface):
 def test_fig4_draws_means_of_large_topographies():
     n = 3000
     heights = np.add.outer(np.arange(n) ** 2.0, np.arange(n) * 10.0)
-    drawn = block_means(heights)
-    assert drawn.shape == (1024, 1024) and block_means(heights[:7, :7]).shape == (7, 7)
+    drawn = average_blocks(heights)
+    assert drawn.shape == (1024, 1024) and average_blocks(heights[:7, :7]).shape == (7, 7)
     # A block of nodes from 3000 k/1024 to the next.
     rows, columns = np.arange(2929, 2932), np.arange(1464, 1467)
     assert drawn[1000, 500] == pytest.approx(np.add.outer(rows**2.0, columns * 10.0).mean())
@@ -187,7 +183,7 @@ def test_fig4_enlarges_small_spots_more(tmp_path):
     spots |= {"spot_radius": rng.uniform(0.05e-6, 0.1e-6, count), "spot_snapshot": np.zeros(count, int)}
     run = run.assign({name: ("spot", values, small.run()[name].attrs) for name, values in spots.items()})
     run["grid"] = run["grid"].copy(data=grid)
-    tree = campaign_tree([(RunLabels("one", "asperities", "rough", 1, 1.0, "soft"), run)])
+    tree = campaign_tree([(LABELS, run)])
     figure = fig4_contact_map.figure(tree, read_dataset(tmp_path / "s.nc"), study="one")
     whole, enlarged = (np.ptp(axes.get_xlim()) for axes in figure.axes[:2])
     # 40 radii are 3.2 um or so, but 64 cells are more.
@@ -195,19 +191,14 @@ def test_fig4_enlarges_small_spots_more(tmp_path):
 
 
 def test_circles_continue_across_borders():
-    circles = list(circles_in_cell([0.02, 0.5], [0.97, 0.5], [0.1, 0.1], 1.0, "periodic"))
-    assert sorted((round(x, 9), round(y, 9)) for x, y, _ in circles) == [
-        (0.02, -0.03),
-        (0.02, 0.97),
-        (0.5, 0.5),
-        (1.02, -0.03),
-        (1.02, 0.97),
-    ]
+    circles = list(wrap_circles([0.02, 0.5], [0.97, 0.5], [0.1, 0.1], 1.0, "periodic"))
+    centres = sorted((round(x, 9), round(y, 9)) for x, y, _ in circles)
+    assert centres == [(0.02, -0.03), (0.02, 0.97), (0.5, 0.5), (1.02, -0.03), (1.02, 0.97)]
     # A free square has no opposite border.
-    assert len(circles_in_cell([0.02, 0.5], [0.97, 0.5], [0.1, 0.1], 1.0, "free")) == 2
+    assert len(wrap_circles([0.02, 0.5], [0.97, 0.5], [0.1, 0.1], 1.0, "free")) == 2
 
 
-def test_fig5_lays_measurements_over_the_curves(tmp_path):
+def test_fig5_draws_measurements_over_the_curves(tmp_path):
     (tmp_path / "one.csv").write_text("p, a\n1, 0.2\n10, 2\n20, 4\n")
     (tmp_path / "other.csv").write_text("p, a\n1e-3, 3e-3\n1e-2, 3e-2\n2e-2, 5e-2\n")
     measured = {"columns": {"p": 1e3, "a": 0.01}, "load_unit": 1e6, "material": "soft", "rms_slope": 0.2}
@@ -228,11 +219,11 @@ def test_fig5_lays_measurements_over_the_curves(tmp_path):
 
 
 def test_values_that_the_campaign_lacks_are_named_with_those_it_has():
-    with pytest.raises(ValueError, match=r"no study 'nothing'.*there are slopes, single"):
+    with pytest.raises(ValueError, match=r"no study 'nothing'.*expected one of: slopes, single"):
         fig2_area_and_gap.figure(small.tree(), study="nothing")
-    with pytest.raises(ValueError, match="no boundary elements beside study 'slopes'; there are some for one"):
+    with pytest.raises(ValueError, match="no boundary elements beside study 'slopes'; expected one of: one"):
         fig10_model_error.figure(compared.tree(), compared.errors(), study="slopes")
-    with pytest.raises(ValueError, match="no material 'steel' in this study; there are soft"):
+    with pytest.raises(ValueError, match="no material 'steel' in this study; expected one of: soft"):
         fig6_spots_by_slope.figure(small.tree(), study="slopes", material="steel")
 
 
@@ -286,9 +277,8 @@ def test_fig9_joins_runs_that_differ_in_range_and_shows_the_adhesionless_one():
     left, right = fig9_tabor.figure(tree, study="tabor").axes
     for axes, name in ((left, "contact_area_fraction"), (right, "reduced_separation")):
         curve, bare = axes.get_lines()
-        own = [runs["long"], runs["short"]]
-        np.testing.assert_array_equal(curve.get_xdata(), [float(run["tabor_parameter"]) for run in own])
-        np.testing.assert_array_equal(curve.get_ydata(), [float(run[name].values[-1]) for run in own])
+        expected = [(float(run["tabor_parameter"]), run[name].values[-1]) for run in (runs["long"], runs["short"])]
+        np.testing.assert_array_equal(curve.get_xydata(), expected)
         assert set(bare.get_ydata()) == {float(runs["bare"][name].values[-1])}
     assert curve.get_xdata()[1] == pytest.approx(4 * curve.get_xdata()[0])
     # The range is along the axis, and not in the name.
@@ -360,7 +350,7 @@ def test_fig3_shows_boundary_elements_of_the_same_state_only():
 
 def test_fig4_puts_boundary_elements_beside_the_spots(surface):
     truth = solution(shift=2)
-    run = compared.runs()["one", "asperities", "rough", 1, 1.0, "soft"]
+    run = compared.runs()[LABELS]
     figure = fig4_contact_map.figure(compared.tree(), surface, truth, study="one")
     assert len(figure.axes) == 5  # four panels and the scale of heights
     contact = truth["contact"].values == 1
@@ -379,18 +369,17 @@ def test_fig4_puts_boundary_elements_beside_the_spots(surface):
 
 
 def test_fig4_shows_the_maps_of_the_other_model(surface):
-    labels = RunLabels("one", "asperities", "rough", 1, 1.0, "soft")
-    truth = compared.own_patches(compared.runs()[labels], area=1.5)
+    truth = compared.own_patches(compared.runs()[LABELS], area=1.5)
     shifted = truth.assign(contact_map=0.75 * truth["contact_map"].roll(column=2))
     figure = fig4_contact_map.figure(compared.tree(), surface, truth=shifted, study="one", target=1e-2, kind=KIND)
-    area = 1.5 * float(compared.runs()[labels]["contact_area_fraction"].values[-1])
+    area = 1.5 * float(compared.runs()[LABELS]["contact_area_fraction"].values[-1])
     assert figure.axes[1].get_title(loc="right") == f"boundary elements, $A/A_0$ = {area:.3f}"
     np.testing.assert_array_equal(
         figure.axes[1].get_images()[1].get_array()[:-1, :-1], shifted["contact_map"].values[1]
     )
     own, other = truth["contact_map"].values[1] > 0, shifted["contact_map"].values[1] > 0
     assert figure.axes[3].get_title(loc="right").endswith(f"{jaccard(own, other):.2f}")
-    with pytest.raises(ValueError, match=r"soft: the boundary elements given are of another contact: seed is 1"):
+    with pytest.raises(ValueError, match=r"soft: the boundary elements are of another contact: seed is 1"):
         fig4_contact_map.figure(compared.tree(), surface, truth=shifted.assign(seed=2), study="one")
     # Where that run ended before, the model's spots stand alone.
     ended = {"truth": shifted.isel(snapshot=[0]), "target": 1e-2, "kind": KIND}
@@ -461,7 +450,7 @@ def test_surfaces_of_different_slopes_are_compared_at_their_own_alone():
     assert np.all(np.isfinite(left.get_xlim() + left.get_ylim()))
 
 
-def test_fig10_gives_every_material_its_panels_where_there_are_many_surfaces():
+def test_fig10_has_panels_for_every_material_if_there_are_many_surfaces():
     def many(node):
         names = [f"s{k}" for k in range(9)]
         dataset = node.to_dataset()
@@ -496,12 +485,12 @@ def test_only_complete_runs_are_drawn():
     runs = [(labels, run) for labels, run in small.runs() if labels.study == "slopes"]
     ended = [(labels, run.assign_attrs(incomplete="no equilibrium at the third stop")) for labels, run in runs]
     tree = campaign_tree([ended[0], *runs[1:]])
-    assert {labels for labels, _ in study_runs(tree, "slopes")} == {labels for labels, _ in runs[1:]}
+    assert {labels for labels, _ in select_runs(tree, "slopes")} == {labels for labels, _ in runs[1:]}
     with pytest.raises(NothingToDraw, match="study slopes: no run is complete"):
         fig5_multi_slope.figure(campaign_tree(ended), study="slopes")
 
 
-def test_units_as_people_write_them():
+def test_formatted_numbers_and_units():
     assert format_quantity(25e6, "Pa") == "25 MPa"
     assert format_quantity(0.05, "J/m²") == "50 mJ/m²"
     assert format_quantity(2.071e-9, "m") == "2.071 nm"
@@ -534,9 +523,7 @@ def dotted(line):
 
 
 def many_seeds(count=5):
-    return campaign_tree(
-        (RunLabels("many", "asperities", "rough", k, 1.0, "soft"), small.run(k)) for k in range(1, count + 1)
-    )
+    return campaign_tree((LABELS._replace(study="many", seed=k), small.run(k)) for k in range(1, count + 1))
 
 
 def test_fig2_shows_means_with_bands_that_stay_above_zero():
@@ -551,7 +538,7 @@ def test_fig2_shows_means_with_bands_that_stay_above_zero():
     assert legend(figure).count("mean and 95 % band, n = 5") == 1
 
 
-def test_of_few_seeds_figures_promise_no_confidence_and_show_every_seed():
+def test_few_seeds_have_no_band_and_are_drawn_themselves():
     figure = fig2_area_and_gap.figure(compared.tree(), study="one")
     for axes, name in zip(figure.axes[:2], ("contact_area_fraction", "reduced_separation"), strict=True):
         assert not shaded(axes)
@@ -594,11 +581,10 @@ def test_fig2_shows_below_what_the_logarithmic_axes_hide():
 
 
 def test_fig2_compares_models_at_equal_loads_whatever_their_stops():
-    labels = RunLabels("one", "asperities", "rough", 1, 1.0, "soft")
-    run = compared.runs()[labels]
+    run = compared.runs()[LABELS]
     truth = compared.own_patches(run, area=1.5)
     truth["reduced_pressure"] = 1.1 * truth["reduced_pressure"]
-    both = campaign_tree([(labels, run), (labels._replace(model="boundary_elements"), truth)])
+    both = campaign_tree([(LABELS, run), (LABELS._replace(model="boundary_elements"), truth)])
     figure = fig2_area_and_gap.figure(both, study="one")
     (crosses,) = lines_of(figure.axes[0], "+")
     np.testing.assert_allclose(crosses.get_xdata(), 1.1 * np.array(compared.PRESSURES), rtol=1e-9)
@@ -689,7 +675,7 @@ def two_surfaces(slopes=(1.0,)):
     return names, campaign_tree(runs)
 
 
-def test_fig5_tells_surfaces_apart():
+def test_fig5_distinguishes_surfaces():
     slopes = (1.0, 0.2)
     names, tree = two_surfaces(slopes)
     figure = fig5_multi_slope.figure(tree, study="vary")
@@ -704,13 +690,13 @@ def test_fig5_tells_surfaces_apart():
     assert len(words) == 4 + 3  # two materials, and the model
 
 
-def test_theories_say_whose_they_are_where_there_are_several_surfaces():
+def test_the_legend_names_the_surface_of_theories_if_there_are_several():
     names, tree = two_surfaces()
     figure = fig7_stiffness.figure(tree, reference_dataset(small.SPECTRUM), study="vary")
     assert {text for text in legend(figure) if text.startswith("theories")} == {f"theories: {names[0]}"}
 
 
-def test_figures_of_one_surface_say_which():
+def test_figures_of_one_surface_name_it():
     names, tree = two_surfaces((1.0, 0.2))
     title = fig8_patch_sizes.figure(tree, study="vary").axes[1].get_title(loc="right")
     assert title == f"{names[0]}, {slope_label(0.2)}"
@@ -735,9 +721,8 @@ def test_logarithmic_axes_label_no_more_than_has_room(limits):
     assert all(one.x1 < two.x0 for one, two in itertools.pairwise(shown))
 
 
-@pytest.mark.parametrize("module", [fig5_multi_slope, fig9_tabor])
-def test_many_surfaces_have_a_scale_of_colours(module):
-    figure = module.figure(many(), study="many")
+def test_many_surfaces_have_a_scale_of_colours():
+    figure = fig5_multi_slope.figure(many(), study="many")
     bar = figure.axes[-1]
     labels = [text.get_text() for text in bar.get_yticklabels()]
     assert bar.get_ylabel() == "rough-hurst" and labels[0] == "0.20" and labels[-1] == "0.36" and len(labels) == 9
@@ -745,9 +730,8 @@ def test_many_surfaces_have_a_scale_of_colours(module):
     assert len(legend(figure)) < 4
 
 
-@pytest.mark.parametrize("module", [fig2_area_and_gap, fig3_distributions])
-def test_many_materials_have_a_scale_of_what_differs(module):
-    figure = module.figure(many(surfaces=1, materials=12), study="many")
+def test_many_materials_have_a_scale_of_what_differs():
+    figure = fig3_distributions.figure(many(surfaces=1, materials=12), study="many")
     bar = figure.axes[-1]
     assert "Delta" in bar.get_ylabel() and "mJ/m²" in bar.get_ylabel()
     labels = [text.get_text() for text in bar.get_yticklabels()]
@@ -765,7 +749,7 @@ def test_names_of_a_scale_lose_what_they_share_but_no_digits():
 
 
 def test_fig4_does_not_show_another_run_where_its_own_failed(surface):
-    runs = [(RunLabels("one", "asperities", "rough", seed, 1.0, "soft"), small.run(seed)) for seed in (1, 2)]
+    runs = [(LABELS._replace(study="one", seed=seed), small.run(seed)) for seed in (1, 2)]
     runs[0] = (runs[0][0], runs[0][1].assign_attrs(incomplete="no equilibrium"))
     tree = campaign_tree(runs)
     with pytest.raises(NothingToDraw, match="one/rough/seed1/slope1/soft: this run is not complete"):

@@ -13,7 +13,7 @@ from icha.datasets.labels import RunLabels
 from icha.figures import fig13_loops, fig14_pull_off, fig15_loss, fig16_snap_map
 from icha.figures.ensembles import Points
 from icha.figures.fig15_loss import PARTS, linear_fit, shares
-from icha.figures.hysteresis import unloaded_runs
+from icha.figures.hysteresis import select_unloaded_runs
 from icha.figures.select import ContactRuns
 
 MODULES = (fig13_loops, fig14_pull_off, fig15_loss, fig16_snap_map)
@@ -108,7 +108,7 @@ def test_loops_of_free_squares_are_along_the_mean_separation():
     ((labels, run), *_) = separate.study("one", materials=("sticky",), slopes=(0.5,), seeds=(1,))
     gap = (run["mean_separation"] + run["rms_height"]).assign_attrs(run["mean_gap"].attrs)
     free = run.assign(boundary=run["boundary"].copy(data="free"), mean_gap=gap)
-    ((_, shown),) = unloaded_runs(campaign_tree([(labels, free)]), "one")
+    ((_, shown),) = select_unloaded_runs(campaign_tree([(labels, free)]), "one")
     np.testing.assert_allclose(shown["reduced_separation"], run["reduced_separation"])
 
 
@@ -119,9 +119,9 @@ def test_fig13_shows_one_surface_and_seed(tree):
     assert len(solid) == len(dashed) == 2
     assert any(line.get_ydata()[-1] == run["reduced_pressure"].values[line.get_ydata().size - 1] for line in solid)
     assert len({line.get_color() for line in solid}) == 2
-    with pytest.raises(ValueError, match="no seed 7 in this study; there are 1, 2"):
+    with pytest.raises(ValueError, match="no seed 7 in this study; expected one of: 1, 2"):
         fig13_loops.figure(tree, study="hard", seed=7)
-    with pytest.raises(ValueError, match="no surface 'smooth' in this study; there are rough"):
+    with pytest.raises(ValueError, match="no surface 'smooth' in this study; expected one of: rough"):
         fig13_loops.figure(tree, study="hard", surface="smooth")
 
 
@@ -416,7 +416,7 @@ def test_fig16_refuses_another_surface_or_run(tree, surface):
         fig16_snap_map.figure(tree, surface.assign(period=surface["period"] * 2), study="slopes")
     with pytest.raises(ValueError, match=r"study slopes: no run of .* rms slope 0\.7"):
         fig16_snap_map.figure(tree, surface, study="slopes", rms_slope=0.7)
-    with pytest.raises(ValueError, match="no material 'glue' in this study; there are sticky"):
+    with pytest.raises(ValueError, match="no material 'glue' in this study; expected one of: sticky"):
         fig16_snap_map.figure(tree, surface, study="slopes", material="glue")
 
 
@@ -454,7 +454,7 @@ def test_figures_of_several_cycles_show_the_first_loading_and_the_last_unloading
 
 @pytest.mark.parametrize("module", MODULES, ids=lambda module: module.__name__.split(".")[-1])
 def test_wrong_studies_are_named(tree, surface, module):
-    with pytest.raises(ValueError, match=r"no study 'nothing'.*there are slopes, gentle, middle, hard"):
+    with pytest.raises(ValueError, match=r"no study 'nothing'.*expected one of: slopes, gentle, middle, hard"):
         draw(module, tree, surface, "nothing")
     with pytest.raises(ValueError, match="study single: no run was unloaded"):
         draw(module, small.tree(), surface, "single")

@@ -1,8 +1,9 @@
-"""A figure is one module: nothing else knows its name, and libraries for drawing are imported where it is drawn."""
+"""A figure is one module: nothing else knows its name, and only drawing imports libraries for drawing."""
 
 import subprocess
 import sys
 
+import pytest
 import small_campaign as small
 
 from icha.datasets.files import write_dataset
@@ -11,7 +12,7 @@ from icha.figures.registry import DECLARATIONS, figure_module, figure_number
 
 MODULE = """
 from icha.figures.declaration import Declaration, StudyFigure
-from icha.figures.select import study_runs
+from icha.figures.select import select_runs
 from icha.figures.style import in_style, new_figure
 
 DECLARATION = Declaration(
@@ -24,7 +25,7 @@ DECLARATION = Declaration(
 def figure(campaign, *, study):
     drawing = new_figure(3, 2)
     axes = drawing.subplots()
-    for _, run in study_runs(campaign, study, ragged=False):
+    for _, run in select_runs(campaign, study, ragged=False):
         axes.plot(run["reduced_pressure"], run["contact_area_fraction"])
     return drawing
 """
@@ -57,6 +58,7 @@ def python(script, *arguments, cwd):
     subprocess.run([sys.executable, "-c", script, *map(str, arguments)], cwd=cwd, check=True)
 
 
+@pytest.mark.slow
 def test_a_module_on_the_path_is_a_figure(tmp_path):
     (tmp_path / "fig99_trivial.py").write_text(MODULE)
     (tmp_path / "dataset").mkdir()

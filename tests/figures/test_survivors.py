@@ -1,4 +1,4 @@
-"""Figures of means whose runs are not all there show it, and count what is missing in their captions."""
+"""Figures of means over fewer seeds than requested show it, and captions count the missing runs."""
 
 import itertools
 

@@ -4,16 +4,7 @@ import numpy as np
 import pytest
 import scipy.special
 from fields import displacement_field
-from half_space import (
-    CENTRES,
-    CURVATURE,
-    ENERGIES,
-    MODULUS,
-    RADIUS,
-    law,
-    periodic_displacement,
-    spectral_displacement,
-)
+from half_space import CENTRES, CURVATURE, ENERGIES, MODULUS, RADIUS, law, periodic_displacement, spectral_displacement
 
 from icha.half_space.grid_displacement import DisplacementField, row_blocks, smooth_half, windows
 
@@ -68,7 +59,7 @@ def test_nodes_of_coarse_and_fine_grids_against_the_direct_image_sum(energy, n):
 
 @pytest.mark.parametrize("energy", ENERGIES)
 def test_the_mean_displacement_is_zero(energy):
-    # Of a field sampled far finer than the smallest spot; the kink at its edge limits the sampling.
+    # The grid is far finer than the smallest spot; the kink at its edge limits the accuracy.
     field = displacement_field(law(energy), 1.0, 1024, CENTRES, RADIUS, CURVATURE)
     assert abs(field.mean()) < 1e-6 * np.max(np.abs(field))
 

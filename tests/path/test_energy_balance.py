@@ -78,7 +78,7 @@ def test_a_jump_into_contact_sets_free_no_less_where_it_is_found_late(beyond):
 
 
 def test_under_load_one_asperity_loses_more():
-    """From first contact it falls to where there is no load; the largest tension pulls it to where contact ends."""
+    """From first contact it jumps to zero load; the largest tension pulls it to where contact ends."""
     contact, waypoints = alone("load")
     total, jump_in, jump_off, coalescence, load_jump, _ = lost(contact, waypoints)
     pulled = -force(PULL_OFF_RADIUS) * (approach(PULL_OFF_RADIUS) - approach(JUMP_OFF_RADIUS))
@@ -182,7 +182,7 @@ def test_without_adhesion_and_unions_nothing_is_lost(turning_points, tolerance):
     assert int(run.coalescence_count[-1]) == 0 and int(run.spot_count.max()) >= 10
     assert abs(float(run.hysteresis_loss)) <= tolerance * float(run.work.max())
     assert float(run.pull_off_pressure) == 0
-    # The way back comes by the separations of the way in.
+    # Unloading visits the separations of loading.
     first, last = (run.isel(step=np.flatnonzero(run.leg == leg)) for leg in (0, int(run.leg.max())))
     u = first.mean_separation.values
     met = 0

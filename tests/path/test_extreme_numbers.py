@@ -1,4 +1,4 @@
-"""Numbers far from anything physical are refused by name; what is allowed ends, finite, or says why it does not."""
+"""Unphysical numbers are refused by name; at the ends of their ranges runs are finite or give a reason."""
 
 import numpy as np
 import pytest

@@ -231,7 +231,7 @@ def test_bad_paths_are_refused_by_name(arguments, message):
 
 
 def test_the_approach_to_first_contact_costs_nothing(surface):
-    """A stop a metre up is met, without a step for every tenth of h_rms on the way down."""
+    """A target a metre up is met without small steps from there to first contact."""
     path = Path(mean_separations=[1.0, 1.5 * surface.rms_height], snapshots=[])
     stops = [(w.target, w.state) for w in follow(contact_of(surface, BARE), path)]
     assert [len(state.spots) > 0 for _, state in stops] == [False, True]

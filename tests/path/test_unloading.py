@@ -199,7 +199,7 @@ def test_a_loop_without_events_is_reversible():
     assert there[-1].state.jump_ins == again[-1].state.jump_ins == 2
     assert again[-1].state.separation == pytest.approx(there[-1].state.separation, rel=1e-9)
     assert abs(again[-1].balance.work - there[-1].balance.work) < 1e-6 * abs(there[-1].balance.work)
-    # All separations of the way back but that of its end, which is the turning point, are met again.
+    # Reloading visits all separations of unloading except the turning point.
     met = {round(w.state.separation, 7): load(contact, w) for w in again}
     common = [w for w in back if round(w.state.separation, 7) in met]
     assert len(common) >= 5
@@ -242,7 +242,7 @@ def test_every_state_continues_the_history_of_the_state_before_it(control):
 
 
 def test_a_contact_without_an_equilibrium_is_not_recorded():
-    """The images of an asperity that jumps in draw it off again at once: at its jump-in there is no equilibrium."""
+    """The images of an asperity that jumps in pull it off again at once: no equilibrium exists at its jump-in."""
     contact = contact_of([HEIGHT], period=20.0, material=Material(1.0, 1.0, 1 / 1.1))
     start = contact.untouched()
     state = contact.equilibrium(start, start.separation - 1e-6)
@@ -361,7 +361,7 @@ def test_under_load_no_stop_is_lost_at_the_load_of_another(load):
 
 
 class Touchy(InteractingAsperities):
-    """On the way back it finds no equilibrium in a step of some lengths, in m, nor a load farther away than some."""
+    """On unloading it finds no equilibrium in steps of some lengths, m, and no load that is too far away."""
 
     lengths, farthest = (0.0, 0.0), np.inf
 

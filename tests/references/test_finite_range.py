@@ -12,12 +12,13 @@ from small_rough_solution import MATERIALS, PRESSURE
 from icha.asperity.cohesive_zone import longest_spacing, strength_number
 from icha.asperity.material import Material
 from icha.references.finite_range import (
+    DEFAULT_TOLERANCE,
+    GapContact,
     NotSolved,
     contact_state,
     finite_range_solution,
 )
 from icha.surfaces.surface import Surface
-from validation.mean_gaps import states_at_mean_separations
 from validation.surfaces import paraboloid
 
 HERTZ = MATERIALS["hertz"]
@@ -142,13 +143,13 @@ def test_energetic_area_is_the_derivative_of_the_energy():
 
     def energy(change):
         softer = Material(material.contact_modulus, material.surface_energy * (1 + change), material.interaction_range)
-        (state,) = states_at_mean_separations(surface, softer, [separation])
+        state = GapContact(surface, softer, DEFAULT_TOLERANCE).solve(separation)
         elastic = 0.5 * np.mean(state.traction * displacement(state, softer.contact_modulus))
         return elastic - softer.surface_energy * state.energetic_area_fraction(softer)
 
     step = 0.02
     slope = (energy(step) - energy(-step)) / (2 * step * material.surface_energy)
-    (state,) = states_at_mean_separations(surface, material, [separation])
+    state = GapContact(surface, material, DEFAULT_TOLERANCE).solve(separation)
     assert slope == pytest.approx(-state.energetic_area_fraction(material), rel=1e-3)
 
 
@@ -181,14 +182,6 @@ def test_wrong_arguments_are_named(wrong, name):
     arguments = {"reduced_pressure": PRESSURE} | wrong
     with pytest.raises(ValueError, match=f"^{name}: "):
         finite_range_solution(small_rough_solution.surface(), MATERIALS["hertz"], **arguments)
-
-
-def test_mean_separations_need_adhesion_and_are_positive():
-    surface = small_rough_solution.surface()
-    with pytest.raises(ValueError, match=r"^surface_energy: "):
-        states_at_mean_separations(surface, MATERIALS["hertz"], [1e-6])
-    with pytest.raises(ValueError, match=r"^mean_separations: "):
-        states_at_mean_separations(surface, MATERIALS["adhesive"], [1e-6, 0.0])
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""The page for exploring: what it shows is what plain xarray reads; it stays small; wrong calls are told."""
+"""The page for exploring: it shows the numbers that xarray reads; its size is limited; wrong calls are refused."""
 
 import base64
 import io
@@ -34,13 +34,13 @@ def data(page):
 
 
 def data_of(page):
-    """The data of a page, as its script reads them."""
+    """Read the data of a page as its script does."""
     text = page.read_text(encoding="utf-8")
     return json.loads(re.search(r'<script type="application/json" id="data">(.*?)</script>', text, re.DOTALL)[1])
 
 
-def numbers(text, kind="<f4"):
-    return np.frombuffer(base64.b64decode(text), kind)
+def numbers(text, dtype="<f4"):
+    return np.frombuffer(base64.b64decode(text), dtype)
 
 
 def contact_of(data, labels):
@@ -50,7 +50,7 @@ def contact_of(data, labels):
 
 
 def plain(folder, labels):
-    """A run of the campaign dataset, its steps, and its spots, by xarray alone."""
+    """Read a run of the campaign dataset, with its steps and spots, with xarray only."""
     study = xr.open_datatree(folder / "dataset/small.nc")[labels.study].to_dataset()
     names = ("model", "surface", "seed", "rms_slope", "material")
     run = study.sel({name: getattr(labels, name) for name in names})
@@ -76,7 +76,7 @@ def test_numbers_are_those_of_the_dataset(folder, data, model):
 
 
 def check_snapshot(shown, run, spots, model):
-    """Circles one by one; pressures bin by bin; of curves of joined bins, what they add up to."""
+    """Compare circles one by one, pressures by bin, and integrals of curves of joined bins."""
     if model == "asperities":
         for own, name in zip(shown["circles"], ("spot_x", "spot_y", "spot_radius"), strict=True):
             np.testing.assert_array_equal(numbers(own), spots[name].values.astype("f4"))
@@ -114,7 +114,7 @@ def test_large_topographies_are_means_over_blocks():
     assert (shown["low"], shown["high"]) == (pytest.approx(means.min()), pytest.approx(means.max()))
 
 
-def test_maps_are_the_runs_own_with_their_first_row_at_the_bottom(data):
+def test_maps_are_those_of_the_runs_with_their_first_row_at_the_bottom(data):
     for labels, run in runs().items():
         if labels.model == "boundary_elements":
             snapshots = contact_of(data, labels)["runs"]["boundary_elements"]["snapshots"]
@@ -131,9 +131,8 @@ def test_both_models_are_at_the_same_stop(data):
     contact = next(each for each in data["contacts"] if len(each["runs"]) == 2)
     assert list(contact["runs"]) == ["asperities", "boundary_elements"]
     own, other = contact["runs"].values()
-    assert [other["stops"][k] for k in other["partners"]] == own["stops"] and own["stops"][
-        0
-    ] == "reduced_pressure 0.003"
+    assert [other["stops"][k] for k in other["partners"]] == own["stops"]
+    assert own["stops"][0] == "reduced_pressure 0.003"
 
 
 def test_between_stops_the_other_model_is_at_the_nearest_separation():
@@ -146,13 +145,13 @@ def test_between_stops_the_other_model_is_at_the_nearest_separation():
     assert partners(one, other) == [1, 1, -1, 3, -1]
 
 
-def test_failures_are_on_the_page_and_runs_without_a_stop_are_counted(folder, page, data):
+def test_failures_are_shown_and_runs_without_a_stop_are_counted(folder, page, data):
     assert contact_of(data, FAILED)["runs"]["asperities"]["failure"] == REASON
     assert NOTHING[0] == "slopes" and len(data["contacts"]) == len({each._replace(model="") for each in runs()}) - 1
     assert "Omitted: 1 contact whose runs reached no stop" in page.read_text(encoding="utf-8")
 
 
-def test_the_page_needs_nothing_else_and_is_closed_to_the_network(page):
+def test_the_page_needs_no_other_files_and_no_network(page):
     text = page.read_text(encoding="utf-8")
     own = text[: text.index("<script>")] + text[text.index('<script type="application/json"') :]
     assert "default-src 'none'" in own and not re.search(r"https?://(?!www\.w3\.org/2000/svg)", own)
@@ -161,7 +160,7 @@ def test_the_page_needs_nothing_else_and_is_closed_to_the_network(page):
     assert text.count("</script>") == 3 and "Small &lt;/script&gt; campaign" in text
 
 
-def test_a_topography_is_found_by_its_name_whatever_that_holds(folder, tmp_path, monkeypatch):
+def test_a_topography_is_found_by_any_name(folder, tmp_path, monkeypatch):
     name = "surfaces/\u202e{surface}-{seed}.nc"
     for seed in (1, 2, 3):
         old = folder / f"surfaces/rough/seed{seed}.nc"
@@ -174,14 +173,14 @@ def test_a_topography_is_found_by_its_name_whatever_that_holds(folder, tmp_path,
         (folder / name.format(surface="rough", seed=seed)).unlink()
 
 
-def test_a_page_stays_as_small_as_it_is_asked_to(folder, page, data, tmp_path):
+def test_the_size_of_a_page_is_limited(folder, page, data, tmp_path):
     library = page.stat().st_size - len(json.dumps(data))
     largest = (library + 0.6 * len(json.dumps(data))) / 1e6
     written = write_explorer(folder, tmp_path / "less.html", largest=largest)
     assert 0 < written.size <= largest * 1e6 and 0 < written.left_out
     assert written.shown + written.left_out + written.without_steps == len(data["contacts"]) + 1
     shown = [(each["study"], each["material"], each["seed"]) for each in data_of(tmp_path / "less.html")["contacts"]]
-    # The first seed of every kind, before the others.
+    # The first seed of each contact precedes the others.
     assert {("one", "soft", 1), ("one", "hertz", 1), ("loops", "soft", 1)} <= set(shown)
     assert [seed for *_, seed in shown] == sorted(seed for *_, seed in shown)
     assert f"Omitted: {written.left_out} contacts" in (tmp_path / "less.html").read_text(encoding="utf-8")
@@ -190,7 +189,7 @@ def test_a_page_stays_as_small_as_it_is_asked_to(folder, page, data, tmp_path):
     assert not (tmp_path / "none.html").exists()
 
 
-def test_runs_whose_files_are_gone_lack_their_maps_only(folder, tmp_path):
+def test_runs_without_files_lack_their_maps_only(folder, tmp_path):
     alone = tmp_path / "results"
     for part in ("dataset", "surfaces"):
         (alone / part).parent.mkdir(exist_ok=True)
@@ -202,7 +201,7 @@ def test_runs_whose_files_are_gone_lack_their_maps_only(folder, tmp_path):
         assert "map" not in snapshot and "circles" not in snapshot and snapshot["gap"]
 
 
-def test_the_command_writes_the_page_and_refuses_what_it_cannot_show(folder, tmp_path):
+def test_the_command_writes_the_page_and_refuses_wrong_calls(folder, tmp_path):
     def icha(*arguments):
         return CliRunner().invoke(app, ["explore", *map(str, arguments)])
 

@@ -1,4 +1,4 @@
-"""Report and page for exploring in headless Chromium: real keys move what they should; nothing comes from outside."""
+"""Report and page for exploring in headless Chromium, used with real keys; they need no network."""
 
 import io
 import json
@@ -70,7 +70,7 @@ def browser(tmp_path_factory):
 
 
 def opened(browser, file):
-    """A page, newly opened; nothing that a test does may lead to an error or to a request."""
+    """Open a page; after the test there must be no error on its console and no request."""
     browser.console.clear(), browser.addresses.clear()
     browser.show(1300)
     browser.open(file)
@@ -93,7 +93,7 @@ def report(browser, report_file):
 
 
 def choose(page, **choices):
-    """Choose from the lists as a reader does."""
+    """Choose from the lists of the page."""
     for name, value in choices.items():
         page.value(
             f"{{ const list = document.getElementById('{name}'); list.value = {json.dumps(str(value))};"
@@ -103,7 +103,7 @@ def choose(page, **choices):
 
 
 def shown(page):
-    """What the page shows: the place, its words, the table, and by model picture, its opacity, point and curve."""
+    """Return what the page shows: step, text, table, and for each model picture, opacity, point and curve."""
     return page.value(
         """(() => {
           const at = (id) => document.getElementById(id);
@@ -145,7 +145,7 @@ def test_the_slider_moves_contact_points_and_distributions_of_both_models(page):
     assert separation[0][1] < first["points"][1][0][1]
 
 
-def test_where_there_is_no_snapshot_the_page_says_so(page):
+def test_steps_without_snapshot_have_a_notice(page):
     choose(page, study="slopes", rms_slope=1, material="soft")
     page.value("document.getElementById('stop').focus()")
     page.press("Home")
@@ -162,7 +162,7 @@ def test_where_there_is_no_snapshot_the_page_says_so(page):
     assert later["points"] != on_it["points"]
 
 
-def test_everything_is_reached_and_used_by_keys(page):
+def test_all_controls_can_be_used_with_keys(page):
     choose(page, study="one", material="soft")
     page.value("document.activeElement.blur(); scrollTo(0, 0)")
     order, outlines = [], []
@@ -175,15 +175,15 @@ def test_everything_is_reached_and_used_by_keys(page):
         if not name:
             break
         order.append(name), outlines.append(outline)
-    # From top to bottom; lists with one entry have nothing to choose.
+    # From top to bottom, without lists of one entry.
     assert order == ["study", "material", "seed", "model", "log", "before", "stop"], order
     assert set(outlines) == {"solid3"}
-    # The first list, by keys alone.
+    # The first list with keys only.
     page.value("document.getElementById('study').focus()")
     before = page.value("document.getElementById('study').value")
     page.press("ArrowUp")
     assert page.value("document.getElementById('study').value") != before
-    # The buttons go from snapshot to snapshot.
+    # The buttons move between snapshots.
     choose(page, study="one", material="soft")
     page.value("document.getElementById('before').focus()")
     page.press("Enter")
@@ -193,8 +193,8 @@ def test_everything_is_reached_and_used_by_keys(page):
     assert page.value("document.getElementById('state').getAttribute('role')") == "status"
 
 
-def test_spots_are_where_the_dataset_has_them(page):
-    """Centres of circles are red, and as much of the map is red as spots cover."""
+def test_spots_have_the_positions_of_the_dataset(page):
+    """Centres of circles are red, and the red fraction of the map is that of the spots."""
     choose(page, study="one", material="soft", model="asperities")
     circles = page.value(
         "(() => { const kept = leading.snapshots.at(-1).circles.map((text) => Array.from(floats(text)));"
@@ -219,8 +219,8 @@ def test_spots_are_where_the_dataset_has_them(page):
             assert red > 150 and green < 90 and blue < 90, (x, y)
     inner = pixels[round(box_y + top) + 2 : round(box_y + top + height) - 2, round(box_x + left) + 2 :]
     inner = inner[:, : round(width) - 4]
-    part = (inner[..., 0] > inner[..., 1] + 60).mean()
-    assert part == pytest.approx(sum(np.pi * radius**2 for *_, radius in circles) / period**2, rel=0.25)
+    red_fraction = (inner[..., 0] > inner[..., 1] + 60).mean()
+    assert red_fraction == pytest.approx(sum(np.pi * radius**2 for *_, radius in circles) / period**2, rel=0.25)
 
 
 def brightness(colour):
@@ -232,7 +232,7 @@ def test_nothing_is_wider_than_the_window(page, width):
     page.show(width, 800)
     choose(page, study="one", material="soft")
     assert page.value("[document.documentElement.scrollWidth, innerWidth]") == [width, width]
-    # The slider stays in sight, and leaves room for what it moves.
+    # The slider remains visible, and leaves room for the pictures.
     page.value("scrollTo(0, 1500)")
     page.settle()
     top, bottom = page.value(
@@ -241,7 +241,7 @@ def test_nothing_is_wider_than_the_window(page, width):
     assert top == 0 and bottom < 250
 
 
-def test_errors_and_requests_would_be_seen(browser, explorer_file, tmp_path):
+def test_errors_and_requests_are_detected(browser, explorer_file, tmp_path):
     text = re.sub("<meta http-equiv.*?>", "", explorer_file.read_text(encoding="utf-8"))
     wrong = '<img src="http://localhost:9/x.png"><script>nothing.at.all;</script></body>'
     (tmp_path / "wrong.html").write_text(text.replace("</body>", wrong), encoding="utf-8")
@@ -254,7 +254,7 @@ def test_errors_and_requests_would_be_seen(browser, explorer_file, tmp_path):
 # --- the report -------------------------------------------------------------------------------------------------
 
 
-def test_figures_are_enlarged_by_a_click_and_left_again(report):
+def test_figures_are_enlarged_by_a_click(report):
     states = report.value("""(async () => {
       const viewer = document.getElementById("viewer");
       const pause = () => new Promise((go) => setTimeout(go, 200));
@@ -273,7 +273,7 @@ def test_figures_are_enlarged_by_a_click_and_left_again(report):
     })()""")
     closed, one, following, before, caption, small_width, at_last = states
     assert closed is at_last is False and caption is True
-    # After the last figure comes the first.
+    # The first figure follows the last one.
     assert [state[:2] for state in (one, following, before)] == [[True, 1], [True, 0], [True, 1]]
     assert one[2] > small_width
 
@@ -297,7 +297,7 @@ def test_every_link_of_the_contents_leads_to_its_heading(report):
     assert all(there and current == 1 for _, there, current in found), found
 
 
-def test_the_report_is_read_on_a_telephone_and_in_the_dark(report):
+def test_the_report_is_readable_on_a_telephone_and_in_the_dark(report):
     report.show(500)
     assert report.value("document.documentElement.scrollWidth <= innerWidth")
     colours = "[getComputedStyle(document.body).backgroundColor, getComputedStyle(document.body).color]"

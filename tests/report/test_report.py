@@ -26,7 +26,7 @@ from icha.report import report, studies
 from icha.report.report import ReportFigure, write_report
 from icha.report.run_times import Benchmark, read_benchmark, write_times, write_times_page
 from icha.report.sections import _draw_spectra, read_surface_statistics
-from icha.report.studies import _range, own_stops
+from icha.report.studies import _range, states_at_stops
 from icha.report.template import scientific
 
 FIGURES = tuple(f"figures/fig1_jkr.{ending}" for ending in ("png", "pdf"))
@@ -64,7 +64,7 @@ def rows(table):
 
 
 def areas_at(runs, pressure=1e-2):
-    return np.array([own_stops(run)["reduced_pressure", pressure]["area"] for run in runs])
+    return np.array([states_at_stops(run)["reduced_pressure", pressure]["area"] for run in runs])
 
 
 def seeds_of(study, seeds):
@@ -377,7 +377,7 @@ def test_comparison_is_of_the_first_loading():
     assert one.sizes["reduced_pressure"] > 5
     for name in other.data_vars:
         np.testing.assert_array_equal(one[name].values, other[name].values, err_msg=name)
-    assert own_stops(cyclic.run(between=3)) == own_stops(small.run())
+    assert states_at_stops(cyclic.run(between=3)) == states_at_stops(small.run())
 
 
 def test_interpolation_is_exact_at_the_stops_and_monotone_between():

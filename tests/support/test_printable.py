@@ -9,7 +9,6 @@ import pytest
 import small_campaign as small
 from typer.testing import CliRunner
 
-import icha
 from icha.cli import app
 from icha.cli.live import Job, error_of, last_line
 from icha.cli.project import UserError, echo, markup, reports_errors
@@ -57,25 +56,11 @@ def test_messages_of_jobs_are_printable(tmp_path):
     assert any(r"\x1b[2J" in line for line in error_of(job, tmp_path))
 
 
-def test_attributes_of_a_file_are_shown_in_their_lines(tmp_path):
-    run = icha.simulate(
-        icha.SelfAffineSpectrum(
-            period=1e-4, rolloff_wavelength=4e-5, short_wavelength=2e-5, hurst=0.8, rms_slope=1.0
-        ).realise(grid=64, seed=1),
-        icha.Material(contact_modulus=25e6, surface_energy=0.0, interaction_range=2e-9),
-        icha.Path(reduced_pressures=[1e-3]),
-    )
-    evil = f"{EVIL}\nrun.nc: all is well"
-    run.attrs |= {"title": evil, "campaign": evil, "study": evil, "incomplete": evil, "contact_model": evil}
-    run.to_netcdf(tmp_path / "run.nc")
-    shown = CliRunner().invoke(app, ["show", str(tmp_path / "run.nc")])
-    assert shown.exit_code == 0, shown.output
-    assert not set("\x1b\x9b\r\b\x07\x7f\u202e") & set(shown.output)
-    assert shown.output.count("all is well") == 5 and "\nrun.nc" not in shown.output
-
-
 def test_no_text_of_a_file_begins_a_line_of_its_own(tmp_path):
     forged = f"{EVIL}\nrun.nc: run, all is well"
+    run = small.run().copy()
+    run.attrs |= dict.fromkeys(("title", "campaign", "study", "incomplete", "contact_model"), forged)
+    run.to_netcdf(tmp_path / "run.nc")
     write_surface(tmp_path / "surface.nc", small.surface(), name="rough", seed=1)
     with netCDF4.Dataset(tmp_path / "surface.nc", "a") as file:
         file["rms_height"].long_name = file["rms_height"].units = file["rms_slope"].units = forged
@@ -83,11 +68,11 @@ def test_no_text_of_a_file_begins_a_line_of_its_own(tmp_path):
     tree.attrs["summary"] = forged
     write_dataset(tree, tmp_path / "campaign.nc")
     told = {}
-    for command, name in (("show", "surface"), ("check", "surface"), ("show", "campaign")):
+    for command, name in (("show", "run"), ("show", "surface"), ("check", "surface"), ("show", "campaign")):
         said = told[command, name] = CliRunner().invoke(app, [command, str(tmp_path / f"{name}.nc")]).output
         assert "all is well" in said, said
         assert "\nrun.nc" not in said and not set("\x1b\x9b\r\b\x07\x7f\u202e") & set(said)
-    assert "problem" in told["check", "surface"]
+    assert told["show", "run"].count("all is well") == 5 and "2 problems" in told["check", "surface"]
 
 
 def test_pages_hold_no_overrides_and_no_control_characters():

@@ -33,27 +33,20 @@ def test_factors_that_are_known_without_pint_are_those_of_pint():
         assert registry.Quantity(Decimal(1), unit).to(si_unit).magnitude == Decimal(factor)
 
 
-@pytest.mark.parametrize(
-    ("text", "metres"),
-    [
-        ("3 Angstrom", 3e-10),
-        ("3 angstroms", 3e-10),
-        ("3 \u00c5", 3e-10),
-        ("3 \u212b", 3e-10),
-        ("3 \u00b5m", 3e-6),
-        ("3 \u03bcm", 3e-6),
-        ("3 micrometers", 3e-6),
-        ("3 Microns", 3e-6),
-        ("3 nanometre", 3e-9),
-        ("3 pm", 3e-12),
-        ("3 in", 0.0762),
-        ("3 inches", 0.0762),
-        ("3 mil", 7.62e-5),
-        ("3 thou", 7.62e-5),
-    ],
-)
-def test_lengths_of_scans(text, metres):
-    assert to_si(text, "m") == metres
+LENGTHS = {
+    "Angstrom angstroms \u00c5 \u212b": "1e-10",
+    "\u00b5m \u03bcm micrometers Microns": "1e-6",
+    "nanometre": "1e-9",
+    "pm": "1e-12",
+    "in inches": "0.0254",
+    "mil thou": "2.54e-5",
+}
+
+
+@pytest.mark.parametrize(("units", "metres"), LENGTHS.items())
+def test_lengths_of_scans(units, metres):
+    for unit in units.split():
+        assert to_si(f"3 {unit}", "m") == float(3 * Decimal(metres))
 
 
 @pytest.mark.parametrize("unit", ["px", "pixel", "pica", "point", "hand", "au", "pc", "li", "pt", "ly", "furlong"])

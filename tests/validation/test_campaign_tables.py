@@ -1,4 +1,4 @@
-"""Tables of the pages on the model's error and on hysteresis, from datasets whose numbers are known."""
+"""Tables of the pages on the model's error and on hysteresis, from datasets with known numbers."""
 
 import compared_campaign as compared
 import numpy as np
@@ -12,11 +12,15 @@ from validation.model_error import errors_by_load, tables
 
 @pytest.fixture(scope="module")
 def entries():
-    def truth(entry, material, seeds=(1, 2, 3)):
+    def solutions(entry, material, seeds=(1, 2, 3)):
         return compared.solutions(entry, lambda labels: labels.material == material and labels.seed in seeds)
 
-    grids = [*truth("adhesionless", "hertz"), *truth("coarse", "hertz", (2,)), *truth("fine", "hertz", (2,))]
-    ranges = [*truth("adhesive", "soft"), *truth("ranges", "soft"), *truth("shortest_range", "soft", (1,))]
+    grids = [
+        *solutions("adhesionless", "hertz"),
+        *solutions("coarse", "hertz", (2,)),
+        *solutions("fine", "hertz", (2,)),
+    ]
+    ranges = [*solutions("adhesive", "soft"), *solutions("ranges", "soft"), *solutions("shortest_range", "soft", (1,))]
     found = model_error(compared.tree(), [*grids, *ranges], runs=compared.patches())
     entries = {name: entry.to_dataset() for name, entry in found.children.items()}
     return entries | {"short_range": entries["one"]}

@@ -55,7 +55,7 @@ def test_curvatures_and_fourth_order_of_crossed_waves():
 
 
 @pytest.mark.parametrize("field_shape", [False, True])
-def test_a_lone_summit_is_hertz_and_its_images(field_shape):
+def test_a_single_summit_is_hertz_with_its_images(field_shape):
     radius, period, pressure = 1.0, 40.0, 1e-6
     summits = summits_at([[3.0, 4.0]], [0.5], [radius], period)
     discs = discs_apart(summits, LAW, pressure, 0.1, field_shape=field_shape)
@@ -89,7 +89,7 @@ def state_of(traction, period=1.0):
     return NodalState(some_surface, np.where(traction > 0, 0.0, 1.0), traction, traction > 0, 0.0)
 
 
-def test_patches_go_on_across_the_cell_and_add_up():
+def test_patches_are_periodic_and_add_up():
     traction = np.zeros((16, 16))
     traction[6:9, 14:] = traction[6:9, :2] = 1.0
     traction[14:, 6:8] = traction[:1, 6:8] = 2.0
@@ -116,7 +116,7 @@ def test_spots_and_patches_are_matched():
 
 
 def test_area_on_a_rotational_profile_of_fourth_order():
-    """Boundary elements against Sneddon's closed form; a lone summit, on which the load is not shared."""
+    """Boundary elements on a single summit against Sneddon's closed form."""
     grid, period, radius, fourth = 256, 4.0, 1.0, 0.35
     x = (np.arange(grid) - grid // 2) * (period / grid)
     r2 = np.minimum(x**2 + x[:, None] ** 2, 1.0)
@@ -150,10 +150,10 @@ def test_split_adds_up_to_the_totals(sources):
     singles = sources["spot_count"].sel(category="single")
     assert int(singles.sum()) == sources.sizes["pair"]
     assert np.array_equal(singles, sources["patch_count"].sel(category="single"))
-    for name, part in (("pair_spot_area", "spot_area_fraction"), ("pair_patch_area", "patch_area_fraction")):
+    for name, total in (("pair_spot_area", "spot_area_fraction"), ("pair_patch_area", "patch_area_fraction")):
         per_state = [float(sources[name][sources["pair_reduced_pressure"] == p].sum()) for p in PRESSURES]
         nominal = float(sources["period"]) ** 2
-        assert per_state == pytest.approx(sources[part].sel(category="single").values * nominal, rel=1e-9)
+        assert per_state == pytest.approx(sources[total].sel(category="single").values * nominal, rel=1e-9)
 
 
 def test_effects_add_up_to_the_error(sources):

@@ -1,4 +1,4 @@
-"""The model against boundary elements where the two must agree: on one bump."""
+"""The model against boundary elements on one paraboloid, where both must agree."""
 
 import numpy as np
 import pytest
@@ -26,13 +26,11 @@ def test_hertzian_bump_agrees_within_one_percent(hertzian, name):
 
 @pytest.fixture(scope="module", params=[2.0, pytest.param(3.5, marks=pytest.mark.slow)])
 def adhesive(request):
-    """A bump with adhesion in compression, in tension and where it is pulled off, on as few nodes as resolve it.
+    """A paraboloid with adhesion in compression, in tension and at pull-off, on the coarsest grid that resolves it.
 
-    At the Tabor parameter 3.5 the two are within 3 %; the smaller one is as quick as it is less near JKR's limit.
-
-    The area is compared with the energetic one, which JKR's is the limit of: the cohesive zone, a few per cent of the
-    radius, is no part of the area of zero gap. Approach and load change sign on the way: their errors are those of
-    JKR's own length, and of the load or the pull-off force, whichever is larger.
+    At the Tabor parameter 3.5 both agree within 3 %; the smaller one is faster and farther from JKR's limit. The area
+    is compared with the energetic area, which tends to JKR's: the area of zero gap lacks the cohesive zone, a few per
+    cent of the radius.
     """
     return one_asperity(request.param, approaches=[3.0, 1.5], period=PERIOD)
 
@@ -50,34 +48,34 @@ def test_jkr_bump_agrees(adhesive, name):
 
 
 def test_jkr_pull_off_force_agrees(adhesive):
-    """The largest tension on the way up, against JKR's 3/2 pi dgamma R."""
+    """The largest tension agrees with JKR's 3/2 pi dgamma R."""
     assert max(-adhesive.force_boundary_elements) == pytest.approx(1.5 * np.pi, rel=near_jkr(adhesive))
 
 
 @pytest.mark.slow
 def test_area_of_zero_gap_agrees_within_three_percent_where_the_cohesive_zone_is_narrow():
-    """It needs a larger Tabor parameter than all else, and a grid to resolve it; this state bears next to no load."""
+    """This needs a larger Tabor parameter and a finer grid; the state is nearly free of load."""
     narrow = one_asperity(5.0, approaches=(2.0,), period=8.0).isel(approach=slice(0, 1))
     for name in ("zero_gap_area_error", "zero_gap_area_error_at_load", "energetic_area_error", "force_error"):
         np.testing.assert_allclose(narrow[name], 0, atol=0.03)
 
 
 def test_jkr_contact_lies_between_the_zero_gap_and_the_energetic_area(adhesive):
-    """In tension, where next to nothing comes from the neighbouring cells."""
+    """In tension, where the effect of the neighbouring cells is small."""
     tension = adhesive.isel(approach=slice(1, None))
     assert np.all(tension.force_boundary_elements < 0) and tension.sizes["approach"] == 2
     assert np.all(tension.zero_gap_area < tension.area_icha)
     assert np.all(tension.area_icha < tension.energetic_area)
 
 
-def test_the_grid_is_the_coarsest_of_its_kind_that_resolves_the_range(adhesive):
+def test_the_grid_is_the_coarsest_fast_one_that_resolves_the_range(adhesive):
     """The strength number falls as the root of the spacing; numbers of factors 2, 3 and 5 lie close."""
     assert 0.95 * MAX_STRENGTH_NUMBER < adhesive.strength_number < MAX_STRENGTH_NUMBER
     assert resolving_grid(Material(1.0, 1.0, 1 / 4), 12.0) == 800  # at 768 it is one half
 
 
 def test_spots_obey_the_law_at_given_approach_and_at_given_load(adhesive, hertzian):
-    """Force and area belong together, and at given load the force is the boundary elements'."""
+    """Force and area agree with the law, and at given load the force is that of the boundary elements."""
     for one, energy in ((adhesive, 1.0), (hertzian, 0.0)):
         for area, force in ((one.area_icha, one.force_icha), (one.area_icha_at_load, one.given_load)):
             np.testing.assert_allclose(jkr_force(np.sqrt(area / np.pi), 1, 1, energy), force, rtol=1e-6)

@@ -354,7 +354,7 @@ def validate(folder: Path, names: list[str], most: int) -> bool:
 
 def main() -> int:
     """Validate the deposit on the command line."""
-    from icha.deposit.verify import LARGE, Damaged, whole_deposit
+    from icha.deposit.verify import LARGE, DamagedDeposit, whole_deposit
     from icha.support.formatting import printable
     from icha.support.input_files import refuse_traps
 
@@ -380,7 +380,7 @@ def main() -> int:
                     sys.exit(f"{name}: {printable(file.relative_to(folder))}: {printable(error)}")
             stay_off_the_network()
             return 0 if validate(folder, arguments.only, sys.maxsize if arguments.all else 5) else 1
-    except Damaged as damaged:
+    except DamagedDeposit as damaged:
         print(*damaged.args, sep="\n")
         sys.exit(f"{name}: is not whole, so no validator was run")
     except OSError as error:

@@ -20,7 +20,7 @@ from icha.surfaces.surface import Surface
 
 ATTRIBUTES = {"campaign": "small", "study": "sticky", "config_sha256": "0", "license": "CC0-1.0"}
 PATH = {"reduced_pressures": [1e-3], "snapshots": [("reduced_pressure", 1e-3)]}
-BOTH_WAYS = PATH | {"unload": True}
+BOTH_WAYS = PATH | {"unload": True, "max_step": 0.5}
 # The energy is ten times that which it takes to press the summits flat.
 STICKY = {"contact_modulus": 1e6, "surface_energy": 48.0, "interaction_range": 8e-6}
 BARE = {"contact_modulus": 25e6, "surface_energy": 0.0, "interaction_range": 2.071e-9}
@@ -50,20 +50,11 @@ def sweep(tmp_path):
     from run_sweep import run_sweep
 
     def run(name, material, path=PATH, surface=None, model="asperities"):
-        said, topography = [], tmp_path / f"{name}-surface.nc"
+        said, topography, output = [], tmp_path / f"{name}-surface.nc", tmp_path / f"{name}.nc"
         write_surface(topography, small.surface() if surface is None else surface, name="rough", seed=1)
-        run_sweep(
-            topography,
-            tmp_path / f"{name}.nc",
-            rms_slope=1.0,
-            seed=1,
-            material=material,
-            path=path,
-            attributes=ATTRIBUTES,
-            progress=said.append,
-            model=model,
-        )
-        return tmp_path / f"{name}.nc", said
+        settings = {"material": material, "path": path, "attributes": ATTRIBUTES, "model": model}
+        run_sweep(topography, output, rms_slope=1.0, seed=1, progress=said.append, **settings)
+        return output, said
 
     return run
 
@@ -76,13 +67,8 @@ def dataset(tmp_path):
     def make(files, model="asperities"):
         names = [name.rpartition("/") for name in files]
         labels = [tuple(RunLabels("sticky", model, surface or "rough", 1, 1.0, name)) for surface, _, name in names]
-        make_dataset(
-            files.values(),
-            tmp_path / "c.nc",
-            labels=labels,
-            settings=["0"] * len(labels),
-            attributes={"title": "Sticky", "config_sha256": "1"},
-        )
+        attributes, settings = {"title": "Sticky", "config_sha256": "1"}, ["0"] * len(labels)
+        make_dataset(files.values(), tmp_path / "c.nc", labels=labels, settings=settings, attributes=attributes)
         return tmp_path / "c.nc", labels
 
     return make
@@ -127,9 +113,8 @@ def test_the_verdict_lists_the_failed_run_and_the_others_are_used(sweep, dataset
     first, line = str(verdict.value).splitlines()
     assert first.startswith("1 of ") and line == f"sticky/rough/seed1/slope1/glue: the run failed: {reason}"
     assert not (tmp_path / "verdict.txt").exists()
-    judge_results(
-        tmp_path / "checks.json", tmp_path / "verdict.txt", known={"sticky/rough/seed1/slope1/glue": "sticky"}
-    )
+    known = {"sticky/rough/seed1/slope1/glue": "sticky"}
+    judge_results(tmp_path / "checks.json", tmp_path / "verdict.txt", known=known)
     first, line = (tmp_path / "verdict.txt").read_text().splitlines()
     assert first.endswith("known failures:") and line == "sticky/rough/seed1/slope1/glue: sticky"
 

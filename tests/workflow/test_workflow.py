@@ -133,7 +133,7 @@ def test_killed_runs_are_finished_with_the_same_bytes(smoke, tmp_path):
     command, environment = snakemake_command("all", "references", "publish")
     environment["PYTHONPATH"] = modules_of(project)
     silent = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "start_new_session": True}
-    for attempt in range(4):
+    for attempt in range(2):
         run = subprocess.Popen(command, cwd=project, env=environment, **silent)
         time.sleep(pause.uniform(3, 9))
         # Of two calls, one is killed alone: its jobs go on for a while, beside those of the next call.
@@ -158,19 +158,6 @@ def test_a_call_removes_what_killed_ones_left_and_refuses_a_second_one(project, 
     before_jobs.locks.pop().close()
     assert snakemake(project).returncode == 0
     assert Path("results/smoke/verdict.txt").exists() and not left.exists()
-
-
-def test_a_failed_check_stops_the_campaign_and_is_named(smoke, tmp_path, monkeypatch):
-    monkeypatch.syspath_prepend(str(REPOSITORY / "workflow/scripts"))
-    from judge_results import judge_results
-
-    checks = json.loads((smoke / "results/smoke/checks.json").read_text())
-    checks[3].update(passed=False, value=0.5)
-    spoilt, verdict = tmp_path / "checks.json", tmp_path / "verdict.txt"
-    spoilt.write_text(json.dumps(checks))
-    with pytest.raises(ValueError, match=f"1 of {len(checks)} checks failed\n.*{checks[3]['name']}: 0.5"):
-        judge_results(spoilt, verdict, known={})
-    assert not verdict.exists()
 
 
 @pytest.mark.parametrize(

@@ -42,13 +42,13 @@ NAMES = {
     "icha_fine_grid": "ICHA, grid twice as fine (over ICHA)",
     "boundary_elements_coarse": "boundary elements, grid half as fine",
 }
-# Patches of fewer boundary elements have no area to speak of.
+# Patches of fewer boundary elements have no accurate area.
 _LEAST_NODES = 20
 _RADII = (0.0, 1.0, 1.5, 2.0, 3.0, np.inf)
 
 
 def ratios(error_sources: Sequence[xr.Dataset], name: str) -> Table:
-    """A variable of every variant over that of boundary elements; the grids' own effects are the last rows."""
+    """Table of a variable of each variant over that of boundary elements; the last rows are effects of the grids."""
     rows = []
     for variant in NAMES:
         if variant not in error_sources[0]["variant"].values:
@@ -60,7 +60,7 @@ def ratios(error_sources: Sequence[xr.Dataset], name: str) -> Table:
 
 
 def steps(error_sources: Sequence[xr.Dataset]) -> Table:
-    """Effects of every step of the chain, and of their sum."""
+    """Table of the effects of all steps, and of their sum."""
     each = [100 * effects(one) for one in error_sources]
     rows = [
         [str(source), *means([one.sel(source=source).values for one in each], "{:+.1f}")]
@@ -71,7 +71,7 @@ def steps(error_sources: Sequence[xr.Dataset]) -> Table:
 
 
 def split(error_sources: Sequence[xr.Dataset]) -> Table:
-    """Areas and loads of spots and patches by category."""
+    """Table of areas and loads of spots and patches by category."""
     rows = []
     for category, meaning in CATEGORIES.items():
         own = [one.sel(category=category) for one in error_sources]
@@ -93,7 +93,7 @@ def split(error_sources: Sequence[xr.Dataset]) -> Table:
 
 
 def single_spots(error_sources: Sequence[xr.Dataset]) -> Table:
-    """Median area over Hertz's, in ranges of the patches' radii."""
+    """Table of the median area over Hertz's, in ranges of the radii of the patches."""
     radius, ratio, nodes = (
         np.concatenate([quantity(one) for one in error_sources])
         for quantity in (relative_radius, shape_ratio, lambda one: one["pair_patch_nodes"])
@@ -116,15 +116,15 @@ LOOKS = {
 }
 _EFFECT_COLOURS = (BLUE, SKY, GREEN, ORANGE, VERMILLION)
 _BINS = 8
-# Points of one load stand this far apart, as a factor.
+# Factor between the abscissas of points of the same load.
 _APART = 1.06
-# Where the frame of panel (d) ends.
+# Upper end of the axis of panel (d).
 _HIGHEST_RATIO = 3.0
 
 
 @in_style
 def figure(error_sources: Sequence[xr.Dataset]) -> Figure:
-    """Draw datasets without adhesion at the same loads, of surfaces that differ in their seeds only."""
+    """Draw datasets without adhesion at the same loads, of surfaces that differ only in their seeds."""
     fig = new_figure(TWO_COLUMNS, 5.7)
     (areas, separations), (steps, singles) = fig.subplots(2, 2)
     _draw_ratios(areas, error_sources, "contact_area_fraction")
@@ -192,10 +192,10 @@ def _draw_single_spots(ax, error_sources):
 
 
 def medians(x: np.ndarray, y: np.ndarray) -> tuple[list, list]:
-    """Medians of x and y in bins of x with equally many points; a y that is NaN counts as beyond all others."""
+    """Return medians of x and y in bins with equal numbers of points; NaN counts as the largest y."""
     bins = np.array_split(np.argsort(x, kind="stable"), _BINS)
     high = np.where(np.isnan(y), np.inf, y)
-    return [np.median(x[part]) for part in bins], [np.median(high[part]) for part in bins]
+    return [np.median(x[members]) for members in bins], [np.median(high[members]) for members in bins]
 
 
 def write(adhesionless: Sequence[xr.Dataset], adhesive: xr.Dataset) -> None:
