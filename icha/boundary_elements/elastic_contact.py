@@ -157,8 +157,7 @@ def solve_active_set(
             gap, misfit, separation = _gap(space, topography, contact, separation, load, dtype, gap)
         left = np.abs(misfit).max(initial=0.0)
         joining = _overlapping_cells(gap, contact.cells, max(tolerance, left))
-        least = left if dtype is float and not sticky else 0.0
-        changed = _next_active_set(contact, keep, joining, least)
+        changed = _next_active_set(contact, keep, joining, left if dtype is float and not sticky else 0.0)
         if changed is None:
             if left <= tolerance:
                 cells, fraction, pressure = contact.cells, contact.fraction, contact.pressure
