@@ -73,7 +73,7 @@ def start_jobs_freely(workflow) -> None:
         workflow.scheduler.job_rate_limiter = None
 
 
-class Campaign:
+class CampaignResults:
     """A campaign in the working directory before its jobs, with its lock.
 
     Snakemake reads the Snakefile also for calls that only report or clean up. The lock does not stop these, only calls
@@ -149,7 +149,7 @@ class Campaign:
         """Return whether Snakemake's record describes the present file, so that Snakemake itself detects changes."""
         try:
             record = json.loads(record_of(f"{self.results}/{path}", METADATA).read_bytes())
-            return checksums.asked_of(record["params"]) == checksums.made_as(self.results, path)
+            return checksums.hash_parameters(record["params"]) == checksums.recorded_hash(self.results, path)
         except (OSError, ValueError, KeyError, TypeError):
             return False
 
@@ -163,10 +163,10 @@ class Campaign:
         _warn(f"{why}, to be made again: {file}{aside}")
 
     def begin(self, missing: str | None = None) -> None:
-        """Take over the results before the first job: jobs that an earlier call left running cannot change them.
+        """Make this call the owner of the results before its first job starts.
 
-        Results are inspected again, since such a job may have changed them in the meantime. A call that only reports
-        never comes here.
+        From then on, jobs of an earlier call cannot change the results. The results are inspected again, because such
+        a job may have changed them since the first inspection. A call that only reports does not call this method.
 
         Parameters
         ----------
@@ -239,7 +239,7 @@ def _present_settings(rules, path: str) -> str:
     rule = next(rule for rule in rules if any(output.match(path) for output in rule.output))
     wildcards = _Wildcards(rule.get_wildcards(path))
     values = (value(wildcards) if callable(value) else value for value in rule.params)
-    return checksums.asked_of(map(repr, values))
+    return checksums.hash_parameters(map(repr, values))
 
 
 @contextlib.contextmanager

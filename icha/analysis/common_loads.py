@@ -120,7 +120,7 @@ def compare_runs(study: xr.Dataset, *, attrs: Mapping[str, str] = {}) -> xr.Data
 
 
 def _loads(study):
-    """Loads of all steps on both axes; NaN except at compressive targets of the first loading."""
+    """Return loads of all steps on both axes; NaN except at compressive targets of the first loading."""
     pressure = study["reduced_pressure"].transpose(*LABELS, "step").values
     slope = study["rms_slope"].broadcast_like(study["status"]).transpose(*LABELS).values[..., None]
     shown = loading_stops(study).transpose(*LABELS, "step").values & (pressure > 0)
@@ -159,8 +159,8 @@ def _spreads(on_grid, averaged):
     for name, short, symbol in _AVERAGED:
         over_seeds = ensemble(np.where(averaged[..., None], on_grid[name], np.nan), LABELS.index("seed"))
         for part, words in _STATISTICS.items():
-            none = "where no run counts" if part == "mean" else "where there is a single seed"
-            description = Variable(_WITHOUT_SEED, "1", words.format(symbol), further={"missing": none})
+            missing = "where no run counts" if part == "mean" else "where there is a single seed"
+            description = Variable(_WITHOUT_SEED, "1", words.format(symbol), further={"missing": missing})
             found[f"{short}_{part}"] = description, getattr(over_seeds, part)
     for label, many in (("material", "materials"), ("rms_slope", "rms slopes")):
         description = Variable(
@@ -238,7 +238,7 @@ def _spread(area, axis):
 
 
 def _common_grid(loads):
-    """Loads that every run covers, evenly spaced by their logarithm; `loads` are positive arrays, one per run."""
+    """Return loads that every run covers, evenly spaced by their logarithm; `loads` has positive values of each run."""
     if not loads or not all(map(len, loads)):
         return np.empty(0)
     lowest = max(float(load.min()) for load in loads)

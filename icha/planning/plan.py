@@ -131,7 +131,7 @@ def _computed_files(campaign, results, files) -> Iterator[Item]:
 
 def _derived_files(campaign, files: CampaignFiles, computed: list[Item]) -> Iterator[tuple]:
     """Yield part, path, stage, inputs and cost of the files that are derived from runs."""
-    runs, held = len(files.runs), _dataset_memory(files, computed)
+    runs, dataset = len(files.runs), _dataset_memory(files, computed)
     size = sum(item.cost.disk for item in computed if item.is_run)
     beside = [*files.compared, *files.solutions]
     tables = [
@@ -142,7 +142,7 @@ def _derived_files(campaign, files: CampaignFiles, computed: list[Item]) -> Iter
     ]
     for kind, paths, stage, inputs, count, disk in tables:
         for path in paths:
-            yield "dataset and checks", path, stage, inputs, costs.table_cost(kind, count, disk, held)
+            yield "dataset and checks", path, stage, inputs, costs.table_cost(kind, count, disk, dataset)
     result_files = ResultFiles(campaign.name)
     for name in campaign.figures.by_name():
         path = result_files.path(results_files.FIGURE, name=name, ending="png")
@@ -153,11 +153,11 @@ def _derived_files(campaign, files: CampaignFiles, computed: list[Item]) -> Iter
             sum(case.study in shown for case in files.runs.values()),
             max(grids) ** 2 if DECLARATIONS[name].holds_topography else 0,
             max((len(campaign.studies[study].models) for study in shown), default=1),
-            held,
+            dataset,
         )
         flat = [path for each in inputs for path in ([each] if isinstance(each, str) else each)]
         yield "figures", path, 3, flat, cost
-    yield "report", files.report, 4, files.computed, costs.report_cost(runs, len(files.figures) // 2, held)
+    yield "report", files.report, 4, files.computed, costs.report_cost(runs, len(files.figures) // 2, dataset)
 
 
 def _dataset_memory(files, computed):
@@ -235,14 +235,14 @@ def failed_runs(campaign: Campaign, results: Path) -> dict[str, str]:
 
 
 def expected_seconds(items: Iterable[Item], folder: str) -> dict[str, float]:
-    """Expected core-seconds of each job with its scheduling, by its path with `folder` before it."""
+    """Return expected core-seconds of each job with its scheduling, by its path with `folder` before it."""
     return {f"{folder}/{item.path}": item.cost.seconds * item.threads + WORKFLOW.job for item in items}
 
 
 def whole_cost(campaign: Campaign, results: Path) -> costs.Cost:
-    """Expected cost of a whole campaign: seconds on one core, memory of the largest job, disk.
+    """Return the expected cost of a whole campaign: seconds on one core, memory of the largest job, disk.
 
-    It is that of the cost model without calibration, so it is the same on every machine.
+    The cost is not calibrated by finished jobs, so every machine gives the same value.
     """
     items = [replace(item, state=TO_DO) for item in _items(campaign, results)]
     return costs.Cost(time_on(items, 1), memory_on(items, 1), total(items).disk)
@@ -318,7 +318,7 @@ def total(items: Iterable[Item]) -> Total:
 
 
 def time_on(items: Iterable[Item], cores: int) -> float:
-    """Expected time from the call to the end on some cores, s; 0 if nothing is to be done.
+    """Return expected time from the call to the end on some cores, s; 0 if nothing is to be done.
 
     The work of a stage is divided among the cores, but takes at least the time of its longest job, and that of
     scheduling all its jobs one by one.

@@ -334,7 +334,7 @@ def _find_gap_at_load(contact, pressure, separation, progress):
 
 
 def _next_gap(tried):
-    """Secant step in the load, limited to the interval between gaps that carry too much and too little."""
+    """Return the next mean gap: a secant step in the load, between the gaps with too much and too little load."""
     gap, error = tried[-1]
     step = _DECAY * (math.log1p(error) if error > -0.9 else -1.0)
     if len(tried) > 1:

@@ -21,7 +21,7 @@ _POINTS = 401
 
 
 def persson_area(reduced_pressure):
-    """A/A0 = erf(sqrt(2) p*) for reduced pressures of any shape (Persson 2001)."""
+    """Compute the contact area fraction erf(sqrt(2) p*) for an array of reduced pressures (Persson 2001)."""
     return erf(np.sqrt(2) * np.asarray(reduced_pressure, float))
 
 
@@ -37,7 +37,7 @@ def persson_pressure_density(pressure, reduced_pressure):
 
 
 def persson_mean_separation(reduced_pressure, spectrum):
-    r"""Mean separation over h_rms at reduced pressures of any shape, from the spectrum of the surface.
+    r"""Compute the mean separation over h_rms from the spectrum of the surface, for an array of reduced pressures.
 
     Yang & Persson (2008): with w(q) = (pi int_{q_L}^q k^3 C(k) dk)^(-1/2) and P = erf(w p/E*),
 

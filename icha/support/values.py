@@ -1,6 +1,7 @@
 """Types of values in a configuration, such as `25 MPa`, which is kept as a float in SI units."""
 
 import math
+import operator
 import re
 import unicodedata
 from collections.abc import Iterable, Iterator
@@ -101,7 +102,7 @@ def conversion_factor(unit: str, si_unit: str) -> Decimal:
 
 
 def _letters(unit):
-    """A unit in lower case, without blanks and signs of a power."""
+    """Return a unit in lower case, without blanks and signs of a power."""
     return re.sub(r"[\s^*]", "", unicodedata.normalize("NFKC", unit)).replace("\u03bc", "u").lower()
 
 
@@ -246,17 +247,18 @@ def distinct(values):
 
 def increasing(values):
     """Refuse a list of numbers that does not increase."""
-    for before, after in pairwise(values):
-        if not after > before:
-            raise ValueError(f"{after:g} comes after {before:g}; expected values in increasing order")
-    return values
+    return _require_order(values, operator.gt, "increasing")
 
 
 def decreasing(values):
     """Refuse a list of lengths that does not decrease."""
+    return _require_order(values, operator.lt, "decreasing", " m")
+
+
+def _require_order(values, follows, order, unit=""):
     for before, after in pairwise(values):
-        if not after < before:
-            raise ValueError(f"{after:g} m comes after {before:g} m; expected values in decreasing order")
+        if not follows(after, before):
+            raise ValueError(f"{after:g}{unit} comes after {before:g}{unit}; expected values in {order} order")
     return values
 
 
@@ -269,7 +271,7 @@ def exactly_one(section):
     return section
 
 
-def listed(names: Iterable) -> str:
+def list_names(names: Iterable) -> str:
     """List names for a message: `a, b, c`, or the first ones and the number of the others."""
     names = list(names)
     more = f", … ({len(names) - _MOST_LISTED} more)" if len(names) > _MOST_LISTED else ""
@@ -279,7 +281,7 @@ def listed(names: Iterable) -> str:
 def unknown(location: tuple, name: str, names: Iterable[str]) -> Iterator[Problem]:
     """Yield the problem of a name that is not one of `names`."""
     if name not in names:
-        yield location, name, f"is not defined; expected {listed(names) or 'no name, because none is defined'}"
+        yield location, name, f"is not defined; expected {list_names(names) or 'no name, because none is defined'}"
 
 
 def _without_controls(value: str) -> str:

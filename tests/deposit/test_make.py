@@ -39,7 +39,7 @@ from icha.deposit.readme import data_dictionary, file_pattern
 from icha.deposit.verify import COMPUTED
 from icha.planning.costs import Cost
 from icha.planning.results import campaign_files
-from icha.support.checksums import asked_of, sha256_as_written, write_checksum
+from icha.support.checksums import hash_parameters, sha256_as_written, write_checksum
 
 # Where and by whom the campaign is run: words that are nowhere else.
 PLACE, PERSON, MACHINE, SECRET = "Quittenbaumhof", "zwetschgenwirt", "mirabellenrechner", "hagebuttengeheimnis"
@@ -248,7 +248,7 @@ publication:
   date: 2026-01-31
   authors: [{name: The team}]
 """
-ASKED = asked_of(["0"])
+ASKED = hash_parameters(["0"])
 SOURCES = ("Snakefile", "uv.lock", "LICENSE", "workflow/scripts/run.py")
 
 
@@ -372,7 +372,7 @@ def test_results_that_do_not_belong_together_are_refused(campaign):
     recorded = dict.fromkeys([*files.runs, files.dataset], ASKED)
     refuse_mixed(results, campaign, recorded)
     with pytest.raises(ValueError, match=r"dataset/small.nc: the workflow has recorded another job for it"):
-        refuse_mixed(results, campaign, recorded | {files.dataset: asked_of(["1"])})
+        refuse_mixed(results, campaign, recorded | {files.dataset: hash_parameters(["1"])})
     # A run of an older program, with the right settings.
     path, case = next(iter(files.runs.items()))
     run = small.run(1, material="hertz").assign_attrs(config_sha256=run_sha256(campaign, case), summary="Older")
