@@ -137,8 +137,6 @@ def solve_active_set(
     ------
     FullContact
         If the contact covers the surface at a given separation, which is the mean gap.
-    NotConverged
-        If pressures or the active set are not found.
     """
     dtype = np.float32 if tolerance > topography.rounding else float
     keep, gap, before, changing = np.full(len(contact.cells), sticky), None, np.inf, not sticky

@@ -300,7 +300,11 @@ class Study(Section):
             targets += [((key, k, state.target[0]), *state.target) for k, state in enumerate(states)]
         for location, kind, value in targets:
             if kind in ASPERITY_RANGES and value > ASPERITY_RANGES[kind].most:
-                yield location, value, f"must be {ASPERITY_RANGES[kind].expected}; or use models: [boundary_elements]"
+                yield (
+                    location,
+                    value,
+                    f"is out of range; expected {ASPERITY_RANGES[kind].expected}, or models: [boundary_elements]",
+                )
 
     def _path_problems(self, snapshots):
         """Report why the settings make no path."""
