@@ -145,7 +145,7 @@ def jump_off(state: IterationState, point: Point, margin: float) -> IterationSta
     """Break the contact of all spots past jump-off by more than a margin, m.
 
     Without adhesion only unions have to break contact: a single asperity out of contact does no harm. Spots that have
-    come into contact during this search break contact first: without them the others may well stay.
+    come into contact during this search break contact first. After that, the other spots may be stable again.
     """
     sites = state.sites
     breaking = sites.status == CONTACT

@@ -52,7 +52,7 @@ def find_equilibrium(
 
     The search always ends. Without adhesion spots are only added or united (a spot of radius zero does no harm and is
     removed at the end). With adhesion an asperity that has broken contact may not make contact again at this
-    separation; `pending` counts those that would.
+    separation; `pending` counts the asperities that this rule keeps out of contact.
 
     Parameters
     ----------
