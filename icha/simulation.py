@@ -260,7 +260,7 @@ class _PathRecord:
 
 
 def _count_uphill_jumps_in(record: _PathRecord) -> int:
-    """Count the jumps into contact that take energy, by the law of the spot alone or by the energy balance."""
+    """Count the jumps into contact that cost energy, by the law of a single spot or by the energy balance."""
     gained = np.diff([step["dissipated_by_jump_in"] for step in record.steps], prepend=0.0) < 0
     return sum(
         int(np.count_nonzero((events.kind == JUMP_IN) & ((events.energy < 0) | uphill)))

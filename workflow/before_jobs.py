@@ -25,7 +25,7 @@ ANOTHER_FOLDER = "use another folder: `icha run --directory FOLDER`, `snakemake 
 
 
 def prepare_process() -> None:
-    """Set what jobs inherit from this process."""
+    """Set the environment variables that jobs inherit from this process."""
     if sys.platform == "linux":
         # Jobs end with this process: see workflow/scripts/job.py.
         os.environ["ICHA_SNAKEMAKE"] = f"{os.getpid()} {beginning_of(os.getpid())}"

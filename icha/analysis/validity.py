@@ -336,7 +336,7 @@ def _used(models):
 
 
 def _error(adhesive):
-    """Describe the errors against boundary elements; `adhesive` holds True, False or both, for with and without."""
+    """Describe the errors against boundary elements; `adhesive` contains True for runs with adhesion, False without."""
 
     def describe(quantity):
         ranges = [VALIDATION[each][quantity] for each in sorted(adhesive, reverse=True)]

@@ -1,4 +1,4 @@
-"""Energy of full contact, which shows before any computation whether a surface is sticky.
+"""Elastic energy of full contact. Its ratio to the work of adhesion shows before a run whether a surface is sticky.
 
 B. N. J. Persson and E. Tosatti, J. Chem. Phys. 115 (2001) 5597-5610, doi:10.1063/1.1398300.
 """

@@ -117,5 +117,5 @@ def campaign_sha256(campaign: Campaign, of_run: Callable[[RunLabels], str] | Non
 
 
 def _sha256(settings) -> str:
-    """Compute the checksum of settings, whatever their order and the units in the configuration."""
+    """Compute the checksum of settings, which does not depend on the order of their keys."""
     return hashlib.sha256(json.dumps(settings, sort_keys=True).encode()).hexdigest()

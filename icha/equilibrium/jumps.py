@@ -147,7 +147,7 @@ def apply_jump_off(state: IterationState, evaluation: Evaluation, margin: float)
     """Break the contact of all spots past jump-off by more than a margin, m.
 
     Without adhesion only unions have to break contact: a single asperity out of contact does no harm. Spots that have
-    come into contact during this search break contact first: without them the others may well stay.
+    come into contact during this search break contact first. After that, the other spots may be stable again.
     """
     sites = state.sites
     breaking = sites.status == CONTACT

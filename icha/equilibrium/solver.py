@@ -51,8 +51,8 @@ def find_equilibrium(
     equations are solved and no event is due.
 
     The search ends with an equilibrium or with an error. An asperity that has broken contact may not make contact again
-    at this separation; `barred_count` counts those that would. Without adhesion a single spot of radius zero does no
-    harm and becomes a candidate at the end.
+    at this separation; `barred_count` counts the asperities that this rule keeps out of contact. Without adhesion a
+    single spot of radius zero does no harm and becomes a candidate at the end.
 
     Parameters
     ----------

@@ -235,7 +235,7 @@ def failed_runs(campaign: Campaign, results: Path) -> dict[str, str]:
 
 
 def expected_seconds(items: Iterable[Item], folder: str) -> dict[str, float]:
-    """Return expected core-seconds of each job with its scheduling, by its path with `folder` before it."""
+    """Return the expected core-seconds of each job, with scheduling; keys are the paths of files in `folder`."""
     return {f"{folder}/{item.path}": item.cost.seconds * item.threads + WORKFLOW.job for item in items}
 
 

@@ -1,4 +1,4 @@
-"""Readers of text: a row of heights per line, or x y z; and the format of a text."""
+"""Readers of text files with a row of heights per line or with x y z per line; choice between the two."""
 
 import re
 from dataclasses import dataclass
@@ -72,7 +72,7 @@ def read_matrix(file: SourceFile, settings: Preparation) -> FileContent:
 
 
 def _as_instrument_file(file, settings):
-    """Read the file with SurfaceTopography, which knows many headings; None if its heights are not all of the numbers.
+    """Read the file with SurfaceTopography; None if the heights have no unit or are not the numbers of the file.
 
     SurfaceTopography raises all kinds of errors for texts of other formats.
     """
