@@ -162,8 +162,7 @@ class RunFigure(StudyFigure):
     )
 
     def arguments(self) -> dict[str, Any]:
-        """Return the arguments, with `surface_name` for the surface, because `surface` is the dataset of the
-        surface."""
+        """Return the arguments; `surface_name` is the name of the surface, because `surface` is its dataset."""
         arguments = super().arguments()
         if "surface" in arguments:
             arguments["surface_name"] = arguments.pop("surface")

@@ -110,14 +110,14 @@ def read_xyz(file: SourceFile, settings: Preparation) -> FileContent:
     size = None
     if along_x and along_y and settings.lateral_unit is None:
         size = sides[0] * along_x, sides[1] * along_y
-    order = ", ".join(f"{axis} {titles[axis].column}" for axis in titles)
+    columns = ", ".join(f"{axis} {titles[axis].column}" for axis in titles)
     reordered = titles and sorted(titles, key=lambda axis: titles[axis].column) != ["x", "y", "z"]
     return FileContent(
         heights.reshape(ny, nx),
         units[2] or heading.height_unit,
         size,
         sides,
-        remark=f"columns {order} by their names" if reordered else "",
+        remark=f"columns {columns} by their names" if reordered else "",
         data_known=heading.channel == settings.data,
     )
 
