@@ -251,7 +251,7 @@ class Study(Section):
             return [self.targets.last]
         if self.snapshots == EVERY_STOP:
             return self.targets.states
-        return [snapshot.target for snapshot in self.snapshots]
+        return [snapshot.kind_and_value for snapshot in self.snapshots]
 
     def path_settings(self, snapshots: list[tuple[str, float]] | None) -> dict:
         """Return the arguments of the path of the runs (`icha.Path`), without unused ones."""
@@ -259,7 +259,7 @@ class Study(Section):
         if self.unload or self.turning_points:
             settings |= {
                 "unload": self.unload,
-                "turning_points": [point.target for point in self.turning_points],
+                "turning_points": [point.kind_and_value for point in self.turning_points],
                 "control": self.control,
             }
         elif self.control != "separation":
@@ -290,6 +290,6 @@ class Study(Section):
             name, _, index = key.partition("[")
             location, value = (name,), getattr(self, name)
             if index:
-                kind, value = value[int(index.rstrip("]"))].target
+                kind, value = value[int(index.rstrip("]"))].kind_and_value
                 location = (name, int(index.rstrip("]")), kind)
             yield location, value, reason.removeprefix(f"{value!r} ")
