@@ -207,7 +207,7 @@ def _surfaces(cases):
 
 
 def _accuracy(cases):
-    """State the error of the asperity model, which is known where surface and material are within the validation."""
+    """State the error of the asperity model, which is known for surfaces and materials within the validation."""
     unknown, adhesive = {}, set()
     for case in cases:
         of_surface = outside_validation({name: case.facts[name] for name in case.facts if name != _RATIO})

@@ -7,12 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from icha.boundary_elements.cells import mask_of
-from icha.boundary_elements.elastic_contact import AdhesiveContact, Contact, Topography
-from icha.boundary_elements.front import Front
+from icha.boundary_elements.elastic_contact import AdhesiveContact, Contact
 from icha.boundary_elements.front_solver import FrontProblem, relax_front
-from icha.boundary_elements.half_space import HalfSpace
 from icha.boundary_elements.local_relaxation import relax_in_windows
-from icha.contact.model import FullContact, NotConverged
+from icha.contact.model import NotConverged
 
 # Residual of the front, and distance within the reach of the attraction over the critical opening, at which new contact
 # forms: first where it is clear, then where it is certain.
@@ -21,8 +19,6 @@ _CLEAR_RESIDUAL, _CLEAR_DISTANCE, _CERTAIN_RESIDUAL = 3e-2, 0.02, 1e-3
 _ROUND_ACCURACY = 1e-2
 # Rounds of new contact: they end, but there may be as many as cells.
 _MAX_ROUNDS = 1000
-# Contact area over nominal area from which the last gaps close by themselves.
-_NEARLY_FULL = 0.98
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,15 +69,7 @@ class Summits:
 
 
 def solve_adhesive_contact(
-    space: HalfSpace,
-    front: Front,
-    topography: Topography,
-    summits: Summits,
-    separation: float,
-    contact: Contact,
-    tolerance: float,
-    *,
-    close: bool = False,
+    problem: FrontProblem, summits: Summits, contact: Contact, tolerance: float, *, close: bool = False
 ) -> tuple[AdhesiveContact, int]:
     """Solve the contact at a separation: relax the fronts, and form contact at all summits within reach.
 
@@ -89,7 +77,8 @@ def solve_adhesive_contact(
 
     Parameters
     ----------
-    separation : mean separation, in cells.
+    problem : the surface at a separation.
+    summits : where contact may form.
     contact : to start from.
     tolerance : residual of the fronts.
     close : whether the contact is so close to equilibrium that it is clear where contact forms.
@@ -100,27 +89,22 @@ def solve_adhesive_contact(
 
     Raises
     ------
-    FullContact
-        If the contact covers the surface.
     NotConverged
         If the equilibrium is not found.
     """
-    problem = FrontProblem(space, front, topography, separation)
-    margin = _CLEAR_DISTANCE * front.critical_opening
+    margin = _CLEAR_DISTANCE * problem.front.critical_opening
 
     def relax_locally(state, far):
-        return relax_in_windows(space, front, separation, state, state.gap, far)
+        return relax_in_windows(problem.space, problem.front, problem.separation, state, state.gap, far)
 
     stages = [(_CLEAR_RESIDUAL, margin), (_CERTAIN_RESIDUAL, 0.0), (tolerance, 0.0)]
     if tolerance > _CERTAIN_RESIDUAL:
         stages[1:] = [(tolerance, margin)]
     first = len(stages) - 1 if close else 0
-    tried, rounds, stage = np.zeros(space.size, dtype=bool), 0, first
+    tried, rounds, stage = np.zeros(problem.space.size, dtype=bool), 0, first
     while True:
         residual, distance = stages[stage]
         solved = relax_front(problem, contact, residual, close=close, relax_locally=relax_locally)
-        if np.sum(solved.fraction) > _NEARLY_FULL * space.size:
-            raise FullContact("the contact runs over the whole surface")
         formed, new, within = summits.new_contact(solved, distance, tried)
         if not len(new):
             stage += 1

@@ -14,7 +14,8 @@ from icha.asperity.material import Material
 from icha.boundary_elements.adhesive import Summits, solve_adhesive_contact
 from icha.boundary_elements.elastic_contact import Contact, Topography, solve_nonadhesive_contact
 from icha.boundary_elements.front import Front, adhesive_areas, reported_area_gradient, reported_areas
-from icha.boundary_elements.front_solver import TOLERANCES, find_active_cells, rates_with_separation
+from icha.boundary_elements.front_solver import TOLERANCES, FrontProblem, find_active_cells, rates_with_separation
+from icha.boundary_elements.full_contact import ROUNDING, FullContactProblem
 from icha.boundary_elements.half_space import HalfSpace
 from icha.boundary_elements.load_control import ControlProblem, solve_at_control
 from icha.boundary_elements.observables import PatchObservables
@@ -28,9 +29,9 @@ from icha.boundary_elements.patches import (
     unpack,
 )
 from icha.contact.checkpoints import CheckpointedContact
-from icha.contact.model import PRESSURE, Control, Events, NotConverged
+from icha.contact.model import AREA_FRACTION, PRESSURE, Control, Events, NotConverged
 from icha.contact.models import MODELS, REFERENCE_MODEL, PathAccuracy
-from icha.surfaces.summits import Asperities, locate_summits
+from icha.surfaces.summits import locate_summits
 from icha.surfaces.surface import Surface
 
 # Smallest critical opening over the largest height; below, rounding of the heights hides it.
@@ -40,44 +41,8 @@ _LARGEST_PREDICTION = 0.25
 
 
 @dataclass(frozen=True, eq=False)
-class BoundaryElements:
-    """`icha.contact.model.ContactModel` of a periodic rough surface against a half-space, cell by cell.
-
-    Parameters
-    ----------
-    heights : (n, n), m.
-    spacing : size of a cell, m.
-    law : of one summit, for the reach of its attraction.
-    rms_height, rms_slope : of the surface, m and 1.
-    asperities : its summits.
-    space, topography, front, summits : the same for the solver, in units of cells and E*.
-    """
-
-    heights: np.ndarray
-    spacing: float
-    law: JKR
-    rms_height: float
-    rms_slope: float
-    asperities: Asperities
-    space: HalfSpace
-    topography: Topography
-    front: Front
-    summits: Summits
-
-    @property
-    def adhesive(self) -> bool:
-        """Whether contact forms and breaks in jumps."""
-        return self.law.material.surface_energy > 0
-
-    @property
-    def contact_modulus(self) -> float:
-        """E*, Pa."""
-        return self.law.material.contact_modulus
-
-    @property
-    def pressure_unit(self) -> float:
-        """E* h'_rms, Pa."""
-        return self.contact_modulus * self.rms_slope
+class BoundaryElements(FullContactProblem):
+    """`icha.contact.model.ContactModel` of a periodic rough surface against a half-space, cell by cell."""
 
     @property
     def area(self) -> float:
@@ -86,7 +51,7 @@ class BoundaryElements:
 
     @property
     def largest_area_fraction(self) -> float:
-        """All of it: full contact ends a path by itself."""
+        """Return 1: the model covers full contact."""
         return 1.0
 
     @property
@@ -112,14 +77,36 @@ class BoundaryElements:
         """
         if let_go:
             raise NotConverged("boundary elements cannot let go of single patches")
-        if control is None:
-            new = self._solve(state, separation)
-        elif not self.adhesive and control.quantity == PRESSURE and control.target > 0 and len(state.cells):
-            new = self._solve_nonadhesive(state, load=control.target / self.contact_modulus)
+        if self.is_full(state):
+            new = self._leave_full_contact(state, separation, control)
         else:
-            new = solve_at_control(ControlProblem(self, control, self._solve, self._events), state, separation)
+            new = self._next_equilibrium(state, separation, control)
         events = self._events(state, new)
         return replace(new, history=(*state.history, events) if len(events) else state.history)
+
+    def _next_equilibrium(self, state, separation, control):
+        """Equilibrium from a state that is not full contact; arguments as of `equilibrium`."""
+        if control is None:
+            closed = separation < self.smallest_gap
+            return self.full_contact(self.closing_pressure) if closed else self._solve(state, separation)
+        if not self.adhesive and control.quantity == PRESSURE and control.target > 0 and len(state.cells):
+            if control.target >= self.opening_pressure:
+                return self.full_contact(control.target)
+            return self._solve_nonadhesive(state, load=control.target / self.contact_modulus)
+        return solve_at_control(ControlProblem(self, control, self._solve, self._events), state, separation)
+
+    def _leave_full_contact(self, state, separation, control):
+        """Equilibrium from full contact, which opens at the weakest place; arguments as of `equilibrium`."""
+        if control is None and separation <= 0:
+            return self.full_contact(self.closing_pressure)
+        if control is not None and control.quantity == PRESSURE and control.target >= self.opening_pressure:
+            return self.full_contact(control.target)
+        if control is not None and control.quantity == AREA_FRACTION and control.target >= 1:
+            return state
+        if control is None and self.pressure(state) > self.opening_pressure + ROUNDING * self.contact_modulus:
+            return self.full_contact(self.opening_pressure)
+        separation = max(separation, self.smallest_gap)
+        return self._next_equilibrium(self.open_weakest(separation), separation, control)
 
     def observables(self, surface: Surface) -> PatchObservables:
         """Observables of the states on a surface."""
@@ -197,16 +184,9 @@ class BoundaryElements:
         """Equilibrium at a separation (m), to a residual of the front; arguments as of `ControlProblem.solve`."""
         if not self.adhesive:
             return self._solve_nonadhesive(state, separation=separation / self.spacing)
-        solved, pending = solve_adhesive_contact(
-            self.space,
-            self.front,
-            self.topography,
-            self.summits,
-            separation / self.spacing,
-            self._predict(state, separation),
-            residual,
-            close=close,
-        )
+        problem = FrontProblem(self.space, self.front, self.topography, separation / self.spacing)
+        start = self._predict(state, separation)
+        solved, pending = solve_adhesive_contact(problem, self.summits, start, residual, close=close)
         new = CellState(
             separation,
             solved.cells,
@@ -269,6 +249,11 @@ class BoundaryElements:
         return self._energy_of_cells(state) if self.adhesive else np.zeros(len(state.cells))
 
 
+def theoretical_strength(material: Material) -> float:
+    """Largest tension of an interface with the attraction of Lennard-Jones' law, 16/(9 sqrt(3)) dgamma/range, Pa."""
+    return 16 / (9 * np.sqrt(3)) * material.surface_energy / material.interaction_range
+
+
 def contact_of(surface: Surface, material: Material) -> BoundaryElements:
     """Contact of a surface and a material.
 
@@ -288,7 +273,8 @@ def contact_of(surface: Surface, material: Material) -> BoundaryElements:
         -jump_in / h,
         law.contact_radius(jump_in, asperities.radius_of_curvature) / h,
     )
-    front = Front(material.surface_energy / (material.contact_modulus * h))
+    strength = theoretical_strength(material) / material.contact_modulus
+    front = Front(material.surface_energy / (material.contact_modulus * h), strength)
     if 0 < front.critical_opening < _SMALLEST_OPENING * np.abs(surface.heights).max() / h:
         raise ValueError(
             f"surface_energy: {material.surface_energy:g} J/m^2 has no effect at the heights of this surface, of up to "

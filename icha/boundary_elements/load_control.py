@@ -10,7 +10,7 @@ import numpy as np
 
 from icha.boundary_elements.front_solver import TOLERANCES
 from icha.boundary_elements.patches import CellState
-from icha.contact.model import AREA_FRACTION, PRESSURE, Control, Events, NotConverged
+from icha.contact.model import AREA_FRACTION, PRESSURE, Control, Events, FullContact, NotConverged
 from icha.contact.models import AREA_TOLERANCE_CELLS, AREA_TOLERANCE_PART
 
 if TYPE_CHECKING:
@@ -27,6 +27,8 @@ _SAME_SEPARATION = 1e-13
 # Unit of the error of a load of zero, over stiffness times h_rms: attraction and repulsion of about this size cancel.
 _ZERO_LOAD = 1e-2
 _MAX_TRIALS, _MAX_ATTEMPTS = 30, 4
+# Change of the mean gap between trials where the target may lie in full contact: over the mean gap, and in h_rms.
+_CLOSING, _LONGEST = 0.5, 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +62,7 @@ class ControlProblem:
         if self.control.target:
             return abs(self.control.target)
         unit = abs(self.contact.stiffness(state)) * self.contact.rms_height
-        return max(abs(self.contact.pressure(state)), _ZERO_LOAD * unit)
+        return max(abs(self.contact.pressure(state)), _ZERO_LOAD * unit if np.isfinite(unit) else 0.0)
 
     def tolerance(self, scale: float) -> float:
         """Largest error of a value that meets the target."""
@@ -130,6 +132,8 @@ def solve_at_control(problem: ControlProblem, state: CellState, separation: floa
     scale = problem.scale(state)
     same = _SAME_SEPARATION * contact.rms_height
     whole = bracket = Bracket(np.sign(-problem.error(state)) or 1.0, same, state)
+    if separation <= 0:
+        separation = 0.5 * state.separation
     try:
         for _ in range(_MAX_ATTEMPTS):
             trial, bracket = bracket_loosely(problem, bracket, separation, scale)
@@ -140,6 +144,11 @@ def solve_at_control(problem: ControlProblem, state: CellState, separation: floa
                 return found
             bracket = whole.with_state(found, problem.error(found))
             separation = bracket.limit(problem.newton_separation(found))
+    except FullContact:
+        # The load is larger than that of the smallest gap.
+        if control.quantity == PRESSURE and whole.sign > 0:
+            return contact.full_contact(control.target)
+        reason = ": the contact closes over the whole surface"
     except NotConverged as failure:
         reason = f": {failure}"
     else:
@@ -155,6 +164,7 @@ def bracket_loosely(
     Where events may happen on the path, none is skipped: a trial that goes too far starts from before it.
     """
     contact, start, residual = problem.contact, bracket.before, _FIRST_RESIDUAL
+    control_is_load = problem.control.quantity == PRESSURE
     close = _CLOSE * scale if contact.adhesive else problem.tolerance(scale)
     for _ in range(_MAX_TRIALS if contact.adhesive else 2 * _MAX_TRIALS):
         trial, residual = problem.solve(start, separation, residual), _RESIDUAL
@@ -164,7 +174,15 @@ def bracket_loosely(
         bracket = bracket.with_state(trial, error)
         passed = trial is not bracket.before and len(problem.events(bracket.before, trial))
         start = bracket.before if passed else trial
-        separation = bracket.limit(problem.newton_separation(trial))
+        separation = problem.newton_separation(trial)
+        if control_is_load and bracket.sign > 0 and bracket.beyond is None and not separation < trial.separation:
+            # The load falls as the surfaces approach: look for it beyond its minimum.
+            separation = trial.separation - min(_CLOSING * trial.separation, _LONGEST * contact.rms_height)
+        separation = bracket.limit(separation)
+        if separation < contact.smallest_gap:
+            separation = (1 - _CLOSING) * trial.separation
+            if separation < contact.smallest_gap:
+                raise FullContact("the mean gap vanishes")
     raise NotConverged(f"{_MAX_TRIALS} trials do not bracket it")
 
 
@@ -173,6 +191,8 @@ def iterate_secant(problem: ControlProblem, bracket: Bracket, trial: CellState, 
     before, error = None, problem.error(trial)
     for _ in range(_MAX_TRIALS):
         separation = bracket.limit(problem.newton_separation(trial, before))
+        if separation < problem.contact.smallest_gap:
+            raise FullContact("the mean gap vanishes")
         same = before is not None and abs(error) < _SAME_SLOPES * scale
         start, before = trial, trial if before is not None or trial.front_residual <= TOLERANCES.front else None
         trial = problem.solve(start, separation, TOLERANCES.front, close=True, same_slopes=same)

@@ -100,7 +100,7 @@ class Draft:
 
 
 def _has(content: Any, keys: tuple) -> bool:
-    """Return whether nested mappings have a value at the end of a list of keys, or already before its end."""
+    """Return whether nested mappings have a value at a path of keys, or a value other than a mapping before its end."""
     for key in keys:
         if not isinstance(content, Mapping):
             return True

@@ -36,7 +36,7 @@ class NotConverged(Exception):
 
 
 class FullContact(NotConverged):
-    """Error: the contact spread over the whole surface."""
+    """Error: the contact has spread over the whole surface."""
 
 
 # Kinds of events, and their names.

@@ -14,8 +14,8 @@ from icha.surfaces.surface import Surface
 def contact_cover(surface: Surface, spots: Spots) -> np.ndarray:
     """Return the fraction of every node's cell that is in contact, (n, n) float, exact for discs.
 
-    The fractions of overlapping spots add up, so a cell may exceed 1. The mean is A/A0 up to rounding; on a free square
-    without the area beyond the edges.
+    The fractions of overlapping spots add up, so the value of a cell may exceed 1. The mean over the grid is A/A0 up to
+    rounding. On a free square the mean does not include the area beyond the edges.
     """
     cover, _ = _cover_grid(surface.period, surface.grid, spots.position, spots.contact_radius, surface.free)
     return cover

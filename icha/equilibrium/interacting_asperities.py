@@ -1,4 +1,4 @@
-"""Interacting asperities: the contact model of Violano & Afferrante, in the form that a path follows."""
+"""Interacting asperities: the contact model of Violano & Afferrante, as a `ContactModel` for `icha.path`."""
 
 from __future__ import annotations
 

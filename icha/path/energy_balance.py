@@ -39,6 +39,19 @@ def integration_error(du, slope, end_slope):
 _CERTAIN_LOSS = 0.1
 
 
+def _beside_full_contact(du, p, q, slope, end_slope):
+    """Pressures, slopes and integration error of a step from or to full contact.
+
+    Full contact is infinitely stiff: its pressure does no work, and jumps where it closes or opens. The pressure at its
+    end of the step is that along the tangent at the other end.
+    """
+    if np.isinf(slope) and np.isinf(end_slope):
+        return p, q, 0.0, 0.0, 0.0
+    if np.isinf(slope):
+        return q - du * end_slope, q, end_slope, end_slope, 0.5 * du**2 * abs(end_slope)
+    return p, p + du * slope, slope, slope, 0.5 * du**2 * abs(slope)
+
+
 @dataclass(frozen=True)
 class Step:
     """Change from one equilibrium of a path to the next.
@@ -73,6 +86,9 @@ class Step:
         du = after.separation - before.separation
         p, q = contact.pressure(before), contact.pressure(after)
         slope, end_slope = -contact.stiffness(before), -contact.stiffness(after)
+        error = integration_error(du, slope, end_slope)
+        if np.isinf(slope) or np.isinf(end_slope):
+            p, q, slope, end_slope, error = _beside_full_contact(du, p, q, slope, end_slope)
         # Without adhesion contact forms and breaks without a jump of the pressure.
         jumps = len(events) if contact.adhesive else events.count(COALESCENCE) + events.count(SPLIT)
         return cls(
@@ -80,7 +96,7 @@ class Step:
             work=-(0.5 * du * (p + q) + du**2 * (slope - end_slope) / 12),
             stored=contact.stored_energy(after) - contact.stored_energy(before),
             pressure_jump=pressure_jump(du, q - p, slope, end_slope) if jumps else 0.0,
-            integration_error=integration_error(du, slope, end_slope),
+            integration_error=error,
             has_jump=bool(jumps),
             events=events,
         )

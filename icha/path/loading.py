@@ -72,7 +72,8 @@ class PathProgress:
     ) -> None:
         """Raise `NotConverged` if the model does not cover the state after a step.
 
-        In a state that meets a target the mean planes may meet, because the range of targets is limited already.
+        The mean planes may meet in a state that meets a target, because the range of targets is limited already; and
+        with a model that covers full contact.
 
         target : the target that the state meets, if there is one; pending : targets that are still to be met.
         """
@@ -83,7 +84,7 @@ class PathProgress:
         if area > contact.largest_area_fraction:
             reason = f"the contact area grows to {area:.2f} of the nominal area, outside the range of the model,"
             raise self.path_error(before, loading, NotConverged(f"{reason} before {name}"))
-        if target is None and contact.mean_gap(after) <= 0:
+        if target is None and contact.largest_area_fraction < 1 and contact.mean_gap(after) <= 0:
             reason = f"the mean planes meet before {name}, outside the range of the model"
             raise self.path_error(after, loading, NotConverged(reason))
 

@@ -300,7 +300,7 @@ class GapContact:
     def _imbalance(self):
         """Largest difference of traction and attraction, over the strength of the interface, where nothing touches.
 
-        The traction of the half-space is E* q/2 times the modes of its displacement; its mean is free.
+        Each mode of the traction is E* q/2 times the same mode of the displacement; the mean traction is unknown.
         """
         gap, n = np.array(self.solver.model["gap"]), self.fine.grid
         q = np.pi * np.hypot(scipy.fft.fftfreq(n, 1 / n)[:, None], scipy.fft.rfftfreq(n, 1 / n)) / self.fine.period
