@@ -150,7 +150,7 @@ class TurningPoint(Section):
     _check = model_validator(mode="after")(exactly_one)
 
     @property
-    def target(self) -> tuple[str, float]:
+    def kind_and_value(self) -> tuple[str, float]:
         """Kind and value (SI units) of the state."""
         ((kind, value),) = self.model_dump(exclude_none=True).items()
         return kind, value
@@ -297,7 +297,7 @@ class Study(Section):
         """Report targets beyond the range of the asperity model."""
         targets = [(("targets", f"{kind}s", k), kind, value) for k, (kind, value) in enumerate(self.targets.states)]
         for key, states in (("snapshots", snapshots), ("turning_points", self.turning_points)):
-            targets += [((key, k, state.target[0]), *state.target) for k, state in enumerate(states)]
+            targets += [((key, k, state.kind_and_value[0]), *state.kind_and_value) for k, state in enumerate(states)]
         for location, kind, value in targets:
             if kind in ASPERITY_RANGES and value > ASPERITY_RANGES[kind].most:
                 yield (
