@@ -310,8 +310,8 @@ def _describe_shares(shares):
 def _outside(study):
     """Yield surface, material and the largest share of single spots outside the range of Wu's formula.
 
-    The share is that at the end of the first loading, the largest over seeds and slopes; None without adhesion, where
-    nothing jumps.
+    The share is taken at the end of the first loading; it is the largest over seeds and slopes. Without adhesion no
+    spot jumps, and the share is None.
     """
     runs = study[["status", "leg", "outside_wu_fraction", "surface_energy"]].sel(model=DEFAULT_MODEL)
     status = runs["status"].transpose(*LABELS[1:]).values

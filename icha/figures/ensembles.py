@@ -212,7 +212,7 @@ class Points:
         return np.isfinite(self.members[0]).sum(axis=0).tolist()
 
     def draw(self, axes: Axes, look: dict, quantity: int = 1) -> ErrorbarContainer:
-        """Draw one of the quantities against the first."""
+        """Draw one of the quantities against the first quantity."""
         return draw_points(axes, self.members[0], self.members[quantity], look, positive=True, asked=self.asked)
 
 

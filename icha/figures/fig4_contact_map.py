@@ -143,7 +143,7 @@ class _Solved(NamedTuple):
 
 
 def _solved(labels, run, at, pressure, truth, solution):
-    """Return the state of boundary elements that is a run's snapshot `at`; None if they ended before."""
+    """Return the state of boundary elements at the snapshot `at` of a run; None if their path ended before it."""
     from icha.analysis.model_error import check_same_contact, state_of
     from icha.datasets.campaign import find_snapshot
 

@@ -85,7 +85,7 @@ def read_surface_statistics(path: str | os.PathLike) -> xr.Dataset:
 
 
 def summarise_surface(surface: xr.Dataset) -> dict:
-    """Return name, parameters and statistics of a surface file; those of a scan as measured."""
+    """Return name, parameters and statistics of a surface file; for a scan, the statistics of the measured heights."""
     lengths = ("period", "rolloff_wavelength", "short_wavelength")
     scale = measured_scale(surface)
     return {
