@@ -12,7 +12,7 @@ from icha.boundary_elements.front import Front
 from icha.boundary_elements.front_solver import FrontProblem, relax_front
 from icha.boundary_elements.half_space import HalfSpace
 from icha.boundary_elements.local_relaxation import relax_in_windows
-from icha.contact.model import FullContact, NotConverged
+from icha.contact.model import NotConverged
 
 # Residual of the front, and distance within the reach of the attraction over the critical opening, at which new contact
 # forms: first where it is clear, then where it is certain.
@@ -21,8 +21,6 @@ _CLEAR_RESIDUAL, _CLEAR_DISTANCE, _CERTAIN_RESIDUAL = 3e-2, 0.02, 1e-3
 _ROUND_ACCURACY = 1e-2
 # Rounds of new contact: they end, but there may be as many as cells.
 _MAX_ROUNDS = 1000
-# Contact area over nominal area from which the last gaps close by themselves.
-_NEARLY_FULL = 0.98
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,8 +117,6 @@ def solve_adhesive_contact(
     while True:
         residual, distance = stages[stage]
         solved = relax_front(problem, contact, residual, close=close, relax_locally=relax_locally)
-        if np.sum(solved.fraction) > _NEARLY_FULL * space.size:
-            raise FullContact("the contact runs over the whole surface")
         formed, new, within = summits.new_contact(solved, distance, tried)
         if not len(new):
             stage += 1

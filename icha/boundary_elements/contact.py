@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import pathlib
 from dataclasses import dataclass, replace
+from functools import cached_property
 from importlib.metadata import version
 
 import numpy as np
@@ -28,7 +29,7 @@ from icha.boundary_elements.patches import (
     unpack,
 )
 from icha.contact.checkpoints import CheckpointedContact
-from icha.contact.model import PRESSURE, Control, Events, NotConverged
+from icha.contact.model import AREA_FRACTION, PRESSURE, Control, Events, FullContact, NotConverged
 from icha.contact.models import MODELS, REFERENCE_MODEL, PathAccuracy
 from icha.surfaces.summits import Asperities, locate_summits
 from icha.surfaces.surface import Surface
@@ -37,6 +38,10 @@ from icha.surfaces.surface import Surface
 _SMALLEST_OPENING = 1e-4
 # Largest change of a fraction of contact for which rates predict the next state.
 _LARGEST_PREDICTION = 0.25
+# Mean gap, in h_rms, below which contact is full: the pressures of smaller gaps are lost in rounding.
+_SMALLEST_GAP = 1e-4
+# Relative difference of pressures of full contact that is rounding.
+_ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,6 +108,36 @@ class BoundaryElements:
         nothing = np.zeros(0)
         return CellState(separation, nothing.astype(int), nothing, nothing, nothing)
 
+    @cached_property
+    def full_contact_pressure(self) -> np.ndarray:
+        """Pressure of full contact less its mean, (n, n), Pa."""
+        return self.contact_modulus * self.space.full_contact_pressure(self.topography.double)
+
+    @property
+    def interface_strength(self) -> float:
+        """Tension at which contact opens without a front: the theoretical strength of the interface, Pa."""
+        return self.front.interface_strength * self.contact_modulus if self.adhesive else 0.0
+
+    @property
+    def smallest_gap(self) -> float:
+        """Mean gap below which contact is full, m."""
+        return _SMALLEST_GAP * self.rms_height
+
+    @property
+    def opening_pressure(self) -> float:
+        """Nominal pressure of full contact at which it opens on unloading, Pa."""
+        return -float(self.full_contact_pressure.min()) - self.interface_strength
+
+    def full_contact(self, pressure: float) -> CellState:
+        """Full contact under a nominal pressure, Pa: closed form."""
+        ones = np.ones(self.heights.size)
+        cells = np.arange(self.heights.size)
+        return CellState(0.0, cells, ones, self.full_contact_pressure.ravel() + pressure, ones, pressure_slope=-np.inf)
+
+    def is_full(self, state: CellState) -> bool:
+        """Whether a state is full contact."""
+        return state.separation == 0 and len(state.cells) == self.heights.size
+
     def equilibrium(
         self, state: CellState, separation: float, control: Control | None = None, *, let_go: int = 0
     ) -> CellState:
@@ -112,14 +147,44 @@ class BoundaryElements:
         """
         if let_go:
             raise NotConverged("boundary elements cannot let go of single patches")
-        if control is None:
-            new = self._solve(state, separation)
-        elif not self.adhesive and control.quantity == PRESSURE and control.target > 0 and len(state.cells):
-            new = self._solve_nonadhesive(state, load=control.target / self.contact_modulus)
+        if self.is_full(state):
+            new = self._leave_full_contact(state, separation, control)
         else:
-            new = solve_at_control(ControlProblem(self, control, self._solve, self._events), state, separation)
+            new = self._next_equilibrium(state, separation, control)
         events = self._events(state, new)
         return replace(new, history=(*state.history, events) if len(events) else state.history)
+
+    def _next_equilibrium(self, state, separation, control):
+        """Equilibrium from a state that is not full contact; arguments as of `equilibrium`."""
+        if control is None:
+            closed = separation < self.smallest_gap
+            return self.full_contact(self._closing_pressure) if closed else self._solve(state, separation)
+        if not self.adhesive and control.quantity == PRESSURE and control.target > 0 and len(state.cells):
+            try:
+                return self._solve_nonadhesive(state, load=control.target / self.contact_modulus)
+            except FullContact:
+                return self.full_contact(control.target)
+        return solve_at_control(ControlProblem(self, control, self._solve, self._events), state, separation)
+
+    def _leave_full_contact(self, state, separation, control):
+        """Equilibrium from full contact, which opens at the weakest place; arguments as of `equilibrium`."""
+        if control is None and separation <= 0:
+            return self.full_contact(self._closing_pressure)
+        if control is not None and control.quantity == PRESSURE and control.target >= self.opening_pressure:
+            return self.full_contact(control.target)
+        if control is not None and control.quantity == AREA_FRACTION and control.target >= 1:
+            return state
+        if control is None and self.pressure(state) > self.opening_pressure + _ROUNDING * self.contact_modulus:
+            return self.full_contact(self.opening_pressure)
+        weakest = self.full_contact_pressure.ravel() <= self.full_contact_pressure.min() + _ROUNDING * self.pressure_unit
+        closed = np.flatnonzero(~weakest)
+        opened = CellState(0.0, closed, state.fraction[closed], state.pressure[closed], state.around[closed])
+        return self._next_equilibrium(opened, max(separation, self.smallest_gap), control)
+
+    @property
+    def _closing_pressure(self):
+        """Nominal pressure, Pa, that stands for any that closes the contact: the mean gap alone does not decide it."""
+        return 10 * max(float(np.abs(self.full_contact_pressure).max()), self.interface_strength)
 
     def observables(self, surface: Surface) -> PatchObservables:
         """Observables of the states on a surface."""
@@ -269,6 +334,11 @@ class BoundaryElements:
         return self._energy_of_cells(state) if self.adhesive else np.zeros(len(state.cells))
 
 
+def theoretical_strength(material: Material) -> float:
+    """Largest tension of an interface with the attraction of Lennard-Jones' law, 16/(9 sqrt(3)) dgamma/range, Pa."""
+    return 16 / (9 * np.sqrt(3)) * material.surface_energy / material.interaction_range
+
+
 def contact_of(surface: Surface, material: Material) -> BoundaryElements:
     """Contact of a surface and a material.
 
@@ -288,7 +358,8 @@ def contact_of(surface: Surface, material: Material) -> BoundaryElements:
         -jump_in / h,
         law.contact_radius(jump_in, asperities.radius_of_curvature) / h,
     )
-    front = Front(material.surface_energy / (material.contact_modulus * h))
+    strength = theoretical_strength(material) / material.contact_modulus
+    front = Front(material.surface_energy / (material.contact_modulus * h), strength)
     if 0 < front.critical_opening < _SMALLEST_OPENING * np.abs(surface.heights).max() / h:
         raise ValueError(
             f"surface_energy: {material.surface_energy:g} J/m^2 has no effect at the heights of this surface, of up to "

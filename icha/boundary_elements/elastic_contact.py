@@ -143,7 +143,7 @@ def solve_active_set(
     dtype = np.float32 if tolerance > topography.rounding else float
     keep, gap, before, changing = np.full(len(contact.cells), sticky), None, np.inf, not sticky
     for _ in range(_MAX_CHANGES):
-        if len(contact.cells) == space.size:
+        if len(contact.cells) == space.size and (contact.fraction >= 1).all():
             raise FullContact("the contact runs over the whole surface")
         if load is not None and len(contact.cells):
             balanced = contact.pressure * (load * space.size / np.sum(contact.pressure))

@@ -106,9 +106,16 @@ def reported_area_gradient(fraction: np.ndarray, around: np.ndarray) -> np.ndarr
 
 @dataclass(frozen=True)
 class Front:
-    """Front of a contact with the adhesion length dgamma/E*, in cells; zero: no adhesion."""
+    """Front of a contact.
+
+    Parameters
+    ----------
+    adhesion_length : dgamma/E*, in cells; zero without adhesion.
+    interface_strength : tension, in E*, at which contact opens without a front.
+    """
 
     adhesion_length: float
+    interface_strength: float = math.inf
 
     @property
     def strength(self) -> float:

@@ -113,13 +113,17 @@ class ActiveCells(Contact):
 
 
 def find_active_cells(front: Front, state: AdhesiveContact) -> ActiveCells:
-    """Find the cells of a state that take part in a step: closed cells open at the edge of contact only."""
+    """Find the cells of a state that take part in a step.
+
+    Closed cells open at the edge of contact, or where their tension reaches the strength of the interface.
+    """
     grid, gap = state.gap.shape[-1], state.gap.ravel()
     tension = -state.pressure / (state.fraction * front.strengths(state.around))
     closing_force = gap[state.rim] / (COMPLIANCE * front.strengths(state.around_rim))
     closed = mask_of(state.cells[state.fraction >= 1], state.gap.shape).ravel()
     opening = tension > 1
-    opening[opening] = ~np.all(closed[adjacent(state.cells[opening], grid)], axis=0) | (state.fraction[opening] < 1)
+    at_edge = ~np.all(closed[adjacent(state.cells[opening], grid)], axis=0) | (state.fraction[opening] < 1)
+    opening[opening] = at_edge | (-state.pressure[opening] > front.interface_strength)
     closing = closing_force < 1
     cells, fraction, pressure, around, intensity, free = merge_cells(
         state.cells,
@@ -290,7 +294,11 @@ class FrontRelaxation:
         accuracy = max(TOLERANCES.displacement, min(self.coarsest, self._moving_accuracy(active)))
         # Short steps cost as much as long ones: after two lengths, more damping finds a better direction.
         for length in (1.0, 0.5) if self.coarsest <= TOLERANCES.certain_displacement else (1.0,):
-            new = problem.solve_elastic(active.after_step(length * change, length * pressure_change), accuracy)
+            try:
+                new = problem.solve_elastic(active.after_step(length * change, length * pressure_change), accuracy)
+            except FullContact:
+                # The gap has a given volume: it does not close.
+                continue
             if problem.is_lower(new, self.state):
                 if length == 1.0:
                     self.damping = self.damping / 4 if self.damping > 0.01 else 0.0

@@ -88,6 +88,14 @@ class HalfSpace:
             return field if at is None else field.ravel()[at]
         return transforms.filter_by_blocks(self.grid, cells, values, factor, at, out)
 
+    def full_contact_pressure(self, heights: np.ndarray) -> np.ndarray:
+        """Pressure (n, n), of zero mean, in E*, that makes the half-space follow heights (n, n) everywhere: q h(q)/2."""
+        compliance = self.compliance[np.dtype(float)]
+        modes = scipy.fft.rfft2(heights, workers=1)
+        modes[0, 0] = 0.0
+        modes.ravel()[1:] /= compliance.ravel()[1:]
+        return scipy.fft.irfft2(modes, s=self.shape, overwrite_x=True, workers=1)
+
     def field(self, cells: np.ndarray, values: np.ndarray | float, dtype: DTypeLike = float) -> np.ndarray:
         """Field with given values on cells (k,), and zero elsewhere."""
         field: np.ndarray = np.zeros(self.shape, dtype)
@@ -128,7 +136,13 @@ class FullGrid:
 
     def approximate_inverse(self, displacement: np.ndarray) -> np.ndarray:
         """Pressures (k,) for displacements (k,), approximately."""
-        return self.space.filter(self.cells, displacement, self.space.stiffness, self.cells)
+        pressure = self.space.filter(self.cells, displacement, self.space.stiffness, self.cells)
+        if len(self.space.shape) == 2:
+            # The smaller the gaps, the stiffer the contact is against its mean pressure.
+            share = len(self.cells) / self.space.size
+            stiffer = self.space.stiffness[0, 0] * share / max(1 - share, 1 / self.space.size)
+            pressure += np.float32(stiffer / self.space.size) * np.sum(displacement)
+        return pressure
 
 
 def by_precision(field: np.ndarray) -> dict[np.dtype, np.ndarray]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from icha.boundary_elements.front_solver import TOLERANCES
 from icha.boundary_elements.patches import CellState
-from icha.contact.model import AREA_FRACTION, PRESSURE, Control, Events, NotConverged
+from icha.contact.model import AREA_FRACTION, PRESSURE, Control, Events, FullContact, NotConverged
 from icha.contact.models import AREA_TOLERANCE_CELLS, AREA_TOLERANCE_PART
 
 if TYPE_CHECKING:
@@ -27,6 +27,8 @@ _SAME_SEPARATION = 1e-13
 # Unit of the error of a load of zero, over stiffness times h_rms: attraction and repulsion of about this size cancel.
 _ZERO_LOAD = 1e-2
 _MAX_TRIALS, _MAX_ATTEMPTS = 30, 4
+# Part of the mean gap that the next trial leaves where the target may lie in full contact.
+_CLOSING = 0.25
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +62,7 @@ class ControlProblem:
         if self.control.target:
             return abs(self.control.target)
         unit = abs(self.contact.stiffness(state)) * self.contact.rms_height
-        return max(abs(self.contact.pressure(state)), _ZERO_LOAD * unit)
+        return max(abs(self.contact.pressure(state)), _ZERO_LOAD * unit if np.isfinite(unit) else 0.0)
 
     def tolerance(self, scale: float) -> float:
         """Largest error of a value that meets the target."""
@@ -130,6 +132,8 @@ def solve_at_control(problem: ControlProblem, state: CellState, separation: floa
     scale = problem.scale(state)
     same = _SAME_SEPARATION * contact.rms_height
     whole = bracket = Bracket(np.sign(-problem.error(state)) or 1.0, same, state)
+    if separation <= 0:
+        separation = 0.5 * state.separation
     try:
         for _ in range(_MAX_ATTEMPTS):
             trial, bracket = bracket_loosely(problem, bracket, separation, scale)
@@ -140,6 +144,10 @@ def solve_at_control(problem: ControlProblem, state: CellState, separation: floa
                 return found
             bracket = whole.with_state(found, problem.error(found))
             separation = bracket.limit(problem.newton_separation(found))
+    except FullContact:
+        if control.quantity == PRESSURE and control.target >= contact.opening_pressure:
+            return contact.full_contact(control.target)
+        reason = ": the contact closes over the whole surface"
     except NotConverged as failure:
         reason = f": {failure}"
     else:
@@ -165,6 +173,10 @@ def bracket_loosely(
         passed = trial is not bracket.before and len(problem.events(bracket.before, trial))
         start = bracket.before if passed else trial
         separation = bracket.limit(problem.newton_separation(trial))
+        if separation <= 0:
+            separation = _CLOSING * trial.separation
+            if separation < contact.smallest_gap:
+                raise FullContact("the mean gap vanishes")
     raise NotConverged(f"{_MAX_TRIALS} trials do not bracket it")
 
 

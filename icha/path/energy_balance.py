@@ -36,6 +36,12 @@ def integration_error(width, slope, end_slope):
 _CERTAIN_LOSS = 0.1
 
 
+def _finite_slopes(slope, end_slope):
+    """Slopes at both ends of a step; for an infinite one that of the other end, or zero."""
+    finite = [each for each in (slope, end_slope) if np.isfinite(each)] or [0.0]
+    return (slope, end_slope) if len(finite) == 2 else (finite[0], finite[0])
+
+
 @dataclass(frozen=True)
 class Step:
     """Change from one equilibrium of a path to the next.
@@ -70,15 +76,18 @@ class Step:
         width = after.separation - before.separation
         p, q = contact.pressure(before), contact.pressure(after)
         slope, end_slope = -contact.stiffness(before), -contact.stiffness(after)
+        # Full contact is infinitely stiff; where it closes or opens, the pressure jumps at one mean separation.
+        closes = np.isinf(slope) != np.isinf(end_slope)
+        slope, end_slope = _finite_slopes(slope, end_slope)
         # Without adhesion contact forms and breaks without a jump of the pressure.
         jumps = len(events) if contact.adhesive else events.count(COALESCENCE) + events.count(SPLIT)
         return cls(
             width=width,
             work=-(0.5 * width * (p + q) + width**2 * (slope - end_slope) / 12),
             stored=contact.stored_energy(after) - contact.stored_energy(before),
-            pressure_jump=pressure_jump(width, q - p, slope, end_slope) if jumps else 0.0,
+            pressure_jump=pressure_jump(width, q - p, slope, end_slope) if jumps or closes else 0.0,
             integration_error=integration_error(width, slope, end_slope),
-            has_jump=bool(jumps),
+            has_jump=bool(jumps or closes),
             events=events,
         )
 
