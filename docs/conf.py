@@ -1,4 +1,4 @@
-"""How Sphinx builds the documentation: `make docs`. It needs no network."""
+"""Configuration of Sphinx for `make docs`, which needs no network."""
 
 import sys
 from importlib.metadata import version as version_of
@@ -33,6 +33,8 @@ default_role = "literal"
 napoleon_numpy_docstring = True
 napoleon_google_docstring = False
 napoleon_use_rtype = False
+# A list of fields, because autodoc describes the members as well.
+napoleon_use_ivar = True
 autodoc_typehints = "none"
 autodoc_member_order = "bysource"
 autodoc_default_options = {"members": True}

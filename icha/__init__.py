@@ -1,4 +1,4 @@
-"""ICHA: adhesive rough contact by interacting and coalescing Hertzian asperities."""
+"""ICHA: adhesive contact of rough surfaces with interacting and coalescing asperities."""
 
 import importlib
 from typing import TYPE_CHECKING
@@ -23,7 +23,7 @@ __all__ = [
     "simulate",
 ]
 
-if TYPE_CHECKING:  # for editors and type checkers; nothing is imported
+if TYPE_CHECKING:  # for editors and type checkers only
     from icha.asperity.material import Material
     from icha.configuration.topographies import read_scan
     from icha.path.targets import Path
@@ -35,7 +35,7 @@ if TYPE_CHECKING:  # for editors and type checkers; nothing is imported
 else:
 
     def __getattr__(name):
-        """Import the public names when they are first asked for, so that a script pays only for what it uses."""
+        """Import a public name at its first use, so that a script imports only what it needs."""
         if name == "__version__":
             from importlib.metadata import version
 
@@ -46,5 +46,5 @@ else:
 
 
 def __dir__() -> list[str]:
-    """The public names."""
+    """Return the public names."""
     return __all__

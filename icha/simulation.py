@@ -215,11 +215,7 @@ def asperity_applicability(
 
 def _check_arguments(surface, material, path):
     """Raise `ValueError` for arguments of the wrong type, and for targets out of range on this surface."""
-    for name, value, kind in (
-        ("surface", surface, Surface),
-        ("material", material, Material),
-        ("path", path, Path),
-    ):
+    for name, value, kind in (("surface", surface, Surface), ("material", material, Material), ("path", path, Path)):
         if not isinstance(value, kind):
             raise ValueError(f"{name}: a {type(value).__name__} is not an icha.{kind.__name__}")
     for target in (*path.targets, *path.turning_points):

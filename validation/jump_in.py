@@ -49,7 +49,7 @@ def jump_in_gap(tabor_parameter: float) -> float:
                 method="bounded",
                 options={"xatol": 1e-6 * scale},
             ).fun
-    raise ValueError(f"tabor_parameter: {tabor_parameter!r} must be at least 0.69; below, contact forms without a jump")
+    raise ValueError(f"tabor_parameter: {tabor_parameter!r}: contact forms without a jump; expected more than 0.69")
 
 
 class _Problem:

@@ -149,7 +149,7 @@ class Campaign:
         """Return whether Snakemake's record describes the present file, so that Snakemake itself detects changes."""
         try:
             record = json.loads(record_of(f"{self.results}/{path}", METADATA).read_bytes())
-            return checksums.asked_of(record["params"]) == checksums.made_as(self.results, path)
+            return checksums.hash_parameters(record["params"]) == checksums.recorded_hash(self.results, path)
         except (OSError, ValueError, KeyError, TypeError):
             return False
 
@@ -239,7 +239,7 @@ def _present_settings(rules, path: str) -> str:
     rule = next(rule for rule in rules if any(output.match(path) for output in rule.output))
     wildcards = _Wildcards(rule.get_wildcards(path))
     values = (value(wildcards) if callable(value) else value for value in rule.params)
-    return checksums.asked_of(map(repr, values))
+    return checksums.hash_parameters(map(repr, values))
 
 
 @contextlib.contextmanager

@@ -159,8 +159,8 @@ def _spreads(on_grid, averaged):
     for name, short, symbol in _AVERAGED:
         over_seeds = ensemble(np.where(averaged[..., None], on_grid[name], np.nan), LABELS.index("seed"))
         for part, words in _STATISTICS.items():
-            none = "where no run counts" if part == "mean" else "where there is a single seed"
-            description = Variable(_WITHOUT_SEED, "1", words.format(symbol), further={"missing": none})
+            missing = "where no run counts" if part == "mean" else "where there is a single seed"
+            description = Variable(_WITHOUT_SEED, "1", words.format(symbol), further={"missing": missing})
             found[f"{short}_{part}"] = description, getattr(over_seeds, part)
     for label, many in (("material", "materials"), ("rms_slope", "rms slopes")):
         description = Variable(

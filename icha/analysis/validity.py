@@ -76,7 +76,7 @@ VALIDATED = {
     "nayak_parameter": Range("Nayak's parameter", 1.5, 47.0),
     # In the validation at most one in two hundred.
     "unsupported_summits": Range("share of unsupported summits", 0.0, 0.01),
-    # Better resolution and less adhesion are not harder, so there is no upper end.
+    # Better resolution and less adhesion are not harder, so the upper end is open.
     "nodes_per_short_wave": Range("nodes per shortest wave", 5.8, math.inf),
     "full_contact_energy_ratio": Range("U_full/dgamma", 76.0, math.inf),
     # 1 for a single square, 0 for a periodic surface.

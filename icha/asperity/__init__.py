@@ -1,1 +1,1 @@
-"""One contact spot: material, law, and what becomes of two that overlap."""
+"""One contact spot: material, law and coalescence; criteria for sticky surfaces."""

@@ -1,1 +1,1 @@
-"""Checks of one run: what it must satisfy, whichever model computed it."""
+"""Checks of one run, for all contact models."""

@@ -22,8 +22,8 @@ from icha.support.values import (
     distinct,
     increasing,
     integer,
+    list_names,
     list_of_names,
-    listed,
     number,
     stops,
     unknown,
@@ -62,7 +62,7 @@ class BesideStudy(Section):
             known = set(getattr(study, key))
             for index, value in enumerate(getattr(self, key) or []):
                 if value not in known:
-                    expected = listed(getattr(study, key))
+                    expected = list_names(getattr(study, key))
                     yield (key, index), value, f"is not in study {self.study!r}; expected one of {expected}"
         contacts = campaign.contacts_beside(self)
         if not contacts and MEASURED not in study.rms_slopes:

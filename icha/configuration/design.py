@@ -19,7 +19,7 @@ from icha.configuration.errors import MOST_PROBLEMS
 from icha.configuration.studies import MEASURED, SCALARS, Study
 from icha.configuration.surfaces import SURFACE_KINDS, MaterialSection
 from icha.datasets.labels import number_label
-from icha.support.values import LONGEST_LABEL, NOTHING, Problem, Unit, listed
+from icha.support.values import LONGEST_LABEL, NOTHING, Problem, Unit, list_names
 
 MAX_RUNS = 100_000
 # Largest number of targets of all runs together.
@@ -165,7 +165,7 @@ def _study_problems(campaign: Campaign, label: str, study: Study) -> Iterator[Pr
     for one, names in (("surface", campaign.surfaces), ("material", campaign.materials)):
         for location, name in values(one):
             if name not in names:
-                yield location, name, f"is not defined; expected one of {listed(names)}"
+                yield location, name, f"is not defined; expected one of {list_names(names)}"
     yield from _zip_problems(prefix, study, lists)
     for location, slope in values("rms_slope"):
         if slope != MEASURED:

@@ -11,7 +11,7 @@ from icha.configuration.campaign import Campaign
 from icha.configuration.surfaces import SelfAffineSurface
 from icha.contact.models import DEFAULT_MODEL
 from icha.support import formatting
-from icha.support.values import Problem, listed, to_number, to_si
+from icha.support.values import Problem, list_names, to_number, to_si
 from icha.surfaces.moments import self_affine_full_contact_energy
 
 CONFIRMED = "confirmed"
@@ -130,7 +130,7 @@ def needless_confirmations(unusual: Collection[Unusual], confirmed: Any) -> Iter
     keys = dict.fromkeys(each.key for each in unusual)
     for index, key in enumerate(_keys(confirmed)):
         if key not in keys:
-            expected = f"expected one of {listed(keys)}" if keys else "all values are usual. Remove it"
+            expected = f"expected one of {list_names(keys)}" if keys else "all values are usual. Remove it"
             yield (CONFIRMED, index), key, f"is not the key of an unusual value; {expected}"
 
 

@@ -26,7 +26,7 @@ from icha.planning.costs import Cost
 from icha.planning.plan import read_attributes
 from icha.planning.results import campaign_files
 from icha.support.atomic_files import moving, sync_folder, whole_file
-from icha.support.checksums import is_whole, made_as, sha256_of, stale
+from icha.support.checksums import is_whole, recorded_hash, sha256_of, stale
 
 _BLOCK = 2**20
 # The time of every file in a zip, the earliest possible one.
@@ -117,8 +117,8 @@ def refuse_mixed(results: Path, campaign: Campaign, recorded: Mapping[str, str])
     ----------
     results : the campaign's folder of results.
     campaign : its configuration.
-    recorded : checksums of the parameters that the workflow recorded for the jobs (`icha.support.checksums.asked_of`),
-        by the path of a result in that folder.
+    recorded : checksums of the parameters that the workflow recorded for the jobs
+        (`icha.support.checksums.hash_parameters`), by the path of a result in that folder.
 
     Raises
     ------
@@ -133,7 +133,7 @@ def refuse_mixed(results: Path, campaign: Campaign, recorded: Mapping[str, str])
         if (read_attributes(results / path) or {}).get("config_sha256") != sha256:
             wrong[path] = "it was not computed with the settings of this campaign"
     for path, asked in recorded.items():
-        if asked != made_as(results, path):
+        if asked != recorded_hash(results, path):
             wrong.setdefault(path, "the workflow has recorded another job for it")
     if wrong:
         raise ValueError(

@@ -1,1 +1,1 @@
-"""Equilibrium of all contact spots at a given separation, load or area, and what it shows."""
+"""Interacting asperities: equilibrium of all contact spots at a given separation, load or area, and its observables."""

@@ -62,7 +62,7 @@ class Curve(NamedTuple):
     @property
     def stops(self) -> dict[int, xr.Dataset]:
         """Steps of the runs at the targets of their study, by seed."""
-        return {seed: path_steps(run) for seed, run in self.runs.runs.items()}
+        return {seed: path_steps(run) for seed, run in self.runs.by_seed.items()}
 
 
 class Curves(NamedTuple):
@@ -84,7 +84,7 @@ class Curves(NamedTuple):
     @property
     def unloaded(self) -> bool:
         """True if any run is unloaded."""
-        return any(unloading_legs(run) for line in self.lines for run in line.runs.runs.values())
+        return any(unloading_legs(run) for line in self.lines for run in line.runs.by_seed.values())
 
 
 def study_curves(campaign: xr.DataTree, study: str, boundary_elements: str | None = None) -> Curves:
@@ -103,7 +103,7 @@ def study_curves(campaign: xr.DataTree, study: str, boundary_elements: str | Non
     other = boundary_elements or (study if name == ASPERITIES_NAME else None)
     truths = select_runs(campaign, other, ragged=False, model=REFERENCE_MODEL) if other else []
     crosses = [Curve(truth, cross_look(looks, truth.contact)) for truth in group_by_contact(campaign, truths)]
-    changed = {"ls": "-" if looks.scale or any(len(group.runs) > 1 for group in groups) else "none"}
+    changed = {"ls": "-" if looks.scale or any(len(group.by_seed) > 1 for group in groups) else "none"}
     changed |= {} if looks.many_places else {"marker": MODEL_MARKERS[name]}
     handles = looks.handles(**changed) | {name: model_handle(name, mfc="white")}
     return Curves(lines, crosses, looks, handles | ({SHORT_RANGE: model_handle(SHORT_RANGE)} if crosses else {}))
@@ -237,7 +237,7 @@ def _draw_unloading(panels, line):
     """
     import xarray as xr
 
-    runs = line.runs.runs.values()
+    runs = line.runs.by_seed.values()
     slope = next(iter(runs))["rms_slope"]
     for leg in average_legs([[("unloading", leg) for leg in unloading_legs(run)] for run in runs]):
         states = xr.Dataset({name: ("step", values) for name, values in leg.values.items()}).assign(rms_slope=slope)
@@ -250,7 +250,7 @@ def _draw_unloading(panels, line):
 
 def add_legend(figure: Figure, panels: Sequence[Axes], curves: Curves, further: Mapping[str, object] = {}) -> None:
     """Add a legend of the curves and of everything named in the panels, and their scale of colours, if any."""
-    seeds = lines_handles(len(line.runs.runs) for line in curves.lines)
+    seeds = lines_handles(len(line.runs.by_seed) for line in curves.lines)
     handles = curves.handles | dict(further) | seeds | named_handles(panels)
     legend_below(figure, handles, scale=curves.looks.scale, panels=panels)
 

@@ -21,7 +21,7 @@ from icha.contact.models import MODELS, REFERENCE_MODEL, first_model
 from icha.datasets import results
 from icha.datasets.labels import RunLabels
 from icha.path.states import Snapshot
-from icha.support.values import Label, Name, Positive, Problem, Section, Seed, listed, unknown
+from icha.support.values import Label, Name, Positive, Problem, Section, Seed, list_names, unknown
 
 # A configuration (`icha.configuration.campaign.Campaign`), which stands above this folder.
 Campaign = Any
@@ -98,7 +98,7 @@ class StudyFigure(FigureOptions):
         ):
             value = getattr(self, key, None)
             if value is not None and value not in present:
-                yield (key,), value, f"is not in study {self.study!r}; expected one of {listed(present)}"
+                yield (key,), value, f"is not in study {self.study!r}; expected one of {list_names(present)}"
 
 
 class TruthFigure(StudyFigure):
@@ -138,7 +138,7 @@ class SnapshotFigure(StudyFigure):
         if snapshots == []:
             yield ("study",), self.study, "keeps no snapshot to draw; expected a study with `snapshots`"
         elif self.snapshot is not None and self.snapshot.target not in (snapshots or []):
-            kept = listed(f"{kind} {value:g}" for kind, value in snapshots or []) or "none, because it names none"
+            kept = list_names(f"{kind} {value:g}" for kind, value in snapshots or []) or "none, because it names none"
             kind, value = self.snapshot.target
             yield ("snapshot",), f"{kind} {value:g}", f"is not kept by study {self.study!r}; expected one of: {kept}"
 

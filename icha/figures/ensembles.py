@@ -190,12 +190,12 @@ class Points:
 
     def __init__(self, groups: Sequence[ContactRuns], *quantities: str, factor: float = 1.0):
         """Arrange the values by seed."""
-        common = set.intersection(*(set(group.runs) for group in groups))
-        seeds = sorted(common or set().union(*(group.runs for group in groups)))
+        common = set.intersection(*(set(group.by_seed) for group in groups))
+        seeds = sorted(common or set().union(*(group.by_seed for group in groups)))
         members = np.full((len(quantities), len(seeds), len(groups)), np.nan)
         for (i, name), (j, seed), (k, group) in itertools.product(*map(enumerate, (quantities, seeds, groups))):
-            if seed in group.runs:
-                members[i, j, k] = float(group.runs[seed][name]) * (factor if i else 1.0)
+            if seed in group.by_seed:
+                members[i, j, k] = float(group.by_seed[seed][name]) * (factor if i else 1.0)
         order = np.argsort(ensemble(members[0]).mean, kind="stable")
         self.members = members[..., order]
         self.same_seeds = bool(common)

@@ -145,7 +145,7 @@ def _loops(campaign, study, other_study, loops, surface, seed):
         pick("seed", seed, [labels.seed for labels, _ in runs])
     found = []
     for group in group_by_contact(campaign, [each for each in runs if seed in (None, each[0].seed)]):
-        legs = average_legs([list(branches(run)) for run in group.runs.values()])
+        legs = average_legs([list(branches(run)) for run in group.by_seed.values()])
         group = group if seed is None else group._replace(asked=1)
         found.append(_Loop(group, legs, truths.get(group.labels, [])))
     return found, surface, seed
@@ -195,7 +195,7 @@ def _draw(ax, loop, look, axis, *, turn, lines):
         if leg.members:
             members = leg.members.get(axis.x, x), leg.members[axis.y]
             draw_scatter(ax, *members, colour, positive=False, lines=lines, ls=dashes)
-    runs = loop.runs.runs.values()
+    runs = loop.runs.by_seed.values()
     marked = []
     if turn or len(runs) < loop.runs.asked:
         ends = [run.isel(step=int(np.flatnonzero(run["leg"].values == 0)[-1])) for run in runs]
@@ -238,8 +238,7 @@ def _enlarge(left, right, loops):
         inset = ax.inset_axes((*corner, 0.46, 0.33 if ax is right else 0.48))
         for loop, look in loops:
             _draw(inset, loop, look, axis, turn=False, lines=len(loops))
-        inset.set_xlim(limits[0])
-        inset.set_ylim(limits[1])
+        inset.set(xlim=limits[0], ylim=limits[1])
         inset.axhline(0, color=GREY, lw=0.5, zorder=1)
         inset.tick_params(labelsize=6.5, pad=2)
         inset.ticklabel_format(style="sci", scilimits=(-2, 3), useMathText=True)
@@ -253,8 +252,8 @@ def _handles(looks, loops, *, marked):
     handles = looks.handles(**_LOOP, **({} if marked else {"marker": "none"}))
     for branch, dashes in BRANCH_DASHES.items():
         handles[branch] = legend_handle(color=GREY, ls=dashes, **_LOOP)
-    handles |= lines_handles(len(loop.runs.runs) for loop in loops)
-    if any(pull_off_step(run) is not None for loop in loops for run in loop.runs.runs.values()):
+    handles |= lines_handles(len(loop.runs.by_seed) for loop in loops)
+    if any(pull_off_step(run) is not None for loop in loops for run in loop.runs.by_seed.values()):
         handles["pull-off"] = legend_handle(marker="o", mfc=GREY, **_PULL_OFF)
     for name in dict.fromkeys(_truth_name(truth) for loop in loops for truth in loop.truths):
         for branch, markers in _CROSSES.items():

@@ -83,7 +83,7 @@ def figure(
         by_load = select_detached_lines(campaign, load_studies, along_slopes=True)
     looks = looks_of_studies(campaign, [study, *load_studies], [contact for contact, _ in (*by_slope, *by_load)])
     points = itertools.chain(*by_slope.values(), *by_load.values())
-    largest = max(float(run[quantity]) for point in points for run in point.runs.values())
+    largest = max(float(run[quantity]) for point in points for run in point.by_seed.values())
     factor, unit = choose_unit(largest, "Pa") if quantity == "pull_off_pressure" else (1.0, "")
 
     fig, [panels] = new_panels(2.9, columns=2 if by_load else 1, width=TWO_COLUMNS if by_load else ONE_COLUMN)

@@ -126,8 +126,8 @@ def _draw_losses(ax, campaign, runs, looks, over_surface_energy):
     ):
         logarithmic_axes(ax)
     ax.axhline(0, color=GREY, lw=0.6, zorder=1)
-    ax.set_xlabel(r"contact area at the largest load  $A/A_0$")
-    ax.set_ylabel(r"hysteresis loss over $\Delta\gamma$" if over_surface_energy else f"hysteresis loss ({unit})")
+    loss = r"hysteresis loss over $\Delta\gamma$" if over_surface_energy else f"hysteresis loss ({unit})"
+    ax.set(xlabel=r"contact area at the largest load  $A/A_0$", ylabel=loss)
     return handles, [count for line in drawn.values() for count in line.counts]
 
 
@@ -160,7 +160,7 @@ def shares(line: Sequence[ContactRuns]) -> dict[str, float]:
     """Return the parts of the loss at the largest load of a line, means over the seeds, over their total magnitude."""
 
     def mean(point, name):
-        return np.mean([float(run[name]) for run in point.runs.values()])
+        return np.mean([float(run[name]) for run in point.by_seed.values()])
 
     top = max(line, key=lambda point: mean(point, "largest_reduced_pressure"))
     found = {name: mean(top, name) for name in PARTS}
@@ -182,8 +182,6 @@ def _draw_parts(ax, runs, looks):
         look = looks.look(contact, applicable=applicable)
         ax.plot(position, -0.055, transform=ax.get_xaxis_transform(), clip_on=False, **look | {"ls": "none"})
     ax.axhline(0, color="black", lw=0.6)
-    ax.set_xlim(-0.7, len(bars) - 0.3)
-    ax.set_xticks([])
+    ax.set(xlim=(-0.7, len(bars) - 0.3), xticks=[], ylabel="share of the loss (%)")
     ax.set_xlabel("lines of (a), at their largest load", labelpad=14)
-    ax.set_ylabel("share of the loss (%)")
     return shown

@@ -154,8 +154,7 @@ def _draw_counts(ax, events):
     else:
         ax.set_ylim(0, 1.06 * most)
         ax.yaxis.set_major_locator(MaxNLocator(integer=True))
-    ax.set_xlabel(SEPARATION_LABEL)
-    ax.set_ylabel("events so far")
+    ax.set(xlabel=SEPARATION_LABEL, ylabel="events so far")
 
 
 def _events(run):

@@ -69,12 +69,9 @@ def figure(*, tabor_parameter: float = 3.0) -> Figure:
         ):
             ax.plot([x], [y], "o", color="white", mec="black", ms=4.5, zorder=5)
             ax.annotate(point, (x, y), shift, textcoords="offset points", fontweight="bold")
-        ax.set_xlim(left, right)
-        ax.set_xlabel(r"approach  $\delta\,/\,(\Delta\gamma^2 R/E^{\ast 2})^{1/3}$")
-    axes[0].set_ylabel(r"force  $F/(\Delta\gamma\,R)$")
-    axes[1].set_ylabel(r"contact radius  $a\,/\,(\Delta\gamma R^2/E^{\ast})^{1/3}$")
-    axes[0].set_ylim(-6, 4.5)
-    axes[1].set_ylim(-0.15, 3.0)
+        ax.set(xlim=(left, right), xlabel=r"approach  $\delta\,/\,(\Delta\gamma^2 R/E^{\ast 2})^{1/3}$")
+    axes[0].set(ylabel=r"force  $F/(\Delta\gamma\,R)$", ylim=(-6, 4.5))
+    axes[1].set(ylabel=r"contact radius  $a\,/\,(\Delta\gamma R^2/E^{\ast})^{1/3}$", ylim=(-0.15, 3.0))
     for x, name in ((jump_in, r"$\Delta_{\mathrm{IN}}$"), (jump_off, r"$\Delta_{\mathrm{OFF}}$")):
         axes[1].axvline(x, ymin=0.05, ymax=0.86, color=GREY, lw=0.5, zorder=0)
         axes[1].text(x, 0.88, name, ha="center", va="bottom", transform=axes[1].get_xaxis_transform())

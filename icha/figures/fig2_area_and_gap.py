@@ -85,20 +85,17 @@ def figure(
             x = (x[0], max(x[1], 1.2 * float(references["gfmd_reduced_pressure"].max())))
         _draw_references(left, right, references, x)
         _draw_separate_summits(left, right, references, dataset, curves.looks.colours)
-    left.set_ylim(min(areas.min(), 1.6 * x[0]) / 1.5, min(1, 3 * areas.max()))
-    right.set_ylim(gaps.min() / 1.4, gaps.max() * 1.4)
+    left.set(ylabel=AREA_LABEL, ylim=(min(areas.min(), 1.6 * x[0]) / 1.5, min(1, 3 * areas.max())))
+    right.set(ylabel=gap_label(dataset), ylim=(gaps.min() / 1.4, gaps.max() * 1.4))
     _label_separations(right, gaps)
-    left.set_ylabel(AREA_LABEL)
-    right.set_ylabel(gap_label(dataset))
     for letter, difference in zip("cd", differences, strict=True):
         if difference:
             _draw_difference(axes[letter], difference, len(curves.lines))
     for letter, ax in axes.items():
-        ax.set_xlim(x)
         panel_label(ax, letter)
         lowest = letter in mosaic.split(";")[1]
+        ax.set(xlim=x, xlabel=PRESSURE_LABEL if lowest else "")
         ax.tick_params(labelbottom=lowest)
-        ax.set_xlabel(PRESSURE_LABEL if lowest else "")
     add_legend(fig, [left, right], curves, theories_handle(dataset) if references is not None else {})
     return fig
 
@@ -144,7 +141,7 @@ def _differences(curves, entries, references):
             if np.isfinite(errors["area_error"].values).any():
                 errors = errors.dropna("reduced_pressure", how="all", subset=["area_error"])
                 load, asked = errors["reduced_pressure"].values, asked_of_entry(errors)
-                of_seeds = errors.sel(seed=[seed for seed in line.runs.runs if seed in errors["seed"].values])
+                of_seeds = errors.sel(seed=[seed for seed in line.runs.by_seed if seed in errors["seed"].values])
                 areas.append((line, load, _per_cent(of_seeds["area_error"]), asked))
                 separations.append((line, load, _per_cent(of_seeds["separation_error"]), asked))
                 break

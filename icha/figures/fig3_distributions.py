@@ -103,10 +103,9 @@ def _finish(left, right, pressures, highest, load):
     if highest > 0:
         right.set_ylim(highest * 5e-5, highest * 3)
     right.axvline(0, color="0.75", lw=0.6, zorder=0)
-    left.set_xlabel(r"gap  $u/h_{\mathrm{rms}}$")
-    left.set_ylabel(r"$P(u)\; h_{\mathrm{rms}}$")
-    right.set_xlabel(r"contact pressure  $p/(E^{\ast}h_{\mathrm{rms}}^{\prime})$")
-    right.set_ylabel(r"$P(p)\; E^{\ast}h_{\mathrm{rms}}^{\prime}$")
+    unit = r"E^{\ast}h_{\mathrm{rms}}^{\prime}"
+    left.set(xlabel=r"gap  $u/h_{\mathrm{rms}}$", ylabel=r"$P(u)\; h_{\mathrm{rms}}$")
+    right.set(xlabel=f"contact pressure  $p/({unit})$", ylabel=rf"$P(p)\; {unit}$")
 
 
 class _Distributions(NamedTuple):
@@ -216,7 +215,7 @@ def _join_bins(edges, contents, least):
 def _solutions(entries, runs, loads):
     """Return the first boundary-element solutions of the states at reduced pressures of some runs that have some."""
     found = []
-    for seed, load in zip(runs.runs, loads, strict=True):
+    for seed, load in zip(runs.by_seed, loads, strict=True):
         labels = runs.labels._replace(seed=seed)
         for errors in errors_of_run(entries, labels, "surface", "seed", "rms_slope", "material"):
             at = np.isclose(errors["reduced_pressure"].values, load, rtol=1e-6)

@@ -272,9 +272,8 @@ def _frame(panels, enlarged, view):
 
     for ax in panels.ravel():
         ax.tick_params(direction="out", top=False, right=False)
-        start, width = (view.corner, view.window) if ax is enlarged else (np.zeros(2), view.side)
-        ax.set_xlim(start[0], start[0] + width)
-        ax.set_ylim(start[1], start[1] + width)
+        (x, y), width = (view.corner, view.window) if ax is enlarged else ((0, 0), view.side)
+        ax.set(xlim=(x, x + width), ylim=(y, y + width))
         if ax is not enlarged:
             frame = "white" if ax.get_images()[0].get_array().ndim == 2 else "black"
             ax.add_patch(Rectangle(view.corner, view.window, view.window, fill=False, ec=frame, lw=1.2))

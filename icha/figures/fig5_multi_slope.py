@@ -95,9 +95,8 @@ def figure(
     draw_curves(curves, {left: area_points, right: _points_at_load}, unloading=True)
     for k, (table, known) in enumerate(zip(tables, measurements, strict=True)):
         _draw_measured(left, right, table, known, colours.get(known["material"], BLACK), DASHES[k % len(DASHES)])
-    left.set_xlabel(PRESSURE_LABEL)
+    left.set(xlabel=PRESSURE_LABEL, ylabel=AREA_LABEL)
     right.set_xlabel(r"relative load  $F/(E^{\ast}A_0)$")
-    left.set_ylabel(AREA_LABEL)
 
     further = {"unloading": legend_handle(color=GREY, **UNLOADING)} if curves.unloaded else {}
     if not curves.looks.scale:

@@ -54,13 +54,10 @@ def figure(campaign: xr.DataTree, references: xr.Dataset | None = None, *, study
         left.plot(p[shown], theory[shown], **look)
         right.plot(p[shown], theory[shown] / p[shown], **look)
         ratio = np.concatenate([ratio, theory[shown] / p[shown]])
-    for ax in (left, right):
-        ax.set_xlim(x)
-        ax.set_xlabel(PRESSURE_LABEL)
-    left.set_ylim(drop_rounding_errors(stiffnesses).min() / 2, stiffnesses.max() * 2)
-    right.set_ylim(0, 1.15 * ratio.max())
-    left.set_ylabel(r"contact stiffness  $K h_{\mathrm{rms}}/(E^{\ast}h_{\mathrm{rms}}^{\prime})$")
-    right.set_ylabel(r"$K h_{\mathrm{rms}}/p$")
+    stiffness_label = r"contact stiffness  $K h_{\mathrm{rms}}/(E^{\ast}h_{\mathrm{rms}}^{\prime})$"
+    y = (drop_rounding_errors(stiffnesses).min() / 2, stiffnesses.max() * 2)
+    left.set(xlim=x, xlabel=PRESSURE_LABEL, ylim=y, ylabel=stiffness_label)
+    right.set(xlim=x, xlabel=PRESSURE_LABEL, ylim=(0, 1.15 * ratio.max()), ylabel=r"$K h_{\mathrm{rms}}/p$")
     further = theories_handle(campaign[study].to_dataset()) if references is not None else {}
     add_legend(fig, [left, right], curves, further)
     return fig

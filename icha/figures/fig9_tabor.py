@@ -52,15 +52,15 @@ def figure(campaign: xr.DataTree, *, study: str, kind: str | None = None, target
     from icha.datasets.campaign import find_snapshot
 
     groups = group_by_contact(campaign, select_runs(campaign, study, ragged=False))
-    run = next(iter(groups[-1].runs.values()))
+    run = next(iter(groups[-1].by_seed.values()))
     shown = snapshot_label(run, find_snapshot(run, kind, target))
     # Materials that differ only in their range are one line, which has the name of the first of them.
     materials: dict[tuple, str] = {}
     curves: dict[tuple, list[ContactRuns]] = {}
     bare: dict[tuple, list[ContactRuns]] = {}
     for group in groups:
-        states = {seed: state_of(run, find_snapshot(run, kind, target)) for seed, run in group.runs.items()}
-        group = group._replace(runs=states)
+        states = {seed: state_of(run, find_snapshot(run, kind, target)) for seed, run in group.by_seed.items()}
+        group = group._replace(by_seed=states)
         modulus, energy = (float(next(iter(states.values()))[name]) for name in ("contact_modulus", "surface_energy"))
         contact = (materials.setdefault((modulus, energy), group.labels.material), *group.contact[1:])
         if energy > 0:
@@ -86,7 +86,7 @@ def figure(campaign: xr.DataTree, *, study: str, kind: str | None = None, target
     for k, (contact, line) in enumerate(bare.items()):
         look = {"color": looks.colour(contact) if looks.by_place else GREY, "label": None if k else "no adhesion"}
         for ax, name in zip(panels, _STATE, strict=True):
-            mean = np.mean([float(state[name]) for group in line for state in group.runs.values()])
+            mean = np.mean([float(state[name]) for group in line for state in group.by_seed.values()])
             ax.axhline(mean, ls=(0, (5, 2)), lw=1, zorder=1, **look)
     for ax, label in zip(panels, (AREA_LABEL, gap_label(dataset)), strict=True):
         _finish(ax, min(drawn))

@@ -32,13 +32,13 @@ class ContactRuns(NamedTuple):
     Attributes
     ----------
     labels : labels of the first run.
-    runs : the runs, by seed.
+    by_seed : the runs, by seed.
     asked : number of seeds that the study requests.
     applicable : whether the asperity model is applicable to the runs.
     """
 
     labels: RunLabels
-    runs: dict[int, xr.Dataset]
+    by_seed: dict[int, xr.Dataset]
     asked: int
     applicable: bool
 
@@ -56,7 +56,7 @@ def group_by_contact(campaign: xr.DataTree, runs: Iterable[tuple[RunLabels, xr.D
         if key not in found:
             asked = asked_seeds(campaign[labels.study].to_dataset(), labels)
             found[key] = ContactRuns(labels, {}, asked, key[1])
-        found[key].runs[labels.seed] = run
+        found[key].by_seed[labels.seed] = run
     return list(found.values())
 
 
@@ -229,7 +229,7 @@ def select_snapshots(
     found = []
     for group in groups:
         if group.contact[1:] == groups[0].contact[1:]:
-            members = [(run, find_snapshot(run, kind, target)) for run in group.runs.values()]
+            members = [(run, find_snapshot(run, kind, target)) for run in group.by_seed.values()]
             run, at = members[0]
             state = str(run["snapshot_kind"].values[at]), float(run["snapshot_target"].values[at])
             found.append(Snapshots(group, members, []))

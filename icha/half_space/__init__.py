@@ -1,1 +1,1 @@
-"""The elastic half-space between the spots: the displacement that every spot causes at the others."""
+"""Elastic half-space: the displacement by contact spots at each other and on a grid."""

@@ -1,1 +1,1 @@
-"""The way from first contact to given loads, areas or separations, and back."""
+"""Paths of a contact: loading to given loads, areas or separations, and unloading."""

@@ -217,12 +217,12 @@ def run_cost(
         further = DEFAULT_STEP / max_step
         steps = (1 + legs) / 2 * (120 * further + (40 if adhesive else 0.75) * most)
         seconds *= (1 + legs) / 2 * further
-    kept = snapshots + bool(legs)
-    disk = 60e3 + 57 * most * max(kept, 1) + 160 * steps + 20e3 * bool(legs)
+    snapshots += bool(legs)
+    disk = 60e3 + 57 * most * max(snapshots, 1) + 160 * steps + 20e3 * bool(legs)
     memory = _memory_before(grid) + 9 * MiB * (1 + bool(legs))
     memory += size.arrays * _DOUBLE * nodes + size.summit * summits
-    disk += size.maps * nodes * kept
-    return Cost(seconds, memory, disk, Recorded(steps, kept, most * kept))
+    disk += size.maps * nodes * snapshots
+    return Cost(seconds, memory, disk, Recorded(steps, snapshots, most * snapshots))
 
 
 def solution_cost(nodes: int, reduced_pressure: float, *, adhesive: bool) -> Cost:
@@ -277,9 +277,9 @@ _COPIES = 2.7
 _BLOCKS = 35 * MiB
 
 
-def table_cost(kind: str, runs: int, disk: float, held: float) -> Cost:
-    """Cost of the dataset, or of a table derived from it; the arrays of the dataset take `held` bytes."""
-    values = min(_COPIES * held, _BLOCKS) if kind == "dataset" else _COPIES * held
+def table_cost(kind: str, runs: int, disk: float, dataset: float) -> Cost:
+    """Cost of the dataset, or of a table derived from it; the arrays of the dataset take `dataset` bytes."""
+    values = min(_COPIES * dataset, _BLOCKS) if kind == "dataset" else _COPIES * dataset
     return Cost(LAWS[kind].seconds(runs=runs), WORKFLOW.forked + 4 * MiB + values, disk)
 
 
@@ -287,7 +287,7 @@ def table_cost(kind: str, runs: int, disk: float, held: float) -> Cost:
 MAP_ARRAYS = {1: 2, 2: 7}
 
 
-def figure_cost(runs: int, nodes: int, models: int = 1, held: float = 0.0) -> Cost:
+def figure_cost(runs: int, nodes: int, models: int = 1, dataset: float = 0.0) -> Cost:
     """Cost of a figure, as PNG and PDF.
 
     Parameters
@@ -295,16 +295,16 @@ def figure_cost(runs: int, nodes: int, models: int = 1, held: float = 0.0) -> Co
     runs : number of runs that it shows.
     nodes : number of nodes of the topography that it shows, 0 without one.
     models : number of models whose contacts it shows.
-    held : memory of the arrays of the campaign dataset, bytes.
+    dataset : memory of the arrays of the campaign dataset, bytes.
     """
     seconds = LAWS["figure"].seconds(runs=runs) + LAWS["map"].seconds(nodes=nodes)
-    memory = 85 * MiB + MAP_ARRAYS[models] * _DOUBLE * nodes + _COPIES * held
+    memory = 85 * MiB + MAP_ARRAYS[models] * _DOUBLE * nodes + _COPIES * dataset
     return Cost(seconds, WORKFLOW.forked + memory, 400e3)
 
 
-def report_cost(runs: int, figures: int, held: float = 0.0) -> Cost:
-    """Cost of the report with its figures; the arrays of the campaign dataset take `held` bytes."""
-    memory = WORKFLOW.forked + 18 * MiB + _COPIES * held
+def report_cost(runs: int, figures: int, dataset: float = 0.0) -> Cost:
+    """Cost of the report with its figures; the arrays of the campaign dataset take `dataset` bytes."""
+    memory = WORKFLOW.forked + 18 * MiB + _COPIES * dataset
     return Cost(LAWS["report"].seconds(runs=runs), memory, 700e3 + 250e3 * figures)
 
 

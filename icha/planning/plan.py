@@ -131,7 +131,7 @@ def _computed_files(campaign, results, files) -> Iterator[Item]:
 
 def _derived_files(campaign, files: CampaignFiles, computed: list[Item]) -> Iterator[tuple]:
     """Yield part, path, stage, inputs and cost of the files that are derived from runs."""
-    runs, held = len(files.runs), _dataset_memory(files, computed)
+    runs, dataset = len(files.runs), _dataset_memory(files, computed)
     size = sum(item.cost.disk for item in computed if item.is_run)
     beside = [*files.compared, *files.solutions]
     tables = [
@@ -142,7 +142,7 @@ def _derived_files(campaign, files: CampaignFiles, computed: list[Item]) -> Iter
     ]
     for kind, paths, stage, inputs, count, disk in tables:
         for path in paths:
-            yield "dataset and checks", path, stage, inputs, costs.table_cost(kind, count, disk, held)
+            yield "dataset and checks", path, stage, inputs, costs.table_cost(kind, count, disk, dataset)
     result_files = ResultFiles(campaign.name)
     for name in campaign.figures.by_name():
         path = result_files.path(results_files.FIGURE, name=name, ending="png")
@@ -153,11 +153,11 @@ def _derived_files(campaign, files: CampaignFiles, computed: list[Item]) -> Iter
             sum(case.study in shown for case in files.runs.values()),
             max(grids) ** 2 if DECLARATIONS[name].holds_topography else 0,
             max((len(campaign.studies[study].models) for study in shown), default=1),
-            held,
+            dataset,
         )
         flat = [path for each in inputs for path in ([each] if isinstance(each, str) else each)]
         yield "figures", path, 3, flat, cost
-    yield "report", files.report, 4, files.computed, costs.report_cost(runs, len(files.figures) // 2, held)
+    yield "report", files.report, 4, files.computed, costs.report_cost(runs, len(files.figures) // 2, dataset)
 
 
 def _dataset_memory(files, computed):

@@ -141,7 +141,7 @@ class _LoopSolver:
         return min(abs(_dissipated(records)[0]), _jump_position_error(records)[0])
 
     def total_work_error(self, records):
-        """Error of the work over all steps, J/m^2: dissipation on branches, which is none, and positions of jumps."""
+        """Error of the work over all steps, J/m^2: dissipation on branches, which is zero, and positions of jumps."""
         dissipated = _dissipated(records)
         jump = dissipated > self.work_tolerance
         return abs(dissipated[~jump].sum()) + _jump_position_error(records)[jump].sum()

@@ -33,7 +33,7 @@ class Checksum(NamedTuple):
     ----------
     sha256 : checksum of the content.
     size, mtime_ns : size and modification time; of a folder the sum and the latest time of its files.
-    asked : checksum of the parameters of its job (`asked_of`).
+    asked : checksum of the parameters of its job (`hash_parameters`).
     inputs : checksums of the results that its job read, by path.
     """
 
@@ -44,7 +44,7 @@ class Checksum(NamedTuple):
     inputs: Mapping[str, str] = {}
 
 
-def asked_of(parameters: Iterable[str]) -> str:
+def hash_parameters(parameters: Iterable[str]) -> str:
     """Checksum of the parameters of a job, given as Python represents them, in any order."""
     return hashlib.sha256("\n".join(sorted(parameters)).encode()).hexdigest()
 
@@ -110,7 +110,8 @@ def stale(
     Parameters
     ----------
     results, paths : the results.
-    asked : returns the present checksum of the parameters of a result (`asked_of`); without it only inputs are checked.
+    asked : returns the present checksum of the parameters of a result (`hash_parameters`); by default only inputs are
+        checked.
     """
     known = cache(lambda path: _known(results, path))
 
@@ -135,7 +136,7 @@ def stale(
                 yield path, f"it was made from another version of {others[0]}"
 
 
-def made_as(results: str | os.PathLike, path: str) -> str:
+def recorded_hash(results: str | os.PathLike, path: str) -> str:
     """Checksum of the parameters of the job that made a result, by its sidecar; empty if unknown."""
     return _known(results, path).asked
 

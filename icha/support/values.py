@@ -269,7 +269,7 @@ def exactly_one(section):
     return section
 
 
-def listed(names: Iterable) -> str:
+def list_names(names: Iterable) -> str:
     """List names for a message: `a, b, c`, or the first ones and the number of the others."""
     names = list(names)
     more = f", … ({len(names) - _MOST_LISTED} more)" if len(names) > _MOST_LISTED else ""
@@ -279,7 +279,7 @@ def listed(names: Iterable) -> str:
 def unknown(location: tuple, name: str, names: Iterable[str]) -> Iterator[Problem]:
     """Yield the problem of a name that is not one of `names`."""
     if name not in names:
-        yield location, name, f"is not defined; expected {listed(names) or 'no name, because none is defined'}"
+        yield location, name, f"is not defined; expected {list_names(names) or 'no name, because none is defined'}"
 
 
 def _without_controls(value: str) -> str:

@@ -39,7 +39,7 @@ from icha.deposit.readme import data_dictionary, file_pattern
 from icha.deposit.verify import COMPUTED
 from icha.planning.costs import Cost
 from icha.planning.results import campaign_files
-from icha.support.checksums import asked_of, sha256_as_written, write_checksum
+from icha.support.checksums import hash_parameters, sha256_as_written, write_checksum
 
 # Where and by whom the campaign is run: words that are nowhere else.
 PLACE, PERSON, MACHINE, SECRET = "Quittenbaumhof", "zwetschgenwirt", "mirabellenrechner", "hagebuttengeheimnis"
@@ -209,7 +209,7 @@ def test_the_page_for_readers_has_the_numbers(published):
 
 
 @pytest.mark.slow
-def test_nothing_tells_where_when_or_by_whom_it_was_made(project, published):
+def test_it_has_no_places_times_or_persons(project, published):
     files = files_of(published)
     own = [path for name, path in files.items() if not name.startswith("source/")]
     public = b"\0".join(path.read_bytes() for name, path in files.items() if name.startswith("source/"))
@@ -248,7 +248,7 @@ publication:
   date: 2026-01-31
   authors: [{name: The team}]
 """
-ASKED = asked_of(["0"])
+ASKED = hash_parameters(["0"])
 SOURCES = ("Snakefile", "uv.lock", "LICENSE", "workflow/scripts/run.py")
 
 
@@ -338,7 +338,7 @@ def test_results_that_are_not_what_was_written_are_refused(campaign, tmp_path):
     assert not (tmp_path / "out").exists()
 
 
-def test_failures_are_published_only_with_their_reason(campaign, tmp_path):
+def test_failures_are_published_only_with_a_reason(campaign, tmp_path):
     campaign, results = campaign
     runs, out = list(campaign_files(campaign).runs), tmp_path / "out/small-1.0.0"
     (results / "checks.json").write_text(json.dumps([check(runs[0], 1e-3), check(runs[1], 1e-12)]))
@@ -372,7 +372,7 @@ def test_results_that_do_not_belong_together_are_refused(campaign):
     recorded = dict.fromkeys([*files.runs, files.dataset], ASKED)
     refuse_mixed(results, campaign, recorded)
     with pytest.raises(ValueError, match=r"dataset/small.nc: the workflow has recorded another job for it"):
-        refuse_mixed(results, campaign, recorded | {files.dataset: asked_of(["1"])})
+        refuse_mixed(results, campaign, recorded | {files.dataset: hash_parameters(["1"])})
     # A run of an older program, with the right settings.
     path, case = next(iter(files.runs.items()))
     run = small.run(1, material="hertz").assign_attrs(config_sha256=run_sha256(campaign, case), summary="Older")
@@ -384,7 +384,7 @@ def test_results_that_do_not_belong_together_are_refused(campaign):
         refuse_mixed(results, campaign, recorded)
 
 
-def test_files_are_kept_with_the_configuration_whatever_names_them(tmp_path):
+def test_files_are_stored_with_the_configuration(tmp_path):
     campaign = yaml.safe_load(CAMPAIGN.format(absolute=tmp_path))
     scans = {"height_unit": "nm", "size": "10 um", "boundary": "mirror"}
     campaign["defaults"] = {"surfaces": {"path": "scan.txt", "kind": "measured"} | scans}

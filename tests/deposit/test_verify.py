@@ -66,7 +66,7 @@ def test_a_whole_deposit_is_whole(ending, folder):
         (lambda f: (f / "SHA256SUMS").write_bytes(b"\xff"), {"SHA256SUMS": "cannot be read"}),
     ],
 )
-def test_whatever_is_done_to_a_folder_is_found(spoil, problems, folder):
+def test_every_change_of_a_folder_is_found(spoil, problems, folder):
     spoil(folder)
     found = problems_with(folder)
     assert len(found) == len(problems) and all(map(is_printable, found)), found

@@ -4,16 +4,7 @@ import numpy as np
 import pytest
 import scipy.special
 from fields import displacement_field
-from half_space import (
-    CENTRES,
-    CURVATURE,
-    ENERGIES,
-    MODULUS,
-    RADIUS,
-    law,
-    periodic_displacement,
-    spectral_displacement,
-)
+from half_space import CENTRES, CURVATURE, ENERGIES, MODULUS, RADIUS, law, periodic_displacement, spectral_displacement
 
 from icha.half_space.grid_displacement import DisplacementField, row_blocks, smooth_half, windows
 

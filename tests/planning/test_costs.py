@@ -86,7 +86,7 @@ def test_memory_of_a_dataset_is_that_of_its_arrays():
     assert expected == pytest.approx(study.nbytes, rel=0.25)
     # Large arrays stay in the file.
     assert costs.dataset_memory(10**5, [recorded] * 10**5) < 0.5 * 10**5 / cells * expected
-    for job in (costs.table_cost("checks", 60, 1.0, 1e9), costs.figure_cost(60, 0, held=1e9)):
+    for job in (costs.table_cost("checks", 60, 1.0, 1e9), costs.figure_cost(60, 0, dataset=1e9)):
         assert job.memory > 1e9
     assert costs.table_cost("dataset", 60, 1.0, 1e9).memory < 1e9  # written block by block
 

@@ -9,12 +9,12 @@ import shutil
 import pytest
 
 from icha.support.checksums import (
-    asked_of,
     begin,
     damaged,
     distrust,
+    hash_parameters,
     is_whole,
-    made_as,
+    recorded_hash,
     set_aside,
     sha256_as_written,
     stale,
@@ -140,7 +140,7 @@ def test_a_folder_is_one_result(results):
 
 
 def test_results_that_are_not_of_what_is_asked_for_or_of_what_is_there_are_stale(results):
-    asked = {path: asked_of([repr({"modulus": 25e6}), repr(path)]) for path in (PATH, "checks.json")}
+    asked = {path: hash_parameters([repr({"modulus": 25e6}), repr(path)]) for path in (PATH, "checks.json")}
 
     def found(now=asked.get):
         return dict(stale(results, asked, now))
@@ -149,8 +149,8 @@ def test_results_that_are_not_of_what_is_asked_for_or_of_what_is_there_are_stale
     write_checksum(results, PATH, asked=asked[PATH])
     inputs = {PATH: sha256_as_written(results, PATH)}
     write_checksum(results, "checks.json", asked=asked["checks.json"], inputs=inputs)
-    assert found() == found(None) == {} and made_as(results, PATH) == asked[PATH]
-    assert "other settings" in found(lambda path: asked_of(["30e6"]) if path == PATH else asked[path])[PATH]
+    assert found() == found(None) == {} and recorded_hash(results, PATH) == asked[PATH]
+    assert "other settings" in found(lambda path: hash_parameters(["30e6"]) if path == PATH else asked[path])[PATH]
     # Another run in its place, asked for in the same way: what was made from the former one is not what is there.
     (results / PATH).write_bytes(CONTENT[::-1])
     write_checksum(results, PATH, asked=asked[PATH])

@@ -36,7 +36,7 @@ def test_the_gap_is_that_of_the_law():
 
 @pytest.mark.parametrize("tabor_parameter", [0.69, 0.3, 0.01])
 def test_stiff_paraboloids_do_not_jump(tabor_parameter):
-    with pytest.raises(ValueError, match=f"tabor_parameter: {tabor_parameter}: such a paraboloid does not jump"):
+    with pytest.raises(ValueError, match=f"tabor_parameter: {tabor_parameter}: contact forms without a jump"):
         jump_in_gap(tabor_parameter)
 
 

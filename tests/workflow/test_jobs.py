@@ -15,7 +15,14 @@ import pytest
 from conftest import REPOSITORY, is_alive, wait_for
 
 from icha.support.atomic_files import take_over, whole_file
-from icha.support.checksums import asked_of, is_whole, made_as, sha256_of, with_sidecar, write_checksum
+from icha.support.checksums import (
+    hash_parameters,
+    is_whole,
+    recorded_hash,
+    sha256_of,
+    with_sidecar,
+    write_checksum,
+)
 from icha.support.program import beginning_of
 
 RESULTS = "results/tiny"
@@ -64,7 +71,7 @@ def test_a_job_records_what_it_wrote_and_what_it_was_asked_for_whatever_it_does_
     assert ended(job(f"{WORK}    snakemake.params[0].clear()\n")) == (0, "")
     assert json.loads((job.results / "checksums/runs/b.nc.json").read_text())["size"] == len("a result")
     assert (job.results / "logs/b.log").read_text() == "at work\n"
-    assert made_as(job.results, "runs/b.nc") == asked_of([repr({"seed": 1}), repr("code")])
+    assert recorded_hash(job.results, "runs/b.nc") == hash_parameters([repr({"seed": 1}), repr("code")])
 
 
 def test_a_job_that_fails_leaves_its_result_to_be_made_again(job):

@@ -11,7 +11,7 @@ import pytest
 from bare_campaign import CAMPAIGN
 from conftest import REPOSITORY, copy_project, snakemake
 
-from icha.support.checksums import asked_of, damaged, sha256_as_written, write_checksum
+from icha.support.checksums import damaged, hash_parameters, sha256_as_written, write_checksum
 
 CONFIGURATION = "config/campaigns/small.yaml"
 RESULTS = Path("results/tiny")
@@ -31,7 +31,7 @@ class Rule(SimpleNamespace):
 def written(path, content, modulus, **made_from):
     """Write a result, its sidecar and the record of Snakemake, as the job for a modulus does."""
     (RESULTS / path).write_bytes(content)
-    write_checksum(RESULTS, path, asked=asked_of([repr(modulus)]), inputs=made_from)
+    write_checksum(RESULTS, path, asked=hash_parameters([repr(modulus)]), inputs=made_from)
     record = METADATA / urlsafe_b64encode(f"{RESULTS}/{path}".encode()).decode()
     record.write_text(json.dumps({"params": [repr(modulus)]}))
     return record
@@ -55,7 +55,7 @@ def one_run_of_other_bytes():
     """From another machine: of the same settings, and older than the dataset."""
     written("run.nc", b"another", 25)
     os.utime(RESULTS / "run.nc", (1, 1))
-    write_checksum(RESULTS, "run.nc", asked=asked_of(["25"]))
+    write_checksum(RESULTS, "run.nc", asked=hash_parameters(["25"]))
 
 
 def checksums_lost():

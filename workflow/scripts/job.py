@@ -37,7 +37,7 @@ def job_context(snakemake):
 
     Yields
     ------
-    asked : checksum of the parameters of the job (`checksums.asked_of`).
+    asked : checksum of the parameters of the job (`checksums.hash_parameters`).
     inputs : checksums of inputs that are results.
     """
     _end_with_snakemake()
@@ -55,7 +55,7 @@ def job_context(snakemake):
             checksums.begin(results, path)
         inputs = _checksums_of(results, snakemake.input)
         # Computed first, since the script may change its parameters.
-        asked = checksums.asked_of(map(repr, snakemake.params))
+        asked = checksums.hash_parameters(map(repr, snakemake.params))
         yield asked, inputs
         for path in outputs:
             checksums.write_checksum(results, path, asked=asked, inputs=inputs)

@@ -22,7 +22,7 @@ def publish(archive, *, results, files, named_files, project):
     from icha.deposit.make import make_deposit, refuse_mixed
     from icha.deposit.program import program_source, refuse_other_environment
     from icha.planning.plan import whole_cost
-    from icha.support.checksums import asked_of
+    from icha.support.checksums import hash_parameters
 
     # `provenance` is a module of the rules, one folder above the scripts.
     sys.path.insert(0, str(Path(project, "workflow")))
@@ -36,7 +36,7 @@ def publish(archive, *, results, files, named_files, project):
     campaign = load_configuration(Path(results, used)).campaign
     records = Path(".snakemake/metadata")
     jobs = recorded_jobs(records, made, given, scripts=Path(project, "workflow/scripts"))
-    asked = {place: asked_of(recorded_parameters(records, file)) for file, place in made.items()}
+    asked = {place: hash_parameters(recorded_parameters(records, file)) for file, place in made.items()}
     refuse_mixed(Path(results), campaign, asked)
     make_deposit(
         archive.removesuffix(".zip"),
