@@ -19,7 +19,7 @@ from icha.contact.models import DEFAULT_MODEL, MODELS
 from icha.datasets.attributes import reasons_not_applicable
 from icha.datasets.labels import LABELS
 from icha.datasets.variables.campaign import COMPUTED_RUNS
-from icha.support.formatting import format_count
+from icha.support.formatting import format_count, format_quantity
 from icha.surfaces.moments import RESOLVED_CELLS, cells_per_short_wave, error_of_cells
 
 if TYPE_CHECKING:
@@ -178,14 +178,15 @@ def _full_contact(cases):
         return
     lowest = min(adhesive, key=lambda case: case.ratio)
     text = (
-        f"U_full/dgamma is about {lowest.ratio:.3g} or more ({lowest.material} on {lowest.surface}: "
-        f"{expected_behaviour(lowest.ratio)}); {MEANING}"
+        f"{expected_behaviour(lowest.ratio)}; U_full/dgamma is about {lowest.ratio:.3g} or more "
+        f"({lowest.material} on {lowest.surface}), {MEANING}"
     )
     if COMPLETE in lowest.facts:
-        complete, strength = lowest.facts[COMPLETE], lowest.facts[STRENGTH]
+        pressures = lowest.facts[COMPLETE], lowest.facts[COMPLETE] - lowest.facts[STRENGTH], lowest.facts[STRENGTH]
+        complete, opening, strength = (format_quantity(pressure, "Pa") for pressure in pressures)
         text += (
-            f"; full contact is complete at about {format_quantity(complete, 'Pa')} without adhesion and opens at "
-            f"{format_quantity(complete - strength, 'Pa')} (strength of the interface: {format_quantity(strength, 'Pa')})"
+            f"; full contact is complete at about {complete} without adhesion and opens at {opening} (strength of the "
+            f"interface: {strength})"
         )
     if any(MODELS[case.model].by_summits and case.ratio < FULL_CONTACT_BELOW for case in cases):
         text += f"; the asperity model is not applicable below {FULL_CONTACT_BELOW:g}"

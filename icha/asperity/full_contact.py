@@ -42,8 +42,8 @@ def theoretical_strength(surface_energy: float, interaction_range: float) -> flo
 def gaussian_complete_pressure(waves: float) -> float:
     """Estimate the pressure over E* h'_rms at which contact with a Gaussian surface is complete without adhesion.
 
-    It compensates the largest tension of full contact at zero load: the largest of about 2 pi waves^2 independent values
-    with the standard deviation E* h'_rms/2. For five spectra the mean of five realisations was 0 to 9 % off.
+    It compensates the largest tension of full contact at zero load: the largest of about 2 pi waves^2 independent
+    values with the standard deviation E* h'_rms/2. For five spectra the mean of five realisations was 0 to 9 % off.
 
     Parameters
     ----------

@@ -176,7 +176,9 @@ class BoundaryElements:
             return state
         if control is None and self.pressure(state) > self.opening_pressure + _ROUNDING * self.contact_modulus:
             return self.full_contact(self.opening_pressure)
-        weakest = self.full_contact_pressure.ravel() <= self.full_contact_pressure.min() + _ROUNDING * self.pressure_unit
+        weakest = (
+            self.full_contact_pressure.ravel() <= self.full_contact_pressure.min() + _ROUNDING * self.pressure_unit
+        )
         closed = np.flatnonzero(~weakest)
         opened = CellState(0.0, closed, state.fraction[closed], state.pressure[closed], state.around[closed])
         return self._next_equilibrium(opened, max(separation, self.smallest_gap), control)
