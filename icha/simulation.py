@@ -33,6 +33,7 @@ from icha.datasets.variables.terms import MATERIAL, ROUGHNESS, Table
 from icha.path.energy_balance import Waypoint, summarise_loop
 from icha.path.follow import follow
 from icha.path.targets import (
+    ASPERITY_RANGES,
     BETWEEN,
     IN_METRES,
     LEAST_PRESSURE,
@@ -121,6 +122,8 @@ def simulate(
     _check_arguments(surface, material, path)
     if model not in tuple(MODELS):
         raise ValueError(f"model: {model!r} must be one of {', '.join(MODELS)}")
+    if MODELS[model].by_summits:
+        _check_asperity_range(surface, path)
     if kept is not None and not MODELS[model].resumable:
         raise ValueError(f"kept: the model {model} has no checkpoints; expected None")
     # Only this model is imported: the fingerprint of a run covers no other one.
@@ -221,11 +224,6 @@ def _check_arguments(surface, material, path):
     for target in (*path.targets, *path.turning_points):
         if target.kind == RELATIVE_LOAD:
             asked = f"path: {RELATIVE_LOAD} = {target.value!r} on a surface of rms slope {surface.rms_slope:.4g}"
-            if target.value > MAX_REDUCED_PRESSURE * surface.rms_slope:
-                raise ValueError(
-                    f"{asked} is beyond the range of the asperity model, which limits all models; expected a reduced "
-                    f"pressure of at most {MAX_REDUCED_PRESSURE}"
-                )
             if 0 < abs(target.value) < LEAST_PRESSURE * surface.rms_slope:
                 raise ValueError(
                     f"{asked} is too small a load; expected a reduced pressure of at least {LEAST_PRESSURE} in "
@@ -235,6 +233,18 @@ def _check_arguments(surface, material, path):
             raise ValueError(
                 f"path: a snapshot at a mean separation of {target.value!r} m is far above any contact; expected at "
                 f"most {_HIGHEST_SNAPSHOT:g} rms heights ({_HIGHEST_SNAPSHOT * surface.rms_height:.4g} m)"
+            )
+
+
+def _check_asperity_range(surface, path):
+    """Raise `ValueError` for targets beyond the asperity model."""
+    for target in (*path.targets, *path.turning_points):
+        if target.kind in ASPERITY_RANGES and target.value > 0:
+            ASPERITY_RANGES[target.kind].validate(f"path: {target.kind}", target.value)
+        if target.kind == RELATIVE_LOAD and target.value > MAX_REDUCED_PRESSURE * surface.rms_slope:
+            raise ValueError(
+                f"path: {RELATIVE_LOAD} = {target.value!r} on a surface of rms slope {surface.rms_slope:.4g} is beyond "
+                f"the range of the asperity model; expected a reduced pressure of at most {MAX_REDUCED_PRESSURE}"
             )
 
 
@@ -300,9 +310,11 @@ def _record_path(contact, observables, path, progress) -> _PathRecord:
 
 
 def _require_finite(values: dict) -> dict:
-    """Return the values; raise `NotConverged` if one of them is not finite."""
+    """Return the values; raise `NotConverged` if one is not finite, except for the stiffness of full contact."""
     for name, value in values.items():
         numbers = np.asarray(value)
+        if name == "contact_stiffness" and np.isposinf(numbers).all():
+            continue
         if numbers.dtype.kind == "f" and not np.isfinite(numbers).all():
             raise NotConverged(f"with values of {name} that are not finite")
     return values

@@ -29,7 +29,7 @@ from icha.boundary_elements.patches import (
     unpack,
 )
 from icha.contact.checkpoints import CheckpointedContact
-from icha.contact.model import AREA_FRACTION, PRESSURE, Control, Events, FullContact, NotConverged
+from icha.contact.model import AREA_FRACTION, PRESSURE, Control, Events, NotConverged
 from icha.contact.models import MODELS, REFERENCE_MODEL, PathAccuracy
 from icha.surfaces.summits import Asperities, locate_summits
 from icha.surfaces.surface import Surface
@@ -160,10 +160,9 @@ class BoundaryElements:
             closed = separation < self.smallest_gap
             return self.full_contact(self._closing_pressure) if closed else self._solve(state, separation)
         if not self.adhesive and control.quantity == PRESSURE and control.target > 0 and len(state.cells):
-            try:
-                return self._solve_nonadhesive(state, load=control.target / self.contact_modulus)
-            except FullContact:
+            if control.target >= self.opening_pressure:
                 return self.full_contact(control.target)
+            return self._solve_nonadhesive(state, load=control.target / self.contact_modulus)
         return solve_at_control(ControlProblem(self, control, self._solve, self._events), state, separation)
 
     def _leave_full_contact(self, state, separation, control):
@@ -176,12 +175,21 @@ class BoundaryElements:
             return state
         if control is None and self.pressure(state) > self.opening_pressure + _ROUNDING * self.contact_modulus:
             return self.full_contact(self.opening_pressure)
-        weakest = (
-            self.full_contact_pressure.ravel() <= self.full_contact_pressure.min() + _ROUNDING * self.pressure_unit
-        )
-        closed = np.flatnonzero(~weakest)
-        opened = CellState(0.0, closed, state.fraction[closed], state.pressure[closed], state.around[closed])
-        return self._next_equilibrium(opened, max(separation, self.smallest_gap), control)
+        separation = max(separation, self.smallest_gap)
+        return self._next_equilibrium(self._open_weakest(separation), separation, control)
+
+    def _open_weakest(self, separation):
+        """Full contact after the cells of least pressure opened, so many that they hold the mean gap (m)."""
+        pressure = self.full_contact_pressure.ravel() - self.full_contact_pressure.min()
+        # Around the first gap the pressure is that of a front, not that which opened it.
+        pressure -= self.front.strength * self.contact_modulus
+        opening = max(self.front.critical_opening * self.spacing, separation)
+        count = int(min(1 + separation / opening * pressure.size, pressure.size / 2))
+        # Cells of equal pressure open together, as symmetry wants.
+        limit = np.partition(pressure, count - 1)[count - 1] + _ROUNDING * self.contact_modulus
+        closed = np.flatnonzero(pressure > limit)
+        ones = np.ones(len(closed))
+        return CellState(0.0, closed, ones, pressure[closed], ones)
 
     @property
     def _closing_pressure(self):

@@ -136,14 +136,14 @@ def solve_active_set(
     Raises
     ------
     FullContact
-        If the contact covers the surface.
+        If the contact covers the surface at a given separation, which is the mean gap.
     NotConverged
         If pressures or the active set are not found.
     """
     dtype = np.float32 if tolerance > topography.rounding else float
     keep, gap, before, changing = np.full(len(contact.cells), sticky), None, np.inf, not sticky
     for _ in range(_MAX_CHANGES):
-        if len(contact.cells) == space.size and (contact.fraction >= 1).all():
+        if load is None and len(contact.cells) == space.size and (contact.fraction >= 1).all():
             raise FullContact("the contact runs over the whole surface")
         if load is not None and len(contact.cells):
             balanced = contact.pressure * (load * space.size / np.sum(contact.pressure))

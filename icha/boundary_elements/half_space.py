@@ -89,7 +89,7 @@ class HalfSpace:
         return transforms.filter_by_blocks(self.grid, cells, values, factor, at, out)
 
     def full_contact_pressure(self, heights: np.ndarray) -> np.ndarray:
-        """Pressure (n, n), of zero mean, in E*, that makes the half-space follow heights (n, n) everywhere: q h(q)/2."""
+        """Pressure (n, n), in E* and of zero mean, at which the half-space follows heights (n, n): q h(q)/2."""
         compliance = self.compliance[np.dtype(float)]
         modes = scipy.fft.rfft2(heights, workers=1)
         modes[0, 0] = 0.0

@@ -27,8 +27,8 @@ _SAME_SEPARATION = 1e-13
 # Unit of the error of a load of zero, over stiffness times h_rms: attraction and repulsion of about this size cancel.
 _ZERO_LOAD = 1e-2
 _MAX_TRIALS, _MAX_ATTEMPTS = 30, 4
-# Part of the mean gap that the next trial leaves where the target may lie in full contact.
-_CLOSING = 0.25
+# Change of the mean gap between trials where the target may lie in full contact: over the mean gap, and in h_rms.
+_CLOSING, _LONGEST = 0.5, 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,6 +163,7 @@ def bracket_loosely(
     Where events may happen on the path, none is skipped: a trial that goes too far starts from before it.
     """
     contact, start, residual = problem.contact, bracket.before, _FIRST_RESIDUAL
+    control_is_load = problem.control.quantity == PRESSURE
     close = _CLOSE * scale if contact.adhesive else problem.tolerance(scale)
     for _ in range(_MAX_TRIALS if contact.adhesive else 2 * _MAX_TRIALS):
         trial, residual = problem.solve(start, separation, residual), _RESIDUAL
@@ -172,9 +173,13 @@ def bracket_loosely(
         bracket = bracket.with_state(trial, error)
         passed = trial is not bracket.before and len(problem.events(bracket.before, trial))
         start = bracket.before if passed else trial
-        separation = bracket.limit(problem.newton_separation(trial))
-        if separation <= 0:
-            separation = _CLOSING * trial.separation
+        separation = problem.newton_separation(trial)
+        if control_is_load and bracket.sign > 0 and bracket.beyond is None and not separation < trial.separation:
+            # The load falls as the surfaces approach: look for it beyond its minimum.
+            separation = trial.separation - min(_CLOSING * trial.separation, _LONGEST * contact.rms_height)
+        separation = bracket.limit(separation)
+        if separation < contact.smallest_gap:
+            separation = (1 - _CLOSING) * trial.separation
             if separation < contact.smallest_gap:
                 raise FullContact("the mean gap vanishes")
     raise NotConverged(f"{_MAX_TRIALS} trials do not bracket it")
@@ -185,6 +190,8 @@ def iterate_secant(problem: ControlProblem, bracket: Bracket, trial: CellState, 
     before, error = None, problem.error(trial)
     for _ in range(_MAX_TRIALS):
         separation = bracket.limit(problem.newton_separation(trial, before))
+        if separation < problem.contact.smallest_gap:
+            raise FullContact("the mean gap vanishes")
         same = before is not None and abs(error) < _SAME_SLOPES * scale
         start, before = trial, trial if before is not None or trial.front_residual <= TOLERANCES.front else None
         trial = problem.solve(start, separation, TOLERANCES.front, close=True, same_slopes=same)

@@ -111,13 +111,18 @@ def count_unshared_separations(run) -> int:
     return int(np.count_nonzero(nearest > same))
 
 
+def finite_stiffness(run) -> np.ndarray:
+    """Contact stiffness, Pa/m; zero in full contact, where no work is done."""
+    return np.where(np.isfinite(run["contact_stiffness"]), run["contact_stiffness"], 0.0)
+
+
 def work_error(run) -> float:
     """Bound the error of the work of a path by the tolerances of its equilibria, J/m^2.
 
     An error of the separation is an error of the pressure, times the stiffness. An error of the stiffness enters as the
     stiffness does, by the cubic through both ends of a step.
     """
-    width, stiffness = np.abs(np.diff(run["mean_separation"])), run["contact_stiffness"]
+    width, stiffness = np.abs(np.diff(run["mean_separation"])), finite_stiffness(run)
     ends = np.abs(stiffness[1:]) + np.abs(stiffness[:-1])
     separation = RESIDUAL_TOLERANCE * float(run["rms_height"])
     relative = model_of(run.attrs).stiffness_error
@@ -134,7 +139,7 @@ def _unresolved_work(run):
     """
     events = sum(np.diff(run[name]) for name in EVENT_COUNTS) > 0
     events &= np.diff(run["dissipated_by_load_jump"]) == 0  # there the pressure is constant
-    width, slope = np.diff(run["mean_separation"]), -run["contact_stiffness"]
+    width, slope = np.diff(run["mean_separation"]), -finite_stiffness(run)
     jumped = pressure_jump(width, np.diff(run["nominal_pressure"]), slope[:-1], slope[1:])
     work = float(np.sum(events * (unresolved_work(width, jumped) + integration_error(width, slope[:-1], slope[1:]))))
     released = sum(abs(float(run[f"dissipated_by_{name}"][-1])) for name in ("jump_in", "jump_off"))

@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from icha.checks.findings import IDENTITY_LIMIT, Check, RunArrays, compare_with_limit, count_not_finite
-from icha.checks.loops import LOOP_CHECKS, check_events, check_loop
+from icha.checks.loops import LOOP_CHECKS, check_events, check_loop, finite_stiffness
 from icha.contact.models import AREA_TOLERANCE_CELLS, AREA_TOLERANCE_PART, SMALLEST_LOAD, model_of
 from icha.datasets.variables.run import OF_MODELS, RUN
 from icha.datasets.variables.terms import INFINITE
@@ -168,7 +168,7 @@ def _target_error(run):
     largest = np.array([np.max(np.abs(reached[kind])) for kind in kinds])
     # With adhesion a load may be the small difference of attraction and repulsion, which are about the stiffness times
     # h_rms. It is met as accurately as they are.
-    gross = np.abs(run["contact_stiffness"]) * float(run["rms_height"]) * adhesive
+    gross = np.abs(finite_stiffness(run)) * float(run["rms_height"]) * adhesive
     unit = {"reduced_pressure": scale * float(run["rms_slope"]), "relative_load": scale}
     least = np.array([SMALLEST_LOAD * gross[k] / unit.get(kind, math.inf) for k, kind in enumerate(kinds)])
     return np.max(error / np.where(target != 0, np.maximum(np.abs(target), least), largest))

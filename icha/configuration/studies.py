@@ -17,7 +17,15 @@ from pydantic import (
 from icha.configuration.surfaces import SURFACE_KINDS, MaterialSection
 from icha.contact.models import DEFAULT_MODEL, MODELS
 from icha.path.states import AreaFraction, ReducedPressure, Snapshot
-from icha.path.targets import DEFAULT_STEP, MAX_AREA_FRACTION, MAX_REDUCED_PRESSURE, STEP, Path
+from icha.path.targets import (
+    ASPERITY_RANGES,
+    DEFAULT_STEP,
+    LARGEST_REDUCED_PRESSURE,
+    MAX_AREA_FRACTION,
+    MAX_REDUCED_PRESSURE,
+    STEP,
+    Path,
+)
 from icha.support.rules import NUMBER, SLOPE, FloatRange
 from icha.support.values import (
     Flag,
@@ -86,10 +94,12 @@ class Targets(Section):
     """The targets of the loading path: exactly one of the three lists."""
 
     reduced_pressures: stops(ReducedPressure, increasing) | None = Field(
-        default=None, description=f"Reduced pressures p/(E* h'rms), increasing, up to {MAX_REDUCED_PRESSURE}."
+        default=None,
+        description=f"Reduced pressures p/(E* h'rms), increasing; with asperities up to {MAX_REDUCED_PRESSURE}.",
     )
     area_fractions: stops(AreaFraction, increasing) | None = Field(
-        default=None, description=f"Contact area fractions A/A0, increasing, up to {MAX_AREA_FRACTION}."
+        default=None,
+        description=f"Contact area fractions A/A0, increasing; with asperities up to {MAX_AREA_FRACTION}.",
     )
     mean_separations: stops(Length, decreasing) | None = Field(
         default=None, description="Mean separations with their unit, decreasing."
@@ -130,7 +140,7 @@ class _OrEveryStop:
 class TurningPoint(Section):
     """A state at which the path turns: exactly one of the four keys. Loads may be tensile (negative) or zero."""
 
-    reduced_pressure: number(FloatRange(most=MAX_REDUCED_PRESSURE, model_ends=True)) | None = Field(
+    reduced_pressure: number(FloatRange(most=LARGEST_REDUCED_PRESSURE)) | None = Field(
         default=None, description="At this p/(E* h'rms)."
     )
     relative_load: number(NUMBER) | None = Field(default=None, description="At this p/E* = F/(E* A0).")
@@ -270,8 +280,10 @@ class Study(Section):
         """Report why the study cannot be run with these snapshots (`Campaign.snapshots_of`)."""
         # The smallest slope makes the largest reduced pressure.
         slope = min((slope for slope in self.rms_slopes if slope != MEASURED), default=math.inf)
-        most = MAX_REDUCED_PRESSURE * slope
+        most = (MAX_REDUCED_PRESSURE if DEFAULT_MODEL in self.models else LARGEST_REDUCED_PRESSURE) * slope
         snapshots_of_study = [] if self.snapshots == EVERY_STOP else self.snapshots
+        if DEFAULT_MODEL in self.models:
+            yield from self._beyond_asperities(snapshots_of_study or [])
         for key, states in (("snapshots", snapshots_of_study), ("turning_points", self.turning_points)):
             for index, state in enumerate(states or []):
                 load = state.relative_load or 0
@@ -280,6 +292,15 @@ class Study(Section):
                     yield (key, index, "relative_load"), load, f"{reason}; expected relative loads up to {most:g}"
         if self.unload or self.turning_points or self.control != "separation":
             yield from self._path_problems(snapshots)
+
+    def _beyond_asperities(self, snapshots):
+        """Report targets beyond the range of the asperity model."""
+        targets = [(("targets", f"{kind}s", k), kind, value) for k, (kind, value) in enumerate(self.targets.states)]
+        for key, states in (("snapshots", snapshots), ("turning_points", self.turning_points)):
+            targets += [((key, k, state.target[0]), *state.target) for k, state in enumerate(states)]
+        for location, kind, value in targets:
+            if kind in ASPERITY_RANGES and value > ASPERITY_RANGES[kind].most:
+                yield location, value, f"must be {ASPERITY_RANGES[kind].expected}; or use models: [boundary_elements]"
 
     def _path_problems(self, snapshots):
         """Report why the settings make no path."""

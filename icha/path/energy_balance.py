@@ -36,10 +36,17 @@ def integration_error(width, slope, end_slope):
 _CERTAIN_LOSS = 0.1
 
 
-def _finite_slopes(slope, end_slope):
-    """Slopes at both ends of a step; for an infinite one that of the other end, or zero."""
-    finite = [each for each in (slope, end_slope) if np.isfinite(each)] or [0.0]
-    return (slope, end_slope) if len(finite) == 2 else (finite[0], finite[0])
+def _beside_full_contact(width, p, q, slope, end_slope):
+    """Pressures, slopes and integration error of a step from or to full contact.
+
+    Full contact is infinitely stiff: its pressure does no work, and jumps where it closes or opens. The pressure at its
+    end of the step is that along the tangent at the other end.
+    """
+    if np.isinf(slope) and np.isinf(end_slope):
+        return p, q, 0.0, 0.0, 0.0
+    if np.isinf(slope):
+        return q - width * end_slope, q, end_slope, end_slope, 0.5 * width**2 * abs(end_slope)
+    return p, p + width * slope, slope, slope, 0.5 * width**2 * abs(slope)
 
 
 @dataclass(frozen=True)
@@ -76,18 +83,18 @@ class Step:
         width = after.separation - before.separation
         p, q = contact.pressure(before), contact.pressure(after)
         slope, end_slope = -contact.stiffness(before), -contact.stiffness(after)
-        # Full contact is infinitely stiff; where it closes or opens, the pressure jumps at one mean separation.
-        closes = np.isinf(slope) != np.isinf(end_slope)
-        slope, end_slope = _finite_slopes(slope, end_slope)
+        error = integration_error(width, slope, end_slope)
+        if np.isinf(slope) or np.isinf(end_slope):
+            p, q, slope, end_slope, error = _beside_full_contact(width, p, q, slope, end_slope)
         # Without adhesion contact forms and breaks without a jump of the pressure.
         jumps = len(events) if contact.adhesive else events.count(COALESCENCE) + events.count(SPLIT)
         return cls(
             width=width,
             work=-(0.5 * width * (p + q) + width**2 * (slope - end_slope) / 12),
             stored=contact.stored_energy(after) - contact.stored_energy(before),
-            pressure_jump=pressure_jump(width, q - p, slope, end_slope) if jumps or closes else 0.0,
-            integration_error=integration_error(width, slope, end_slope),
-            has_jump=bool(jumps or closes),
+            pressure_jump=pressure_jump(width, q - p, slope, end_slope) if jumps else 0.0,
+            integration_error=error,
+            has_jump=bool(jumps),
             events=events,
         )
 

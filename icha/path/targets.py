@@ -8,10 +8,12 @@ from icha.contact.model import AREA_FRACTION as CONTROLLED_AREA
 from icha.contact.model import PRESSURE, ContactModel, Control, State
 from icha.support.rules import LENGTH, NUMBER, POSITIVE, FloatRange
 
-# Largest reduced pressure and area fraction of a target. Beyond them asperities lose their identity, and soon after the
-# mean planes of a surface without adhesion meet.
+# Largest reduced pressure and area fraction of a target with the asperity model. Beyond them asperities lose their
+# identity, and soon after the mean planes of a surface without adhesion meet.
 MAX_REDUCED_PRESSURE = 0.15
 MAX_AREA_FRACTION = 0.25
+# Largest reduced pressure of any target: rough surfaces are in full contact at about 1.
+LARGEST_REDUCED_PRESSURE = 100.0
 # Smallest reduced pressure (other than zero) and area fraction: smaller ones are less than the error of an equilibrium.
 LEAST_PRESSURE, LEAST_AREA = 1e-12, 1e-9
 # Limits of the longest step of the mean separation, in h_rms, and its default. With the smallest limit a path has some
@@ -61,8 +63,13 @@ class TargetQuantity:
 
 REDUCED_PRESSURE, RELATIVE_LOAD = "reduced_pressure", "relative_load"
 AREA_FRACTION, MEAN_SEPARATION = "area_fraction", "mean_separation"
-_PRESSURES = FloatRange(least=LEAST_PRESSURE, most=MAX_REDUCED_PRESSURE, model_ends=True)
-_AREAS = FloatRange(least=LEAST_AREA, most=MAX_AREA_FRACTION, model_ends=True)
+_PRESSURES = FloatRange(least=LEAST_PRESSURE, most=LARGEST_REDUCED_PRESSURE)
+_AREAS = FloatRange(least=LEAST_AREA, most=1.0)
+# Ranges of targets with the asperity model.
+ASPERITY_RANGES = {
+    REDUCED_PRESSURE: FloatRange(least=LEAST_PRESSURE, most=MAX_REDUCED_PRESSURE, model_ends=True),
+    AREA_FRACTION: FloatRange(least=LEAST_AREA, most=MAX_AREA_FRACTION, model_ends=True),
+}
 QUANTITIES = {
     quantity.name: quantity
     for quantity in (
@@ -112,8 +119,8 @@ class Path:
 
     Parameters
     ----------
-    reduced_pressures : p/(E* h'_rms), increasing, in [1e-12, 0.15].
-    area_fractions : A/A0, increasing, in [1e-9, 0.25].
+    reduced_pressures : p/(E* h'_rms), increasing, in [1e-12, 100]; with the asperity model up to 0.15.
+    area_fractions : A/A0, increasing, in [1e-9, 1]; with the asperity model up to 0.25.
     mean_separations : u in m, decreasing, in [1e-24, 1e9]. Exactly one of these three lists is given.
     snapshots : pairs (kind, value), in any order, of states whose fields and spots are stored. The kind is
         "reduced_pressure", "relative_load" (F/(E* A0)), "area_fraction" or "mean_separation" (m). A snapshot is an

@@ -21,7 +21,7 @@ class FloatRange:
     unit : of the number.
     above : the number must be greater than this.
     least, most : the number must be in [least, most].
-    model_ends : whether `most` is where the asperity model, and with it every model, ends.
+    model_ends : whether `most` is where the asperity model ends.
     """
 
     unit: str = "1"

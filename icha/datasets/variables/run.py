@@ -27,6 +27,7 @@ _SUM = {"comment": "where uphill_jump_in_count is not 0, only the sum with the o
 _ATTRIBUTES = {
     "spot_snapshot": _index_of("snapshot"),
     "full_contact_energy_ratio": {INFINITE: "without adhesion"},
+    "contact_stiffness": {INFINITE: "in full contact"},
     "slope_anisotropy": {INFINITE: "for straight grooves"},
     "event_kind": {
         "flag_values": np.arange(len(EVENT_KINDS), dtype=np.int8),

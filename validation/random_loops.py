@@ -1,0 +1,103 @@
+"""Random loops by boundary elements: each one must end where it was asked to end.
+
+python -m validation.random_loops [--count N] [--first K] [--grid CELLS]
+
+Smooth, elliptic and rough surfaces and plateaus, half of them sticky, under control of separation, load or area. A
+target may lie inside a jump, where there is no equilibrium; any other failure is one of the solver.
+"""
+
+import argparse
+import time
+import warnings
+from typing import NamedTuple
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from icha import ConvergenceError, Material, Path, SelfAffineSpectrum, Surface, simulate
+from icha.contact.models import REFERENCE_MODEL
+from validation.surfaces import bump
+
+KINDS = ("bump", "ellipse", "rough", "rough", "plateau")
+_PERIOD, _MODULUS, _RADIUS = 100e-6, 25e6, 1e-3
+
+
+class Loop(NamedTuple):
+    """A surface, a material and a path, with the kind of the surface and the control of the path."""
+
+    kind: str
+    control: str
+    surface: Surface
+    material: Material
+    path: Path
+
+
+def random_loop(number: int, grid: int | None = None) -> Loop:
+    """Draw a loop by its number; grid: cells along a side, drawn too if it is None."""
+    rng = np.random.default_rng(1000 + number)
+    grid = grid or int(rng.choice([48, 64, 96, 128], p=[0.35, 0.35, 0.2, 0.1]))
+    kind, spacing = KINDS[number % 5], _PERIOD / grid
+    sticky = (number // 5) % 2 == 0
+    if kind in ("bump", "ellipse"):
+        aspect = 1.0 if kind == "bump" else float(rng.uniform(1.2, 3.0))
+        radii = (_RADIUS * aspect**0.5, _RADIUS * aspect**-0.5)
+        surface, _ = bump(grid, _PERIOD, tuple(rng.uniform(-0.5, 0.5, 2)), radii, float(rng.uniform(0, np.pi)))
+        radius, curvature = float(rng.uniform(3, min(10, grid / 8))) * spacing, 1 / _RADIUS
+        reach = float(rng.uniform(0.05, 0.5)) * radius**2 * curvature
+        unit = radius**2 * curvature
+    else:
+        surface = SelfAffineSpectrum(_PERIOD, 50e-6, 8 * spacing, 0.8, 1.0).realise(grid, int(rng.integers(1000)))
+        radius, curvature = (float(rng.uniform(1, 6)) if sticky else 0.3) * spacing, surface.rms_curvature
+        if kind == "plateau":
+            highest = float(np.quantile(surface.heights, rng.uniform(0.7, 0.95)))
+            surface = Surface(np.minimum(surface.heights, highest), _PERIOD)
+        # The strength of the interface is that of a front of two cells.
+        reach = float(np.sqrt(radius**3 * curvature**2 * spacing)) * 2
+        unit = surface.rms_height
+    # With the radius of contact under no load (dgamma R^2/E*)^(1/3).
+    material = Material(_MODULUS, radius**3 * curvature**2 * _MODULUS, reach)
+    control = ("separation", "load", "area")[int(rng.integers(3))]
+    if control == "separation":
+        ends = float(surface.heights.max()) - min(unit, 0.6 * float(surface.heights.max())) * np.sort(
+            rng.uniform(0, 1.5, 2)
+        )
+        path = Path(mean_separations=ends.tolist(), unload=True, snapshots=[])
+    elif control == "load":
+        loads = np.sort(10 ** rng.uniform(-3, 0.3, 2)).tolist()
+        path = Path(reduced_pressures=loads, unload=True, control="load", snapshots=[])
+    else:
+        path = Path(area_fractions=np.sort(10 ** rng.uniform(-1.7, -0.1, 2)).tolist(), unload=True, snapshots=[])
+    return Loop(kind, control, surface, material, path)
+
+
+def follow_loop(loop: Loop) -> str:
+    """Follow a loop; return an empty text, or why it ended before its end."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        try:
+            simulate(loop.surface, loop.material, loop.path, model=REFERENCE_MODEL)
+        except ConvergenceError as error:
+            return "" if "lies inside a jump" in str(error) else str(error)
+    return ""
+
+
+def main() -> None:
+    """Follow random loops and print how each of them ends."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--count", type=int, default=300)
+    parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("--grid", type=int, default=None)
+    options = parser.parse_args()
+    failed = 0
+    for number in range(options.first, options.first + options.count):
+        loop, clock = random_loop(number, options.grid), time.process_time()
+        with threadpool_limits(1):
+            reason = follow_loop(loop)
+        failed += bool(reason)
+        grid, seconds = loop.surface.grid, time.process_time() - clock
+        print(f"{number} {loop.kind} {grid}^2 {loop.control} {seconds:.1f} s {reason or 'ends'}", flush=True)
+    print(f"{failed} of {options.count} loops did not end")
+
+
+if __name__ == "__main__":
+    main()
