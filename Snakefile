@@ -32,7 +32,7 @@ before_jobs.prepare_process()
 
 if workflow.is_main_process:
     before_jobs.end_with_caller()
-    campaign = before_jobs.Campaign(
+    campaign = before_jobs.CampaignResults(
         RESULTS, CAMPAIGN.name, CONFIGURATION.origin, ROOT, dry_run=workflow.output_settings.dryrun
     )
     campaign.have_stale_made_again([FILES.configuration, *COPIED, *FILES.computed, FILES.run_times], workflow.rules)

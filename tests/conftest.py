@@ -1,4 +1,4 @@
-"""The smoke campaign, run once for real, for all tests that look at the workflow."""
+"""The smoke campaign, run once for all tests of the workflow, and calls of Snakemake."""
 
 import contextlib
 import fcntl
@@ -22,7 +22,7 @@ REPOSITORY = Path(__file__).parents[1]
 PARTS = ("Snakefile", "icha", "workflow", "config", "profiles", ".gitignore", "Makefile", "LICENSE")
 PARTS += ("pyproject.toml", "uv.lock", "README.md")
 SMOKE = "config/campaigns/smoke.yaml"
-# Of its figures, one for each kind of input; and what else may be less for every rule to run all the same.
+# Figures of the campaign in tests, one for each kind of input, and replacements that make its runs smaller.
 FIGURES = ("fig1_jkr", "fig2_area_and_gap", "fig3_distributions", "fig5_multi_slope")
 FIGURES += ("fig10_model_error", "fig13_loops")
 LESS = {
@@ -31,50 +31,50 @@ LESS = {
     "[3.16e-3, 1.0e-2]\n    turning_points": "[1.0e-3, 3.16e-3]\n    turning_points",
     "pressure: 5.0e-3\n      - reduced_pressure: 1.0e-2": "pressure: 1.5e-3\n      - reduced_pressure: 3.16e-3",
 }
-# How many random cases a test tries: as many as one waits for, unless --hypothesis-profile asks for thorough ones. They
-# are the same ones each time, so that no change fails by chance.
+# Number of random cases of a test; --hypothesis-profile thorough tries more. They are the same each time, so that no
+# change fails by chance.
 settings.register_profile("fast", max_examples=40, deadline=None, derandomize=True, database=None)
-settings.register_profile("thorough", settings.get_profile("fast"), max_examples=400)
+settings.register_profile("thorough", settings.get_profile("fast"), max_examples=300)
 settings.load_profile("fast")
 
-# Files with the longest tests of all, the longest first: begun last, they would keep one core waiting. With "worksteal"
-# one worker begins with them, and so with the campaign, while another has those after the middle.
+# Files with the longest tests, the longest first; at the end they would keep one core waiting. With "worksteal" one
+# worker begins with them, and so with the campaign, while another begins in the middle.
 LONG = ("every_case_ends", "slurm", "reruns", "faults", "workflow", "finite_range", "make", "energy_balance")
 
 
 def _numbers(text):
-    """What `3` or `1-20` stands for."""
+    """Expand `3` or `1-20`."""
     first, _, last = text.partition("-")
     return list(range(int(first), int(last or first) + 1))
 
 
 def pytest_addoption(parser):
-    """Which of the random cases of test_every_case_ends.py are computed."""
+    """Add the option for the series of random cases of test_every_case_ends.py."""
     parser.addoption("--series", type=_numbers, default="1", help="series of random cases: 3, or 1-20 (default: 1)")
 
 
 def pytest_collection_modifyitems(items):
-    """Begin with the files that take longest."""
+    """Sort the files that take longest to the beginning."""
     rank = {f"test_{name}.py": number for number, name in enumerate(LONG)}
     items.sort(key=lambda item: rank.get(item.path.name, len(LONG)))
 
 
 def modules_of(project):
-    """Where Python finds the package and the plugins of a copy of the project."""
+    """PYTHONPATH of the package and the plugins of a copy of the project."""
     return os.pathsep.join([str(project), str(project / "workflow/plugins")])
 
 
 def snakemake_command(*arguments, configuration=SMOKE):
-    """Command and environment of a call of Snakemake in a copy of the project, with that copy's package."""
+    """Command and environment of a call of Snakemake in a copy of the project."""
     environment = os.environ | {"PYTHONDONTWRITEBYTECODE": "1"}
     chosen = ["--configfile", str(configuration)] if configuration else []
     return [sys.executable, "-m", "snakemake", *arguments, *chosen], environment
 
 
 def snakemake(project, *arguments, configuration=SMOKE):
-    """Call Snakemake in a copy of the project; return the finished process with all that it said as `stdout`.
+    """Call Snakemake in a copy of the project; return the finished process with its output as `stdout`.
 
-    It is called in a fork of this process, which has imported it: a dry run takes a fifth of a new process.
+    The call is a fork of this process, which has imported Snakemake, so a dry run takes a fifth of a new process.
     """
     command, environment = snakemake_command(*arguments, configuration=configuration)
     environment["PYTHONPATH"] = modules_of(project)
@@ -87,7 +87,7 @@ def snakemake(project, *arguments, configuration=SMOKE):
 
 
 def _call(project, arguments, environment, said):
-    """Be Snakemake, with the modules of a copy of the project."""
+    """Run Snakemake in this process, with the modules of a copy of the project."""
     for descriptor in (1, 2):
         os.dup2(said.fileno(), descriptor)
     sys.stdout, sys.stderr = (open(descriptor, "w", buffering=1, encoding="utf-8") for descriptor in (1, 2))
@@ -108,7 +108,7 @@ def _call(project, arguments, environment, said):
 
 
 def smoke_at_finite_ranges():
-    """The text of the campaign smoke with all that Tamaas solves."""
+    """Text of the campaign smoke with the sections that Tamaas solves."""
     text = (REPOSITORY / SMOKE).read_text(encoding="utf-8")
     assert text.count("figures:\n") == 1
     asked = (REPOSITORY / "tests/finite_ranges.yaml").read_text(encoding="utf-8")
@@ -116,7 +116,7 @@ def smoke_at_finite_ranges():
 
 
 def smaller_smoke():
-    """The text of the campaign smoke with all that Tamaas solves, and with less of everything."""
+    """Text of the campaign smoke with the sections that Tamaas solves, and with smaller runs and fewer figures."""
     text = smoke_at_finite_ranges()
     for much, little in LESS.items():
         assert much in text
@@ -126,7 +126,7 @@ def smaller_smoke():
 
 
 def copy_project(source, target, changed=()):
-    """Copy the program's files, some with another text, and commit them, as a clone has them."""
+    """Copy the files of the program, some with changed text, and commit them, as in a clone."""
     target.mkdir(parents=True)
     for part in PARTS:
         if (source / part).is_dir():
@@ -144,10 +144,10 @@ def copy_project(source, target, changed=()):
 
 @pytest.fixture(scope="session")
 def smoke(tmp_path_factory):
-    """A copy of the project in which a small campaign smoke has been run to the end; not to be changed."""
+    """Copy of the project with the finished small campaign smoke; tests must not change it."""
     folder = tmp_path_factory.getbasetemp()
     if "PYTEST_XDIST_WORKER" in os.environ:
-        folder = folder.parent  # one for all processes that share the tests
+        folder = folder.parent  # shared by all worker processes
     project = folder / "smoke"
     with (folder / "smoke.lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
@@ -159,18 +159,18 @@ def smoke(tmp_path_factory):
 
 
 def wait_for(what, seconds=120):
-    """Wait until something is true; files that are not there yet are no error."""
+    """Wait until a condition is true; missing files are not an error."""
     until = time.monotonic() + seconds
     while time.monotonic() < until:
         with contextlib.suppress(FileNotFoundError):
             if what():
                 return
         time.sleep(0.02)
-    raise AssertionError("in vain")
+    raise AssertionError(f"the condition was not met in {seconds} s")
 
 
 def is_alive(process):
-    """Whether a process runs: one that has ended and that nobody asked for its status does not."""
+    """Return whether a process runs; a zombie does not."""
     try:
         return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
     except OSError:
@@ -188,5 +188,5 @@ def before_jobs(monkeypatch):
 
 @pytest.fixture
 def project(smoke, tmp_path):
-    """A finished campaign of one's own."""
+    """Copy of the finished campaign that a test may change."""
     return shutil.copytree(smoke, tmp_path / "project")

@@ -190,7 +190,7 @@ def test_loops_without_adhesion_pass_their_checks(series):
     completed = []
 
     @seed(series)
-    @settings(max_examples=min(CASES_IN_SERIES, settings.default.max_examples // 4), derandomize=False)
+    @settings(max_examples=min(CASES_IN_SERIES, settings.default.max_examples // 3), derandomize=False)
     @given(loops())
     def are_sound(case):
         completed.append(assert_loop_is_sound(case))

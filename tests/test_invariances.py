@@ -31,13 +31,8 @@ ANY = st.one_of(NONE, ADHERING)
 BOTH = pytest.mark.parametrize("model", [DEFAULT_MODEL, REFERENCE_MODEL])
 
 
-# One in so many of the random cases of other tests: each case here computes two runs or more.
-OFTEN, SELDOM = 10, 20
-
-
-def some(part):
-    """One in so many random cases."""
-    return settings(max_examples=max(settings.default.max_examples // part, 2))
+# Each case computes two runs or more, so only one in twenty of the random cases of other tests is tried.
+SOME = settings(max_examples=max(settings.default.max_examples // 20, 2))
 
 
 @st.composite
@@ -97,7 +92,7 @@ def scaled(surface, material, length, stress):
 
 
 @BOTH
-@some(OFTEN)
+@SOME
 @given(st.data(), st.floats(-4, 4), st.floats(-3, 3))
 def test_units_drop_out(model, data, lengths, pressures):
     contact, length, stress = data.draw(contacts(model)), 10**lengths, 10**pressures
@@ -126,7 +121,7 @@ def test_units_drop_out_of_a_loop(contact, lengths, pressures):
 
 
 @BOTH
-@some(OFTEN)
+@SOME
 @given(st.data(), st.tuples(st.integers(0, 63), st.integers(0, 63)), st.integers(0, 3), st.booleans())
 def test_place_and_direction_of_the_surface_change_nothing(model, data, shift, turns, mirrored):
     surface, material = data.draw(contacts(model))
@@ -136,7 +131,7 @@ def test_place_and_direction_of_the_surface_change_nothing(model, data, shift, t
 
 
 @BOTH
-@some(SELDOM)
+@SOME
 @given(st.data(), st.floats(-6, 6))
 def test_without_adhesion_the_range_changes_no_bit(model, data, power):
     surface, material = data.draw(contacts(model, NONE))
@@ -146,7 +141,7 @@ def test_without_adhesion_the_range_changes_no_bit(model, data, power):
 
 
 @BOTH
-@some(SELDOM)
+@SOME
 @given(st.data(), st.floats(-12, 0))
 def test_heights_scale_apart_from_lengths(model, data, power):
     """With heights scale approaches and pressures; the adhesive part of an approach does if the energy is squared."""
@@ -157,7 +152,7 @@ def test_heights_scale_apart_from_lengths(model, data, power):
     assert_same(pressed(surface, material, model), pressed(flatter, scaled, model), SAME[model])
 
 
-@some(SELDOM)
+@SOME
 @given(contacts(DEFAULT_MODEL, NONE))
 def test_adhesion_vanishes_with_its_energy(contact):
     """An approach is less than Hertz's by sqrt(2 pi a dgamma/E*): what it changes falls with the root of the energy."""
@@ -171,7 +166,7 @@ def test_adhesion_vanishes_with_its_energy(contact):
 
 
 @BOTH
-@some(SELDOM)
+@SOME
 @given(st.data())
 def test_steps_change_nothing_but_unions(model, data):
     surface, material = data.draw(contacts(model))
@@ -187,7 +182,7 @@ def test_steps_change_nothing_but_unions(model, data):
 
 
 @BOTH
-@some(SELDOM)
+@SOME
 @given(st.data())
 def test_threads_change_no_bit(model, data):
     surface, material = data.draw(contacts(model))

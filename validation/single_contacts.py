@@ -153,7 +153,7 @@ def sphere_jump_in(grid: int, range_: float = MATERIAL.interaction_range) -> dic
 
 
 def ellipse(grid: int, angle: float, approaches: Sequence[float] = (2.0, 1.0, 0.0)) -> list[dict]:
-    """An elliptic paraboloid with radii of curvature sqrt(1/2) and sqrt(2), turned by an angle (degrees)."""
+    """Return an elliptic paraboloid with radii of curvature sqrt(1/2) and sqrt(2), turned by an angle (degrees)."""
     radii = (math.sqrt(2), math.sqrt(1 / 2))
     surface, top = bump(grid, _PERIOD, (0.3, 0.1), radii, math.radians(angle))
     contact = contact_of(surface, MATERIAL)
@@ -252,7 +252,7 @@ def sinusoid(grid: int, alpha: float, psi: Sequence[float] = (0.3, 0.5, 0.8, 1.1
 
 
 def crack(grid: int, radii: Sequence[float] = (0.2, 0.16, 0.12), amplitude: float = 0.02) -> Iterator[dict]:
-    """The last gap in the trough of a wave in two dimensions, at given radii over the period (falling).
+    """Return the last gap in the trough of a wave in two dimensions, at given radii over the period (falling).
 
     Errors of the pressure are over that of full contact at the trough.
     """

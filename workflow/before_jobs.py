@@ -73,7 +73,7 @@ def start_jobs_freely(workflow) -> None:
         workflow.scheduler.job_rate_limiter = None
 
 
-class Campaign:
+class CampaignResults:
     """A campaign in the working directory before its jobs, with its lock.
 
     Snakemake reads the Snakefile also for calls that only report or clean up. The lock does not stop these, only calls

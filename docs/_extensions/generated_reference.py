@@ -137,7 +137,7 @@ def _small_spectrum():
 
 @cache
 def _small_campaign():
-    """A campaign of one run with unloading on a surface of a few summits."""
+    """Return a campaign of one run with unloading on a surface of a few summits."""
     import icha
     from icha.datasets.campaign import campaign_tree
 

@@ -120,7 +120,7 @@ def compare_runs(study: xr.Dataset, *, attrs: Mapping[str, str] = {}) -> xr.Data
 
 
 def _loads(study):
-    """Loads of all steps on both axes; NaN except at compressive targets of the first loading."""
+    """Return loads of all steps on both axes; NaN except at compressive targets of the first loading."""
     pressure = study["reduced_pressure"].transpose(*LABELS, "step").values
     slope = study["rms_slope"].broadcast_like(study["status"]).transpose(*LABELS).values[..., None]
     shown = loading_stops(study).transpose(*LABELS, "step").values & (pressure > 0)
@@ -238,7 +238,7 @@ def _spread(area, axis):
 
 
 def _common_grid(loads):
-    """Loads that every run covers, evenly spaced by their logarithm; `loads` are positive arrays, one per run."""
+    """Return loads that every run covers, evenly spaced by their logarithm; `loads` has positive values of each run."""
     if not loads or not all(map(len, loads)):
         return np.empty(0)
     lowest = max(float(load.min()) for load in loads)

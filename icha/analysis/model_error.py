@@ -187,7 +187,7 @@ def _with_all_loads(states):
 
 
 def _stops(run):
-    """Steps of the targets of kind `reduced_pressure` in the first loading, by their values."""
+    """Return steps of the targets of kind `reduced_pressure` in the first loading, by their values."""
     targets = loading_stops(run) & (run["step_kind"] == REDUCED_PRESSURE)
     return {float(run["step_target"].values[step]): step for step in np.flatnonzero(targets.values).tolist()}
 
@@ -391,7 +391,7 @@ def _entry_dataset(campaign, entry, states):
 
 
 def _of_asperities(quantity, labelled):
-    """A quantity of the runs with the asperity model at all labels of a dataset; missing where there is no run."""
+    """Return a quantity of the asperity runs at all labels of a dataset; missing where there is no run."""
     none = "" if quantity.dtype.kind in "OSU" else np.nan
     values = np.full([labelled.sizes[label] for label in _LABELS], none, object if none == "" else float)
     for place in np.ndindex(values.shape):

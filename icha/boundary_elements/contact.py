@@ -234,7 +234,7 @@ class BoundaryElements:
         return state.separation
 
     def spot_count(self, state: CellState) -> int:
-        """Number of patches."""
+        """Return number of patches."""
         return label_patches(state.cells, self.space.grid)[1]
 
     def stiffness(self, state: CellState) -> float:
@@ -242,7 +242,7 @@ class BoundaryElements:
         return 0.0 - self.slope(PRESSURE, state)
 
     def slope(self, quantity: str, state: CellState) -> float:
-        """Derivative of a load or area with respect to the mean separation, with moving fronts."""
+        """Return derivative of a load or area with respect to the mean separation, with moving fronts."""
         return state.pressure_slope if quantity == PRESSURE else state.area_slope
 
     def stored_energy(self, state: CellState) -> float:

@@ -83,7 +83,7 @@ def adhesive_areas(fraction: np.ndarray, around: np.ndarray) -> np.ndarray:
 
 
 def adhesive_area_gradient(around: np.ndarray) -> np.ndarray:
-    """Derivative of the total of `adhesive_areas` with respect to the fraction of each cell."""
+    """Return derivative of the total of `adhesive_areas` with respect to the fraction of each cell."""
     return 1 - PERIMETER + 2 * PERIMETER * around
 
 
@@ -98,7 +98,7 @@ def reported_areas(fraction: np.ndarray, around: np.ndarray) -> np.ndarray:
 
 
 def reported_area_gradient(fraction: np.ndarray, around: np.ndarray) -> np.ndarray:
-    """Derivative of the total of `reported_areas` with respect to the fraction of each cell."""
+    """Return derivative of the total of `reported_areas` with respect to the fraction of each cell."""
     gradient = 1 - _EDGE - _FRONT_WIDTH + 2 * _EDGE * around + 2 * _FRONT_WIDTH * fraction
     share = 1 - _EDGE * (1 - around) - _FRONT_WIDTH * (1 - fraction)
     return np.where(share > _SMALLEST_SHARE, gradient, _SMALLEST_SHARE)

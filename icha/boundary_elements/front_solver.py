@@ -396,7 +396,7 @@ class LinearisedFront:
         return fraction, scale * pressure.astype(float)
 
     def _pressures(self, unknowns):
-        """Changes of pressure, (k,); of the strengths and tensions at the front."""
+        """Return changes of pressure, (k,); of the strengths and tensions at the front."""
         fraction = unknowns[self.at_front] / self.unit
         if not len(fraction):
             return unknowns, fraction, fraction

@@ -58,7 +58,7 @@ class ControlProblem:
         return of(state)
 
     def scale(self, state: CellState) -> float:
-        """Unit of relative errors, from the state at the start."""
+        """Return unit of relative errors, from the state at the start."""
         if self.control.target:
             return abs(self.control.target)
         unit = abs(self.contact.stiffness(state)) * self.contact.rms_height

@@ -70,7 +70,7 @@ BEYOND_EDGES = (np.pi - 1 + np.log(2)) / 24
 
 
 def label_patches(cells: np.ndarray, grid: int) -> tuple[np.ndarray, int]:
-    """Number the patches, from 1: that of each cell, (k,), and their count.
+    """Label the patches, from 1: that of each cell, (k,), and their count.
 
     Cells that share an edge are of one patch, across the edges of the period too.
     """
@@ -95,7 +95,7 @@ def label_patches(cells: np.ndarray, grid: int) -> tuple[np.ndarray, int]:
 
 
 def labels_at(places: np.ndarray, cells: np.ndarray, labels: np.ndarray) -> np.ndarray:
-    """Number of the patch at each place, (m,); 0 where there is none."""
+    """Return number of the patch at each place, (m,); 0 where there is none."""
     result = np.zeros(len(places), dtype=int)
     present, index = find_among(places, cells)
     result[present] = labels[index]
@@ -103,7 +103,7 @@ def labels_at(places: np.ndarray, cells: np.ndarray, labels: np.ndarray) -> np.n
 
 
 def free_edges(cells: np.ndarray, grid: int) -> np.ndarray:
-    """Number of edges of each cell, (k,), at which it has no neighbour in contact."""
+    """Return number of edges of each cell, (k,), at which it has no neighbour in contact."""
     touching = mask_of(cells, (grid, grid)).ravel()
     return 4.0 - np.count_nonzero(touching[adjacent(cells, grid)], axis=0)
 

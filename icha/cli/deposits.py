@@ -14,7 +14,7 @@ from typing import Annotated
 
 import typer
 
-from icha.cli.project import FAILED, Anyway, Cores, Large, UserError, confirm, echo, option, short_path
+from icha.cli.project import FAILED, Anyway, Cores, Large, UserError, confirm, echo, option, shorten_path
 from icha.cli.run import run
 from icha.support import formatting
 from icha.support.formatting import format_count, printable
@@ -129,11 +129,11 @@ def reproduce(
         raise UserError(f"{printable(deposit)}: {refused}") from None
     reproduced = _print_comparison(comparison)
     if status:
-        echo(f"Some jobs did not run; to continue, add --folder {short_path(target)} to the same command.", fg="yellow")
+        echo(f"Some jobs did not run; to continue, add --folder {shorten_path(target)} to the command.", fg="yellow")
     if folder is None and reproduced:
         shutil.rmtree(target)
     else:
-        echo(f"new results: {short_path(results)}")
+        echo(f"new results: {shorten_path(results)}")
     if json:
         write_json(comparison, json)
     if not reproduced:
@@ -163,7 +163,7 @@ def _introduce(deposit: Path, original: Path, folder: Path | None) -> None:
     echo(f"program:    the installed ICHA {version('icha')}; nothing in the deposit is executed")
     if changed := count_changed_files(original):
         echo(f"            (the deposit's source differs from it in {format_count(changed, 'file')})", fg="yellow")
-    echo(f"writes to:  {short_path(folder) if folder else 'a temporary folder'}")
+    echo(f"writes to:  {shorten_path(folder) if folder else 'a temporary folder'}")
 
 
 def _run(project: Path, targets: list[str], cores: str | None, anyway: bool) -> int:
@@ -323,7 +323,7 @@ def _send(server, files, metadata, number, new_version_of, publish, yes) -> None
             server_option = "" if server.address == ZENODO else f" --url {server.address}"
             echo(
                 f"A draft remains: {draft.page}\n"
-                f"To continue it:  icha upload {short_path(files[0])}{server_option} --draft {draft.number}",
+                f"To continue it:  icha upload {shorten_path(files[0])}{server_option} --draft {draft.number}",
                 err=True,
             )
         raise typer.Exit(FAILED) from None

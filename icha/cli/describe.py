@@ -12,17 +12,17 @@ from icha.cli.project import (
     Folder,
     Plot,
     UserError,
-    configuration_path,
-    core_count,
+    count_cores,
     echo,
-    markup,
-    profile_settings,
+    escape_markup,
+    find_configuration,
+    find_workflow,
     project,
     read_configuration,
-    short_path,
-    workflow_folder,
+    read_profile,
+    shorten_path,
 )
-from icha.cli.scans import about_scan
+from icha.cli.scans import describe_scan
 from icha.support import formatting
 from icha.support.formatting import format_count
 
@@ -41,9 +41,9 @@ def describe(
     program. For measured surfaces it prints the number of summits, whether the spectrum ends in noise, and what to do
     about it; `--plot` draws them with their spectra.
     """
-    path = configuration_path(config)
+    path = find_configuration(config)
     campaign = read_configuration(path).campaign
-    print_plan(path, campaign, workflow_folder(), (folder or project()).resolve(), core_count(cores), runs=runs)
+    print_plan(path, campaign, find_workflow(), (folder or project()).resolve(), count_cores(cores), runs=runs)
     _print_scans(campaign, plot)
 
 
@@ -67,7 +67,7 @@ def _print_scans(campaign, plot: Path | None) -> None:
     scans = {name: examine_scan(section.path, section.preparation) for name, section in sections.items()}
     echo("")
     for name, scan in scans.items():
-        for line in about_scan(name, scan, models=models[name]):
+        for line in describe_scan(name, scan, models=models[name]):
             echo(line)
     if plot is not None:
         from icha.cli.quick_plot import draw_scans
@@ -102,10 +102,10 @@ def print_plan(path: Path, campaign, workflow: Path, home: Path, cores: int, *, 
     console = Console(width=None if sys.stdout.isatty() else 120, highlight=False)
 
     def print_line(style: str, name: str, text: str):
-        console.print(f"[{style}]{name}:[/] {markup(text)}", soft_wrap=True)
+        console.print(f"[{style}]{name}:[/] {escape_markup(text)}", soft_wrap=True)
 
-    console.print(f"[bold]{campaign.name}[/]: {markup(campaign.title)}")
-    console.print(f"configuration: {markup(short_path(path))}\n")
+    console.print(f"[bold]{campaign.name}[/]: {escape_markup(campaign.title)}")
+    console.print(f"configuration: {escape_markup(shorten_path(path))}\n")
     if runs:
         _print_files(console, items)
     _print_sums(console, items)
@@ -119,14 +119,14 @@ def print_plan(path: Path, campaign, workflow: Path, home: Path, cores: int, *, 
         print_line("bold", statement.about, statement.text)
     problem = licence_problem(campaign)
     obstacles = {
-        "cannot be run": find_conflict(short_path(results), campaign.name, path, workflow),
-        "cannot be published": problem and f"{short_path(path)}: {': '.join(problem)}",
+        "cannot be run": find_conflict(shorten_path(results), campaign.name, path, workflow),
+        "cannot be published": problem and f"{shorten_path(path)}: {': '.join(problem)}",
         "missing": missing_software(campaign),
     }
     for name, reason in obstacles.items():
         if reason:
             print_line("red", name, reason)
-    for shortage in find_shortages(items, cores, results, profile_settings(profile or workflow / "profiles/default")):
+    for shortage in find_shortages(items, cores, results, read_profile(profile or workflow / "profiles/default")):
         print_line("red", "too small", shortage)
 
 

@@ -43,7 +43,7 @@ MOST_JOBS = 8  # running jobs in the live view
 
 
 @dataclass(frozen=True)
-class Job:
+class JobRecord:
     """A job of Snakemake.
 
     Attributes
@@ -88,15 +88,15 @@ class Progress:
     expected: Mapping[str, float] = field(default_factory=dict)
     clock: Callable[[], float] = time.monotonic
     total: dict[str, int] = field(default_factory=dict)
-    running: dict[int, Job] = field(default_factory=dict)
-    done: list[Job] = field(default_factory=list)
-    failed: list[Job] = field(default_factory=list)
+    running: dict[int, JobRecord] = field(default_factory=dict)
+    done: list[JobRecord] = field(default_factory=list)
+    failed: list[JobRecord] = field(default_factory=list)
     cores: int = 1
     started: float | None = None
     called: float = field(default_factory=time.monotonic)
     lock: threading.RLock = field(default_factory=threading.RLock)
 
-    def update(self, event: Mapping) -> Job | None:
+    def update(self, event: Mapping) -> JobRecord | None:
         """Apply an event of the logger plugin; return the job that it ended, if any."""
         with self.lock:
             match event["event"]:
@@ -108,7 +108,7 @@ class Progress:
                 case "resources_info" if event.get("cores") or event.get("nodes"):
                     self.cores = int(event.get("cores") or event["nodes"])
                 case "job_info" if event["rule_name"] not in TARGET_RULES:
-                    self.running[event["jobid"]] = Job(
+                    self.running[event["jobid"]] = JobRecord(
                         event["rule_name"],
                         printable(event["rule_msg"] or event["rule_name"]),
                         tuple(event["output"] or ()),
@@ -135,7 +135,7 @@ class Progress:
         running = Counter(job.rule for job in self.running.values())
         return [(rule, done[rule], running[rule], failed[rule], total) for rule, total in self.total.items()]
 
-    def _expected_work(self, job: Job) -> float:
+    def _expected_work(self, job: JobRecord) -> float:
         """Return the core-seconds that a job is expected to take."""
         return max((self.expected.get(output, 0.0) for output in job.outputs), default=0.0) or DEFAULT_SECONDS
 
@@ -155,7 +155,7 @@ class Progress:
         work = sum(max(self._expected_work(job) * slowness - (now - job.started) * job.threads, 0.0) for job in running)
         return (work + self._waiting_work([*ended, *running]) * slowness) / max(self.cores, 1)
 
-    def _waiting_work(self, begun: list[Job]) -> float:
+    def _waiting_work(self, begun: list[JobRecord]) -> float:
         """Return the expected core-seconds of the jobs that have not begun.
 
         Snakemake reports only their number by rule, so each counts as the mean over the files of this rule.
@@ -164,7 +164,7 @@ class Progress:
         expected: dict[str, list[float]] = {}
         for output, seconds in self.expected.items():
             if output not in outputs:
-                expected.setdefault(rule_of(output), []).append(seconds)
+                expected.setdefault(find_rule(output), []).append(seconds)
         waiting = Counter(self.total) - Counter(job.rule for job in begun)
         work = 0.0
         for rule, count in waiting.items():
@@ -178,13 +178,13 @@ class Progress:
         return "time left unknown" if seconds is None else f"about {formatting.duration(seconds)} left"
 
 
-def rule_of(output: str) -> str:
+def find_rule(output: str) -> str:
     """Return the rule that makes a file under `results/<campaign>/`."""
     path = "/".join(Path(output).parts[2:])
     return next((rule for beginning, rule in RULES.items() if path.startswith(beginning)), "")
 
 
-def error_of(job: Job, folder: Path) -> list[str]:
+def read_error(job: JobRecord, folder: Path) -> list[str]:
     """Return why a job failed: the lines of its log from the last one that begins with `Error:`.
 
     Empty if the log has no such line, for example because the job was killed.
@@ -201,7 +201,7 @@ def error_of(job: Job, folder: Path) -> list[str]:
     return []
 
 
-def last_line(job: Job, folder: Path) -> str:
+def read_last_line(job: JobRecord, folder: Path) -> str:
     """Return the last complete line in the log of a running job."""
     for log in job.logs:
         try:
@@ -232,13 +232,13 @@ class PlainView(AbstractContextManager):
     def __exit__(self, *error):
         """Nothing remains to be done."""
 
-    def print_job(self, job: Job, failed: bool) -> None:
+    def print_job(self, job: JobRecord, failed: bool) -> None:
         """Print how many jobs have ended, the job, and why it failed."""
         progress = self._progress
         ended, total = len(progress.done) + len(progress.failed), str(progress.job_count)
         title = f"failed: {job.title}" if failed else job.title
         echo(f"[{ended:>{len(total)}}/{total}, {progress.time_left()}] {title} ({formatting.duration(job.seconds)})")
-        for line in error_of(job, self.folder)[:3] if failed else ():
+        for line in read_error(job, self.folder)[:3] if failed else ():
             echo(f"    {line}")
 
     def print(self, text: str) -> None:
@@ -268,11 +268,11 @@ class LiveView(PlainView):
         """Remove the table from the terminal."""
         self._live.stop()
 
-    def print_job(self, job: Job, failed: bool) -> None:
+    def print_job(self, job: JobRecord, failed: bool) -> None:
         """Print a job if it failed."""
         if failed:
             self._console.print(Text(f"failed: {job.title}", style="red"))
-            for line in error_of(job, self.folder)[:3]:
+            for line in read_error(job, self.folder)[:3]:
                 self._console.print(Text(f"    {line}", style="red"), overflow="fold")
 
     def print(self, text: str) -> None:
@@ -314,7 +314,7 @@ class LiveView(PlainView):
         for job in sorted(progress.running.values(), key=lambda job: job.started)[:MOST_JOBS]:
             duration = formatting.duration(progress.clock() - job.started)
             lines.append(Text(f"▸ {duration:>8}  {job.title}", no_wrap=True))
-            if message := last_line(job, self.folder):
+            if message := read_last_line(job, self.folder):
                 lines.append(Text(f"            {message}", style="dim", no_wrap=True))
         if len(progress.running) > MOST_JOBS:
             lines.append(Text(f"  and {len(progress.running) - MOST_JOBS} more", style="dim"))

@@ -8,8 +8,18 @@ from typing import Annotated
 
 import typer
 
-from icha.cli.project import CAMPAIGNS, Plot, UserError, campaigns, echo, option, project, short_path, workflow_folder
-from icha.cli.scans import MeasuredSection, about_scan, measured_section
+from icha.cli.project import (
+    CAMPAIGNS,
+    Plot,
+    UserError,
+    echo,
+    find_workflow,
+    list_campaigns,
+    option,
+    project,
+    shorten_path,
+)
+from icha.cli.scans import MeasuredSection, describe_scan, read_measured_section
 
 TEMPLATE = Path(__file__).parent / "templates/campaign.yaml"
 # Explanations of the keys of a configuration, for editors and for people.
@@ -43,13 +53,13 @@ def new(
     if not re.fullmatch(NAME_PATTERN, name) or name.startswith("-"):
         raise UserError(f"{name!r} is not a name; expected lower-case letters, digits, '_' and '-'")
     if file.exists():
-        raise UserError(f"{short_path(file)} exists already; choose another name, or remove it")
-    if name in campaigns():
-        raise UserError(f"{name} is the campaign of {short_path(campaigns()[name])}; choose another name")
+        raise UserError(f"{shorten_path(file)} exists already; choose another name, or remove it")
+    if name in list_campaigns():
+        raise UserError(f"{name} is the campaign of {shorten_path(list_campaigns()[name])}; choose another name")
     for names, value in (("--data", data), ("--plot", plot)):
         if value is not None and measured is None:
             raise UserError(f"{names} needs a measured file; use it with --measured FILE")
-    section = None if measured is None else measured_section(measured, data, file.parent)
+    section = None if measured is None else read_measured_section(measured, data, file.parent)
     values = {
         "name": name,
         "schema": Path(os.path.relpath(_schema(), file.parent)).as_posix(),
@@ -63,7 +73,7 @@ def new(
     problems = [] if section is None else _problems(file, section)
     if problems:
         _write(file, values, f"once `icha describe {name}` reports no more problems")
-    echo(f"{short_path(file)} written")
+    echo(f"{shorten_path(file)} written")
     if section is not None:
         _print_section(section, problems)
         if plot is not None:
@@ -75,7 +85,7 @@ def new(
 
 def _schema() -> Path:
     """Return the schema of configurations; outside a clone, copy it and the page on all keys to config/."""
-    workflow, folder = workflow_folder(), project()
+    workflow, folder = find_workflow(), project()
     if workflow == folder:
         return folder / SCHEMA
     copies = [folder / "config" / file.name for file in (SCHEMA, README)]
@@ -112,7 +122,7 @@ def _problems(file: Path, section: MeasuredSection) -> list[str]:
 def _print_section(section: MeasuredSection, problems: list[str]) -> None:
     """Print what is known of a scan, the keys to fill in, and the other problems."""
     to_scale = not problems and not section.to_fill_in.keys() - {"boundary"}
-    for line in about_scan(section.name, section.scan, to_scale=to_scale):
+    for line in describe_scan(section.name, section.scan, to_scale=to_scale):
         echo(line)
     if not to_scale:
         echo(f"{section.name}: `icha describe` analyses its spectrum once units and size are known")

@@ -64,7 +64,7 @@ Folder = Annotated[
 ]
 
 
-def core_count(cores: str | None) -> int:
+def count_cores(cores: str | None) -> int:
     """Return the number of cores that the option `--cores` means."""
     if cores == "all":
         return os.cpu_count() or 1
@@ -76,7 +76,7 @@ def echo(text: object = "", *, err: bool = False, **style) -> None:
     typer.secho(printable_lines(text), err=err, **style)
 
 
-def markup(text: object) -> str:
+def escape_markup(text: object) -> str:
     """Escape text for rich, which gives brackets a meaning."""
     from rich.markup import escape
 
@@ -124,8 +124,7 @@ def reports_errors(command: Callable) -> Callable:
 
 def find_project() -> Path | None:
     """Return the clone: the folder with the Snakefile, at or above the working directory."""
-    here = Path.cwd()
-    for folder in (here, *here.parents):
+    for folder in (Path.cwd(), *Path.cwd().parents):
         if (folder / "Snakefile").is_file() and (folder / "workflow/rules/runs.smk").is_file():
             return folder
     return None
@@ -136,18 +135,18 @@ def project() -> Path:
     return find_project() or Path.cwd()
 
 
-def workflow_folder() -> Path:
+def find_workflow() -> Path:
     """Return the folder of the Snakefile and its profiles: the clone, else the installed workflow."""
     return find_project() or own_workflow()
 
 
-def campaigns() -> dict[str, Path]:
+def list_campaigns() -> dict[str, Path]:
     """Return the configuration files that commands find by name: those of the project and those shipped with ICHA.
 
     The default file has the name that is written in it.
     """
     files: dict[str, Path] = {}
-    for folder in (workflow_folder(), project()):  # the project's files replace shipped ones of the same name
+    for folder in (find_workflow(), project()):  # the project's files replace shipped ones of the same name
         default = folder / DEFAULT
         if default.is_file() and (name := _campaign_name(default)):
             files[name] = default
@@ -167,7 +166,7 @@ def _campaign_name(file: Path) -> str | None:
     return name if isinstance(name, str) else None
 
 
-def configuration_path(config: str | None) -> Path:
+def find_configuration(config: str | None) -> Path:
     """Find a configuration file by its path or by the name of its campaign; None means the default file.
 
     Raises
@@ -175,16 +174,16 @@ def configuration_path(config: str | None) -> Path:
     UserError
         If the file does not exist.
     """
-    files = campaigns()
+    files = list_campaigns()
     listed = f"expected a YAML file or a campaign: {', '.join(sorted(files))}. `icha new NAME` writes a new campaign"
     if config is None:
         if not (project() / DEFAULT).is_file():
             raise UserError(f"no {DEFAULT} in this folder; {listed}")
-        return short_path(project() / DEFAULT)
+        return shorten_path(project() / DEFAULT)
     if Path(config).is_file():
         return Path(config)
     if config in files:
-        return short_path(files[config])
+        return shorten_path(files[config])
     raise UserError(f"{config}: {problem_with_path(config)}, and not the name of a campaign; {listed}")
 
 
@@ -208,7 +207,7 @@ def read_configuration(path: Path):
     return configuration
 
 
-def profile_settings(folder: Path) -> dict:
+def read_profile(folder: Path) -> dict:
     """Read the settings of a Snakemake profile; none if the folder has no config.yaml."""
     import yaml
 
@@ -216,7 +215,7 @@ def profile_settings(folder: Path) -> dict:
     return yaml.safe_load(file.read_text(encoding="utf-8")) or {} if file.is_file() else {}
 
 
-def short_path(path: Path) -> Path:
+def shorten_path(path: Path) -> Path:
     """Shorten a path for printing: relative to the working directory if it lies inside."""
     path = Path(path)
     return path.relative_to(Path.cwd()) if path.is_absolute() and path.is_relative_to(Path.cwd()) else path

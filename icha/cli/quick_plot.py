@@ -7,7 +7,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
-from icha.cli.project import echo, short_path
+from icha.cli.project import echo, shorten_path
 from icha.datasets.campaign import reduced_gap
 from icha.datasets.format import RUN, SURFACE
 from icha.datasets.labels import LABELS
@@ -45,7 +45,7 @@ def draw_scans(scans: Mapping, path: Path) -> None:
 def _save(figure: Figure, path: Path) -> None:
     with whole_file(path) as temporary:
         figure.savefig(temporary, format=path.suffix[1:], dpi=150)
-    echo(f"plot: {short_path(path)}")
+    echo(f"plot: {shorten_path(path)}")
 
 
 @in_style

@@ -23,15 +23,15 @@ from icha.cli.project import (
     Cores,
     Folder,
     UserError,
-    configuration_path,
-    core_count,
+    count_cores,
     echo,
+    find_configuration,
+    find_workflow,
     option,
-    profile_settings,
     project,
     read_configuration,
-    short_path,
-    workflow_folder,
+    read_profile,
+    shorten_path,
 )
 from icha.support import formatting
 from icha.support.atomic_files import find_obstacle
@@ -76,12 +76,12 @@ def run(
 
     Ctrl-C stops it; the next call continues.
     """
-    workflow = workflow_folder()
+    workflow = find_workflow()
     targets = list(targets or [])
     # `icha run figures` and `icha run -- --forceall` name no configuration.
     if config is not None and (config.startswith("-") or (config in TARGETS and not Path(config).is_file())):
         config, targets = None, [config, *targets]
-    path = configuration_path(config)
+    path = find_configuration(config)
     campaign = read_configuration(path).campaign
     folder = (folder or project()).resolve()
     results = folder / "results" / campaign.name
@@ -98,7 +98,7 @@ def run(
     ]
     if dry_run:
         jobs = _dry_run([*command, "--dry-run"], workflow, campaign, targets)
-        print_plan(path, campaign, workflow, folder, core_count(cores), profile=profile_folder)
+        print_plan(path, campaign, workflow, folder, count_cores(cores), profile=profile_folder)
         echo(jobs)
         return
     from rich.console import Console
@@ -110,7 +110,7 @@ def run(
     console = Console()
     items = plan(campaign, results)
     if not anyway:
-        _confirm_if_too_large(items, targets, core_count(cores), results, profile_settings(profile_folder))
+        _confirm_if_too_large(items, targets, count_cores(cores), results, read_profile(profile_folder))
     if not set(targets) - set(TARGETS):
         _print_validity(expected_validity(campaign))
     progress = Progress(expected_seconds(items, f"results/{campaign.name}"))
@@ -127,24 +127,23 @@ def run(
             log.unlink(missing_ok=True)
             raise
     # The estimate of `icha describe` is for all targets, and for this machine.
-    expected = None if profile or set(targets) - {"all"} else time_on(items, core_count(cores))
+    expected = None if profile or set(targets) - {"all"} else time_on(items, count_cores(cores))
     _print_outcome(status, stopped, progress, campaign, folder, log, expected)
     if status:
         raise typer.Exit(FAILED)
     if not set(targets) - {"all", "report", "publish"}:
         _print_checks(campaign, results)
     if "publish" in targets:
-        echo(
-            f"deposit: {short_path(results / 'publish' / f'{campaign.name}-{campaign.deposit_metadata().version}.zip')}"
-        )
+        version = campaign.deposit_metadata().version
+        echo(f"deposit: {shorten_path(results / 'publish' / f'{campaign.name}-{version}.zip')}")
 
 
 def _refuse_obstacles(folder: Path, results: Path, name: str, path: Path, workflow: Path) -> None:
     from icha.planning.ownership import find_conflict
 
-    if reason := find_conflict(short_path(results), name, path, workflow):
+    if reason := find_conflict(shorten_path(results), name, path, workflow):
         raise UserError(f"{reason} Nothing was started")
-    if obstacle := find_obstacle(short_path(folder / ".snakemake")):
+    if obstacle := find_obstacle(shorten_path(folder / ".snakemake")):
         raise UserError(f"{obstacle}: Snakemake needs this folder for its records. Remove it or repair it")
 
 
@@ -291,7 +290,7 @@ def _run_snakemake(command: list[str], workflow: Path, log: Path, progress, view
 
 def _listen(reading: int, progress, view, stopped: list) -> None:
     """Read the events of Snakemake, one JSON object per line, until it ends."""
-    from icha.cli.live import error_of
+    from icha.cli.live import read_error
 
     with open(reading, encoding="utf-8") as events:
         for line in events:
@@ -302,7 +301,7 @@ def _listen(reading: int, progress, view, stopped: list) -> None:
             job = progress.update(event)
             failed = event["event"] == "job_error"
             # A job that was stopped has not failed.
-            if job is not None and not (failed and stopped and not error_of(job, view.folder)):
+            if job is not None and not (failed and stopped and not read_error(job, view.folder)):
                 view.print_job(job, failed)
 
 
@@ -326,7 +325,7 @@ def _print_outcome(status: int, stopped: bool, progress, campaign, folder: Path,
     if status and results.is_dir() and (reason := probe_folder(results)):
         # Logs are in this folder, so jobs may have been unable to report it.
         echo(
-            f"cannot write to {short_path(results)}: {reason.strerror}. Repair this and repeat the command.",
+            f"cannot write to {shorten_path(results)}: {reason.strerror}. Repair this and repeat the command.",
             fg="red",
         )
     if stopped or status < 0:
@@ -340,14 +339,14 @@ def _print_outcome(status: int, stopped: bool, progress, campaign, folder: Path,
         files = {"figures": "figures", "dataset": f"dataset/{campaign.name}.nc", "report": "report.html"}
         for name, file in files.items():
             if (results / file).exists():
-                echo(f"{name + ':':<9}{short_path(results / file)}")
+                echo(f"{name + ':':<9}{shorten_path(results / file)}")
     if status:
-        echo(f"log:     {short_path(log)}")
+        echo(f"log:     {shorten_path(log)}")
 
 
 def _print_failures(status: int, stopped: bool, progress, campaign, folder: Path, log: Path) -> None:
     """List runs without a result, and failed jobs."""
-    from icha.cli.live import error_of
+    from icha.cli.live import read_error
     from icha.planning.plan import failed_runs
 
     results = folder / "results" / campaign.name
@@ -356,13 +355,13 @@ def _print_failures(status: int, stopped: bool, progress, campaign, folder: Path
         echo(f"{format_count(len(incomplete), 'run')} without a result:", fg="red")
         for path, reason in incomplete.items():
             _print_failure(None, path, [reason])
-    failed = [job for job in progress.failed if not stopped or error_of(job, folder)]
+    failed = [job for job in progress.failed if not stopped or read_error(job, folder)]
     if failed:
         echo(f"{format_count(len(failed), 'job')} failed:", fg="red")
         for job in failed:
-            logs = ", ".join(str(short_path(folder / name)) for name in job.logs)
+            logs = ", ".join(str(shorten_path(folder / name)) for name in job.logs)
             # The verdict repeats the runs without a result.
-            reason = [line for line in error_of(job, folder) if not any(line.startswith(path) for path in incomplete)]
+            reason = [line for line in read_error(job, folder) if not any(line.startswith(path) for path in incomplete)]
             unknown = f"it ended without a message, perhaps killed (out of memory?); see {logs or log}"
             _print_failure(None, job.title, reason or [unknown])
             if logs:

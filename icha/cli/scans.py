@@ -27,7 +27,7 @@ EXAMPLES = {"height_unit": "nm", "lateral_unit": "um", "size": "[90 um, 90 um]"}
 FIRST_BYTES = 2**16  # read to see whether a file is empty
 
 
-def about_scan(name: str, scan, *, to_scale: bool = True, models: Iterable[Model] = ()) -> Iterator[str]:
+def describe_scan(name: str, scan, *, to_scale: bool = True, models: Iterable[Model] = ()) -> Iterator[str]:
     """Return the lines that describe a scan.
 
     Parameters
@@ -105,13 +105,13 @@ def _noise(scan) -> Iterator[str]:
             f"contribute {noise.slope_share:.0%} of the mean square slope"
         )
     if scan.advice:
-        keys = " and ".join(f"`{key}: {value}`" for key, value in advice_in_yaml(scan.advice).items())
+        keys = " and ".join(f"`{key}: {value}`" for key, value in format_advice(scan.advice).items())
         cutoff = scan.advice.get("cutoff")
         effect = f", which keeps {filtered_slope_share(scan.measured, cutoff):.0%} of the rms slope" if cutoff else ""
         yield f"recommended: {keys}{effect}"
 
 
-def advice_in_yaml(advice: Mapping[str, float | int]) -> dict[str, str]:
+def format_advice(advice: Mapping[str, float | int]) -> dict[str, str]:
     """Return recommended keys with their values as written in a configuration."""
     return {key: formatting.length(value) if key == "cutoff" else str(value) for key, value in advice.items()}
 
@@ -140,7 +140,7 @@ class MeasuredSection:
     scan: Any
 
 
-def measured_section(path: Path, data: str | None, folder: Path) -> MeasuredSection:
+def read_measured_section(path: Path, data: str | None, folder: Path) -> MeasuredSection:
     """Read a measured topography and return its section for a configuration in a folder.
 
     Raises
@@ -173,7 +173,7 @@ def measured_section(path: Path, data: str | None, folder: Path) -> MeasuredSect
         lines.append(f"{key}:        # to fill in, since the file lacks it{default}: such as {EXAMPLES[key]}")
     if gaps:
         lines.append(f"missing: fill                # {gaps} points have no height; `refuse` makes that an error")
-    advice = {} if missing else advice_in_yaml(resolution.advice)
+    advice = {} if missing else format_advice(resolution.advice)
     name = re.sub("[^a-z0-9_-]+", "_", path.stem.lower()).strip("_") or "measured"
     if not periodic:
         missing = missing | {"boundary": "what surrounds the scan: free, window, mirror or periodic"}

@@ -239,14 +239,14 @@ class _Variants:
         entries = getattr(self._campaign, section)
         values = {name: value for name, (_, value) in changes.items()}
         try:
-            made = type(entries[base]).model_validate(dict(self._content[section][base]) | values)
+            variant = type(entries[base]).model_validate(dict(self._content[section][base]) | values)
         except ValidationError as error:
             for details in error.errors():
                 self._add_problem(base, changes, details)
             return base
-        if hasattr(made, "path"):
-            made = made.model_copy(update={"path": entries[base].path})
-        name = "-".join([base, *(f"{key}{value_label(made, key)}" for key in changes)])
+        if hasattr(variant, "path"):
+            variant = variant.model_copy(update={"path": entries[base].path})
+        name = "-".join([base, *(f"{key}{value_label(variant, key)}" for key in changes)])
         location, value = next(iter(changes.values()))
         if name in entries:
             reason = f"gives {base!r} a variant named {name!r}, but this name is taken. Rename that entry"
@@ -254,7 +254,7 @@ class _Variants:
         if len(name) > LONGEST_LABEL:
             reason = f"gives {base!r} a variant with a name of {len(name)} letters, too long for a file"
             self.problems[(section, name)] = (location, value, f"{reason}; expected at most {LONGEST_LABEL}")
-        self.derived[section][name] = made
+        self.derived[section][name] = variant
         self.origin[section, name] = base
         return name
 

@@ -48,7 +48,7 @@ class ConfigurationError(ValueError):
 
 def format_problem(origin: str, location: tuple, value: Any, reason: str) -> str:
     """Format a problem as a line that is safe to print, since a stranger may have written the file."""
-    keys = [f"[{part}]" if isinstance(part, int) else f".{_cut(str(part), 80)}" for part in location]
+    keys = [f"[{entry}]" if isinstance(entry, int) else f".{_cut(str(entry), 80)}" for entry in location]
     key = "".join(keys).lstrip(".") or "top level"
     shown = "" if value is NOTHING else " (empty)" if value is None else f" {_cut(repr(value), 80)}"
     return printable(f"{origin}: {key}:{shown} {_cut(reason, 2000)}")
@@ -96,7 +96,7 @@ def _without_tags(location: tuple) -> tuple:
 
 
 def _section_at(location: tuple, content: Any) -> type[BaseModel] | None:
-    """Return the model of the section at a location; None if there is no section."""
+    """Return the model of the section at a location; None if it is not a section."""
     model: Any = Campaign
     for key in location:
         content = content[key]

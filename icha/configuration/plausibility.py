@@ -81,7 +81,7 @@ class Unusual(NamedTuple):
     @property
     def key(self) -> str:
         """Key in `confirmed`: all entries of a list have the key of the list."""
-        return ".".join(part for part in self.location if isinstance(part, str))
+        return ".".join(entry for entry in self.location if isinstance(entry, str))
 
 
 def unusual_values(written: Mapping) -> list[Unusual]:

@@ -63,9 +63,9 @@ def inspect_scan(surface: MeasuredSurface, *, with_slope: bool = True) -> Topogr
 def _facts(path: str, version: tuple[int, int] | None, preparation: str) -> Topography:
     """Facts of a prepared topography, which are kept until the file has another version (time and size)."""
     # Slow to import, and not needed for every campaign.
-    from icha.surfaces.measured.topography import prepare_topography
+    from icha.surfaces.measured.topography import prepared_topography
 
-    prepared = prepare_topography(path, json.loads(preparation))
+    prepared = prepared_topography(path, json.loads(preparation))
     surface = prepared.surface
     energy = surface.full_contact_energy / surface.rms_slope**2
     return Topography(surface.grid, surface.period, _rounded(surface.rms_slope), prepared.source_sha256, energy)
@@ -111,7 +111,7 @@ def read_scan(path: str | os.PathLike, *, confirmed: Collection[str] = (), **key
     section = {"kind": "measured", "path": os.fspath(path), **keywords}
     from icha.configuration.plausibility import unusual_topography, unusual_values
     from icha.surfaces.measured.settings import UnfitTopography
-    from icha.surfaces.measured.topography import prepare_topography
+    from icha.surfaces.measured.topography import prepared_topography
     from icha.surfaces.surface import MISFIT_OF_EDGES, EdgeWarning, edges_fit
 
     try:
@@ -126,7 +126,7 @@ def read_scan(path: str | os.PathLike, *, confirmed: Collection[str] = (), **key
         raise ConfigurationError("\n".join(lines)) from None
     _refuse_unusual(unusual_values({"surfaces": {"scan": section}}), confirmed)
     try:
-        surface = prepare_topography(path, measured.preparation).surface
+        surface = prepared_topography(path, measured.preparation).surface
     except UnfitTopography as error:
         value = section.get(error.key)
         raise ConfigurationError(

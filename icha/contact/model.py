@@ -150,22 +150,22 @@ class ContactModel(Protocol[S]):
         """Mean gap over the nominal area, m; on a periodic surface the mean separation."""
 
     def spot_count(self, state: S) -> int:
-        """Number of contact spots."""
+        """Return number of contact spots."""
 
     def stiffness(self, state: S) -> float:
         """Contact stiffness -dp/du of the present spots, Pa/m."""
 
     def slope(self, quantity: str, state: S) -> float:
-        """Derivative of PRESSURE or AREA_FRACTION with respect to the mean separation, for unchanged contacts."""
+        """Return the derivative of PRESSURE or AREA_FRACTION by the mean separation, for unchanged contacts."""
 
     def stored_energy(self, state: S) -> float:
         """Elastic energy less that of adhesion over nominal area, J/m^2; zero out of contact."""
 
     def is_unstable(self, state: S) -> bool:
-        """True if a spot would approach as the surfaces part, which happens on an unstable branch only."""
+        """Return true if a spot would approach as the surfaces part, which happens on an unstable branch only."""
 
     def events_between(self, before: S, after: S) -> Events:
-        """The events on the path from one state to a later one."""
+        """Return the events on the path from one state to a later one."""
 
     def observables(self, surface: Surface) -> Observables[S]:
         """Observables of the states on a surface."""

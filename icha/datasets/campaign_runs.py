@@ -394,7 +394,7 @@ def _sizes(entries: list[Entry], dim: str) -> np.ndarray:
 
 
 def _snapshots(entries: list[Entry]) -> dict[tuple[bytes, float], int]:
-    """Number the snapshots of the study, known by kind and target.
+    """Assign numbers to the snapshots of the study, known by kind and target.
 
     Runs may meet their stops, and take their snapshots, in different orders (a load and an area, for instance).
     """

@@ -270,7 +270,7 @@ def _add_action(crate: ROCrate, key: str, kind: str = "CreateAction", **properti
 
 
 def _add_value(crate: ROCrate, job: Job, name: str, value: str) -> Entity:
-    """A setting of a job; jobs of a rule with the same setting share it."""
+    """Return a setting of a job; jobs of a rule with the same setting share it."""
     digest = hashlib.sha256(value.encode()).hexdigest()[:16]
     key = f"#{job.rule}/{quote(name)}/{digest}"
     return crate.dereference(key) or _add(crate, key, "PropertyValue", name=name, value=value)

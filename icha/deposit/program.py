@@ -252,7 +252,7 @@ def _locked(lock: str) -> dict[str, set[str]]:
 
 
 def _packages(lock: str) -> Iterator[dict]:
-    """Packages of a lock, except the project itself, which has no version there."""
+    """Return packages of a lock, except the project itself, which has no version there."""
     return (package for package in tomllib.loads(lock)["package"] if "editable" not in package["source"])
 
 

@@ -218,24 +218,22 @@ class Points:
 
 def lines_handles(counts: Iterable[int]) -> dict[str, Line2D]:
     """Return legend entries of lines that are means over these numbers of seeds."""
-    band = legend_handle(color=GREY, alpha=0.35, lw=6, solid_capstyle="butt")
-    return _handles(counts, ("mean and 95 % band", band), legend_handle(color=GREY, **_SEED_LINE))
+    band = {"alpha": 0.35, "lw": 6, "solid_capstyle": "butt"}
+    return _handles(counts, ("mean and 95 % band", band), ("single seeds beside their mean", _SEED_LINE))
 
 
 def points_handles(counts: Iterable[int]) -> dict[str, Line2D]:
     """Return legend entries of points that are means over these numbers of seeds."""
-    bars = legend_handle(color=GREY, marker="|", ls="none", ms=8)
-    return _handles(counts, ("means, bars 95 %", bars), legend_handle(color=GREY, **_SEED_DOT))
+    bars = {"marker": "|", "ls": "none", "ms": 8}
+    return _handles(counts, ("means, bars 95 %", bars), ("single seeds beside their mean", _SEED_DOT))
 
 
-def _handles(counts, enough, seeds):
-    counts = sorted({int(count) for count in counts if count > 1})
-    found = {}
-    for (words, handle), sizes in (
-        (enough, [count for count in counts if count >= ENOUGH]),
-        (("single seeds beside their mean", seeds), [count for count in counts if count < ENOUGH]),
-    ):
-        if sizes:
-            span = f"{sizes[0]}" if len(sizes) == 1 else f"{sizes[0]}–{sizes[-1]}"
-            found[f"{words}, n = {span}"] = handle
-    return found
+def _handles(counts, enough, few):
+    """Return legend entries, in words and looks, of means over enough seeds and of means over few."""
+    sizes = {int(count) for count in counts if count > 1}
+    groups = ([size for size in sizes if size >= ENOUGH], [size for size in sizes if size < ENOUGH])
+    return {
+        f"{words}, n = {'–'.join(map(str, sorted({min(group), max(group)})))}": legend_handle(color=GREY, **look)
+        for (words, look), group in zip((enough, few), groups, strict=True)
+        if group
+    }

@@ -17,6 +17,7 @@ import numpy as np
 from icha.contact.model import ContactModel, NotConverged, State
 from icha.path.energy_balance import Step, Waypoint, waypoint_between
 from icha.path.loading import PathProgress
+from icha.path.step_accuracy import StepAccuracy
 from icha.path.stops import (
     CLOSE_TO_A_JUMP,
     SAME_EXCESS,
@@ -26,19 +27,8 @@ from icha.path.stops import (
     TargetFunction,
     find_first_target,
 )
-from icha.path.targets import LOADS, MEAN_SEPARATION, UNRESOLVED_LOSS, Path
+from icha.path.targets import LOADS, MEAN_SEPARATION, Path
 
-# Largest unknown work of a step where jumps have released no energy, relative to the work so far.
-UNRESOLVED_WORK = 2e-4
-# Longest step in which spots may coalesce or split, relative to the longest step of the path.
-UNION_STEP = 1 / 16
-# Largest integration error of a step without events, relative to the work so far, unless work and change of energy
-# agree.
-_CURVED_WORK = 1e-4
-# Smallest scale of the losses in tension, relative to the work so far.
-_LEAST_LOSS = 1e-2
-# Largest error of the largest tension at an event, relative to it.
-_MISSED_TENSION = 1e-3
 # Without adhesion unloading visits a separation so far above first contact, in h_rms, in case the error of an
 # equilibrium leaves a spot in contact there.
 _ABOVE_CONTACT = 1e-8
@@ -109,9 +99,7 @@ class _Cycle:
     event_at : first known position of an event that is not resolved yet, as direction times separation, m.
     event_width : length of a step that resolves it, m.
     smooth_length : length of steps without events, m.
-    effort : sum of work and losses so far, without their signs, J/m^2.
-    jump_energy : energy released by jumps so far, each as if its spot were alone, J/m^2.
-    lowest_pressure : lowest nominal pressure so far, at most zero, Pa.
+    accuracy : sums over all steps so far, and the accuracy that they require.
     stations : separations visited on loading, which the path will visit again, ascending, m.
     """
 
@@ -124,14 +112,12 @@ class _Cycle:
     event_at: float = np.inf
     event_width: float = 0.0
     smooth_length: float = 0.0
-    effort: float = 0.0
-    jump_energy: float = 0.0
-    lowest_pressure: float = 0.0
+    accuracy: StepAccuracy = field(init=False)
     stations: list[float] = field(default_factory=list)
 
     def __post_init__(self):
         """Begin with the longest step."""
-        self.step_length = self.longest
+        self.step_length, self.accuracy = self.longest, StepAccuracy(self.contact, self.longest)
 
     @property
     def loading(self) -> bool:
@@ -188,8 +174,9 @@ class _Cycle:
             # The first contact forms in the shortest step; after that the longest one is tried.
             first = leg == 0 and len(visited) == 1
             self.step_length = self.longest if first else self._next_length(step, met)
-            self._accept(met, step)
-            width_limit = np.inf
+            self.accuracy.add(step, met)
+            self.progress.record_equilibrium(met, self.loading)
+            self.state, width_limit = met, np.inf
             if self._is_new_station(met.separation, visited[-1]):
                 visited.append(met.separation)
             if listed is not None:
@@ -204,14 +191,6 @@ class _Cycle:
             new = (separation for separation in [*visited, self.state.separation] if separation < lowest)
             self.stations = sorted({*self.stations, *new})
 
-    def _accept(self, state, step):
-        """Move to the next state, and add the step to the sums over all steps."""
-        self.effort += abs(step.work) + abs(step.loss)
-        self.jump_energy += step.jump_energy(self.contact)
-        self.lowest_pressure = min(self.lowest_pressure, self.contact.pressure(state))
-        self.progress.record_equilibrium(state, self.loading)
-        self.state = state
-
     def find_next(self, width: float) -> tuple[State, Step]:
         """Find the next equilibrium, so close that the work up to it is known, and the step to it.
 
@@ -220,7 +199,7 @@ class _Cycle:
 
         width : length of the step that is tried first, m.
         """
-        start = self.state
+        start, accuracy = self.state, self.accuracy
         while True:
             try:
                 state = self._find_equilibrium(start.separation + self.direction * width, width)
@@ -231,17 +210,17 @@ class _Cycle:
             # Within the error of an equilibrium an event may happen in a long step and not in a short one.
             passed = step.has_jump and self.direction * start.separation + self.shortest >= self.event_at
             sharp = width <= self.shortest or passed
-            if sharp or (self._is_work_known(state, step) and self._is_tension_known(state, step)):
+            if sharp or (accuracy.is_work_known(state, step) and accuracy.is_tension_known(start, state, step)):
                 if step.has_jump:
                     self.event_at = np.inf
-                weakest = None if sharp else self._new_largest_tension(state, step)
+                weakest = None if sharp else accuracy.find_largest_tension(start, state, step)
                 if weakest is None:
                     return state, step
                 width = weakest - start.separation
             else:
                 if step.has_jump:
                     self.event_at = min(self.event_at, self.direction * state.separation)
-                    self.event_width = 0.5 * width * min(1.0, self._unknown_work(step) / (step.unresolved or np.inf))
+                    self.event_width = 0.5 * width * min(1.0, accuracy.unknown_work(step) / (step.unresolved or np.inf))
                 else:
                     self.smooth_length = min(self.smooth_length, 0.5 * width)
                 width *= 0.5
@@ -274,34 +253,6 @@ class _Cycle:
         self.step_length = min(self.step_length, width)
         return width
 
-    def _is_work_known(self, state, step):
-        """Return whether the work of a step is known well enough.
-
-        It is not if the events of the step, which may happen anywhere in it, leave too much of the work open; if spots
-        unite in a long step; or if the integral of the pressure is inaccurate and does not agree with the change of the
-        stored energy in a step without events.
-        """
-        width = abs(step.width)
-        if step.unresolved > self._unknown_work(step):
-            return False
-        # The union of two spots depends on how far they overlap when it is found.
-        if step.has_union and width > UNION_STEP * self.longest:
-            return False
-        accuracy = self.contact.path_accuracy
-        scale = effort = self.effort + abs(step.work) + abs(step.loss)
-        if step.width > 0 and self.contact.pressure(state) < 0:
-            # In compression loading and unloading visit the same stations, so that their errors cancel. In tension
-            # they do not: the error is relative to the losses.
-            scale = min(effort, max(10 * self.jump_energy, _LEAST_LOSS * effort))
-        unbalanced = step.integration_error > _CURVED_WORK * scale and abs(step.loss) > accuracy.balance * scale
-        return step.has_jump or not unbalanced or width <= self.longest / 256
-
-    def _unknown_work(self, step):
-        """Return the largest work that the events of a step may leave unknown, J/m^2."""
-        effort = self.effort + abs(step.work) + abs(step.loss)
-        released = UNRESOLVED_LOSS * (self.jump_energy + step.jump_energy(self.contact))
-        return max(released, self.contact.path_accuracy.loss * effort) if released else UNRESOLVED_WORK * effort
-
     def _next_length(self, step, state):
         """Return the length of the step after one to a state: twice as long, or as far as its errors allow."""
         longer = min(self.longest, 2 * self.step_length)
@@ -313,39 +264,7 @@ class _Cycle:
         if 0 < distance < np.inf:
             return distance if distance <= self.event_width else 0.5 * distance
         self.smooth_length = max(self.smooth_length, abs(step.width))
-        # The error of a step grows with the cube of its length.
-        effort = self.effort + abs(step.work) + abs(step.loss)
-        return longer if 8 * step.integration_error <= _CURVED_WORK * effort else self.step_length
-
-    def _is_tension_known(self, state, step):
-        """Return whether the largest tension of a step is known well enough, as far as its events decide it."""
-        contact, start = self.contact, self.state
-        if step.width < 0 or not step.pressure_jump:
-            return True
-        if contact.adhesive and contact.spot_count(start) and not contact.spot_count(state):
-            return False  # the last contact breaks: found as sharply as possible
-        # The pressure may have fallen along its tangent up to the event.
-        p, slope = contact.pressure(start), -contact.stiffness(start)
-        lowest, found = min(p, p + step.width * slope), min(p, contact.pressure(state))
-        return lowest >= self.lowest_pressure or found - lowest <= _MISSED_TENSION * abs(lowest)
-
-    def _new_largest_tension(self, state, step):
-        """Return the separation at which the tension is largest between two states without an event, m.
-
-        None if the tension has no maximum there, or a smaller one than before.
-        """
-        contact, start = self.contact, self.state
-        slope, end_slope = (-contact.stiffness(each) for each in (start, state))
-        if step.width < 0 or step.pressure_jump or not slope < 0 < end_slope:
-            return None
-        p, q = (contact.pressure(each) for each in (start, state))
-        # The tangents meet below the curve.
-        meet = (q - end_slope * step.width - p) / (slope - end_slope)
-        lowest = p + slope * meet
-        if lowest >= self.lowest_pressure or min(p, q) - lowest <= contact.path_accuracy.tension * abs(lowest):
-            return None
-        lowest_at = _minimum_of_cubic(step.width, (p, q), (slope, end_slope))
-        return start.separation + (meet if lowest_at is None else lowest_at)
+        return longer if self.accuracy.allows_twice_the_length(step) else self.step_length
 
     def _is_apart(self):
         """Return whether nothing touches, at least as far up as where contact was about to be made first."""
@@ -370,16 +289,6 @@ class _Cycle:
         """Return the error of surfaces that part before a turning point; for a load, with the largest tension."""
         reason = f"the surfaces are apart before the turning point {target.target.describe()}"
         if target.target.kind in LOADS:
-            tension = max(0.0, -self.lowest_pressure / target.target.quantity.scale(self.contact))
+            tension = max(0.0, -self.accuracy.lowest_pressure / target.target.quantity.scale(self.contact))
             reason += f"; the largest tension is {tension:.4g}"
         return NotConverged(reason)
-
-
-def _minimum_of_cubic(width, values, slopes):
-    """Return where the cubic with these values and slopes at 0 and `width` has its lowest turn between; or None."""
-    # The import takes long, and loading does not need it.
-    from scipy.interpolate import CubicHermiteSpline
-
-    curve = CubicHermiteSpline([0.0, width], values, slopes)
-    turns = [u for u in curve.derivative().roots(extrapolate=False) if 0 < u < width]
-    return min(turns, key=curve, default=None)

@@ -16,6 +16,9 @@ from icha.asperity.material import Material
 from icha.contact.model import COALESCENCE, JUMP_IN, JUMP_OFF, SPLIT, ContactModel, Events, State
 from icha.path.targets import BETWEEN, Target
 
+# In these functions width is the change of the separation in a step, m; slope and end_slope are dp/du at its ends,
+# Pa/m.
+
 
 def pressure_jump(width, change, slope, end_slope):
     """Return the part of a change of pressure that the tangents at both ends of the step do not explain, Pa."""

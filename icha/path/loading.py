@@ -106,8 +106,8 @@ class PathProgress:
         )
 
 
-# Number of attempts to reach a target in one step.
-_TRIALS = 2
+# Number of attempts to reach a target in one step, before it is bracketed by two states.
+_DIRECT_ATTEMPTS = 2
 # A step to a target that failed is shortened to this part if it is long, that is longer than `_LONG` longest steps.
 _FIRST_PART, _LONG = 0.6, 0.1
 # Number of equilibria after a failed step until steps become longer again: a step that failed usually fails again.
@@ -139,13 +139,13 @@ def first_loading(
         nearest, expected = _nearest_target(pending.next_of_each_kind, state)
         distance = state.separation - expected
         try:
-            if distance <= step and failed_trials < _TRIALS:
+            if distance <= step and failed_trials < _DIRECT_ATTEMPTS:
                 target = nearest
                 after = _solve_directly(nearest, expected, pending.next_of_each_kind, state, step)
                 if after is None:
                     # Try a shorter step first; if that fails too, the target is bracketed by two states.
-                    failed_trials = failed_trials + 1 if distance > _LONG * longest else _TRIALS
-                    if failed_trials < _TRIALS:
+                    failed_trials = failed_trials + 1 if distance > _LONG * longest else _DIRECT_ATTEMPTS
+                    if failed_trials < _DIRECT_ATTEMPTS:
                         step, found = _FIRST_PART * distance, 0
                     continue
             else:

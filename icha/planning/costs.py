@@ -147,7 +147,7 @@ def surface_cost(grid: int) -> Cost:
 
 
 def spots(summits: float, load: float) -> float:
-    """Number of spots at a reduced pressure, to a factor of two for surfaces of 10 to 200 000 summits."""
+    """Return number of spots at a reduced pressure, to a factor of two for surfaces of 10 to 200 000 summits."""
     return max(1.0, summits * min(0.6, math.sqrt(load)))
 
 

@@ -235,12 +235,12 @@ def failed_runs(campaign: Campaign, results: Path) -> dict[str, str]:
 
 
 def expected_seconds(items: Iterable[Item], folder: str) -> dict[str, float]:
-    """Expected core-seconds of each job with its scheduling, by its path with `folder` before it."""
+    """Return expected core-seconds of each job with its scheduling, by its path with `folder` before it."""
     return {f"{folder}/{item.path}": item.cost.seconds * item.threads + WORKFLOW.job for item in items}
 
 
 def whole_cost(campaign: Campaign, results: Path) -> costs.Cost:
-    """Expected cost of a whole campaign: seconds on one core, memory of the largest job, disk.
+    """Return expected cost of a whole campaign: seconds on one core, memory of the largest job, disk.
 
     It is that of the cost model without calibration, so it is the same on every machine.
     """
@@ -318,7 +318,7 @@ def total(items: Iterable[Item]) -> Total:
 
 
 def time_on(items: Iterable[Item], cores: int) -> float:
-    """Expected time from the call to the end on some cores, s; 0 if nothing is to be done.
+    """Return expected time from the call to the end on some cores, s; 0 if nothing is to be done.
 
     The work of a stage is divided among the cores, but takes at least the time of its longest job, and that of
     scheduling all its jobs one by one.

@@ -21,7 +21,7 @@ BY_TAMAAS = ("finite_range", "boundary_element_loops")
 
 
 def further_software(campaign: Campaign) -> tuple[str, ...]:
-    """Optional packages that a campaign needs."""
+    """Return optional packages that a campaign needs."""
     return (TAMAAS,) if _sections(campaign) else ()
 
 

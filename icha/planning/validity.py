@@ -65,7 +65,7 @@ def _moments(section) -> SpectralMoments:
 
 
 def expected_summits(campaign: Campaign, name: str) -> float:
-    """Number of summits of a surface: by the spectrum of a random one, counted on one from a file."""
+    """Return number of summits of a surface: by the spectrum of a random one, counted on one from a file."""
     section = campaign.surfaces[name]
     if isinstance(section, SelfAffineSurface):
         moments = _moments(section)
@@ -123,9 +123,9 @@ def surface_facts(campaign: Campaign, name: str) -> dict[str, float]:
 def _read(section):
     # These imports load SciPy, which campaigns without such a surface do not need.
     if isinstance(section, MeasuredSurface):
-        from icha.surfaces.measured.topography import prepare_topography
+        from icha.surfaces.measured.topography import prepared_topography
 
-        return prepare_topography(section.path, section.preparation).surface
+        return prepared_topography(section.path, section.preparation).surface
     from icha.surfaces.measured.array_files import read_height_map
     from icha.surfaces.surface import Surface
 

@@ -165,7 +165,7 @@ class _LoopSolver:
 
 
 def _load_and_unload(solver, step, target, progress):
-    """Records of both legs of the loop, from apart until apart."""
+    """Return records of both legs of the loop, from apart until apart."""
     start = float(solver.fine.heights.max()) + _START * solver.range
     last, legs = None, ([], [])
     try:

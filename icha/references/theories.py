@@ -19,7 +19,7 @@ SUMMIT_AREAS = np.geomspace(1e-5, summit_theories.SEPARATE_SUMMITS_AREA_LIMIT, 8
 
 
 def literature(name: str) -> dict:
-    """Published numbers: one entry of `literature.json`, with title, description, citation, DOIs and units.
+    """Return published numbers: one entry of `literature.json`, with title, description, citation, DOIs and units.
 
     Entries are `gfmd_area`, `area_slope` and `contact_mechanics_challenge`. The lists of an entry have the same points.
     """

@@ -45,7 +45,7 @@ class NothingToExplore(ValueError):
     """Results from which no page can be made; the message gives the reason."""
 
 
-class Written(NamedTuple):
+class PageSummary(NamedTuple):
     """Summary of a page.
 
     Attributes
@@ -64,7 +64,7 @@ class Written(NamedTuple):
 
 def write_explorer(
     folder: str | os.PathLike, page: str | os.PathLike, *, only: Mapping[str, Collection] = {}, largest: float
-) -> Written:
+) -> PageSummary:
     """Write the page of a campaign.
 
     The first seed of each contact precedes the others, so that a small page contains all kinds of contacts.
@@ -97,7 +97,7 @@ def write_explorer(
             without_steps += 1
             continue
         name = results.SURFACE.format(surface=runs[0].surface, seed=runs[0].seed)
-        new = {} if name in topographies else {name: topography(read_dataset(folder / name))}
+        new = {} if name in topographies else {name: encode_topography(read_dataset(folder / name))}
         room -= len(json.dumps([entry, new]))
         if room < 0:
             left_out = len(contacts) - number
@@ -112,7 +112,7 @@ def write_explorer(
     text = _filled(campaign, data, library=library, largest=largest, left_out=left_out, without_steps=without_steps)
     with whole_file(page) as temporary:
         temporary.write_text(text, encoding="utf-8")
-    return Written(len(text.encode()), len(included), left_out, without_steps)
+    return PageSummary(len(text.encode()), len(included), left_out, without_steps)
 
 
 def _dataset(folder: Path) -> Path:
@@ -148,7 +148,7 @@ def _contact(campaign: xr.DataTree, folder: Path, labels: list[RunLabels]) -> di
     """Return the data of a contact with all models; None if no run reached a stop."""
     runs = {run.model: select_run(campaign, run) for run in labels}
     entries = {
-        run.model: run_entry(runs[run.model], _maps(folder, run, runs[run.model]))
+        run.model: encode_run(runs[run.model], _maps(folder, run, runs[run.model]))
         for run in labels
         if runs[run.model].sizes["step"]
     }
@@ -156,7 +156,7 @@ def _contact(campaign: xr.DataTree, folder: Path, labels: list[RunLabels]) -> di
         return None
     first, *others = entries
     for other in others:
-        entries[other]["partners"] = partners(runs[first], runs[other])
+        entries[other]["partners"] = find_partners(runs[first], runs[other])
     return {name: getattr(labels[0], name) for name in CHOICES} | {"runs": entries}
 
 
@@ -170,7 +170,7 @@ def _maps(folder: Path, labels: RunLabels, run: xr.Dataset) -> list[str] | None:
         return None
     with readable(file), xr.open_dataset(file, engine="netcdf4") as data:
         states = zip(run["snapshot_kind"].values.astype(str), run["snapshot_target"].values, strict=True)
-        return [picture(data["contact_map"][find_snapshot(data, *state)].values) for state in states]
+        return [encode_map(data["contact_map"][find_snapshot(data, *state)].values) for state in states]
 
 
 def _library() -> str:
@@ -213,12 +213,12 @@ def _base64(data: bytes) -> str:
     return base64.b64encode(data).decode("ascii")
 
 
-def floats(values: np.ndarray) -> str:
+def encode_floats(values: np.ndarray) -> str:
     """Encode numbers in base64: little-endian, single precision."""
     return _base64(np.asarray(values, "<f4").tobytes())
 
 
-def topography(surface: xr.Dataset) -> dict:
+def encode_topography(surface: xr.Dataset) -> dict:
     """Return the heights of a surface file over its rms height: means over blocks of nodes, in 256 levels."""
     heights = surface["height"].transpose("y", "x").values / float(surface["rms_height"])
     means = average_blocks(heights, MOST_HEIGHTS)
@@ -233,14 +233,14 @@ def topography(surface: xr.Dataset) -> dict:
     }
 
 
-def run_entry(run: xr.Dataset, maps: Sequence[str] | None) -> dict:
+def encode_run(run: xr.Dataset, maps: Sequence[str] | None) -> dict:
     """Return the curves of a run and its snapshots.
 
     Parameters
     ----------
     run : a run of a campaign dataset, with at least one step.
-    maps : `picture` of every snapshot of boundary elements; None for asperities, whose spots are in the run, and if the
-        file with the maps is missing.
+    maps : `encode_map` of every snapshot of boundary elements; None for asperities, whose spots are in the run, and if
+        the file with the maps is missing.
     """
     stops = zip(run["step_kind"].values.astype(str), run["step_target"].values, strict=True)
     return {
@@ -249,9 +249,9 @@ def run_entry(run: xr.Dataset, maps: Sequence[str] | None) -> dict:
         "periodic": str(run["boundary"].values) == "periodic",
         "grid": int(run["grid"]),
         "rms_height": float(run["rms_height"]),
-        "pressure": floats(run["reduced_pressure"]),
-        "area": floats(run["contact_area_fraction"]),
-        "gap": floats(reduced_gap(run)),
+        "pressure": encode_floats(run["reduced_pressure"]),
+        "area": encode_floats(run["contact_area_fraction"]),
+        "gap": encode_floats(reduced_gap(run)),
         "spots": run["spot_count"].values.tolist(),
         "leg": run["leg"].values.tolist(),
         "stops": [None if kind == BETWEEN else f"{kind} {target:.6g}" for kind, target in stops],
@@ -270,7 +270,7 @@ def _snapshot(run: xr.Dataset, snapshot: int, maps: Sequence[str] | None) -> dic
     data = {
         "step": int(run["snapshot_step"].values[snapshot]),
         "gap": _points(gap_densities([(run, snapshot)])),
-        "pressure": [floats(pressure[visible]), floats(density[visible])],
+        "pressure": [encode_floats(pressure[visible]), encode_floats(density[visible])],
         "sizes": _points(patch_density(areas, cell)),
         "larger": _points(patches_above(areas, cell)),
     }
@@ -278,17 +278,17 @@ def _snapshot(run: xr.Dataset, snapshot: int, maps: Sequence[str] | None) -> dic
         data["map"] = maps[snapshot]
     elif not by_cells:
         spots = spots_of(run, snapshot)
-        data["circles"] = [floats(spots[f"spot_{name}"]) for name in ("x", "y", "radius")]
+        data["circles"] = [encode_floats(spots[f"spot_{name}"]) for name in ("x", "y", "radius")]
     return data
 
 
 def _points(curve) -> list[str]:
     """Return the points of a curve of a single run."""
     x, (y,) = curve
-    return [floats(x), floats(y)]
+    return [encode_floats(x), encode_floats(y)]
 
 
-def picture(contact: np.ndarray) -> str:
+def encode_map(contact: np.ndarray) -> str:
     """Return a map of contact as a PNG in base64; opacity is the fraction of a cell in contact.
 
     Parameters
@@ -306,7 +306,7 @@ def picture(contact: np.ndarray) -> str:
     return _base64(file.getvalue())
 
 
-def partners(one: xr.Dataset, other: xr.Dataset) -> list[int]:
+def find_partners(one: xr.Dataset, other: xr.Dataset) -> list[int]:
     """Find, for every step of a run, the step of another run at the same state of the path; -1 without one.
 
     The partner of a stop is the same stop on the same leg. The partner of another equilibrium is the step on the same

@@ -23,8 +23,8 @@ from icha.contact.models import MODEL_PAPER
 from icha.datasets.results import EXPLORER
 from icha.figures.captions import count_runs
 from icha.figures.registry import figure_number
-from icha.report.sections import error_section, provenance, sources, spectra, surface_row
-from icha.report.studies import study_section
+from icha.report.sections import build_provenance, draw_spectra, list_sources, summarise_errors, summarise_surface
+from icha.report.studies import summarise_study
 from icha.report.template import MOST_ROWS, write_page
 
 SOFTWARE = ("icha", "numpy", "scipy", "finufft", "xarray", "netCDF4", "matplotlib", "snakemake")
@@ -85,10 +85,9 @@ def write_report(
     citations : further sources to cite, such as those of measurements.
     further_software : packages that this campaign needs besides `SOFTWARE`.
     """
-
     link = partial(_link, Path(path).parent)
     pictures = _pictures(figures, campaign, link)
-    studies = [study_section(campaign, name, comparison) for name in campaign.children]
+    studies = [summarise_study(campaign, name, comparison) for name in campaign.children]
     surfaces = list(surfaces)
     linked = {name: link(target) for name, target in files.items()}
     write_page(
@@ -98,7 +97,7 @@ def write_report(
         **_check_values(list(checks)),
         **_surface_values(surfaces),
         figures=pictures,
-        graph=provenance(studies, surfaces, pictures, model_error, linked, link(dataset_path)),
+        graph=build_provenance(studies, surfaces, pictures, model_error, linked, link(dataset_path)),
         **_source_values(campaign, model_error),
         dataset=link(dataset_path),
         times=link(times_path),
@@ -139,10 +138,10 @@ def _check_values(checks: list[Check]) -> dict:
 
 def _surface_values(surfaces: list[xr.Dataset]) -> dict:
     return {
-        "surfaces": [surface_row(surface) for surface in surfaces[:MOST_ROWS]],
+        "surfaces": [summarise_surface(surface) for surface in surfaces[:MOST_ROWS]],
         "surface_count": len(surfaces),
-        "sources": sources(surfaces),
-        "spectra": spectra(surfaces),
+        "sources": list_sources(surfaces),
+        "spectra": draw_spectra(surfaces),
     }
 
 
@@ -171,7 +170,7 @@ def _source_values(campaign: xr.DataTree, model_error: xr.DataTree | None) -> di
     entries = list(model_error.children.values()) if model_error is not None else []
     texts = ";".join(node.attrs.get("references", "") for node in [*campaign.children.values(), *entries])
     return {
-        "entries": [error_section(node.to_dataset()) for node in entries],
+        "entries": [summarise_errors(node.to_dataset()) for node in entries],
         "references": list(dict.fromkeys(source.strip() for source in texts.split(";") if source.strip())),
     }
 

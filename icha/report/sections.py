@@ -34,12 +34,12 @@ class Box(NamedTuple):
     target: str | None = None
 
 
-def provenance(studies, surfaces, figures, model_error, files, dataset) -> list[list[Box]]:
+def build_provenance(studies, surfaces, figures, model_error, files, dataset) -> list[list[Box]]:
     """Return the columns of the graph of origins: each was made from the columns before it.
 
     Parameters
     ----------
-    studies : results of `icha.report.studies.study_section`.
+    studies : results of `icha.report.studies.summarise_study`.
     surfaces : surface files.
     figures : figures of the report.
     model_error : error of the model by entry; None without boundary elements.
@@ -47,7 +47,7 @@ def provenance(studies, surfaces, figures, model_error, files, dataset) -> list[
     dataset : link to the campaign dataset.
     """
     origins = [Box("Configuration", "as used", files.get("Configuration"))]
-    if measured := {source["source_sha256"] for source in sources(surfaces)}:
+    if measured := {source["source_sha256"] for source in list_sources(surfaces)}:
         origins.append(Box("Measurements", format_count(len(measured), "file"), "#surfaces"))
     runs = [
         Box(_short(study["name"]), _run_count(study["complete"], study["failed"]), f"#study-{study['name']}")
@@ -84,7 +84,7 @@ def read_surface_statistics(path: str | os.PathLike) -> xr.Dataset:
         return dataset.load()
 
 
-def surface_row(surface: xr.Dataset) -> dict:
+def summarise_surface(surface: xr.Dataset) -> dict:
     """Return name, parameters and statistics of a surface file; those of a scan as measured."""
     lengths = ("period", "rolloff_wavelength", "short_wavelength")
     scale = measured_scale(surface)
@@ -102,14 +102,14 @@ def surface_row(surface: xr.Dataset) -> dict:
     }
 
 
-def sources(surfaces) -> list[dict[str, str]]:
+def list_sources(surfaces) -> list[dict[str, str]]:
     """Return file, checksum and preparation of each measured surface."""
     keys = ("surface", "source_file", "source_sha256", "preparation")
     rows = [tuple(each.attrs.get(key, "") for key in keys) for each in surfaces if "source_file" in each.attrs]
     return [dict(zip(keys, row, strict=True)) for row in dict.fromkeys(rows)]
 
 
-def spectra(surfaces) -> str | None:
+def draw_spectra(surfaces) -> str | None:
     """Draw the power spectra, averaged over the seeds of each surface: a PNG in base64; None if no file has one."""
     members: dict[str, list] = {}
     for surface in surfaces:
@@ -140,7 +140,7 @@ def _draw_spectra(members):
     return figure
 
 
-def error_section(errors: xr.Dataset) -> dict:
+def summarise_errors(errors: xr.Dataset) -> dict:
     """Return what the page prints about one entry of the model error: its ranges, and a row for each contact state."""
     labels = itertools.product(surfaces_and_slopes(errors), errors["material"].values.tolist())
     rows = []

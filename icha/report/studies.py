@@ -11,8 +11,13 @@ from icha.datasets.campaign import loading_stops, reduced_gap, run_place, runs_o
 from icha.datasets.labels import LABELS, RunLabels, labels_at, slopes_of
 from icha.datasets.variables.campaign import COMPLETE, COMPUTED_RUNS, FAILED_CHECKS, INCOMPLETE, MISSING, RAGGED
 from icha.figures.select import asked_seeds, path_steps
+<<<<<<< HEAD
 from icha.report.template import MOST_ROWS, scientific
 from icha.support.formatting import choose_unit, format_quantity
+=======
+from icha.figures.style import choose_unit, format_quantity
+from icha.report.template import MOST_ROWS, format_scientific
+>>>>>>> house
 from icha.support.statistics import ENOUGH, ensemble
 
 # Quantities in a table by the kind of its stops: two of pressure, contact area and mean gap.
@@ -23,7 +28,7 @@ SHOWN_AT = {
     "mean_separation": ("pressure", "area"),
 }
 MOST_STOPS = 12  # columns of a table, evenly chosen
-FORMATS = {"pressure": scientific, "area": scientific, "gap": "{:.3f}".format}
+FORMATS = {"pressure": format_scientific, "area": format_scientific, "gap": "{:.3f}".format}
 EVENT_COUNTS = ("spot_count", "jump_in_count", "jump_off_count", "coalescence_count")
 # Contributions to a loss, and their names on the page.
 LOSS_NAMES = {
@@ -39,7 +44,7 @@ EVENT_NAMES = {
 }
 
 
-def study_section(campaign: xr.DataTree, name: str, comparison: xr.DataTree | None) -> dict:
+def summarise_study(campaign: xr.DataTree, name: str, comparison: xr.DataTree | None) -> dict:
     """Return what the page prints about one study."""
     dataset = campaign[name].to_dataset()
     status = dataset["status"].values
@@ -109,9 +114,6 @@ def _run(labels: RunLabels, run: xr.Dataset) -> dict:
         "steps": run.sizes["step"],
         "tabor": float(run["tabor_parameter"]) if adhesive else None,
         "asperities": int(run["asperity_count"]),
-        "rms_height": format_quantity(float(run["rms_height"]), "m"),
-        "period": format_quantity(float(run["period"]), "m"),
-        "grid": int(run["grid"]),
         "nayak_parameter": float(run["nayak_parameter"]),
         "stickiness": float(run["stickiness"]),
         "energy_ratio": float(run["full_contact_energy_ratio"]) if adhesive else None,
@@ -125,7 +127,7 @@ def _run(labels: RunLabels, run: xr.Dataset) -> dict:
 # --- tables of states at the stops of the path ---
 
 
-def states_at_stops(run: xr.Dataset) -> dict[tuple[str, float], dict[str, float]]:
+def collect_states(run: xr.Dataset) -> dict[tuple[str, float], dict[str, float]]:
     """Return reduced pressure, A/A0 and mean gap over h_rms at the stops of a loading, by kind and target."""
     stops = path_steps(run)
     keys = zip(stops["step_kind"].values.tolist(), stops["step_target"].values.tolist(), strict=True)
@@ -154,7 +156,7 @@ def _stops_of(states) -> dict:
 
 def _table(runs) -> dict:
     """Return rows with the states of every run."""
-    states = [(labels, states_at_stops(run)) for labels, run in runs]
+    states = [(labels, collect_states(run)) for labels, run in runs]
     table = _stops_of([stops for _, stops in states])
 
     def cell(stops, target):
@@ -177,7 +179,7 @@ def _means(dataset: xr.Dataset, complete: list[RunLabels]) -> dict:
     members = []
     for line, labels in list(lines.items())[:MOST_ROWS]:
         runs = [steps.isel(run_place(dataset, each)) for each in labels]
-        states = [states_at_stops(run.isel(step=slice(0, int(run["step_count"])))) for run in runs]
+        states = [collect_states(run.isel(step=slice(0, int(run["step_count"])))) for run in runs]
         members.append((line, _seed_count(len(labels), asked_seeds(dataset, labels[0])), states))
     table = _stops_of([stops for *_, states in members for stops in states])
 
@@ -290,8 +292,8 @@ def _loop(dataset: xr.Dataset, members: list[tuple], asked: int) -> dict:
 def _with_unit(values: np.ndarray, unit: str = "") -> Markup:
     """Format a mean with its unit, and its accuracy below it."""
     factor, unit = choose_unit(float(np.mean(values)), unit) if unit else (1.0, "")
-    mean = scientific(float(np.mean(values)) * factor) + (f" {unit}" if unit else "")
-    text = _range(values * factor, scientific)
+    mean = format_scientific(float(np.mean(values)) * factor) + (f" {unit}" if unit else "")
+    text = _range(values * factor, format_scientific)
     return (mean + (Markup("<br>") + text if text else "")).replace("-", "−")
 
 

@@ -31,7 +31,7 @@ def _symbols(text: str) -> Markup:
     return Markup(result)
 
 
-def scientific(value: float | None) -> Markup:
+def format_scientific(value: float | None) -> Markup:
     """Format a number with three digits, with a power of ten if it is small or large."""
     if value is None:
         return Markup("–")
@@ -63,7 +63,7 @@ def template(name: str) -> jinja2.Template:
     )
     environment.filters |= {
         "symbols": _symbols,
-        "scientific": scientific,
+        "scientific": format_scientific,
         "per_cent": _per_cent,
         "number": "{:g}".format,
         "duration": formatting.duration,

@@ -67,7 +67,7 @@ def move_only_while_owned() -> None:
 
 
 def moving() -> AbstractContextManager:
-    """The context in which files are moved into place."""
+    """Return the context in which files are moved into place."""
     return _moving()
 
 

@@ -9,7 +9,7 @@ LARGE_GRID = 2048
 
 
 def cores() -> int:
-    """Number of threads: OMP_NUM_THREADS if it is set, otherwise the processors that the process may use.
+    """Return number of threads: OMP_NUM_THREADS if it is set, otherwise the processors that the process may use.
 
     Snakemake sets OMP_NUM_THREADS to the `threads` of a rule.
     """

@@ -1,4 +1,4 @@
-"""This program on this machine: the folder of its workflow, in a clone or installed, and its processes.
+"""The program on this machine: the folder of its workflow, in a clone or installed, and its processes.
 
 `python -m icha.support.program` prints the folder of the workflow; shipped campaigns and examples are in its config/.
 """

@@ -1,6 +1,7 @@
 """Types of values in a configuration, such as `25 MPa`, which is kept as a float in SI units."""
 
 import math
+import operator
 import re
 import unicodedata
 from collections.abc import Iterable, Iterator
@@ -101,7 +102,7 @@ def conversion_factor(unit: str, si_unit: str) -> Decimal:
 
 
 def _letters(unit):
-    """A unit in lower case, without blanks and signs of a power."""
+    """Return a unit in lower case, without blanks and signs of a power."""
     return re.sub(r"[\s^*]", "", unicodedata.normalize("NFKC", unit)).replace("\u03bc", "u").lower()
 
 
@@ -246,17 +247,18 @@ def distinct(values):
 
 def increasing(values):
     """Refuse a list of numbers that does not increase."""
-    for before, after in pairwise(values):
-        if not after > before:
-            raise ValueError(f"{after:g} comes after {before:g}; expected values in increasing order")
-    return values
+    return _require_order(values, operator.gt, "increasing")
 
 
 def decreasing(values):
     """Refuse a list of lengths that does not decrease."""
+    return _require_order(values, operator.lt, "decreasing", " m")
+
+
+def _require_order(values, follows, order, unit=""):
     for before, after in pairwise(values):
-        if not after < before:
-            raise ValueError(f"{after:g} m comes after {before:g} m; expected values in decreasing order")
+        if not follows(after, before):
+            raise ValueError(f"{after:g}{unit} comes after {before:g}{unit}; expected values in {order} order")
     return values
 
 

@@ -15,7 +15,7 @@ def periodic_difference(first, second, period):
 
 
 def problem_with_heights(heights: np.ndarray) -> str | None:
-    """Return why an array of real numbers is no height map: shape, values that are not finite, flatness; else None."""
+    """Return why an array is not a height map: its shape, values that are not finite, or flatness; None if it is."""
     if heights.ndim != 2 or heights.shape[0] != heights.shape[1] or heights.shape[0] < 8:
         return f"an array of shape {heights.shape}, not a square of at least 8 x 8"
     bad = int(np.count_nonzero(~np.isfinite(heights)))

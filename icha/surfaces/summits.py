@@ -78,7 +78,7 @@ class Asperities:
     period : side of the square, m.
     free : whether the square is single, on a free half-space; else it repeats.
     unsupported_height : (m,) array, heights of the maxima of the spline without support of the nodes around them, m.
-        They are no asperities.
+        They are not asperities.
     """
 
     position: np.ndarray
@@ -94,7 +94,7 @@ class Asperities:
         return cell_of(self.period, self.free)
 
     def __len__(self) -> int:
-        """Number of asperities."""
+        """Return number of asperities."""
         return len(self.height)
 
 

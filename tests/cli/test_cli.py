@@ -19,8 +19,8 @@ from typer.testing import CliRunner
 
 from icha.analysis.checks import check_campaign, write_checks
 from icha.cli import app
-from icha.cli.live import LiveView, Progress, error_of, last_line
-from icha.cli.project import campaigns
+from icha.cli.live import LiveView, Progress, read_error, read_last_line
+from icha.cli.project import list_campaigns
 from icha.configuration.cases import run_cases, run_sha256
 from icha.configuration.errors import ConfigurationError
 from icha.configuration.load import load_configuration
@@ -355,7 +355,7 @@ def test_a_licence_that_no_deposit_can_have_is_reported_before_anything_is_compu
 
 def test_outside_a_clone_the_installed_workflow_is_used(empty_folder):
     shipped = {path.stem for path in (REPOSITORY / CAMPAIGNS).glob("*.yaml")}
-    assert {*campaigns()} == {*shipped, "paper"}
+    assert {*list_campaigns()} == {*shipped, "paper"}
     refused = output("run", status=2)
     assert "no config/config.yaml" in refused and "cmc_full, " in refused
     for name in ("paper", "smoke"):
@@ -639,6 +639,6 @@ def test_the_live_view_shows_jobs_and_the_last_lines_of_their_logs(progress, tmp
 def test_reasons_of_failures_are_in_logs(progress, tmp_path):
     progress.update(started(0, log=["0.log"]))
     job = progress.update({"event": "job_error", "jobid": 0})
-    assert error_of(job, tmp_path) == [] and last_line(job, tmp_path) == ""
+    assert read_error(job, tmp_path) == [] and read_last_line(job, tmp_path) == ""
     (tmp_path / "0.log").write_text("stop 1 of 2\nError: 2 checks failed\nthis one\nthat one\n")
-    assert error_of(job, tmp_path) == ["2 checks failed", "this one", "that one"]
+    assert read_error(job, tmp_path) == ["2 checks failed", "this one", "that one"]

@@ -34,7 +34,7 @@ def load(tmp_path):
 
 @pytest.fixture
 def refused(load, tmp_path):
-    """Load GOOD with a value changed (or several), and see that the message says what is wrong and allowed."""
+    """Load GOOD with a value changed (or several), and check the message."""
 
     def refuse(key, value, message):
         with pytest.raises(ConfigurationError) as error:

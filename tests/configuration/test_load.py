@@ -1,4 +1,4 @@
-"""Files of configurations: what is no configuration, overrides, all mistakes at once."""
+"""Files of configurations: invalid files, overrides, all problems at once."""
 
 from datetime import date
 
@@ -10,7 +10,7 @@ from icha.configuration.load import load_configuration
 from icha.configuration.yaml_files import dump_yaml, read_yaml
 
 
-def test_all_mistakes_are_named_at_once(load):
+def test_all_problems_are_reported_at_once(load):
     with pytest.raises(ConfigurationError) as error:
         load({"name": "A B", "surfaces.rough.hurst": 2, "materials.soft.surface_energy": "1 m", "extra": 1})
     assert len(str(error.value).splitlines()) == 4
@@ -51,7 +51,7 @@ def test_overrides_are_part_of_the_configuration_as_used(load, tmp_path):
         (b"a: !!python/object:os.system {}\n", "expected a YAML mapping"),
     ],
 )
-def test_files_that_are_no_configuration(content, message, tmp_path):
+def test_files_that_are_not_configurations(content, message, tmp_path):
     file = tmp_path / "campaign.yaml"
     file.write_bytes(content)
     with pytest.raises(ConfigurationError, match=message) as error:
@@ -95,7 +95,7 @@ def test_leading_zeros_are_no_octal_numbers_and_colons_no_base_of_60(tmp_path, t
         ({"figures": {"fig2_area_and_gap": {"study": "two"}}}, r"fig2_area_and_gap\.study: 'two' is not defined"),
     ],
 )
-def test_mistakes_of_the_text_are_told_before_a_scan_is_read(changes, message, load, monkeypatch):
+def test_problems_of_the_text_are_reported_before_a_scan_is_read(changes, message, load, monkeypatch):
     monkeypatch.setattr("icha.configuration.load.inspect_topographies", lambda campaign: pytest.fail("was read"))
     measured = {"surfaces.rough": measured_surface(), "studies.one.rms_slopes": "measured"}
     with pytest.raises(ConfigurationError, match=message):

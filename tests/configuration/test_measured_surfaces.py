@@ -6,7 +6,7 @@ from demo_configuration import measured_surface
 from icha.configuration.cases import run_cases, surface_settings
 from icha.configuration.surfaces import MeasuredSurface
 from icha.surfaces.measured.settings import Preparation
-from icha.surfaces.measured.topography import prepare_topography
+from icha.surfaces.measured.topography import prepared_topography
 
 SECTION = {"kind": "measured", "path": "scan.npy", "boundary": "mirror", "height_unit": "nm", "size": "90 um"}
 
@@ -31,7 +31,7 @@ def test_a_measured_surface_at_its_own_slope(load):
     topography = campaign.topography("rough")
     assert (case.seed, case.rms_slope) == (0, topography.rms_slope)
     assert (topography.grid, topography.period) == (128, 64e-6)
-    assert prepare_topography(
+    assert prepared_topography(
         campaign.surfaces["rough"].path, surface_settings_of_file(campaign, "rough")
     ).rms_slope == pytest.approx(case.rms_slope, rel=1e-5)
 

@@ -9,7 +9,7 @@ from icha.configuration.errors import ConfigurationError
 from icha.configuration.publication import missing_metadata
 
 DOI = "10.1007/s11249-017-0900-2"
-# Key and value that are refused, and the beginning of what is said of them.
+# Wrong values, by the beginning of their message.
 BAD = {
     "authors[0].orcid: '1' is not an ORCID": {"authors": [CARBERRY | {"orcid": "1"}]},
     "authors[0].orcid: '0000-0002-1825-0098' is no": {"authors": [CARBERRY | {"orcid": "0000-0002-1825-0098"}]},
@@ -67,7 +67,7 @@ BAD = {
 
 
 @pytest.mark.parametrize("message", BAD)
-def test_mistakes_are_named(message, refused):
+def test_wrong_values_are_refused(message, refused):
     refused("publication", BAD[message], message)
 
 

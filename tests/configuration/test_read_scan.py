@@ -1,4 +1,4 @@
-"""A measured surface in a script is that of a campaign."""
+"""`icha.read_scan` prepares a measured surface as a campaign does."""
 
 import subprocess
 import sys
@@ -9,7 +9,7 @@ import pytest
 
 import icha
 from icha.configuration.surfaces import MeasuredSurface
-from icha.surfaces.measured.topography import prepare_topography
+from icha.surfaces.measured.topography import prepared_topography
 from icha.surfaces.surface import EdgeWarning
 
 PERIOD = 1e-5
@@ -35,7 +35,7 @@ def file(tmp_path):
 def test_prepared_as_in_a_campaign(file, boundary):
     keys = {**KEYS, "boundary": boundary, "cutoff": "1 um"}
     section = MeasuredSurface.model_validate({"kind": "measured", "path": str(file), **keys})
-    expected = prepare_topography(file, section.preparation).surface
+    expected = prepared_topography(file, section.preparation).surface
     surface = icha.read_scan(file, **keys)
     np.testing.assert_array_equal(surface.heights, expected.heights)
     assert (surface.period, surface.boundary) == (expected.period, expected.boundary)

@@ -1,4 +1,4 @@
-"""Wrong configurations (`refusals.yaml`): each is refused with file, key, value and what is allowed."""
+"""Wrong configurations (`refusals.yaml`): each is refused with file, key, value and what is expected."""
 
 from pathlib import Path
 
@@ -10,6 +10,6 @@ _TEXT = (Path(__file__).parent / "refusals.yaml").read_text(encoding="utf-8")
 CASES = yaml.safe_load(_TEXT.replace("SCAN", str(REPOSITORY / "config/topographies/synthetic_scan.txt")))
 
 
-@pytest.mark.parametrize("case", CASES, ids=lambda case: case["says"].replace(" ", "_")[:70])
-def test_wrong_configurations_are_refused_in_words(case, refused):
-    refused("", case["changes"], case["says"])
+@pytest.mark.parametrize("case", CASES, ids=lambda case: case["message"].replace(" ", "_")[:70])
+def test_wrong_configurations_are_refused(case, refused):
+    refused("", case["changes"], case["message"])

@@ -1,4 +1,4 @@
-"""Configurations of strangers: each is refused at once with file, key, value and what is allowed, or it is sound."""
+"""Untrusted configurations: each is valid, or refused at once with file, key, value and what is expected."""
 
 import os
 import re
@@ -47,7 +47,7 @@ def test_thousands_of_cases_are_read_and_aliases_count_as_what_they_stand_for(tm
     assert read_yaml(tmp_path / "two.yaml")["a"] == [{"seed": 1}] * 2001
 
 
-def test_what_would_be_too_long_as_it_is_kept_is_refused_before_anything_is_computed(tmp_path):
+def test_a_copy_for_the_results_that_would_be_too_long_is_refused(tmp_path):
     authors = ", ".join(f"{{family_names: A{k}, given_names: *b}}" for k in range(999))
     text = f"{GOOD}publication: {{authors: [{{family_names: A, given_names: &b {'b' * 1000}}}, {authors}]}}\n"
     (tmp_path / "long.yaml").write_text(text)
@@ -70,20 +70,20 @@ def test_what_only_looks_like_a_number_is_text_until_it_is_checked(number, tmp_p
 
 
 @pytest.mark.parametrize("key", ["1.5", "1", "yes", "~", "2026-02-01"])
-def test_keys_that_are_no_text_are_refused_by_their_line(key, tmp_path):
+def test_keys_that_are_not_text_are_refused_by_their_line(key, tmp_path):
     (tmp_path / "one.yaml").write_text(GOOD.replace("  rough:", f"  {key}:"))
     with pytest.raises(ConfigurationError, match=r"one\.yaml, line 7: key .+ is not text; use quotes"):
         load_configuration(tmp_path / "one.yaml")
 
 
-def test_kinds_that_are_no_text_are_refused_with_defaults_as_without(refused):
+def test_kinds_that_are_not_text_are_refused_with_defaults_as_without(refused):
     surface = yaml.safe_load(GOOD)["surfaces"]["rough"]
     for kind in (["self_affine"], {"a": 1}, "none"):
         wrong = {"defaults": {"surfaces": {"hurst": 0.8}}, "surfaces.rough": surface | {"kind": kind}}
         refused(None, wrong, f"surfaces.rough.kind: {kind!r} is not a kind of surface; expected one of ")
 
 
-def test_what_is_wrong_is_told_without_what_acts_on_a_terminal(load):
+def test_messages_have_no_control_characters(load):
     with pytest.raises(ConfigurationError, match=r"\\x1b\[2Jx: unknown key") as error:
         load({"\x1b[2Jx": 1})
     assert "\x1b" not in str(error.value)
@@ -191,7 +191,7 @@ def test_formulas_and_dollars_that_can_be_drawn(load, tmp_path):
         assert load({"measurements": {"m": entry}}).campaign.measurements["m"].label == label
 
 
-def test_of_a_thousand_mistakes_the_first_are_told(load):
+def test_of_a_thousand_problems_the_first_are_reported(load):
     with pytest.raises(ConfigurationError) as error:
         load({f"key{i}": 1 for i in range(1000)} | {"studies.one.surfaces": [f"none{i}" for i in range(1000)]})
     lines = str(error.value).splitlines()
@@ -202,7 +202,7 @@ def test_of_a_thousand_mistakes_the_first_are_told(load):
 
 
 def test_thousands_of_targets_snapshots_and_seeds_are_planned(load, tmp_path):
-    """Each with each would be 10^8 comparisons and more."""
+    """Comparing all pairs would take 10^8 comparisons."""
     study = {
         "studies.one.targets": {"reduced_pressures": [1e-3 + 1e-6 * i for i in range(5_000)]},
         "studies.one.snapshots": "every_stop",
@@ -250,7 +250,7 @@ _SHIPPED = [
 
 @st.composite
 def mutated(draw):
-    """A configuration that comes with ICHA, in which some values are others, gone, or elsewhere."""
+    """Change, remove or move some values of a configuration of ICHA."""
     content = yaml.safe_load(yaml.safe_dump(draw(st.sampled_from(_SHIPPED))))
     if draw(st.booleans()):
         content["defaults"] = {"surfaces": {"hurst": 0.8}, "materials": {"surface_energy": "0 J/m^2"}}
@@ -279,7 +279,7 @@ def mutated(draw):
 
 @pytest.fixture(scope="module")
 def file(tmp_path_factory):
-    """Where configurations are written, one after the other."""
+    """Return the path of the configurations."""
     return tmp_path_factory.mktemp("mutated") / "campaign.yaml"
 
 
@@ -294,7 +294,7 @@ _ODD = ["0b_", "-0x_", "1:1:1.5", f"1{':1' * 180}.5", "1.5", "._", "2026-02-30",
 
 @given(content=st.sampled_from(_SHIPPED), data=st.data())
 def test_mutated_texts_are_right_or_refused(file, content, data):
-    """Of the text single characters, keys and values are others, or lines are gone or come twice."""
+    """Change characters, keys and values of the text, remove or repeat lines."""
     text = yaml.safe_dump(content, allow_unicode=True)
     lines = text.splitlines(keepends=True)
     for _ in range(data.draw(st.integers(1, 3))):

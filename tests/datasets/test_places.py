@@ -35,8 +35,8 @@ from icha.figures import (
     fig10_model_error,
     fig11_distribution_error,
 )
-from icha.report import sections as error_section
-from icha.report.studies import study_section
+from icha.report import sections
+from icha.report.studies import summarise_study
 
 
 @pytest.mark.parametrize("value", [0.1, 0.1 + 0.2, 1.0, 1e-5, 12.5, 100.0])
@@ -156,14 +156,14 @@ def test_report_checks_and_validity_of_either_form_are_the_same():
     tree, other = crops.tree(), crops.square_tree()
 
     def section(tree):
-        found = study_section(tree, crops.STUDY, compare_campaign(tree))
+        found = summarise_study(tree, crops.STUDY, compare_campaign(tree))
         found.pop("combinations")
         return repr({name: value for name, value in found.items() if name != "spread"})
 
     assert section(tree) == section(other)
     assert check_campaign(tree) == check_campaign(other)
     assert statements_on_dataset(tree) == statements_on_dataset(other)
-    rows = [error_section.error_section(crops.errors(each)[crops.STUDY].to_dataset()) for each in (tree, other)]
+    rows = [sections.summarise_errors(crops.errors(each)[crops.STUDY].to_dataset()) for each in (tree, other)]
     assert repr(rows[0]) == repr(rows[1]) and len(rows[0]["rows"]) == 3 * 2 * 2
 
 

@@ -40,7 +40,7 @@ from scipy.optimize import brentq
 
 import icha
 from icha import Material, Path
-from icha.contact.model import COALESCENCE, JUMP_IN, JUMP_OFF, SPLIT, NotConverged
+from icha.contact.model import COALESCENCE, JUMP_IN, JUMP_OFF, SPLIT, ContactModel, NotConverged
 from icha.equilibrium.interacting_asperities import InteractingAsperities
 from icha.path.cycle import _Cycle
 from icha.path.follow import follow
@@ -233,7 +233,7 @@ def scattered(count, seed):
 
 @pytest.mark.parametrize("control", [pytest.param("separation", marks=pytest.mark.slow), "load"])
 def test_every_state_continues_the_history_of_the_state_before_it(control):
-    waypoints = travelled(scattered(3, 0), [0.02], unload=True, control=control)
+    waypoints = travelled(scattered(2, 0), [0.02], unload=True, control=control)
     for before, after in pairwise(waypoints):
         assert after.state.history[: len(before.state.history)] == before.state.history
     counts = [history(waypoints).count(kind) for kind in (JUMP_IN, JUMP_OFF, COALESCENCE, SPLIT)]
@@ -397,3 +397,22 @@ def test_a_load_that_is_not_met_before_a_station_is_met_in_shorter_steps():
     waypoints = travelled(contact, None, mean_separations=[HEIGHT - 3.0], turning_points=[turn], max_step=0.15)
     assert waypoints[-1].leg == 1
     assert HEIGHT - waypoints[-1].state.separation == pytest.approx(2.5, abs=1e-6)
+
+
+class InterfaceOnly:
+    """Only those attributes of a contact that the interface of contact models names."""
+
+    def __init__(self, contact):
+        self._contact = contact
+
+    def __getattr__(self, name):
+        if name not in vars(ContactModel):
+            raise AttributeError(f"{name} is not in the interface")
+        return getattr(self._contact, name)
+
+
+@pytest.mark.parametrize("settings", [{}, {"unload": True, "control": "load"}], ids=str)
+def test_a_path_needs_no_more_of_a_contact_than_the_interface(settings):
+    contact = contact_of([HEIGHT, HEIGHT], [[-4, 0], [4, 0]])
+    expected, found = (travelled(each, [0.001, 0.005], **settings) for each in (contact, InterfaceOnly(contact)))
+    assert [w.state.separation for w in found] == [w.state.separation for w in expected]

@@ -11,7 +11,7 @@ from icha.planning.costs import WORKFLOW, Cost
 from icha.planning.plan import DONE, TO_DO, Item, memory_on, plan, start_up, time_on
 from icha.planning.results import campaign_files
 from icha.planning.validity import expected_summits
-from icha.surfaces.measured.topography import prepare_topography
+from icha.surfaces.measured.topography import prepared_topography
 from icha.surfaces.summits import find_summits
 
 GB = 1e9
@@ -50,7 +50,7 @@ def campaign(tmp_path):
 
 def test_the_summits_of_a_measured_surface_are_counted_in_its_file(campaign):
     section = campaign.surfaces["scan"]
-    surface = prepare_topography(section.path, section.preparation).surface
+    surface = prepared_topography(section.path, section.preparation).surface
     counted = expected_summits(campaign, "scan")
     assert counted == len(find_summits(surface))
     assert expected_summits(campaign, "map") != pytest.approx(counted, rel=0.1)

@@ -11,7 +11,7 @@ from icha.asperity.stickiness import stickiness
 from icha.configuration.load import load_configuration
 from icha.datasets.campaign_file import write_campaign
 from icha.planning.validity import expected_validity, found_validity, rms_curvature
-from icha.surfaces.measured.topography import prepare_topography
+from icha.surfaces.measured.topography import prepared_topography
 from icha.surfaces.moments import spectral_moments
 
 CAMPAIGN = """
@@ -51,7 +51,7 @@ def test_curvatures_are_those_of_the_surfaces(campaign):
     surface = small.surface()
     assert rms_curvature(campaign, "rough") == pytest.approx(surface.rms_curvature / surface.rms_slope, rel=0.1)
     section = campaign.surfaces["scan"]
-    scan = prepare_topography(section.path, section.preparation).surface
+    scan = prepared_topography(section.path, section.preparation).surface
     assert rms_curvature(campaign, "scan") == pytest.approx(scan.rms_curvature / scan.rms_slope)
 
 

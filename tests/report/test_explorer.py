@@ -13,7 +13,7 @@ from PIL import Image
 from typer.testing import CliRunner
 
 from icha.cli import app
-from icha.report.explorer import NothingToExplore, partners, picture, topography, write_explorer
+from icha.report.explorer import NothingToExplore, encode_map, encode_topography, find_partners, write_explorer
 
 
 @pytest.fixture(scope="module")
@@ -108,7 +108,7 @@ def test_heights_are_those_of_the_surface(folder, data):
 
 def test_large_topographies_are_means_over_blocks():
     fine = np.random.default_rng(1).normal(size=(512, 512))
-    shown = topography(xr.Dataset({"height": (("y", "x"), fine), "rms_height": 2.0}))
+    shown = encode_topography(xr.Dataset({"height": (("y", "x"), fine), "rms_height": 2.0}))
     means = fine.reshape(256, 2, 256, 2).mean(axis=(1, 3)) / 2
     assert (shown["grid"], shown["cells"]) == (512, 256)
     assert (shown["low"], shown["high"]) == (pytest.approx(means.min()), pytest.approx(means.max()))
@@ -123,7 +123,7 @@ def test_maps_are_those_of_the_runs_with_their_first_row_at_the_bottom(data):
                 pixels = np.asarray(image)
                 np.testing.assert_allclose(pixels[::-1, :, 3] / 255, run["contact_map"][k], atol=0.003)
                 assert set(map(tuple, pixels[..., :3].reshape(-1, 3))) == {(230, 0, 13)}
-    half = np.asarray(Image.open(io.BytesIO(base64.b64decode(picture(np.full((4, 4), 0.5))))).convert("RGBA"))
+    half = np.asarray(Image.open(io.BytesIO(base64.b64decode(encode_map(np.full((4, 4), 0.5))))).convert("RGBA"))
     assert (half[..., 3] == 128).all()
 
 
@@ -142,7 +142,7 @@ def test_between_stops_the_other_model_is_at_the_nearest_separation():
 
     one = path(["load", "path", "load", "path", "path"], [1, 4.0, 2, 3.5, 9], [0, 0, 0, 1, 2], [5, 4, 3, 3.5, 9])
     other = path(["path", "load", "path", "path"], [4.4, 1, 2.0, 3.6], [0, 0, 1, 1], [4.4, 3.7, 2, 3.6])
-    assert partners(one, other) == [1, 1, -1, 3, -1]
+    assert find_partners(one, other) == [1, 1, -1, 3, -1]
 
 
 def test_failures_are_shown_and_runs_without_a_stop_are_counted(folder, page, data):

@@ -26,8 +26,8 @@ from icha.report import report, studies
 from icha.report.report import ReportFigure, write_report
 from icha.report.run_times import Benchmark, read_benchmark, write_times, write_times_page
 from icha.report.sections import _draw_spectra, read_surface_statistics
-from icha.report.studies import _range, states_at_stops
-from icha.report.template import scientific
+from icha.report.studies import _range, collect_states
+from icha.report.template import format_scientific
 from icha.support.formatting import format_quantity
 
 FIGURES = tuple(f"figures/fig1_jkr.{ending}" for ending in ("png", "pdf"))
@@ -65,7 +65,7 @@ def rows(table):
 
 
 def areas_at(runs, pressure=1e-2):
-    return np.array([states_at_stops(run)["reduced_pressure", pressure]["area"] for run in runs])
+    return np.array([collect_states(run)["reduced_pressure", pressure]["area"] for run in runs])
 
 
 def seeds_of(study, seeds):
@@ -182,7 +182,7 @@ def test_unloaded_runs_have_tables_of_pull_off_and_loss(write):
     assert loss["soft"]["Jumping off, %"] == "100.0" and loss["hertz"]["Jumping off, %"] == "–"
     assert loss["hertz"]["Loss"] == "0 J/m²" and loss["hertz"]["over Δγ"] == "–"
     over = np.array([float(run["hysteresis_loss"]) / 0.05 for run in runs])
-    mean, low, high = (scientific(each) for each in (over.mean(), over.min(), over.max()))
+    mean, low, high = (format_scientific(each) for each in (over.mean(), over.min(), over.max()))
     assert loss["soft"]["over Δγ"] == f"{mean}<br>({low} … {high})".replace("-", "−")
     assert "Unions, %" not in loss["soft"], "a loss of zero in all rows has no column"
     formed, broken = loss["soft"]["Contacts formed, broken"].split("<br>")
@@ -285,7 +285,7 @@ def test_means_over_remaining_seeds_have_their_number_and_no_confidence(write, p
     separate, row = sorted(rows(means(text)), key=lambda cells: cells[3])
     assert separate[0].endswith("(model not applicable)") and separate[3] == "1 of 5"
     assert row[3] == "3 of 5" and not any("±" in cell for cell in row)
-    mean, low, high = map(scientific, (areas[2:].mean(), areas[2:].min(), areas[2:].max()))
+    mean, low, high = map(format_scientific, (areas[2:].mean(), areas[2:].min(), areas[2:].max()))
     assert row[-2].split("<br>")[0] == f"{mean} ({low} … {high})"
     assert "loss below zero" in section(text, "failures", "not-applicable")
     assert "seed 2" in section(text, "not-applicable", "studies")
@@ -378,7 +378,7 @@ def test_comparison_is_of_the_first_loading():
     assert one.sizes["reduced_pressure"] > 5
     for name in other.data_vars:
         np.testing.assert_array_equal(one[name].values, other[name].values, err_msg=name)
-    assert states_at_stops(cyclic.run(between=3)) == states_at_stops(small.run())
+    assert collect_states(cyclic.run(between=3)) == collect_states(small.run())
 
 
 def test_interpolation_is_exact_at_the_stops_and_monotone_between():

@@ -10,8 +10,8 @@ import small_campaign as small
 from typer.testing import CliRunner
 
 from icha.cli import app
-from icha.cli.live import Job, error_of, last_line
-from icha.cli.project import UserError, echo, markup, reports_errors
+from icha.cli.live import JobRecord, read_error, read_last_line
+from icha.cli.project import UserError, echo, escape_markup, reports_errors
 from icha.datasets.files import write_dataset
 from icha.datasets.surface_file import write_surface
 from icha.report.explorer import _filled
@@ -46,14 +46,14 @@ def test_commands_say_nothing_else(capsys):
     out, err = capsys.readouterr()
     assert r"\x1b[2J" in out and r"\x1b[2J" in err and err.startswith("two\n")
     assert not set("\x1b\x9b\r\b\x07\x7f\u202e") & set(out + err)
-    assert markup("[red]x[/] \x1b") == r"\[red]x\[/] \x1b"
+    assert escape_markup("[red]x[/] \x1b") == r"\[red]x\[/] \x1b"
 
 
 def test_messages_of_jobs_are_printable(tmp_path):
     (tmp_path / "log").write_text(f"working\nError: {EVIL}\nmore \x1b[1A\n", encoding="utf-8")
-    job = Job("run", "title", ("out",), ("log",), 0.0)
-    assert all(map(is_printable, [*error_of(job, tmp_path), last_line(job, tmp_path)]))
-    assert any(r"\x1b[2J" in line for line in error_of(job, tmp_path))
+    job = JobRecord("run", "title", ("out",), ("log",), 0.0)
+    assert all(map(is_printable, [*read_error(job, tmp_path), read_last_line(job, tmp_path)]))
+    assert any(r"\x1b[2J" in line for line in read_error(job, tmp_path))
 
 
 def test_no_text_of_a_file_begins_a_line_of_its_own(tmp_path):

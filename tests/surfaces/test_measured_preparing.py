@@ -14,7 +14,7 @@ from icha.configuration.topographies import inspect_scan
 from icha.datasets.files import read_dataset
 from icha.datasets.surface_file import read_surface, write_surface
 from icha.surfaces.measured.settings import UnfitTopography
-from icha.surfaces.measured.topography import prepare_topography
+from icha.surfaces.measured.topography import prepared_topography
 from icha.surfaces.spectrum import SelfAffineSpectrum
 
 TOPOGRAPHIES = Path(__file__).parents[2] / "config" / "topographies"
@@ -25,7 +25,7 @@ def prepared(tmp_path):
     def prepare(heights, **keys):
         np.save(tmp_path / "scan.npy", heights)
         keys = {"height_unit": 1.0, "size": tuple(0.5 * n for n in np.shape(heights)[::-1])} | keys
-        return prepare_topography(tmp_path / "scan.npy", preparation(**keys))
+        return prepared_topography(tmp_path / "scan.npy", preparation(**keys))
 
     return prepare
 
@@ -268,11 +268,12 @@ def test_where_coordinates_tell_the_size_their_unit_is_doubted(tmp_path):
     path = write_xyz(tmp_path / "scan.xyz")
     crop = {"x": 0.0, "y": 0.0, "side": 2000 * UM}
     with refused("crop", "units of 1 nm, see `lateral_unit`"):
-        prepare_topography(path, preparation(height_unit=NM, crop=crop))
-    assert prepare_topography(path, preparation(height_unit=NM, lateral_unit=UM, crop=crop)).surface.period == 4000 * UM
+        prepared_topography(path, preparation(height_unit=NM, crop=crop))
+    given = preparation(height_unit=NM, lateral_unit=UM, crop=crop)
+    assert prepared_topography(path, given).surface.period == 4000 * UM
     # Not where the size was given.
     with pytest.raises(UnfitTopography) as raised:
-        prepare_topography(path, preparation(height_unit=NM, size=SIZE, crop=crop))
+        prepared_topography(path, preparation(height_unit=NM, size=SIZE, crop=crop))
     assert "lateral_unit" not in str(raised.value)
 
 
@@ -304,7 +305,7 @@ def test_synthetic_scan_is_what_its_script_makes(tmp_path):
             "missing": "fill", "detrend": "curvature", "boundary": "mirror",
         }
     )  # fmt: skip
-    result = prepare_topography(TOPOGRAPHIES / "synthetic_scan.txt", json.loads(json.dumps(section.preparation)))
+    result = prepared_topography(TOPOGRAPHIES / "synthetic_scan.txt", json.loads(json.dumps(section.preparation)))
     assert result.surface.grid == 256 and result.surface.period == pytest.approx(128e-6)
     # What was put in: slopes of 0.15 of the roughness; the scratch and the filled points add a little.
     assert 0.12 < result.rms_slope < 0.2

@@ -1,4 +1,4 @@
-"""What is seen of a scan before it is used: summits, the noise of the instrument, and what is advised."""
+"""Resolution of a scan: summits, the noise of the instrument, and advice."""
 
 import numpy as np
 import pytest
@@ -29,10 +29,10 @@ def test_noise_of_each_pixel_is_found_with_its_height(boundary, noise):
     assert 3e-6 < floor.wavelength < 4.5e-6
 
 
-def test_the_slope_that_a_cut_off_leaves(looked_at):
+def test_the_slope_that_a_cut_off_leaves(examined):
     rough = SPECTRUM.realise(GRID, 1)
     for cutoff in (4e-6, 8e-6):
-        filtered = looked_at(rough, cutoff=cutoff).used
+        filtered = examined(rough, cutoff=cutoff).used
         assert filtered_slope_share(rough, cutoff) == pytest.approx(filtered.rms_slope / rough.rms_slope, rel=0.05)
 
 
@@ -51,7 +51,7 @@ def test_a_spectrum_that_falls_to_its_end_has_no_floor(hurst):
 
 
 @pytest.fixture
-def looked_at(tmp_path):
+def examined(tmp_path):
     def look(surface, **keys):
         np.save(tmp_path / "scan.npy", surface.heights)
         keys = {"height_unit": 1.0, "size": (surface.period, surface.period), "boundary": "free"} | keys
@@ -61,43 +61,43 @@ def looked_at(tmp_path):
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
-def test_against_noise_alone_no_cutoff_helps(looked_at, seed):
-    scan = looked_at(Surface(np.random.default_rng(seed).normal(size=(96, 96)), SIDE, "free"))
+def test_against_noise_alone_no_cutoff_helps(examined, seed):
+    scan = examined(Surface(np.random.default_rng(seed).normal(size=(96, 96)), SIDE, "free"))
     assert scan.noise.rms == pytest.approx(1, rel=0.1) and scan.noise.slope_share > 0.99
     assert scan.advice == {}
 
 
-def test_above_the_noise_a_cutoff_is_advised_that_removes_it(looked_at):
-    scan = looked_at(noisy(50e-9))
+def test_above_the_noise_a_cutoff_is_advised_that_removes_it(examined):
+    scan = examined(noisy(50e-9))
     assert scan.noise.wavelength <= scan.advice["cutoff"] <= 1.1 * scan.noise.wavelength
     # Eight cells for every wave of the cut-off are enough.
-    again = looked_at(noisy(50e-9), cutoff=scan.advice["cutoff"])
+    again = examined(noisy(50e-9), cutoff=scan.advice["cutoff"])
     assert again.advice == {} and again.noise == scan.noise
     assert again.summits < 0.5 * scan.summits
-    clean = looked_at(noisy(0.0), cutoff=scan.advice["cutoff"])
+    clean = examined(noisy(0.0), cutoff=scan.advice["cutoff"])
     assert abs(again.used.rms_slope / clean.used.rms_slope - 1) < 0.05
 
 
-def test_summits_are_those_of_the_surface_that_is_used(looked_at):
+def test_summits_are_those_of_the_surface_that_is_used(examined):
     for keys in ({"boundary": "free"}, {"boundary": "mirror"}, {"boundary": "window", "taper": 0.1, "grid": 96}):
-        scan = looked_at(noisy(10e-9), **keys)
+        scan = examined(noisy(10e-9), **keys)
         assert scan.summits == len(find_summits(scan.used)) + len(find_summits(scan.used).unsupported_height)
         assert scan.cells_per_summit == pytest.approx(scan.used.grid**2 / scan.summits)
         assert scan.measured.grid == GRID
 
 
 @pytest.mark.filterwarnings("ignore:grid")
-def test_summits_as_small_as_pixels_are_to_be_filtered_until_they_are_resolved(looked_at):
+def test_summits_as_small_as_pixels_are_to_be_filtered_until_they_are_resolved(examined):
     fine = SelfAffineSpectrum(SIDE, 50e-6, 2.001 * SIDE / GRID, 0.8, rms_slope=0.1).realise(GRID, 1)
-    scan = looked_at(fine)
+    scan = examined(fine)
     assert scan.noise is None and scan.cells_per_summit < 80
     assert scan.advice == {"cutoff": pytest.approx(8 * SIDE / GRID)}
-    again = looked_at(fine, **scan.advice)
+    again = examined(fine, **scan.advice)
     assert again.cells_per_summit > 80 and again.advice == {}
 
 
-def test_a_resolved_surface_needs_nothing_and_a_needlessly_fine_grid_is_told(looked_at):
+def test_a_resolved_surface_needs_nothing_and_a_needlessly_fine_grid_is_reported(examined):
     resolved = SelfAffineSpectrum(SIDE, 50e-6, 10e-6, 0.8, rms_slope=0.1).realise(GRID, 1)
-    scan = looked_at(resolved, boundary="periodic")
+    scan = examined(resolved, boundary="periodic")
     assert scan.noise is None and scan.advice == {} and scan.cells_per_summit > 80
-    assert looked_at(resolved, boundary="periodic", cutoff=10e-6).advice == {"grid": 80}
+    assert examined(resolved, boundary="periodic", cutoff=10e-6).advice == {"grid": 80}

@@ -139,29 +139,21 @@ def test_too_few_cells_per_wave_are_refused_and_few_are_warned_of():
         spectrum.realise(64, 1)
 
 
-@pytest.mark.parametrize(
-    ("argument", "value"),
-    [
-        ("period", 0.0),
-        ("period", -1.0),
-        ("period", "100 um"),
-        ("period", None),
-        ("rolloff_wavelength", 101e-6),
-        ("rolloff_wavelength", float("nan")),
-        ("short_wavelength", 20e-6),
-        ("short_wavelength", 30e-6),
-        ("short_wavelength", 0.0),
-        ("hurst", 0.0),
-        ("hurst", 1.0001),
-        ("hurst", -0.5),
-        ("hurst", True),
-        ("rms_slope", 0.0),
-        ("rms_slope", float("inf")),
-    ],
-)
-def test_bad_spectrum_is_refused_by_name(argument, value):
-    with pytest.raises(ValueError, match=argument):
-        SelfAffineSpectrum(**(SPECTRUM | {argument: value}))
+BAD_SPECTRA = {
+    "period": [0.0, -1.0, "100 um", None],
+    "rolloff_wavelength": [101e-6, float("nan")],
+    "short_wavelength": [20e-6, 30e-6, 0.0],
+    "hurst": [0.0, 1.0001, -0.5, True],
+    "rms_slope": [0.0, float("inf")],
+}
+BAD_REALISATIONS = {"grid": [64.0, 4, "64"], "seed": [-1, 1.5, None], "amplitudes": ["none"]}
+
+
+@pytest.mark.parametrize(("argument", "values"), BAD_SPECTRA.items())
+def test_bad_spectrum_is_refused_by_name(argument, values):
+    for value in values:
+        with pytest.raises(ValueError, match=argument):
+            SelfAffineSpectrum(**(SPECTRUM | {argument: value}))
 
 
 def test_a_spectrum_without_any_wave_is_refused():
@@ -169,14 +161,11 @@ def test_a_spectrum_without_any_wave_is_refused():
         SelfAffineSpectrum(1.0, 1.0, 0.999999999999, 0.8)
 
 
-@pytest.mark.parametrize(
-    ("argument", "value"),
-    [("grid", 64.0), ("grid", 4), ("grid", "64"), ("seed", -1), ("seed", 1.5), ("seed", None), ("amplitudes", "none")],
-)
-def test_bad_realisation_is_refused_by_name(argument, value):
-    good = {"grid": 64, "seed": 1, "amplitudes": "fixed"}
-    with pytest.raises(ValueError, match=argument):
-        SelfAffineSpectrum(**SPECTRUM).realise(**(good | {argument: value}))
+@pytest.mark.parametrize(("argument", "values"), BAD_REALISATIONS.items())
+def test_bad_realisation_is_refused_by_name(argument, values):
+    for value in values:
+        with pytest.raises(ValueError, match=argument):
+            SelfAffineSpectrum(**SPECTRUM).realise(**({"grid": 64, "seed": 1} | {argument: value}))
 
 
 def _with(value):

@@ -1,4 +1,4 @@
-"""Texts as people and instruments write them: the heights that they hold, or the line and what to do."""
+"""Heights in texts of people and instruments; or a message with the line and what to do."""
 
 import bz2
 import gzip
@@ -8,7 +8,7 @@ import pytest
 from scans import refused
 
 from icha.surfaces.measured.settings import Preparation, UnfitTopography
-from icha.surfaces.measured.topography import prepare_topography
+from icha.surfaces.measured.topography import prepared_topography
 from icha.surfaces.spectrum import SelfAffineSpectrum
 
 NM, UM = 1e-9, 1e-6
@@ -27,11 +27,10 @@ def text(fields, delimiter=",", heading=()):
 
 
 def read(path, **keys):
-    """Surface and description of a text, of which nothing is removed but the mean."""
+    """Prepare the surface of a text without removing a trend."""
     given = {"height_unit": NM, "size": (SIDE, SIDE)} | keys
     settings = Preparation(format="auto", boundary="periodic", missing="fill", **given)
-    prepared = prepare_topography(path, vars(settings))
-    return prepared
+    return prepared_topography(path, vars(settings))
 
 
 def written(tmp_path, content, name="scan.csv", encoding="utf-8"):
@@ -41,7 +40,7 @@ def written(tmp_path, content, name="scan.csv", encoding="utf-8"):
 
 
 def assert_heights(prepared, missing=0):
-    """The heights are those that were written, but for the mean and for what is missing."""
+    """Check the heights, except for their mean and missing points."""
     assert prepared.filled == missing
     difference = prepared.surface.heights / NM - HEIGHTS
     # Filled points shift the mean.
@@ -78,11 +77,11 @@ def test_numbers_and_coordinates_of_rows_and_columns_are_no_heights(tmp_path, st
     assert "left out" in prepared.description or corner == "y/x"
 
 
-def test_a_plane_is_no_table_with_numbered_rows(tmp_path):
+def test_a_plane_is_not_a_table_with_numbered_rows(tmp_path):
     plane = np.add.outer(np.arange(GRID), 2.0 * np.arange(GRID))
+    settings = Preparation("auto", "window", height_unit=NM, size=(SIDE, SIDE), detrend="tilt")
     with pytest.raises(UnfitTopography, match="all the same but for the trend"):
-        path = written(tmp_path, text(rows(plane)))
-        prepare_topography(path, vars(Preparation("auto", "window", height_unit=NM, size=(SIDE, SIDE), detrend="tilt")))
+        prepared_topography(written(tmp_path, text(rows(plane))), vars(settings))
 
 
 HEADINGS = {
@@ -293,17 +292,13 @@ def test_wide_characters_without_a_mark(tmp_path, encoding):
 
 def test_what_is_wrong_with_a_file_is_named(tmp_path):
     content = text(rows(), " ").encode()
+    labelled = text([[f"L{k}", *row] for k, row in enumerate(rows())])
+    below_heading = text([["x" * 3, *row] for row in rows()], heading=["a,b", ""])
     for damaged, words in (
         (gzip.compress(content)[:-200], "damaged or cut off"),
         (bz2.compress(content), "compressed by bzip2"),
-        (
-            text([[f"L{k}", *row] for k, row in enumerate(rows())]).encode(),
-            "labels in the first column.*'L0' in line 1",
-        ),
-        (
-            text([["x" * 3, *row] for row in rows()], heading=["a,b", ""]).encode(),
-            "labels in the first column.* line 3",
-        ),
+        (labelled.encode(), "labels in the first column.*'L0' in line 1"),
+        (below_heading.encode(), "labels in the first column.* line 3"),
         (text(rows()).replace("\n", "]\n").encode(), r"\]' in line 1, column 24"),
     ):
         (tmp_path / "scan.txt").write_bytes(damaged)
@@ -335,6 +330,7 @@ def test_what_is_given_instead_of_what_the_file_says_is_printed(tmp_path):
 
 # --- two hundred tables, damaged at random -------------------------------------------------------------------------
 
+WRITE = ("{:.3f}".format, "{:.6e}".format, '"{:.3f}"'.format, lambda height: f"{height:.9E}".replace("E", "D"))
 WORDS = ("", "BAD", "none", "NaN", "-", "*", "#N/A", "null")
 
 
@@ -342,12 +338,7 @@ def damaged_table(number):
     """A table with several damages: its bytes, the number of missing points, and whether a row is broken."""
     random = np.random.default_rng(number)
     delimiter = random.choice([",", ";", "\t", " "])
-    write = [
-        "{:.3f}".format,
-        "{:.6e}".format,
-        '"{:.3f}"'.format,
-        lambda height: f"{height:.9E}".replace("E", "D"),
-    ][random.integers(4)]
+    write = WRITE[random.integers(4)]
     fields = rows(write=write)
     holes = random.choice(GRID**2, random.choice([0, 1, 20]), replace=False)
     for hole in holes:
@@ -356,13 +347,8 @@ def damaged_table(number):
     broken = random.random() < 0.2
     if broken:
         row = fields[random.integers(GRID)]
-        match random.integers(3):
-            case 0:
-                row[random.integers(GRID)] = "1.2.3"
-            case 1:
-                del row[-1]
-            case 2:
-                row.append("3.1")
+        changes = (lambda: row.__setitem__(random.integers(GRID), "1.2.3"), row.pop, lambda: row.append("3.1"))
+        changes[random.integers(3)]()
     heading = random.choice(["", "# remark\n", "Sample: A1\nUnit: nm\n", "x;y;z\n\n"])
     if random.random() < 0.3:
         fields = [[str(k), *row] for k, row in enumerate(fields)]

@@ -1,4 +1,4 @@
-"""Data files of strangers: what they declare, unpack to or point to is bounded, and refused with what is allowed."""
+"""Untrusted data files: their declared and unpacked sizes and their links are bounded, with messages."""
 
 import os
 import re
@@ -18,7 +18,7 @@ from scans import COLUMNS, HEIGHTS, NM, ROWS, SIZE, refused, scan, write_xyz
 from icha.datasets.format import SURFACE, UnknownFile, identify_file
 from icha.surfaces.measured.array_files import read_height_map
 from icha.surfaces.measured.settings import UnfitTopography
-from icha.surfaces.measured.topography import prepare_topography
+from icha.surfaces.measured.topography import prepared_topography
 
 HUGE = 200_000  # nodes a side: 320 GB as floats
 LINES = {"height_unit": NM, "size": SIZE}
@@ -40,7 +40,7 @@ def declare_netcdf(path):
 
 
 def declare_classic_netcdf(path):
-    """Of the old format, which is not HDF5."""
+    """Write the old format, which is not HDF5."""
     with netCDF4.Dataset(path, "w", format="NETCDF3_64BIT_DATA") as file:
         file.set_fill_off()
         for axis in "yx":
@@ -108,7 +108,7 @@ def test_the_limit_can_be_raised_and_must_be_a_number(tmp_path, monkeypatch):
 
 
 def packed(megabytes):
-    """So many megabytes of zeros, packed to a thousandth (RFC 1950): one block of them, repeated."""
+    """Compress megabytes of zeros to a thousandth (RFC 1950): one block, repeated."""
     packer = zlib.compressobj(wbits=-15)
     block = packer.compress(bytes(10**6)) + packer.flush(zlib.Z_FULL_FLUSH)
     adler32 = (megabytes * 10**6 % 65521 << 16) + 1
@@ -117,7 +117,7 @@ def packed(megabytes):
 
 @pytest.mark.skipif(sys.platform != "linux", reason="only Linux can bound the memory of a process")
 def test_files_that_unpack_to_more_than_they_declare_are_refused(tmp_path):
-    """Read in a process of their own, with 20 MB; the chunk of the first two holds 2 GB."""
+    """Read in a separate process with 20 MB; the chunk of the first two files has 2 GB."""
     names = ("scan.h5", "scan.nc", "scan.npz")
     for name in names[:2]:
         with h5py.File(tmp_path / name, "w") as file:
@@ -139,8 +139,8 @@ def test_files_that_unpack_to_more_than_they_declare_are_refused(tmp_path):
     environment = os.environ | {"ICHA_INPUT_MB": "20", "OMP_NUM_THREADS": "1"}
     done = subprocess.run(command, env=environment, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
-    *said, more = done.stdout.splitlines()
-    assert len(said) == 3 and all(line.startswith("UnfitTopography") for line in said), said
+    *messages, more = done.stdout.splitlines()
+    assert len(messages) == 3 and all(line.startswith("UnfitTopography") for line in messages), messages
     assert int(more) < 40_000  # kB
 
 
@@ -227,7 +227,7 @@ CIRCLES = {
 @pytest.mark.parametrize("name", ["scan.h5", "scan.nc"])
 @pytest.mark.parametrize("circle", CIRCLES)
 def test_groups_with_two_names_are_refused(circle, name, tmp_path):
-    """netCDF's library breaks down at some of them, and takes the program with it."""
+    """Some of them crash the netCDF library and the program."""
     with h5py.File(tmp_path / name, "w") as file:
         file["height"] = HEIGHTS
         CIRCLES[circle](file, file.create_group("group"))
@@ -255,7 +255,7 @@ def test_soft_links_are_no_datasets(tmp_path):
         file["nowhere"] = h5py.SoftLink("/none")
         file["itself"] = h5py.SoftLink("/itself")
     assert scan(path, **LINES).heights.shape == HEIGHTS.shape
-    with pytest.raises(UnfitTopography, match="is no dataset of the file; expected one of: heights"):
+    with pytest.raises(UnfitTopography, match="is not a dataset of the file; expected one of: heights"):
         scan(path, **LINES, data="other")
 
 
@@ -275,12 +275,12 @@ def test_paths_that_are_no_files_are_not_opened(tmp_path, monkeypatch):
             ("x" * 5000, "cannot be read"),
         ):
             with refused("path", f"{flaw}.*; expected a file of heights"):
-                prepare_topography(path, settings)
+                prepared_topography(path, settings)
 
 
 @pytest.mark.parametrize("size", [2, 8, 128, 8192, 100_000])
 def test_random_bytes_are_the_file_of_no_instrument(size, tmp_path):
-    """Some formats have no signature: of these any bytes of the right number are heights."""
+    """In formats without a signature any bytes of the right number are heights."""
     (tmp_path / "scan.dat").write_bytes(np.random.default_rng(size).bytes(size))
     with pytest.raises(UnfitTopography, match="cannot be read as instrument"):
         scan(tmp_path / "scan.dat", **LINES)
@@ -331,7 +331,7 @@ NAMES += ["frt-2.frt", "top-1.top", "x3p-2_part.x3p"]
 @given(name=st.sampled_from(NAMES), data=st.data())
 @pytest.mark.filterwarnings("ignore")
 def test_damaged_and_changed_files_are_read_or_refused(whole, name, data):
-    """Bytes that are others, gone or inserted, most of them at the beginning, where headers are."""
+    """Change, remove or insert bytes, mostly at the beginning, where headers are."""
     folder, contents = whole
     content = bytearray(contents[name])
     for _ in range(data.draw(st.integers(1, 4))):
@@ -362,7 +362,7 @@ def test_damaged_and_changed_files_are_read_or_refused(whole, name, data):
         "detrend": "tilt",
     }
     try:
-        surface = prepare_topography(path, settings).surface
+        surface = prepared_topography(path, settings).surface
     except UnfitTopography as error:
         assert re.search("expected|allowed: |leave it out", str(error))
     else:

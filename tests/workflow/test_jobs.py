@@ -173,7 +173,7 @@ def test_a_job_of_an_earlier_call_completes_nothing_that_a_later_one_owns(job, t
 
 
 def campaign(before_jobs, *, dry_run=False):
-    return before_jobs.Campaign(RESULTS, "tiny", "tiny.yaml", "clone", dry_run=dry_run)
+    return before_jobs.CampaignResults(RESULTS, "tiny", "tiny.yaml", "clone", dry_run=dry_run)
 
 
 def test_a_call_that_has_no_jobs_takes_nothing_from_those_that_run(job, tmp_path, monkeypatch, before_jobs):

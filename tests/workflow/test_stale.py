@@ -84,7 +84,7 @@ def test_what_snakemake_does_not_see_is_made_again(what, now, again, tmp_path, m
     what()
     assert damaged(RESULTS) == []
     METADATA.mkdir(exist_ok=True)
-    campaign = before_jobs.Campaign(str(RESULTS), "tiny", "tiny.yaml", "clone", dry_run=False)
+    campaign = before_jobs.CampaignResults(str(RESULTS), "tiny", "tiny.yaml", "clone", dry_run=False)
     paths = [f"{RESULTS}/run.nc", f"{RESULTS}/dataset.nc"]
     campaign.have_stale_made_again(paths, [Rule(path, now) for path in paths])
     marked = {urlsafe_b64decode(file.name).decode() for file in INCOMPLETE.iterdir()} if INCOMPLETE.is_dir() else set()

@@ -4,7 +4,7 @@ from job import attributes, job_context, refuse_changed
 
 from icha.datasets.surface_file import write_surface
 from icha.surfaces.measured.array_files import read_height_map
-from icha.surfaces.measured.topography import prepare_topography
+from icha.surfaces.measured.topography import prepared_topography
 from icha.surfaces.spectrum import SelfAffineSpectrum
 from icha.surfaces.surface import Surface
 
@@ -28,7 +28,7 @@ def make_surface(output, *, name, seed, settings, height_map=None, sha256=None, 
         spectrum = SelfAffineSpectrum(**{key: settings[key] for key in SPECTRUM})
         surface = spectrum.realise(settings["grid"], seed, amplitudes=settings["amplitudes"])
     elif settings["kind"] == "measured":
-        measured = prepare_topography(height_map, {key: settings[key] for key in settings if key != "kind"})
+        measured = prepared_topography(height_map, {key: settings[key] for key in settings if key != "kind"})
         surface = measured.surface
     else:
         surface = Surface(read_height_map(height_map, settings["metres_per_unit"]), settings["period"])

@@ -25,7 +25,7 @@ from icha.surfaces.square import problem_with_heights
 _COPIES = 3
 # Formats in which any bytes of the right number are heights; only the ending of the name identifies them.
 _WITHOUT_SIGNATURE = ("hgt", "nms")
-# Formats that are no evidence of an instrument: SurfaceTopography finds them in any text with numbers, of which it
+# Formats that do not identify an instrument: SurfaceTopography finds them in any text with numbers, of which it
 # drops other fields, and in any file of a certain length.
 _OF_ANY_TEXT = ("asc", *_WITHOUT_SIGNATURE)
 # Attributes of packed numbers, and their values if they are left out.
@@ -175,14 +175,14 @@ def _is_map(shape):
 def find_maps(shapes: Mapping[Any, tuple[int, ...]]) -> list:
     """Return the names of the arrays that can be maps of heights.
 
-    Lines and single numbers of two dimensions, as which MATLAB stores them, count only if there is no other array.
+    Lines and single numbers of two dimensions, as which MATLAB stores them, count only without another array.
     """
     maps = [name for name, shape in shapes.items() if _is_map(shape)]
     return [name for name in maps if min(shapes[name][-2:]) > 2] or maps
 
 
 def _unit_of(attributes):
-    """Return the metres of the unit in a variable's attributes; None if there is none, or none of length."""
+    """Return the metres of the unit in a variable's attributes; None if it has none of length."""
     text = attributes.get("units", attributes.get("unit"))
     if isinstance(text, bytes):
         text = text.decode("utf-8", "replace")

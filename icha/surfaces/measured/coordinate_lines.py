@@ -111,7 +111,7 @@ def _equal_step(line: np.ndarray, *, rounded: bool = True) -> float | None:
 
 
 def _last_digit(numbers):
-    """Unit of the last digit of the largest number, as far as the numbers show it."""
+    """Return unit of the last digit of the largest number, as far as the numbers show it."""
     largest = np.max(np.abs(numbers))
     digits = max(len(f"{abs(number):.14e}".partition("e")[0].replace(".", "").rstrip("0")) for number in numbers)
     return 10.0 ** (np.floor(np.log10(largest)) + 1 - digits) if largest else 0.0

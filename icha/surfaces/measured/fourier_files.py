@@ -87,7 +87,7 @@ def _wave_numbers(q, settings):
     # The longest wave fixes the unit only to the digits that it is written with; the shortest one is more accurate.
     k = np.rint(q * (highest / largest))
     if np.max(np.abs(q * (np.max(np.abs(k)) / largest) - k)) > 0.01:
-        raise ValueError("the wave vectors are no multiples of the smallest one")
+        raise ValueError("the wave vectors are not multiples of the smallest one")
     _require_few(np.max(np.abs(k)))
     return k.astype(int)
 

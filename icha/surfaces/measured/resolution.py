@@ -10,7 +10,7 @@ import numpy as np
 import scipy.fft
 
 from icha.surfaces.measured.steps import LEAST_PIXELS
-from icha.surfaces.measured.topography import PreparedTopography, prepare_topography
+from icha.surfaces.measured.topography import PreparedTopography, prepared_topography
 from icha.surfaces.moments import (
     LEAST_CELLS_OF_SUMMIT,
     RESOLVED_CELLS,
@@ -128,13 +128,13 @@ def filtered_slope_share(surface: Surface, cutoff: float) -> float:
 
 
 def examine_scan(path: str | os.PathLike, preparation: Mapping) -> ScanResolution:
-    """Examine a scan; arguments and errors as `icha.surfaces.measured.topography.prepare_topography`."""
+    """Examine a scan; arguments and errors as `icha.surfaces.measured.topography.prepared_topography`."""
     raw = {key: preparation[key] for key in preparation if key not in ("cutoff", "taper")}
     if preparation["boundary"] != PERIODIC:
         raw |= {"boundary": FREE, "grid": None}
-    measured = prepare_topography(path, raw).surface
+    measured = prepared_topography(path, raw).surface
     return ScanResolution(
-        **vars(prepare_topography(path, preparation)), measured=measured, cutoff=preparation.get("cutoff")
+        **vars(prepared_topography(path, preparation)), measured=measured, cutoff=preparation.get("cutoff")
     )
 
 

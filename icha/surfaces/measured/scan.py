@@ -70,7 +70,7 @@ class Scan:
 
 
 def load_scan(path: Path, settings: Preparation) -> Scan:
-    """Read a file of any format; raises errors as `icha.surfaces.measured.topography.prepare_topography`."""
+    """Read a file of any format; raises errors as `icha.surfaces.measured.topography.prepared_topography`."""
     if not path.stat().st_size:
         raise UnfitTopography("path", "is empty; expected a file of heights")
     name, found = _read(path, settings)
@@ -101,7 +101,7 @@ def load_scan(path: Path, settings: Preparation) -> Scan:
 
 
 def _describe_replaced(settings, found):
-    """Describe the size and unit of the file that given ones replace; empty if there are none."""
+    """Describe the size and unit of the file that given ones replace; empty without them."""
     replaced = []
     if settings.size and found.size and not np.allclose(settings.size, found.size, rtol=1e-3, atol=0):
         replaced.append(f"its size {' x '.join(map(formatting.length, found.size))}")

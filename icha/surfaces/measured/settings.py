@@ -19,7 +19,7 @@ _OFF_TICK = 0.05
 
 
 class UnfitTopography(ValueError):
-    """A file that is no topography or cannot be prepared as asked; `key` is the setting at fault."""
+    """A file that is not a topography or cannot be prepared as asked; `key` is the setting at fault."""
 
     def __init__(self, key: str, message: str):
         """Keep the key and the message, which gives the reason and what is expected."""
@@ -129,7 +129,7 @@ def choose_name(asked: str | None, names: Sequence[str], usual: Sequence[str], w
     expected = f"expected one of: {', '.join(names)}"
     if asked is not None:
         if asked not in names:
-            raise UnfitTopography("data", f"is no {what} of the file; {expected if names else 'it has none'}")
+            raise UnfitTopography("data", f"is not a {what} of the file; {expected if names else 'it has none'}")
         return asked
     for name in (*usual, *(names if len(names) == 1 else ())):
         if name in names:
@@ -142,7 +142,7 @@ def choose_name(asked: str | None, names: Sequence[str], usual: Sequence[str], w
 
 
 def metres_of(unit: str) -> float | None:
-    """Return the metres of a unit; None if it is no unit of length."""
+    """Return the metres of a unit; None for units of other quantities."""
     try:
         return float(conversion_factor(str(unit), "m"))
     except ValueError:

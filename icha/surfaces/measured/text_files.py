@@ -31,7 +31,7 @@ _FEW_DIGITS = 1e-6
 
 
 def format_of_text(file: SourceFile) -> str | None:
-    """Find the format of a text by its columns; None if it is no table of numbers, or a format of an instrument."""
+    """Find the format of a text by its columns; None for an instrument, or without a table of numbers."""
     layout = file.layout
     if layout is not None and _titles(layout):
         return "xyz"
@@ -110,13 +110,14 @@ def read_xyz(file: SourceFile, settings: Preparation) -> FileContent:
     size = None
     if along_x and along_y and settings.lateral_unit is None:
         size = sides[0] * along_x, sides[1] * along_y
+    order = ", ".join(f"{axis} {titles[axis].column}" for axis in titles)
     reordered = titles and sorted(titles, key=lambda axis: titles[axis].column) != ["x", "y", "z"]
     return FileContent(
         heights.reshape(ny, nx),
         units[2] or heading.height_unit,
         size,
         sides,
-        remark=f"columns {', '.join(f'{axis} {titles[axis].column}' for axis in 'xyz')} by names" if reordered else "",
+        remark=f"columns {order} by their names" if reordered else "",
         data_known=heading.channel == settings.data,
     )
 

@@ -126,7 +126,7 @@ def _sizes(image_sides, entries, shape):
 
 
 def _length(text):
-    """Value of a length, in m if its unit is given, and whether it is; None if the text is no length."""
+    """Value of a length, in m if its unit is given, and whether it is; None for other text."""
     if not (found := _LENGTH.match(text)):
         return None
     if not found[2]:

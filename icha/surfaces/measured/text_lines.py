@@ -70,7 +70,7 @@ class Notation:
 
     Attributes
     ----------
-    delimiter : "\\t", ";", "," or None for blanks.
+    delimiter : tab, semicolon, comma or None for blanks.
     decimal_comma : whether numbers have decimal commas.
     """
 
@@ -95,7 +95,7 @@ class Notation:
         return [field.strip().strip("\"'").strip() for field in fields]
 
     def number(self, field: str) -> float | None:
-        """Return the number in a field, nan for a missing one; None if the field is no number."""
+        """Return the number in a field, nan for a missing one; None for other fields."""
         if field.lower() in _MISSING or _NAN.fullmatch(field):
             return np.nan
         if "_" in field:
@@ -108,7 +108,7 @@ class Notation:
             return None
 
     def wrong_fields(self, fields: Iterable[str]) -> list[int]:
-        """Return the indices of the fields that are no numbers."""
+        """Return the indices of the fields that are not numbers."""
         return [k for k, field in enumerate(fields) if self.number(field) is None]
 
 

@@ -37,7 +37,7 @@ class Layout:
     Attributes
     ----------
     heading : lines above the numbers, remarks included.
-    words : whether some lines of the heading are no remarks (#).
+    words : whether some lines of the heading are not remarks (#).
     first_line : number of lines above the first line of numbers.
     notation : delimiter and decimal sign.
     columns : numbers in the first line of numbers; 0 if the text has none.
@@ -75,7 +75,7 @@ class SourceFile:
 
     @cached_property
     def layout(self) -> Layout | None:
-        """How to read its lines; None if it is no text with numbers."""
+        """How to read its lines; None if it is not a text with numbers."""
         try:
             layout = _find_layout(self.path)
             if layout is not None and any(map(WIDTH.match, layout.heading)):
@@ -102,7 +102,7 @@ class SourceFile:
         Raises
         ------
         UnfitTopography
-            If it has no numbers, a field that is no number, or a row of another length; with the line's number.
+            If it has no numbers, a field that is not a number, or a row of another length; with the line's number.
         """
         layout = self.table_layout
         try:
@@ -154,11 +154,11 @@ class SourceFile:
             rows.append(np.array(row))
             line_numbers.append(number)
         usual = int(np.bincount([len(row) for row in rows]).argmax())
-        # A delimiter behind the last number of every row is no column.
+        # A delimiter after the last number of every row does not begin a column.
         if usual == layout.columns + 1 and all(np.isnan(row[-1]) for row in rows if len(row) == usual):
             rows = [row[: layout.columns] if len(row) == usual else row for row in rows]
             usual = layout.columns
-        # Between blanks an empty corner is no field.
+        # With blanks between fields an empty corner has no field.
         if layout.notation.delimiter is None and len(rows[0]) == usual - 1 and is_scale(list(rows[0])):
             rows[0] = np.array([np.nan, *rows[0]])
         for number, row in zip(line_numbers, rows, strict=True):
@@ -204,7 +204,7 @@ def _not_a_number(fields, index, line):
 
 
 def _first_lines(path):
-    """Read the lines at the beginning of a text; none if the file is no text."""
+    """Read the lines at the beginning of a text; an empty list if the file is not text."""
     with open_text(path) as file:
         start = file.read(_BEGINNING)
     return [] if "\0" in start else start.splitlines()
@@ -216,7 +216,7 @@ def _column_count(fields):
 
 
 def _find_layout(path: Path) -> Layout | None:
-    """Find the first line of numbers and how numbers are written; None if the file is no text with numbers.
+    """Find the first line of numbers and how numbers are written; None if the file is not a text with numbers.
 
     A text of nothing but remarks has no columns. Raises UnfitTopography if it is not clear whether commas are decimal.
     """
@@ -298,14 +298,14 @@ def _find_image(path, layout, data):
             heading = []
     names = tuple(image.data for image in images)
     if data is not None and data not in names:
-        raise UnfitTopography("data", f"is no image of the file; expected one of: {', '.join(names)}")
+        raise UnfitTopography("data", f"is not an image of the file; expected one of: {', '.join(names)}")
     chosen = 0 if data is None else names.index(data)
     name = names[chosen] if len(names) > 1 else ""
     return replace(images[chosen], images=names, data=name, last_line=last_lines[chosen])
 
 
 def reason_against_table(path: Path) -> str | None:
-    """Explain why a file is no table of numbers; None if it does not look like one at all."""
+    """Explain why a file cannot be read as a table of numbers; None if it does not resemble one."""
     with path.open("rb") as file:
         start = file.read(8)
     for signature, name in _OTHER_COMPRESSION.items():

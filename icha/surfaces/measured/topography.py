@@ -63,7 +63,7 @@ class PreparedTopography:
         return self.surface.rms_slope
 
 
-def prepare_topography(path: str | os.PathLike, preparation: Mapping) -> PreparedTopography:
+def prepared_topography(path: str | os.PathLike, preparation: Mapping) -> PreparedTopography:
     """Read a topography and make the surface that the settings describe.
 
     Parameters

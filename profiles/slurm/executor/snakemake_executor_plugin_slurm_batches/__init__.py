@@ -34,7 +34,7 @@ class Executor(SlurmExecutor):
         super().run_job_pre(job)
 
     def get_job_args(self, job, **kwargs):
-        """What the Snakemake on the node is to run: no more at a time than fits into the submission."""
+        """Return what Snakemake runs on the node: at most as much at a time as the submission has room for."""
         return f"{super().get_job_args(job, **kwargs)} --cores {job.threads} --resources mem_mb={job.resources.mem_mb}"
 
     def additional_general_args(self):

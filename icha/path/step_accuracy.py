@@ -1,0 +1,123 @@
+"""Accuracy of the steps of a cyclic path: whether the work and the largest tension of a step are known."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from icha.contact.model import ContactModel, State
+from icha.path.energy_balance import Step
+from icha.path.targets import UNRESOLVED_LOSS
+
+# Largest unknown work of a step where jumps have released no energy, relative to the work so far.
+UNRESOLVED_WORK = 2e-4
+# Longest step in which spots may coalesce or split, relative to the longest step of the path.
+UNION_STEP = 1 / 16
+# Largest integration error of a step without events, relative to the work so far, unless work and change of energy
+# agree.
+_CURVED_WORK = 1e-4
+# Smallest scale of the losses in tension, relative to the work so far.
+_LEAST_LOSS = 1e-2
+# Largest error of the largest tension at an event, relative to it.
+_MISSED_TENSION = 1e-3
+
+
+@dataclass(eq=False)
+class StepAccuracy:
+    """Sums over all steps of a path so far, and how accurate a further step is relative to them.
+
+    Attributes
+    ----------
+    contact : contact that the path follows.
+    longest : longest step of the separation, m.
+    effort : sum of work and losses so far, without their signs, J/m^2.
+    jump_energy : energy released by jumps so far, each as if its spot were alone, J/m^2.
+    lowest_pressure : lowest nominal pressure so far, at most zero, Pa.
+    """
+
+    contact: ContactModel
+    longest: float
+    effort: float = 0.0
+    jump_energy: float = 0.0
+    lowest_pressure: float = 0.0
+
+    def add(self, step: Step, state: State) -> None:
+        """Add a step to a state to the sums."""
+        self.effort = self.effort_after(step)
+        self.jump_energy += step.jump_energy(self.contact)
+        self.lowest_pressure = min(self.lowest_pressure, self.contact.pressure(state))
+
+    def effort_after(self, step: Step) -> float:
+        """Return the sum of work and losses with one more step, J/m^2."""
+        return self.effort + (abs(step.work) + abs(step.loss))
+
+    def allows_twice_the_length(self, step: Step) -> bool:
+        """Return whether a step of twice the length would be accurate: its error grows with the cube of its length."""
+        return 8 * step.integration_error <= _CURVED_WORK * self.effort_after(step)
+
+    def is_work_known(self, state, step):
+        """Return whether the work of a step is known well enough.
+
+        It is not if the events of the step, which may happen anywhere in it, leave too much of the work open; if spots
+        unite in a long step; or if the integral of the pressure is inaccurate and does not agree with the change of the
+        stored energy in a step without events.
+        """
+        width = abs(step.width)
+        if step.unresolved > self.unknown_work(step):
+            return False
+        # The union of two spots depends on how far they overlap when it is found.
+        if step.has_union and width > UNION_STEP * self.longest:
+            return False
+        accuracy = self.contact.path_accuracy
+        scale = effort = self.effort_after(step)
+        if step.width > 0 and self.contact.pressure(state) < 0:
+            # In compression loading and unloading visit the same stations, so that their errors cancel. In tension
+            # they do not: the error is relative to the losses.
+            scale = min(effort, max(10 * self.jump_energy, _LEAST_LOSS * effort))
+        unbalanced = step.integration_error > _CURVED_WORK * scale and abs(step.loss) > accuracy.balance * scale
+        return step.has_jump or not unbalanced or width <= self.longest / 256
+
+    def unknown_work(self, step):
+        """Return the largest work that the events of a step may leave unknown, J/m^2."""
+        effort = self.effort_after(step)
+        released = UNRESOLVED_LOSS * (self.jump_energy + step.jump_energy(self.contact))
+        return max(released, self.contact.path_accuracy.loss * effort) if released else UNRESOLVED_WORK * effort
+
+    def is_tension_known(self, start, state, step):
+        """Return whether the largest tension of a step is known well enough, as far as its events decide it."""
+        contact = self.contact
+        if step.width < 0 or not step.pressure_jump:
+            return True
+        if contact.adhesive and contact.spot_count(start) and not contact.spot_count(state):
+            return False  # the last contact breaks: found as sharply as possible
+        # The pressure may have fallen along its tangent up to the event.
+        p, slope = contact.pressure(start), -contact.stiffness(start)
+        lowest, found = min(p, p + step.width * slope), min(p, contact.pressure(state))
+        return lowest >= self.lowest_pressure or found - lowest <= _MISSED_TENSION * abs(lowest)
+
+    def find_largest_tension(self, start, state, step):
+        """Return the separation at which the tension is largest between two states without an event, m.
+
+        None if the tension has no maximum there, or a smaller one than before.
+        """
+        contact = self.contact
+        slope, end_slope = (-contact.stiffness(each) for each in (start, state))
+        if step.width < 0 or step.pressure_jump or not slope < 0 < end_slope:
+            return None
+        p, q = (contact.pressure(each) for each in (start, state))
+        # The tangents meet below the curve.
+        meet = (q - end_slope * step.width - p) / (slope - end_slope)
+        lowest = p + slope * meet
+        if lowest >= self.lowest_pressure or min(p, q) - lowest <= contact.path_accuracy.tension * abs(lowest):
+            return None
+        lowest_at = _minimum_of_cubic(step.width, (p, q), (slope, end_slope))
+        return start.separation + (meet if lowest_at is None else lowest_at)
+
+
+def _minimum_of_cubic(width, values, slopes):
+    """Return where the cubic with these values and slopes at 0 and `width` has its lowest turn between; or None."""
+    # The import takes long, and loading does not need it.
+    from scipy.interpolate import CubicHermiteSpline
+
+    curve = CubicHermiteSpline([0.0, width], values, slopes)
+    turns = [u for u in curve.derivative().roots(extrapolate=False) if 0 < u < width]
+    return min(turns, key=curve, default=None)
