@@ -70,7 +70,7 @@ class ConvergenceError(RuntimeError):
         self.dataset = dataset
 
     def __reduce__(self):
-        """Keep the dataset when the error is pickled."""
+        """Pickle the error together with its dataset."""
         return type(self), (self.args[0], self.dataset)
 
 
@@ -163,7 +163,7 @@ def empty_run(
 ) -> xr.Dataset:
     """Return the dataset of a run that could not be computed: no step, and the reason in the attribute `incomplete`.
 
-    The arguments are those of `simulate`.
+    The arguments are the same as those of `simulate`.
     """
     record, summits = _PathRecord(reason), locate_summits(surface)
     coverage = SummitCoverage.of(surface, summits)
@@ -270,7 +270,7 @@ class _PathRecord:
 
 
 def _count_uphill_jumps_in(record: _PathRecord) -> int:
-    """Count the jumps into contact that take energy, by the law of the spot alone or by the energy balance."""
+    """Count the jumps into contact that cost energy, by the law of a single spot or by the energy balance."""
     gained = np.diff([step["dissipated_by_jump_in"] for step in record.steps], prepend=0.0) < 0
     return sum(
         int(np.count_nonzero((events.kind == JUMP_IN) & ((events.energy < 0) | uphill)))

@@ -25,7 +25,7 @@ ANOTHER_FOLDER = "use another folder: `icha run --directory FOLDER`, `snakemake 
 
 
 def prepare_process() -> None:
-    """Set what jobs inherit from this process."""
+    """Set the environment variables that jobs inherit from this process."""
     if sys.platform == "linux":
         # Jobs end with this process: see workflow/scripts/job.py.
         os.environ["ICHA_SNAKEMAKE"] = f"{os.getpid()} {beginning_of(os.getpid())}"
@@ -163,10 +163,10 @@ class CampaignResults:
         _warn(f"{why}, to be made again: {file}{aside}")
 
     def begin(self, missing: str | None = None) -> None:
-        """Take over the results before the first job: jobs that an earlier call left running cannot change them.
+        """Make this call the owner of the results before its first job starts.
 
-        Results are inspected again, since such a job may have changed them in the meantime. A call that only reports
-        never comes here.
+        From then on, jobs of an earlier call cannot change the results. The results are inspected again, because such
+        a job may have changed them since the first inspection. A call that only reports does not call this method.
 
         Parameters
         ----------

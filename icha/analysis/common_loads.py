@@ -81,8 +81,8 @@ def compare_runs(study: xr.Dataset, *, attrs: Mapping[str, str] = {}) -> xr.Data
     `_at_load` on the second:
 
     - `contact_area_fraction` and `reduced_separation` along the labels of the runs;
-    - their mean, standard deviation and half the width of the 95 % confidence interval over the seeds (`area_mean`,
-      `area_deviation`, `area_confidence`, `separation_mean`, …; `icha.support.statistics`);
+    - over the seeds, the mean, the standard deviation and half the width of the 95 % confidence interval of both
+      (`area_mean`, `area_deviation`, `area_confidence`, `separation_mean`, …; `icha.support.statistics`);
     - `material_spread` and `slope_spread`: the largest over the smallest area of all materials (slopes), minus one.
 
     Incomplete runs (`status`) have no values and do not count. Runs to which the asperity model is not applicable are

@@ -79,8 +79,8 @@ def model_error(
     - `<name>_mean` over the seeds for names in `SUMMARISED`, and from two seeds on `<name>_deviation`, the standard
       deviation;
     - modulus, energy, range and Tabor parameter of the runs;
-    - `status(surface, seed, rms_slope, material)`: which combinations have solutions and a complete run; values of the
-      others are missing.
+    - `status(surface, seed, rms_slope, material)`: whether a combination of labels has solutions and a complete run;
+      without both, its values are missing.
 
     Raises
     ------

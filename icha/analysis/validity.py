@@ -219,7 +219,7 @@ def _surfaces(cases):
 
 
 def _accuracy(cases):
-    """State the error of the asperity model, which is known where surface and material are within the validation."""
+    """State the error of the asperity model, which is known for surfaces and materials within the validation."""
     unknown, adhesive = {}, set()
     for case in cases:
         of_surface = outside_validation({name: case.facts[name] for name in case.facts if name != _RATIO})
@@ -348,7 +348,7 @@ def _used(models):
 
 
 def _error(adhesive):
-    """Describe the errors against boundary elements; `adhesive` holds True, False or both, for with and without."""
+    """Describe the errors against boundary elements; `adhesive` contains True for runs with adhesion, False without."""
 
     def describe(quantity):
         ranges = [VALIDATION[each][quantity] for each in sorted(adhesive, reverse=True)]

@@ -1,6 +1,6 @@
 """Full contact: its energy, and the pressures at which it is complete and opens.
 
-They show before any computation whether a surface is sticky. In full contact the pressure p(q) = q E* h(q)/2 flattens
+They show before a run whether a surface is sticky. In full contact the pressure p(q) = q E* h(q)/2 flattens
 the waves of the surface.
 
 B. N. J. Persson and E. Tosatti, J. Chem. Phys. 115 (2001) 5597-5610, doi:10.1063/1.1398300 (energy).

@@ -17,5 +17,6 @@ Read the modules in this order:
 `front_solver`      the front at a given separation: Newton steps, each of which lowers the energy.
 `local_relaxation`  the same in small windows, where few places of a large contact are far from equilibrium.
 `adhesive`          both together, with new contact at summits; `load_control` for given loads and areas.
+`full_contact`      contact without gaps: a closed form, and where it opens.
 `contact`           all of this as a contact model; `patches` and `observables` for its results.
 """

@@ -7,10 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from icha.boundary_elements.cells import mask_of
-from icha.boundary_elements.elastic_contact import AdhesiveContact, Contact, Topography
-from icha.boundary_elements.front import Front
+from icha.boundary_elements.elastic_contact import AdhesiveContact, Contact
 from icha.boundary_elements.front_solver import FrontProblem, relax_front
-from icha.boundary_elements.half_space import HalfSpace
 from icha.boundary_elements.local_relaxation import relax_in_windows
 from icha.contact.model import NotConverged
 
@@ -71,15 +69,7 @@ class Summits:
 
 
 def solve_adhesive_contact(
-    space: HalfSpace,
-    front: Front,
-    topography: Topography,
-    summits: Summits,
-    separation: float,
-    contact: Contact,
-    tolerance: float,
-    *,
-    close: bool = False,
+    problem: FrontProblem, summits: Summits, contact: Contact, tolerance: float, *, close: bool = False
 ) -> tuple[AdhesiveContact, int]:
     """Solve the contact at a separation: relax the fronts, and form contact at all summits within reach.
 
@@ -87,7 +77,8 @@ def solve_adhesive_contact(
 
     Parameters
     ----------
-    separation : mean separation, in cells.
+    problem : the surface at a separation.
+    summits : where contact may form.
     contact : to start from.
     tolerance : residual of the fronts.
     close : whether the contact is so close to equilibrium that it is clear where contact forms.
@@ -98,22 +89,19 @@ def solve_adhesive_contact(
 
     Raises
     ------
-    FullContact
-        If the contact covers the surface.
     NotConverged
         If the equilibrium is not found.
     """
-    problem = FrontProblem(space, front, topography, separation)
-    margin = _CLEAR_DISTANCE * front.critical_opening
+    margin = _CLEAR_DISTANCE * problem.front.critical_opening
 
     def relax_locally(state, far):
-        return relax_in_windows(space, front, separation, state, state.gap, far)
+        return relax_in_windows(problem.space, problem.front, problem.separation, state, state.gap, far)
 
     stages = [(_CLEAR_RESIDUAL, margin), (_CERTAIN_RESIDUAL, 0.0), (tolerance, 0.0)]
     if tolerance > _CERTAIN_RESIDUAL:
         stages[1:] = [(tolerance, margin)]
     first = len(stages) - 1 if close else 0
-    tried, rounds, stage = np.zeros(space.size, dtype=bool), 0, first
+    tried, rounds, stage = np.zeros(problem.space.size, dtype=bool), 0, first
     while True:
         residual, distance = stages[stage]
         solved = relax_front(problem, contact, residual, close=close, relax_locally=relax_locally)

@@ -5,17 +5,18 @@ from __future__ import annotations
 import hashlib
 import pathlib
 from dataclasses import dataclass, replace
-from functools import cached_property
 from importlib.metadata import version
 
 import numpy as np
 
+from icha.asperity.full_contact import theoretical_strength
 from icha.asperity.jkr import JKR
 from icha.asperity.material import Material
 from icha.boundary_elements.adhesive import Summits, solve_adhesive_contact
 from icha.boundary_elements.elastic_contact import Contact, Topography, solve_nonadhesive_contact
 from icha.boundary_elements.front import Front, adhesive_areas, reported_area_gradient, reported_areas
-from icha.boundary_elements.front_solver import TOLERANCES, find_active_cells, rates_with_separation
+from icha.boundary_elements.front_solver import TOLERANCES, FrontProblem, find_active_cells, rates_with_separation
+from icha.boundary_elements.full_contact import ROUNDING, FullContactProblem
 from icha.boundary_elements.half_space import HalfSpace
 from icha.boundary_elements.load_control import ControlProblem, solve_at_control
 from icha.boundary_elements.observables import PatchObservables
@@ -31,58 +32,18 @@ from icha.boundary_elements.patches import (
 from icha.contact.checkpoints import CheckpointedContact
 from icha.contact.model import AREA_FRACTION, PRESSURE, Control, Events, NotConverged
 from icha.contact.models import MODELS, REFERENCE_MODEL, PathAccuracy
-from icha.surfaces.summits import Asperities, locate_summits
+from icha.surfaces.summits import locate_summits
 from icha.surfaces.surface import Surface
 
 # Smallest critical opening over the largest height; below, rounding of the heights hides it.
 _SMALLEST_OPENING = 1e-4
 # Largest change of a fraction of contact for which rates predict the next state.
 _LARGEST_PREDICTION = 0.25
-# Mean gap, in h_rms, below which contact is full: the pressures of smaller gaps are lost in rounding.
-_SMALLEST_GAP = 1e-4
-# Relative difference of pressures of full contact that is rounding.
-_ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class BoundaryElements:
-    """`icha.contact.model.ContactModel` of a periodic rough surface against a half-space, cell by cell.
-
-    Parameters
-    ----------
-    heights : (n, n), m.
-    spacing : size of a cell, m.
-    law : of one summit, for the reach of its attraction.
-    rms_height, rms_slope : of the surface, m and 1.
-    asperities : its summits.
-    space, topography, front, summits : the same for the solver, in units of cells and E*.
-    """
-
-    heights: np.ndarray
-    spacing: float
-    law: JKR
-    rms_height: float
-    rms_slope: float
-    asperities: Asperities
-    space: HalfSpace
-    topography: Topography
-    front: Front
-    summits: Summits
-
-    @property
-    def adhesive(self) -> bool:
-        """Whether contact forms and breaks in jumps."""
-        return self.law.material.surface_energy > 0
-
-    @property
-    def contact_modulus(self) -> float:
-        """E*, Pa."""
-        return self.law.material.contact_modulus
-
-    @property
-    def pressure_unit(self) -> float:
-        """E* h'_rms, Pa."""
-        return self.contact_modulus * self.rms_slope
+class BoundaryElements(FullContactProblem):
+    """`icha.contact.model.ContactModel` of a periodic rough surface against a half-space, cell by cell."""
 
     @property
     def area(self) -> float:
@@ -91,7 +52,7 @@ class BoundaryElements:
 
     @property
     def largest_area_fraction(self) -> float:
-        """All of it: full contact ends a path by itself."""
+        """Return 1: the model covers full contact."""
         return 1.0
 
     @property
@@ -107,36 +68,6 @@ class BoundaryElements:
             separation = float(np.max(first, initial=separation))
         nothing = np.zeros(0)
         return CellState(separation, nothing.astype(int), nothing, nothing, nothing)
-
-    @cached_property
-    def full_contact_pressure(self) -> np.ndarray:
-        """Pressure of full contact less its mean, (n, n), Pa."""
-        return self.contact_modulus * self.space.full_contact_pressure(self.topography.double)
-
-    @property
-    def interface_strength(self) -> float:
-        """Tension at which contact opens without a front: the theoretical strength of the interface, Pa."""
-        return self.front.interface_strength * self.contact_modulus if self.adhesive else 0.0
-
-    @property
-    def smallest_gap(self) -> float:
-        """Mean gap below which contact is full, m."""
-        return _SMALLEST_GAP * self.rms_height
-
-    @property
-    def opening_pressure(self) -> float:
-        """Nominal pressure of full contact at which it opens on unloading, Pa."""
-        return -float(self.full_contact_pressure.min()) - self.interface_strength
-
-    def full_contact(self, pressure: float) -> CellState:
-        """Full contact under a nominal pressure, Pa: closed form."""
-        ones = np.ones(self.heights.size)
-        cells = np.arange(self.heights.size)
-        return CellState(0.0, cells, ones, self.full_contact_pressure.ravel() + pressure, ones, pressure_slope=-np.inf)
-
-    def is_full(self, state: CellState) -> bool:
-        """Whether a state is full contact."""
-        return state.separation == 0 and len(state.cells) == self.heights.size
 
     def equilibrium(
         self, state: CellState, separation: float, control: Control | None = None, *, let_go: int = 0
@@ -158,7 +89,7 @@ class BoundaryElements:
         """Equilibrium from a state that is not full contact; arguments as of `equilibrium`."""
         if control is None:
             closed = separation < self.smallest_gap
-            return self.full_contact(self._closing_pressure) if closed else self._solve(state, separation)
+            return self.full_contact(self.closing_pressure) if closed else self._solve(state, separation)
         if not self.adhesive and control.quantity == PRESSURE and control.target > 0 and len(state.cells):
             if control.target >= self.opening_pressure:
                 return self.full_contact(control.target)
@@ -168,33 +99,15 @@ class BoundaryElements:
     def _leave_full_contact(self, state, separation, control):
         """Equilibrium from full contact, which opens at the weakest place; arguments as of `equilibrium`."""
         if control is None and separation <= 0:
-            return self.full_contact(self._closing_pressure)
+            return self.full_contact(self.closing_pressure)
         if control is not None and control.quantity == PRESSURE and control.target >= self.opening_pressure:
             return self.full_contact(control.target)
         if control is not None and control.quantity == AREA_FRACTION and control.target >= 1:
             return state
-        if control is None and self.pressure(state) > self.opening_pressure + _ROUNDING * self.contact_modulus:
+        if control is None and self.pressure(state) > self.opening_pressure + ROUNDING * self.contact_modulus:
             return self.full_contact(self.opening_pressure)
         separation = max(separation, self.smallest_gap)
-        return self._next_equilibrium(self._open_weakest(separation), separation, control)
-
-    def _open_weakest(self, separation):
-        """Full contact after the cells of least pressure opened, so many that they hold the mean gap (m)."""
-        pressure = self.full_contact_pressure.ravel() - self.full_contact_pressure.min()
-        # Around the first gap the pressure is that of a front, not that which opened it.
-        pressure -= self.front.strength * self.contact_modulus
-        opening = max(self.front.critical_opening * self.spacing, separation)
-        count = int(min(1 + separation / opening * pressure.size, pressure.size / 2))
-        # Cells of equal pressure open together, as symmetry wants.
-        limit = np.partition(pressure, count - 1)[count - 1] + _ROUNDING * self.contact_modulus
-        closed = np.flatnonzero(pressure > limit)
-        ones = np.ones(len(closed))
-        return CellState(0.0, closed, ones, pressure[closed], ones)
-
-    @property
-    def _closing_pressure(self):
-        """Nominal pressure, Pa, that stands for any that closes the contact: the mean gap alone does not decide it."""
-        return 10 * max(float(np.abs(self.full_contact_pressure).max()), self.interface_strength)
+        return self._next_equilibrium(self.open_weakest(separation), separation, control)
 
     def observables(self, surface: Surface) -> PatchObservables:
         """Observables of the states on a surface."""
@@ -272,16 +185,9 @@ class BoundaryElements:
         """Equilibrium at a separation (m), to a residual of the front; arguments as of `ControlProblem.solve`."""
         if not self.adhesive:
             return self._solve_nonadhesive(state, separation=separation / self.spacing)
-        solved, pending = solve_adhesive_contact(
-            self.space,
-            self.front,
-            self.topography,
-            self.summits,
-            separation / self.spacing,
-            self._predict(state, separation),
-            residual,
-            close=close,
-        )
+        problem = FrontProblem(self.space, self.front, self.topography, separation / self.spacing)
+        start = self._predict(state, separation)
+        solved, pending = solve_adhesive_contact(problem, self.summits, start, residual, close=close)
         new = CellState(
             separation,
             solved.cells,
@@ -344,11 +250,6 @@ class BoundaryElements:
         return self._energy_of_cells(state) if self.adhesive else np.zeros(len(state.cells))
 
 
-def theoretical_strength(material: Material) -> float:
-    """Largest tension of an interface with the attraction of Lennard-Jones' law, 16/(9 sqrt(3)) dgamma/range, Pa."""
-    return 16 / (9 * np.sqrt(3)) * material.surface_energy / material.interaction_range
-
-
 def contact_of(surface: Surface, material: Material) -> BoundaryElements:
     """Contact of a surface and a material.
 
@@ -368,7 +269,7 @@ def contact_of(surface: Surface, material: Material) -> BoundaryElements:
         -jump_in / h,
         law.contact_radius(jump_in, asperities.radius_of_curvature) / h,
     )
-    strength = theoretical_strength(material) / material.contact_modulus
+    strength = theoretical_strength(material.surface_energy, material.interaction_range) / material.contact_modulus
     front = Front(material.surface_energy / (material.contact_modulus * h), strength)
     if 0 < front.critical_opening < _SMALLEST_OPENING * np.abs(surface.heights).max() / h:
         raise ValueError(

@@ -137,8 +137,6 @@ def solve_active_set(
     ------
     FullContact
         If the contact covers the surface at a given separation, which is the mean gap.
-    NotConverged
-        If pressures or the active set are not found.
     """
     dtype = np.float32 if tolerance > topography.rounding else float
     keep, gap, before, changing = np.full(len(contact.cells), sticky), None, np.inf, not sticky
@@ -157,13 +155,16 @@ def solve_active_set(
             gap, misfit, separation = _gap(space, topography, contact, separation, load, dtype, gap)
         left = np.abs(misfit).max(initial=0.0)
         joining = _overlapping_cells(gap, contact.cells, max(tolerance, left))
-        least = left if dtype is float and not sticky else 0.0
-        changed = _next_active_set(contact, keep, joining, least)
+        changed = _next_active_set(contact, keep, joining, left if dtype is float and not sticky else 0.0)
         if changed is None:
             if left <= tolerance:
                 cells, fraction, pressure = contact.cells, contact.fraction, contact.pressure
                 return ElasticContact(cells, fraction, pressure, gap, separation, misfit, tolerance)
             if not left <= LEAST_GAIN * before:
+                if dtype == np.float32 and np.isfinite(left):
+                    # Displacements much larger than the heights are rounded more.
+                    dtype, gap, before = float, None, np.inf
+                    continue
                 raise NotConverged(f"the pressures in contact did not converge (displacement error {left:.1e} cells)")
             before, changing = left, False
             continue

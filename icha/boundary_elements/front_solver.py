@@ -51,7 +51,7 @@ class FrontTolerances:
     """
 
     front: float = 1e-6
-    stagnation: float = 1e-4
+    stagnation: float = 1e-3
     displacement: float = 1e-9
     moving_displacement: float = 0.1
     certain_displacement: float = 1e-5

@@ -145,7 +145,8 @@ def solve_at_control(problem: ControlProblem, state: CellState, separation: floa
             bracket = whole.with_state(found, problem.error(found))
             separation = bracket.limit(problem.newton_separation(found))
     except FullContact:
-        if control.quantity == PRESSURE and control.target >= contact.opening_pressure:
+        # The load is larger than that of the smallest gap.
+        if control.quantity == PRESSURE and whole.sign > 0:
             return contact.full_contact(control.target)
         reason = ": the contact closes over the whole surface"
     except NotConverged as failure:

@@ -37,7 +37,7 @@ class Check:
 
 @dataclass(frozen=True)
 class RunArrays:
-    """Arrays of a run by name; for thousands of small runs the labels of xarray would cost more than the checks."""
+    """Arrays of a run by name, without xarray, whose labels take more time than the checks of a small run."""
 
     values: dict[str, np.ndarray]
     sizes: dict[str, int]

@@ -132,10 +132,10 @@ def work_error(run) -> float:
 def _unresolved_work(run):
     """Bound the error of the work of the steps with events, J/m^2; an event may happen anywhere in its step.
 
-    An event changes the work by its change of pressure, times its distance from the middle of the step. An event that
-    changes the stiffness alone changes it by a part of the difference that this makes to the integral. No step leaves
-    more open than UNRESOLVED_LOSS of the energy of all jumps, or than the model's
-    accuracy of a loss, relative to the work and losses so far.
+    The bound of a step has two terms: `unresolved_work` from the jump of the pressure, and `integration_error` from the
+    change of the stiffness (an event may change the stiffness alone). The sum over all steps with events is limited to
+    their number times the larger of two energies: UNRESOLVED_LOSS times the energy of all jumps, and the model's
+    accuracy of a loss times the sum of all changes of work and loss.
     """
     events = sum(np.diff(run[name]) for name in EVENT_COUNTS) > 0
     events &= np.diff(run["dissipated_by_load_jump"]) == 0  # there the pressure is constant

@@ -20,7 +20,7 @@ from icha.path.targets import AREA_FRACTION, BETWEEN
 RESIDUAL_LIMIT = 1e-8
 TARGET_LIMIT = 1e-8
 # Largest residual of the fronts of boundary elements, which converge to 1e-6 or stagnate below this limit.
-FRONT_LIMIT = 1e-4
+FRONT_LIMIT = 1e-3
 # Largest fall of the contact area of boundary elements, over its maximum. Positions of fronts within their cells are
 # known less accurately, so that the area may seem to fall a little where a front enters another cell.
 CELL_LIMIT = 1e-3

@@ -306,7 +306,7 @@ def _listen(reading: int, progress, view, stopped: list) -> None:
 
 
 def _print_outcome(status: int, stopped: bool, progress, campaign, folder: Path, log: Path, expected) -> None:
-    """Print the jobs done and failed with reasons, and where results and log are; `expected` is the duration in s."""
+    """Print the numbers of finished jobs, the reasons of failures, and the paths of results and log; `expected`: s."""
     from icha.support.atomic_files import probe_folder
 
     results = folder / "results" / campaign.name

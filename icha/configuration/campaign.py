@@ -173,7 +173,7 @@ class Campaign(Section):
     def snapshots_of(self, study: str) -> list[tuple[str, float]] | None:
         """Return kind and value of all states that the runs of a study save; None if they save their last one.
 
-        The loads of the boundary elements beside the study are among them.
+        The result includes the loads at which the section `finite_range` solves the surfaces of this study.
         """
         loads = sorted({p for e in self.finite_range.values() if e.study == study for p in e.reduced_pressures})
         if self.studies[study].snapshots is None and not loads:

@@ -109,12 +109,13 @@ def run_sha256(campaign: Campaign, case: RunLabels) -> str:
 def campaign_sha256(campaign: Campaign, of_run: Callable[[RunLabels], str] | None = None) -> str:
     """Compute the checksum of everything that determines the runs of a campaign, without its figures and title.
 
-    `of_run` returns the checksum of a run (`run_sha256`), if the checksums are known already.
+    If the checksums of the runs are known already, pass `of_run`, a function that returns the checksum of a run.
+    Without `of_run`, `run_sha256` computes the checksums.
     """
     of_run = of_run or partial(run_sha256, campaign)
     return _sha256({case.path: of_run(case) for case in run_cases(campaign)})
 
 
 def _sha256(settings) -> str:
-    """Compute the checksum of settings, whatever their order and the units in the configuration."""
+    """Compute the checksum of settings, which does not depend on the order of their keys."""
     return hashlib.sha256(json.dumps(settings, sort_keys=True).encode()).hexdigest()

@@ -197,7 +197,7 @@ def _zip_problems(prefix, study, lists) -> Iterator[Problem]:
 
 
 class _Variants:
-    """Surfaces and materials with varied parameters, each made once."""
+    """Surfaces and materials with varied parameters; each combination of values exists once."""
 
     def __init__(self, campaign: Campaign, content: Mapping):
         self._campaign, self._content = campaign, content

@@ -100,7 +100,7 @@ class Draft:
 
 
 def _has(content: Any, keys: tuple) -> bool:
-    """Tell whether nested mappings have a value at some keys, or another value in place of a mapping."""
+    """Return whether nested mappings have a value at a path of keys, or a value other than a mapping before its end."""
     for key in keys:
         if not isinstance(content, Mapping):
             return True

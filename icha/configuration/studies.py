@@ -277,7 +277,7 @@ class Study(Section):
         return settings
 
     def problems(self, snapshots: list[tuple[str, float]] | None) -> Iterator[Problem]:
-        """Report why the study cannot be run with these snapshots (`Campaign.snapshots_of`)."""
+        """Yield the reasons why the study cannot run with these snapshots (`Campaign.snapshots_of`)."""
         # The smallest slope makes the largest reduced pressure.
         slope = min((slope for slope in self.rms_slopes if slope != MEASURED), default=math.inf)
         most = (MAX_REDUCED_PRESSURE if DEFAULT_MODEL in self.models else LARGEST_REDUCED_PRESSURE) * slope
@@ -300,7 +300,11 @@ class Study(Section):
             targets += [((key, k, state.target[0]), *state.target) for k, state in enumerate(states)]
         for location, kind, value in targets:
             if kind in ASPERITY_RANGES and value > ASPERITY_RANGES[kind].most:
-                yield location, value, f"must be {ASPERITY_RANGES[kind].expected}; or use models: [boundary_elements]"
+                yield (
+                    location,
+                    value,
+                    f"is out of range; expected {ASPERITY_RANGES[kind].expected}, or models: [boundary_elements]",
+                )
 
     def _path_problems(self, snapshots):
         """Report why the settings make no path."""

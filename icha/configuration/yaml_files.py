@@ -110,7 +110,8 @@ class _Loader(yaml.SafeLoader):
     def construct_unless_text(self, node, construct):
         """Construct the value of a scalar; return its text if that fails, which the section then checks.
 
-        `0b_` and a 30th of February only look like a number and a date, and Python refuses thousands of digits.
+        Examples of scalars that fail: `0b_` looks like a number, 30 February looks like a date, and Python refuses
+        integers of thousands of digits.
         """
         text = self.construct_scalar(node)
         # YAML 1.1 would read a time such as 1:30 as a number of base 60.

@@ -36,7 +36,7 @@ class NotConverged(Exception):
 
 
 class FullContact(NotConverged):
-    """Error: the contact spread over the whole surface."""
+    """Error: the contact has spread over the whole surface."""
 
 
 # Kinds of events, and their names.
@@ -162,7 +162,7 @@ class ContactModel(Protocol[S]):
         """Elastic energy less that of adhesion over nominal area, J/m^2; zero out of contact."""
 
     def is_unstable(self, state: S) -> bool:
-        """Return true if a spot would approach as the surfaces part, which happens on an unstable branch only."""
+        """Return true if a spot would approach as the surfaces move apart, as on an unstable branch only."""
 
     def events_between(self, before: S, after: S) -> Events:
         """Return the events on the path from one state to a later one."""

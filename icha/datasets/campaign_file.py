@@ -87,7 +87,7 @@ class Column(NamedTuple):
 
 
 class Group(NamedTuple):
-    """The group of a study, defined and empty.
+    """The group of a study: its dimensions and variables are defined, and no values are written yet.
 
     Attributes
     ----------
@@ -389,7 +389,7 @@ class _SharedVariable:
         self.known = np.zeros(shape[: len(column.along) + snapshot], bool)
 
     def put(self, labels: RunLabels, place: tuple[int, ...], slots: tuple, values: np.ndarray) -> None:
-        """Take the values of a run, or compare them."""
+        """Store the values of a run; if these labels have values already, check that both are equal."""
         index = (*place, *slots)
         known, present = self.known[index[: self.known.ndim]], self.values[index]
         if np.all(known) and np.array_equal(present, values):
@@ -421,7 +421,7 @@ class _RaggedVariables:
         self.runs, self.pending, self.written = [], 0, 0
 
     def add(self, position: tuple[int, ...], values: Mapping[str, np.ndarray], snapshots: list[int]) -> None:
-        """Take the values of a run at a position; its spots are sorted by the positions of their snapshots."""
+        """Store the values of a run at a position; its spots are sorted by the positions of their snapshots."""
         found = {name: values[name] for name in self.variables if name in values}
         count = len(next(iter(found.values()), ()))
         if not count:

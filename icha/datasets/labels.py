@@ -1,8 +1,9 @@
 """Labels of the runs of a campaign and of references, and their positions in a dataset.
 
-The labels are dimensions, and their values coordinates. `rms_slope` is one of them where surfaces have the same rms
-slopes. Where each has different slopes, as measured surfaces have, a rectangle of surfaces and slopes would be nearly
-empty: `rms_slope(surface, rms_slope)` then holds the slopes of every surface, with missing values after the last one.
+The labels are dimensions, and their values coordinates. If all surfaces have the same rms slopes, `rms_slope` is one of
+the labels. Measured surfaces have different slopes, and an array of all surfaces and all slopes would be nearly empty.
+Then the coordinate `rms_slope(surface, rms_slope)` contains the slopes of every surface, with missing values after the
+last slope.
 """
 
 from __future__ import annotations
@@ -64,7 +65,7 @@ LABELS = RunLabels._fields[1:]
 
 
 class ContactLabels(NamedTuple):
-    """Labels of a contact that an entry of the references asks for."""
+    """Labels of a contact that an entry of `finite_range` or `boundary_element_loops` requests."""
 
     entry: str
     surface: str
@@ -79,7 +80,7 @@ class ContactLabels(NamedTuple):
 
 
 class SolutionLabels(NamedTuple):
-    """Labels of a boundary-element solution: the entry that asks for it, the run compared with it, and its load."""
+    """Labels of a boundary-element solution: the entry that requests it, the run to compare, and the load."""
 
     entry: str
     study: str
@@ -119,7 +120,7 @@ def number_label(value: float) -> str:
 
 
 def arrange_slopes(pairs: Iterable[tuple[str, float]]) -> np.ndarray:
-    """Arrange rms slopes in ascending order: common ones, or a row for every surface if that takes fewer cells.
+    """Arrange rms slopes in ascending order: one row for all surfaces, or one row per surface if this is smaller.
 
     Parameters
     ----------
@@ -167,7 +168,7 @@ def surfaces_and_slopes(data: xr.Dataset) -> list[tuple[str, float]]:
 
 
 def labels_at(data: xr.Dataset, place: Sequence[int], labels: Sequence[str]) -> list[Any]:
-    """Return the values of the labels at a position along them."""
+    """Return the values of the labels at the indices `place`."""
     at = dict(zip(labels, place, strict=True))
     coordinates = (data.variables[label] for label in labels)
     return [np.asarray(each.values[tuple(at[dim] for dim in each.dims)]).item() for each in coordinates]

@@ -41,7 +41,7 @@ class ResultFiles:
     folder: str = ""
 
     def path(self, pattern: str, case: NamedTuple | None = None, **names: object) -> str:
-        """Return the path of one file; fields are those of the campaign, of the labels of a case, or `names`."""
+        """Return the path of one file: the pattern, filled with the campaign, the labels of a case, and `names`."""
         of_case = {} if case is None else labels.path_fields(case)
         return "/".join(filter(None, (self.folder, pattern.format(campaign=self.campaign, **of_case, **names))))
 

@@ -8,8 +8,9 @@ variable's largest count as that large. The residual of a solver is not known to
 within tolerance if they differ by at most what is allowed of one (`NOISE`).
 
 Everything else has to be equal: integers, text, places of missing values, dimensions, types, attributes. Storage
-(chunks, compression, order in the file) is not compared. Figures and the report are drawn from what is compared here,
-with libraries and fonts that may differ; if only they differ, that is a remark.
+(chunks, compression, order in the file) is not compared. Figures and the report are drawn from the compared values, by
+libraries and fonts that may differ. If only figures or the report differ, the comparison makes a remark and counts no
+difference.
 """
 
 import json

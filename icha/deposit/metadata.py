@@ -156,10 +156,10 @@ def _cff_author(author: Author) -> dict[str, str | None]:
 
 
 def zenodo_metadata(publication: Publication) -> dict[str, Any]:
-    """Return the metadata of `.zenodo.json`, as Zenodo's deposit API takes them (https://developers.zenodo.org).
+    """Return the metadata of `.zenodo.json` in the format of Zenodo's deposit API (https://developers.zenodo.org).
 
-    Grants are listed if Zenodo knows the funder. The notes have all funding, and the runs that are published although a
-    check fails.
+    Grants are listed if Zenodo has a record of the funder. The notes list all funding, and the runs that are published
+    although a check fails.
     """
     notes = [f"{acknowledgement(funding)}." for funding in publication.funding]
     notes += [f"Published with a failed check: {each.run}. {each.reason}" for each in publication.known_failures]

@@ -128,7 +128,7 @@ def _is_complete(deposit: Path, run: str) -> bool:
 
 
 def add_surfaces(runs: Iterable[str], deposit: Path) -> list[str]:
-    """Return the paths of runs, and of their surfaces if the deposit has them."""
+    """Return the paths of runs, and of those of their surfaces that are in the deposit."""
     surfaces = dict.fromkeys("surfaces/{2}/{3}.nc".format(*run.split("/")) for run in runs)
     return [*runs, *(path for path in surfaces if (deposit / path).is_file())]
 

@@ -86,7 +86,7 @@ class Zenodo:
     """A server and a token for it. Every method raises `ZenodoError` if the server refuses or does not answer."""
 
     def __init__(self, address: str, token: str, patience: Retry | None = None):
-        """Take the address, as `server_address` does, and the token; nothing is sent yet."""
+        """Store the address of the server (see `server_address`) and the token, without sending anything."""
         self.address = server_address(address)
         self._token = token
         self._session = requests.Session()
@@ -95,7 +95,7 @@ class Zenodo:
             self._session.mount(scheme, HTTPAdapter(max_retries=patience or _PATIENCE))
 
     def _authorize(self, request: requests.PreparedRequest) -> requests.PreparedRequest:
-        """Add the token to a request; as authentication of the session, no `.netrc` replaces it."""
+        """Add the token to a request. As the session's authentication, it takes precedence over a file `.netrc`."""
         request.headers["Authorization"] = f"Bearer {self._token}"
         return request
 
@@ -189,7 +189,7 @@ class Zenodo:
         return found
 
     def _refusal(self, path: str, answer: requests.Response) -> str:
-        """Describe why the server refuses, with its message and advice."""
+        """Describe why the server refused a request: its message, and advice."""
         advice = _ADVICE.get(answer.status_code, "").format(self.address)
         if answer.status_code in _FAILING:
             advice = "it is busy or has failed; try again in a while"

@@ -94,7 +94,7 @@ def read_text(folder: Path, name: str) -> str:
 
 
 def problem_with_name(name: str) -> str:
-    """Explain why a path must not be in a deposit; empty if it names the same file on every system."""
+    """Return why a file name must not be in a deposit; empty text if the name means the same file on every system."""
     names = name.split("/")
     if name.startswith("/") or re.match("[A-Za-z]:", name):
         return "is an absolute path"

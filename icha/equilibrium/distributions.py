@@ -14,33 +14,36 @@ from icha.surfaces.surface import Surface
 def contact_cover(surface: Surface, spots: Spots) -> np.ndarray:
     """Return the fraction of every node's cell that is in contact, (n, n) float, exact for discs.
 
-    Its mean is the contact area fraction up to rounding, because spots are disjoint; on a free square without the area
-    beyond the edges.
+    The fractions of overlapping spots add up, so the value of a cell may exceed 1. The mean over the grid is A/A0 up to
+    rounding. On a free square the mean does not include the area beyond the edges.
     """
     cover, _ = _cover_grid(surface.period, surface.grid, spots.position, spots.contact_radius, surface.free)
     return cover
 
 
-def nodes_in_discs(period: float, grid: int, centres: np.ndarray, radii: np.ndarray, free: bool = False) -> np.ndarray:
+def nodes_in_discs(
+    period: float, grid: int, centres: np.ndarray, radii: np.ndarray, free_square: bool = False
+) -> np.ndarray:
     """Return whether each node of a grid lies inside a disc, (n, n) bool.
 
-    centres : (m, 2), radii : (m,), m; free : whether the discs are single, or repeat with the period.
+    centres : (m, 2), radii : (m,), m; free_square : True: each disc exists once; False: it repeats with the period.
     """
-    _, inside = _cover_grid(period, grid, centres, radii, free)
+    _, inside = _cover_grid(period, grid, centres, radii, free_square)
     return inside
 
 
-def _cover_grid(period, grid, centres, radii, free):
+def _cover_grid(period, grid, centres, radii, free_square):
     """Return the results of `_cover` for all rows of a grid."""
-    blocks = on_cores(lambda rows: _cover(period, grid, centres, radii, rows, free), row_blocks(grid))
+    blocks = on_cores(lambda rows: _cover(period, grid, centres, radii, rows, free_square), row_blocks(grid))
     return tuple(np.concatenate(parts) for parts in zip(*blocks, strict=True))
 
 
 def gap_distribution(law: JKR, surface: Surface, state: ContactState) -> dict:
-    """Return the distribution P(u) of the gap over the nominal area, by the names of its variables.
+    """Return the distribution P(u) of the gap over the nominal area, as a dictionary with the keys below.
 
-    A cell on the edge of a spot counts with its part outside the spot; if its node lies inside the spot, this part has
-    gap zero. The last bin includes larger gaps. The gaps are evaluated in blocks of rows, never as a whole field.
+    A cell on the edge of a spot counts with its fraction outside the spot; if its node lies inside the spot, this
+    fraction has gap zero. The last bin includes larger gaps. The gaps are evaluated in blocks of rows, never as a whole
+    field.
 
     Returns
     -------
@@ -51,12 +54,12 @@ def gap_distribution(law: JKR, surface: Surface, state: ContactState) -> dict:
     """
     edges = gap_bins(surface)
     spots, a = state.spots, state.spots.contact_radius
-    period, grid, free = surface.period, surface.grid, surface.free
-    field = DisplacementField(law, period, grid, spots.position, a, spots.radius_of_curvature, free)
+    period, grid, free_square = surface.period, surface.grid, surface.free
+    field = DisplacementField(law, period, grid, spots.position, a, spots.radius_of_curvature, free_square)
 
     def count_cells(rows, w):
         u = w + (state.separation - surface.heights[rows])
-        cover, inside = _cover(period, grid, spots.position, a, rows, free)
+        cover, inside = _cover(period, grid, spots.position, a, rows, free_square)
         u[inside] = 0.0
         # Bin 0 is the overlap.
         index = np.where(u < 0, 0, _gap_bin(u, edges) + 1).ravel()
@@ -66,12 +69,12 @@ def gap_distribution(law: JKR, surface: Surface, state: ContactState) -> dict:
 
     content, covered, twice = zip(*field.map_blocks(count_cells), strict=True)
     content = np.sum(content, axis=0) / grid**2
-    beyond = float(sum(twice)) / grid**2
-    if free:
+    excess_area = float(sum(twice)) / grid**2
+    if free_square:
         area = np.sum(np.pi * a**2) / period**2
-        beyond += max(float(area - sum(covered) / grid**2), 0.0)
+        excess_area += max(float(area - sum(covered) / grid**2), 0.0)
     density = content[1:] / np.diff(edges)
-    return {"gap_density": density, "overlap_fraction": float(content[0]), "area_beyond_edges": beyond}
+    return {"gap_density": density, "overlap_fraction": float(content[0]), "area_beyond_edges": excess_area}
 
 
 def _gap_bin(u, edges):
@@ -86,7 +89,7 @@ def _gap_bin(u, edges):
 
 
 def pressure_distribution(law: JKR, surface: Surface, spots: Spots) -> dict:
-    """Return the distribution P(p) of the pressure over the nominal area, by the names of its variables.
+    """Return the distribution P(p) of the pressure over the nominal area, as a dictionary with the keys below.
 
     It follows from the closed form for every spot, without a grid. The integral of P(p) is A/A0; the sum of density
     times width times mean over the bins is F/A0. The last bin, which ends at 500 E* h'_rms, includes larger pressures.
@@ -102,6 +105,7 @@ def pressure_distribution(law: JKR, surface: Surface, spots: Spots) -> dict:
     if len(a):
         largest = np.max(law.largest_pressure(a, R))
         for k, p in enumerate([*edges[:-1], max(edges[-1], largest)]):
+            # Area and force at pressures below p, of every spot.
             areas, forces = law.pressure_distribution(p, a, R)
             area[k], force[k] = np.sum(areas), np.sum(forces)
         # The pressure at the edge of a JKR spot is minus infinity: the first bin includes all lower pressures.
@@ -111,11 +115,11 @@ def pressure_distribution(law: JKR, surface: Surface, spots: Spots) -> dict:
     return {"pressure_density": content / (surface.period**2 * np.diff(edges)), "pressure_bin_mean": mean}
 
 
-def _cover(period, grid, centres, radii, rows, free=False):
+def _cover(period, grid, centres, radii, rows, free_square=False):
     """Return for a range of rows the fraction of every cell in contact, and whether its node lies inside a spot."""
-    if free:
+    if free_square:
         # In a cell of twice the side no spot returns at the opposite edge.
-        parts = _cover(cell_of(period, free), cell_of(grid, free), centres, radii, rows)
+        parts = _cover(cell_of(period, free_square), cell_of(grid, free_square), centres, radii, rows)
         return tuple(part[:, :grid] for part in parts)
     spacing = period / grid
     cover = np.zeros((rows.stop - rows.start) * grid)

@@ -18,43 +18,43 @@ import numpy as np
 from icha.asperity.jkr import JKR
 from icha.contact.model import PRESSURE, Control
 from icha.contact.models import RESIDUAL_TOLERANCE, SMALLEST_LOAD
-from icha.equilibrium.sites import Problem, Sites
+from icha.equilibrium.sites import AsperityContact, Sites
 from icha.half_space.interaction import Interaction
 
 # Largest relative error of a load or an area under control.
 TARGET_TOLERANCE = 1e-11
 # Weight of this error relative to the error of the equilibrium, which makes both tolerances equal.
 _TARGET_WEIGHT = RESIDUAL_TOLERANCE / TARGET_TOLERANCE
-# The interaction is set up for larger contact radii, so that it serves several evaluations: those of approaches that
-# are larger by this part of h_rms, times this factor.
+# The interaction is set up for larger contact radii, so that it serves several evaluations: the radii at approaches
+# larger by _APPROACH_AHEAD h_rms, times _RADIUS_AHEAD.
 _APPROACH_AHEAD = 0.02
 _RADIUS_AHEAD = 1.2
 
 
-def nominal_value(problem: Problem, quantity: str, a, R) -> float:
+def nominal_value(contact: AsperityContact, quantity: str, a, R) -> float:
     """Return the nominal pressure (Pa) or the area fraction of spots of contact radii a and radii of curvature R, m."""
     if quantity == PRESSURE:
-        return float(np.sum(problem.law.force(a, R))) / problem.area
-    return float(np.sum(np.pi * a**2)) / problem.area
+        return float(np.sum(contact.law.force(a, R))) / contact.area
+    return float(np.sum(np.pi * a**2)) / contact.area
 
 
-def nominal_derivative(problem: Problem, quantity: str, a, R):
+def nominal_derivative(contact: AsperityContact, quantity: str, a, R):
     """Return the derivative of `nominal_value` with respect to each contact radius."""
     if quantity == PRESSURE:
-        return problem.law.force_derivative(a, R) / problem.area
-    return 2 * np.pi * a / problem.area
+        return contact.law.force_derivative(a, R) / contact.area
+    return 2 * np.pi * a / contact.area
 
 
-def radius_response(law: JKR, a, R, approach, jump_off):
-    """Return da/d(delta) of each spot: zero past jump-off, bounded close to it, where it is infinite."""
+def radius_slope(law: JKR, a, R, approach, jump_off_approach):
+    """Return da/d(delta): zero past jump-off; close to it the law returns a finite bound instead of infinity."""
     slope = np.zeros(len(a))
-    touching = (a > 0) & (approach >= jump_off)
+    touching = (a > 0) & (approach >= jump_off_approach)
     slope[touching] = law.radius_derivative(a[touching], R[touching])
     return slope
 
 
 @dataclass(frozen=True, eq=False)
-class Point:
+class Evaluation:
     """One evaluation of the equations at n sites.
 
     Attributes
@@ -62,9 +62,9 @@ class Point:
     approach : (n,) float, m.
     separation : mean separation, m.
     a : (n,) float, contact radii, m.
-    level : (n,) float, heights with which the sites would be in equilibrium, m.
+    equilibrium_height : (n,) float, heights with which the sites would be in equilibrium, m.
     error : (n,) float, left side minus right side of the equations, m.
-    miss : load or area minus its target, in Pa or as a fraction; 0 without a control.
+    control_error : load or area minus its target, in Pa or as a fraction; 0 without a control.
     repulsion : nominal pressure by the repulsive parts of the forces alone, Pa.
     interaction : interaction of the spots.
     """
@@ -72,34 +72,34 @@ class Point:
     approach: np.ndarray
     separation: float
     a: np.ndarray
-    level: np.ndarray
+    equilibrium_height: np.ndarray
     error: np.ndarray
-    miss: float
+    control_error: float
     repulsion: float
     interaction: Interaction
 
 
 @dataclass(frozen=True, eq=False)
 class Equations:
-    """Equations of equilibrium of the sites of a problem.
+    """Equations of equilibrium of the sites of a contact.
 
     Attributes
     ----------
-    problem : contact problem.
+    contact : contact of the asperities.
     sites : table of n sites.
     control : load or area to hold; the separation is one more unknown then.
     """
 
-    problem: Problem
+    contact: AsperityContact
     sites: Sites
     control: Control | None = None
 
-    def evaluate(self, approach, separation: float, interaction: Interaction | None = None) -> Point:
+    def evaluate(self, approach, separation: float, interaction: Interaction | None = None) -> Evaluation:
         """Evaluate the equations at approaches (n,) and a separation, m.
 
         interaction : the one of the last evaluation, used again as long as it covers the contact radii.
         """
-        problem, sites, law = self.problem, self.sites, self.problem.law
+        contact, sites, law = self.contact, self.sites, self.contact.law
         present, R = sites.present, sites.radius_of_curvature
         a = np.zeros(len(sites))
         a[present] = law.contact_radius(approach[present], R[present])
@@ -108,23 +108,23 @@ class Equations:
             or interaction.half_space is not sites.half_space
             or np.any(a > interaction.largest_radius)
         ):
-            ahead = np.where(present, approach + _APPROACH_AHEAD * problem.rms_height, 0.0)
+            ahead = np.where(present, approach + _APPROACH_AHEAD * contact.rms_height, 0.0)
             largest = np.where(present, _RADIUS_AHEAD * law.contact_radius(ahead, R), 0.0)
             interaction = Interaction.between(law, sites.half_space, R, largest)
-        level = approach + interaction.displacement(a) + separation
-        error = np.where(present, level - sites.height, 0.0)
-        miss = repulsion = 0.0
+        equilibrium_height = approach + interaction.displacement(a) + separation
+        error = np.where(present, equilibrium_height - sites.height, 0.0)
+        control_error = repulsion = 0.0
         if self.control is not None:
-            miss = nominal_value(problem, self.control.quantity, a[present], R[present]) - self.control.target
+            control_error = nominal_value(contact, self.control.quantity, a[present], R[present]) - self.control.target
             if self.control.quantity == PRESSURE:
-                repulsion = float(np.sum(law.repulsive_force(a[present], R[present]))) / problem.area
-        return Point(approach, separation, a, level, error, miss, repulsion, interaction)
+                repulsion = float(np.sum(law.repulsive_force(a[present], R[present]))) / contact.area
+        return Evaluation(approach, separation, a, equilibrium_height, error, control_error, repulsion, interaction)
 
-    def error_size(self, point: Point, target_weight: float = _TARGET_WEIGHT) -> float:
+    def error_size(self, evaluation: Evaluation, target_weight: float = _TARGET_WEIGHT) -> float:
         """Return the largest error, in h_rms; the relative error of the load or area counts with a weight."""
-        size = float(np.max(np.abs(point.error), initial=0.0)) / self.problem.rms_height
+        size = float(np.max(np.abs(evaluation.error), initial=0.0)) / self.contact.rms_height
         if self.control is None:
             return size
         # A load that is the small difference of attraction and repulsion is met as accurately as they are.
-        unit = max(abs(self.control.target), SMALLEST_LOAD * point.repulsion)
-        return max(size, abs(point.miss) / unit * target_weight)
+        unit = max(abs(self.control.target), SMALLEST_LOAD * evaluation.repulsion)
+        return max(size, abs(evaluation.control_error) / unit * target_weight)

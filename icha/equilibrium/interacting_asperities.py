@@ -1,4 +1,4 @@
-"""Interacting asperities: the contact model of Violano & Afferrante, in the form that a path follows."""
+"""Interacting asperities: the contact model of Violano & Afferrante, as a `ContactModel` for `icha.path`."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from icha.asperity.material import Material
 from icha.contact.model import AREA_FRACTION, PRESSURE, Control, Events, count_summits, largest_tension
 from icha.contact.models import DEFAULT_MODEL, MODELS, PathAccuracy
 from icha.equilibrium.distributions import gap_distribution, pressure_distribution
-from icha.equilibrium.equations import nominal_derivative, nominal_value, radius_response
-from icha.equilibrium.sites import ContactState, Problem, Sites
+from icha.equilibrium.equations import nominal_derivative, nominal_value, radius_slope
+from icha.equilibrium.sites import AsperityContact, ContactState, Sites
 from icha.equilibrium.solver import find_equilibrium
 from icha.half_space.free_square import mean_displacement
 from icha.surfaces.summits import LARGEST_DEPARTURE, SummitCoverage, find_summits, paraboloid_departure
@@ -21,12 +21,12 @@ from icha.surfaces.surface import Surface
 
 # Largest contact area fraction of a state. Targets are allowed up to 0.25; the search for them goes somewhat beyond.
 _LARGEST_AREA = 1.5 * 0.25
-# Rate of the approach to the mean separation on unloading, above which a spot is on an unstable branch.
+# Derivative of the approach with respect to the mean separation, above which a spot is on an unstable branch.
 _UNSTABLE_RESPONSE = 10.0
 
 
 @dataclass(frozen=True, eq=False)
-class InteractingAsperities(Problem):
+class InteractingAsperities(AsperityContact):
     """Asperities that interact through the half-space and unite where they overlap: a `ContactModel`.
 
     The quantities of a state are those of its spots (`ContactState.spots`).
@@ -43,12 +43,12 @@ class InteractingAsperities(Problem):
         return MODELS[DEFAULT_MODEL].accuracy
 
     def untouched(self) -> ContactState:
-        """Return the state in which the first asperity is about to make contact."""
+        """Return the state at first contact: the first asperity is about to jump in, and none touches yet."""
         asperities = self.asperities
-        separation = float(np.max(asperities.height - self.jump_in))
+        separation = float(np.max(asperities.height - self.jump_in_approach))
         return ContactState(
             separation=separation,
-            sites=Sites.none(self.law, asperities),
+            sites=Sites.empty(self.law, asperities),
             contact_radius=np.empty(0),
             site_of_asperity=np.full(len(asperities), -1),
             last_approach=asperities.height - separation,
@@ -59,7 +59,7 @@ class InteractingAsperities(Problem):
         self, state: ContactState, separation: float, control: Control | None = None, *, let_go: int = 0
     ) -> ContactState:
         """Find the equilibrium at another mean separation (m), load or area; see `ContactModel`."""
-        return find_equilibrium(self, state, separation, control, break_first=let_go)
+        return find_equilibrium(self, state, separation, control, let_go=let_go)
 
     def pressure(self, state: ContactState) -> float:
         """Return the force over the nominal area, Pa."""
@@ -93,18 +93,18 @@ class InteractingAsperities(Problem):
 
         It follows from the responses of the approaches, for unchanged contacts.
         """
-        sites, c = state.sites, state.in_contact
+        sites, c = state.sites, state.contact_index
         a, R = state.contact_radius[c], sites.radius_of_curvature[c]
-        growth = radius_response(self.law, a, R, sites.approach[c], sites.jump_off[c]) * sites.response[c]
+        growth = radius_slope(self.law, a, R, sites.approach[c], sites.jump_off_approach[c]) * sites.response[c]
         return float(np.sum(nominal_derivative(self, quantity, a, R) * growth))
 
     def stored_energy(self, state: ContactState) -> float:
         """Return the elastic energy less the energy of adhesion over the nominal area, J/m^2; zero out of contact.
 
-        Every spot has the work that would make it alone, and half the work of its force on the displacement by the
-        others. As in eq. (4), force and displacement are those at the centres of the spots. So the interaction of spots
-        of unlike size is only nearly reciprocal: along a path without events the energy changes by the work done up to
-        a part of the order of (a/r)^2 of that interaction.
+        The energy of a spot is that of a single JKR contact, plus half its force times the displacement by the others.
+        As in eq. (4), force and displacement are those at the centres of the spots. So the interaction of spots of
+        unlike size is only nearly reciprocal: along a path without events the change of the energy differs from the
+        work done by a fraction of the order of (a/r)^2 of that interaction.
         """
         spots, law = state.spots, self.law
         a, R = spots.contact_radius, spots.radius_of_curvature
@@ -112,8 +112,8 @@ class InteractingAsperities(Problem):
         return float(np.sum(law.energy(a, R) + 0.5 * law.force(a, R) * displaced)) / self.area
 
     def is_unstable(self, state: ContactState) -> bool:
-        """Return whether a spot would approach as the surfaces part."""
-        return bool(np.max(state.sites.response[state.in_contact], initial=0.0) > _UNSTABLE_RESPONSE)
+        """Return whether d(delta)/du of a spot exceeds 10; on a stable branch it does not."""
+        return bool(np.max(state.sites.response[state.contact_index], initial=0.0) > _UNSTABLE_RESPONSE)
 
     def events_between(self, before: ContactState, after: ContactState) -> Events:
         """Return the events on the path from one state to a later one."""
@@ -142,7 +142,7 @@ class AsperityObservables:
         return count_summits(self.contact.asperities)
 
     def of_step(self, state: ContactState) -> dict:
-        """Return the residual, the numbers of events, and the part of single spots outside Wu's formula."""
+        """Return the residual, the numbers of events, and the fraction of single spots outside Wu's formula."""
         law, spots = self.contact.law, state.spots
         verified = law.is_jump_in_verified(spots.radius_of_curvature[spots.members == 1])
         outside = np.count_nonzero(~verified) / max(len(verified), 1)
@@ -152,7 +152,7 @@ class AsperityObservables:
             "jump_off_count": state.jump_offs,
             "coalescence_count": state.coalescences,
             "split_count": state.splits,
-            "pending_count": state.pending,
+            "pending_count": state.barred_count,
             "outside_wu_fraction": outside if self.contact.adhesive else 0.0,
         }
 
@@ -173,7 +173,10 @@ class AsperityObservables:
         }
 
     def reasons_against(self, separations: Iterable[float], pressed: ContactState | None) -> list[str]:
-        """Return the reasons why the asperities do not represent the surface in the first loading."""
+        """Return the reasons why the asperities do not represent the surface in the first loading.
+
+        pressed : state with the largest contact area, if any.
+        """
         reasons = SummitCoverage.of(self.surface, self.contact.asperities).reasons_against(separations)
         if pressed is None:
             return reasons
@@ -184,8 +187,9 @@ class AsperityObservables:
         )
         if departure > LARGEST_DEPARTURE:
             reasons.append(
-                "the tops are not parabolic over the contact spots: their depth at the edges differs by a factor of "
-                f"{np.exp(departure):.2g} on average, expected at most {np.exp(LARGEST_DEPARTURE):.2g}"
+                "the tops are not parabolic over the contact spots: at the contact edge the real depth and the "
+                f"paraboloid's differ by a factor of {np.exp(departure):.2g} on average, expected at most "
+                f"{np.exp(LARGEST_DEPARTURE):.2g}"
             )
         return reasons
 

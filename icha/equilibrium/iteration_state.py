@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from icha.contact.model import JUMP_IN, SPLIT, Events
-from icha.equilibrium.sites import CONTACT, ContactState, Problem, Sites
+from icha.equilibrium.sites import CONTACT, AsperityContact, ContactState, Sites
 
 
 @dataclass(frozen=True, eq=False)
@@ -16,11 +16,11 @@ class IterationState:
 
     Attributes
     ----------
-    problem : contact problem.
+    contact : contact of the asperities.
     start : equilibrium from which the search starts.
-    unloading : whether the surfaces move apart.
+    unloading : whether the given (or guessed) separation is larger than that of the start.
     sites : table of sites.
-    site_of_asperity, last_approach, last_separation, pending : as in `ContactState`.
+    site_of_asperity, last_approach, last_separation, barred_count : as in `ContactState`.
     released_from : (asperities,) int, union that an asperity has just been released from; -1 for others.
     was_released : (asperities,) bool, whether it has been released from a union during this search.
     barred : (asperities,) bool, whether it has broken contact during this search and may not make it again.
@@ -28,7 +28,7 @@ class IterationState:
     log : events so far, as rows of kind, position, members, energy and asperity.
     """
 
-    problem: Problem
+    contact: AsperityContact
     start: ContactState
     unloading: bool
     sites: Sites
@@ -39,13 +39,13 @@ class IterationState:
     was_released: np.ndarray
     barred: np.ndarray
     new_unions: np.ndarray
-    pending: int = 0
+    barred_count: int = 0
     log: tuple = ()
 
     @classmethod
-    def towards(cls, problem: Problem, state: ContactState, separation: float) -> IterationState:
+    def towards(cls, contact: AsperityContact, state: ContactState, separation: float) -> IterationState:
         """Start from an equilibrium towards another separation, m; approaches are extrapolated by their responses."""
-        count, before = len(problem.asperities), state.sites
+        count, before = len(contact.asperities), state.sites
         sites = replace(
             before,
             approach=before.approach + before.response * (separation - state.separation),
@@ -53,7 +53,7 @@ class IterationState:
         )
         sites, index = sites.compact()
         return cls(
-            problem=problem,
+            contact=contact,
             start=state,
             unloading=separation > state.separation,
             sites=sites,
@@ -68,12 +68,12 @@ class IterationState:
         )
 
     @property
-    def free(self) -> np.ndarray:
-        """True where an asperity is neither a site nor merged into one, (asperities,) bool."""
-        free = self.site_of_asperity < 0
+    def without_site(self) -> np.ndarray:
+        """True where an asperity is no site, not merged into one and not under one, (asperities,) bool."""
+        without_site = self.site_of_asperity < 0
         single = (self.sites.asperity >= 0) & self.sites.present
-        free[self.sites.asperity[single]] = False
-        return free
+        without_site[self.sites.asperity[single]] = False
+        return without_site
 
     @property
     def splits(self) -> int:
@@ -99,7 +99,7 @@ class IterationState:
         return replace(self, log=(*self.log, *rows))
 
     def without_jumps_in(self, asperity) -> IterationState:
-        """Return the state without the jumps into contact of some asperities in its log."""
+        """Return the state; its log no longer holds the jump-ins of these asperities."""
         dropped = set(asperity.tolist())
         return replace(self, log=tuple(row for row in self.log if row[0] != JUMP_IN or row[4] not in dropped))
 

@@ -1,9 +1,9 @@
 """Jumps of asperities into contact and out of it.
 
-Jump-in: free asperities whose approach reaches the jump-in approach, eq. (3), become sites. Without adhesion contact
-forms at an approach of zero and without a jump: there all asperities that may come into contact are candidates, and the
-iteration decides which of them do. Jump-off: spots past the end of their stable branch break contact, and unions
-release their asperities. Those of them that have a stable state of the law stay in contact.
+Jump-in: asperities out of contact whose approach reaches the jump-in approach, eq. (3), become sites. Without adhesion
+contact forms at an approach of zero and without a jump: there all asperities that may come into contact are candidates,
+and the iteration decides which of them do. Jump-off: spots past the end of their stable branch break contact, and
+unions release their asperities. Those of them that have a stable state of the law stay in contact.
 """
 
 from dataclasses import replace
@@ -12,16 +12,16 @@ import numpy as np
 
 from icha.asperity.coalescence import covering_spot
 from icha.contact.model import JUMP_IN, JUMP_OFF, SPLIT
-from icha.equilibrium.equations import Point
+from icha.equilibrium.equations import Evaluation
 from icha.equilibrium.iteration_state import IterationState
 from icha.equilibrium.sites import CANDIDATE, CONTACT
 from icha.half_space.interaction import displacement_at
 
-# Largest and probable growth of the approach of a free asperity, relative to the fall of the separation.
+# Largest and probable growth of the approach of an asperity out of contact, relative to the fall of the separation.
 _FASTEST_APPROACH = 3.0
 _PROBABLE_APPROACH = 1.2
-# Growth of the approach by jumps of other spots, in h_rms and in the largest jump-off approach: a guess that serves on
-# the way to an equilibrium, and a bound that serves at the equilibrium.
+# Allowance for sudden growth of the approach by jumps of other spots: x h_rms + y |delta_off| with the pairs x, y below
+# and the largest jump-off approach. The guess is used during the search, the bound at the equilibrium.
 _SUDDEN_GUESS = 0.02, 2.0
 _SUDDEN_BOUND = 1.0, 10.0
 # Relative difference of the distances from jump-off up to which spots break contact together.
@@ -31,103 +31,105 @@ _SAME_STRENGTH = 1e-3
 def add_candidates(state: IterationState, separation: float) -> IterationState:
     """Add the asperities that will probably come into contact at a separation, m, as candidates; without adhesion."""
     fall = state.last_separation - separation
-    growth = _PROBABLE_APPROACH * fall + _sudden_growth(state.problem, _SUDDEN_GUESS)
-    candidates = np.flatnonzero((state.last_approach + growth > 0) & state.free)
+    growth = _PROBABLE_APPROACH * fall + _sudden_growth(state.contact, _SUDDEN_GUESS)
+    candidates = np.flatnonzero((state.last_approach + growth > 0) & state.without_site)
     # The approach of an asperity that has lost contact is not known, but small.
     expected = np.where(np.isfinite(fall), state.last_approach + fall, 0.0)
     return _add_sites(state, candidates, CANDIDATE, expected[candidates])
 
 
-def jump_in(state: IterationState, point: Point, margin: float) -> tuple[IterationState, bool]:
-    """Let the free asperities that are beyond their jump-in approach by more than a margin, m, jump into contact.
+def apply_jump_in(state: IterationState, evaluation: Evaluation, margin: float) -> tuple[IterationState, bool]:
+    """Bring asperities into contact that are beyond their jump-in approach by more than a margin, m.
 
     An asperity under a spot is taken into that spot. An asperity that has just been released from a union was in
-    contact, and stays in contact if it has a stable state.
+    contact, and stays in contact if it has a stable state; the released asperities that stay count as a split.
 
     Returns
     -------
-    The new state, and whether any asperity has jumped in.
+    The new state, and whether sites were added.
     """
-    problem, law, asperities = state.problem, state.problem.law, state.problem.asperities
-    spots = np.flatnonzero((point.a > 0) & state.sites.present)
-    state, evaluated = _evaluate_approaches(state, point, spots, margin)
+    contact, law, asperities = state.contact, state.contact.law, state.contact.asperities
+    spots = np.flatnonzero((evaluation.a > 0) & state.sites.present)
+    state, evaluated = _evaluate_approaches(state, evaluation, spots, margin)
     released = state.released_from[evaluated] >= 0
-    threshold = problem.jump_in[evaluated] + margin
+    threshold = contact.jump_in_approach[evaluated] + margin
     threshold[released] = law.jump_off_approach(asperities.radius_of_curvature[evaluated[released]])
     ready = state.last_approach[evaluated] >= threshold
-    if not problem.adhesive:
+    if not contact.adhesive:
         ready &= state.last_approach[evaluated] > 0
     barred, site_of_asperity = state.barred.copy(), state.site_of_asperity.copy()
     barred[evaluated[released & ~ready]] = True
     ready = evaluated[ready]
-    pending, ready = int(np.count_nonzero(barred[ready])), ready[~barred[ready]]
-    under = covering_spot(asperities.position[ready], state.sites.position[spots], point.a[spots], asperities.cell)
+    barred_count, ready = int(np.count_nonzero(barred[ready])), ready[~barred[ready]]
+    under = covering_spot(asperities.position[ready], state.sites.position[spots], evaluation.a[spots], asperities.cell)
     site_of_asperity[ready[under >= 0]] = spots[under[under >= 0]]
     ready = _largest_of_each_group(state, ready[under < 0])
     source = state.released_from[ready]
     none = np.full(len(state.released_from), -1)
-    state = replace(state, barred=barred, site_of_asperity=site_of_asperity, pending=pending, released_from=none)
+    state = replace(
+        state, barred=barred, site_of_asperity=site_of_asperity, barred_count=barred_count, released_from=none
+    )
     if not len(ready):
         return state, False
     splits, jumping = np.unique(source[source >= 0]), ready[source < 0]
     state = state.with_events(SPLIT, state.sites.position[splits], state.sites.members[splits])
-    if problem.adhesive:
+    if contact.adhesive:
         # The energy is released at the jump-in approach; any further approach is work done on the spot.
         R = asperities.radius_of_curvature[jumping]
-        energy = -law.energy(law.contact_radius(problem.jump_in[jumping], R), R)
+        energy = -law.energy(law.contact_radius(contact.jump_in_approach[jumping], R), R)
         state = state.with_events(JUMP_IN, asperities.position[jumping], 1, energy, jumping)
-    return _add_sites(state, ready, CONTACT if problem.adhesive else CANDIDATE, state.last_approach[ready]), True
+    return _add_sites(state, ready, CONTACT if contact.adhesive else CANDIDATE, state.last_approach[ready]), True
 
 
-def _sudden_growth(problem, reach):
+def _sudden_growth(contact, reach):
     """Return by how much the approach of an asperity may grow by jumps of other spots, m."""
     heights, jumps = reach
-    largest_jump = -problem.law.jump_off_approach(np.max(problem.asperities.radius_of_curvature))
-    return heights * problem.rms_height + jumps * largest_jump
+    largest_jump = -contact.law.jump_off_approach(np.max(contact.asperities.radius_of_curvature))
+    return heights * contact.rms_height + jumps * largest_jump
 
 
-def _evaluate_approaches(state, point, spots, margin):
-    """Evaluate the approaches of the free asperities that may have come into contact; return their indices too."""
-    problem, asperities, sites = state.problem, state.problem.asperities, state.sites
-    reach = state.last_approach + _FASTEST_APPROACH * np.abs(state.last_separation - point.separation)
-    reach += _sudden_growth(problem, _SUDDEN_GUESS if margin > 0 else _SUDDEN_BOUND)
-    evaluated = np.flatnonzero((reach >= problem.jump_in) & state.free)
+def _evaluate_approaches(state, evaluation, spots, margin):
+    """Evaluate the approaches of asperities without a site that may have made contact; return their indices too."""
+    contact, asperities, sites = state.contact, state.contact.asperities, state.sites
+    reach = state.last_approach + _FASTEST_APPROACH * np.abs(state.last_separation - evaluation.separation)
+    reach += _sudden_growth(contact, _SUDDEN_GUESS if margin > 0 else _SUDDEN_BOUND)
+    evaluated = np.flatnonzero((reach >= contact.jump_in_approach) & state.without_site)
     w = displacement_at(
-        problem.law,
+        contact.law,
         asperities.period,
         asperities.position[evaluated],
         sites.position[spots],
-        point.a[spots],
+        evaluation.a[spots],
         sites.radius_of_curvature[spots],
         sites.half_space.ewald.once,
     )
     last_approach, last_separation = state.last_approach.copy(), state.last_separation.copy()
-    last_approach[evaluated] = asperities.height[evaluated] - point.separation - w
-    last_separation[evaluated] = point.separation
+    last_approach[evaluated] = asperities.height[evaluated] - evaluation.separation - w
+    last_separation[evaluated] = evaluation.separation
     return replace(state, last_approach=last_approach, last_separation=last_separation), evaluated
 
 
 def _largest_of_each_group(state, jumping):
     """Return those asperities (k,) that would not lie inside the contact of a larger one of them."""
-    asperities = state.problem.asperities
+    asperities = state.contact.asperities
     if len(jumping) < 2:
         return jumping
     position = asperities.position[jumping]
-    a = state.problem.law.contact_radius(state.last_approach[jumping], asperities.radius_of_curvature[jumping])
+    a = state.contact.law.contact_radius(state.last_approach[jumping], asperities.radius_of_curvature[jumping])
     under = covering_spot(position, position, a, asperities.cell, larger_than=a)
     return jumping[under < 0]
 
 
 def _add_sites(state, asperity, status, approach):
-    """Make free asperities (k,) sites with approaches (k,), m."""
+    """Make asperities (k,) sites with approaches (k,), m."""
     if not len(asperity):
         return state
-    asperities, site_of_asperity = state.problem.asperities, state.site_of_asperity
+    asperities, site_of_asperity = state.contact.asperities, state.site_of_asperity
     if status == CONTACT:
         site_of_asperity = site_of_asperity.copy()
         site_of_asperity[asperity] = len(state.sites) + np.arange(len(asperity))
     sites = state.sites.append(
-        state.problem.law,
+        state.contact.law,
         position=asperities.position[asperity],
         height=asperities.height[asperity],
         radius_of_curvature=asperities.radius_of_curvature[asperity],
@@ -141,31 +143,34 @@ def _add_sites(state, asperity, status, approach):
     return replace(state, sites=sites, site_of_asperity=site_of_asperity)
 
 
-def jump_off(state: IterationState, point: Point, margin: float) -> IterationState:
+def apply_jump_off(state: IterationState, evaluation: Evaluation, margin: float) -> IterationState:
     """Break the contact of all spots past jump-off by more than a margin, m.
 
     Without adhesion only unions have to break contact: a single asperity out of contact does no harm. Spots that have
-    come into contact during this search break contact first: without them the others may well stay.
+    come into contact during this search break contact first. After that, the other spots may be stable again.
     """
     sites = state.sites
     breaking = sites.status == CONTACT
-    if state.problem.adhesive:
+    if state.contact.adhesive:
         new = breaking & ~sites.was_in_contact
-        breaking &= point.approach < sites.jump_off - margin
-        if np.any(new & (point.approach < sites.jump_off)):
+        breaking &= evaluation.approach < sites.jump_off_approach - margin
+        if np.any(new & (evaluation.approach < sites.jump_off_approach)):
             breaking &= new
     else:
-        breaking &= (point.approach <= 0) & (sites.asperity < 0) & (margin == 0)
+        breaking &= (evaluation.approach <= 0) & (sites.asperity < 0) & (margin == 0)
     return _break_contact(state, breaking) if breaking.any() else state
 
 
-def break_weakest(state: IterationState, separation: float, count: int) -> IterationState:
-    """Break the contact of the `count` spots that would reach jump-off first, and of those equally close to it."""
+def break_closest_to_jump_off(state: IterationState, separation: float, let_go: int) -> IterationState:
+    """Break the contact of the `let_go` spots that would reach jump-off first, and of those equally close to it.
+
+    All approaches go back to those at the start of the search.
+    """
     sites = state.sites
     approach = sites.approach - sites.response * (separation - state.start.separation)
     rate = np.maximum(-sites.response, 1e-3)
-    rise = np.where(sites.status == CONTACT, (approach - sites.jump_off) / rate, np.inf)
-    last = np.partition(rise, count - 1)[count - 1]
+    rise = np.where(sites.status == CONTACT, (approach - sites.jump_off_approach) / rate, np.inf)
+    last = np.partition(rise, let_go - 1)[let_go - 1]
     return _break_contact(state.with_approach(approach), rise <= last * (1 + _SAME_STRENGTH))
 
 
@@ -176,7 +181,7 @@ def _break_contact(state, breaking):
     contact again at this separation. An asperity that jumped in during this search was never in contact: its jump is
     removed from the log.
     """
-    sites, law = state.sites, state.problem.law
+    sites, law = state.sites, state.contact.law
     new = np.isin(sites.asperity, state.jumped_in) & breaking
     spots = np.flatnonzero(breaking & ~new)
     R = sites.radius_of_curvature[spots]

@@ -11,17 +11,17 @@ from scipy.sparse.linalg import LinearOperator, gmres
 
 from icha.contact.model import NotConverged
 from icha.contact.models import DEFAULT_MODEL, MODELS
-from icha.equilibrium.equations import Equations, Point, nominal_derivative, radius_response
+from icha.equilibrium.equations import Equations, Evaluation, nominal_derivative, radius_slope
 from icha.equilibrium.sites import CONTACT
 
 # Largest number of halvings of a Newton step.
 _MAX_HALVINGS = 8
 # Largest error of the response of the approaches to the separation.
-_STIFFNESS_ERROR = MODELS[DEFAULT_MODEL].stiffness_error
-# Relative errors of most linear solves, and of those that are repeated with the exact operator.
+_RESPONSE_ERROR = MODELS[DEFAULT_MODEL].stiffness_error
+# Relative errors of most linear solves, and of those that are repeated with the exact matrix.
 _LINEAR_TOLERANCE = 3e-3
 _EXACT_TOLERANCE = 1e-6
-# Number of solves for the response: first with the approximate operator, then with the exact one.
+# Number of solves for the response: first with the approximate matrix, then with the exact one.
 _APPROXIMATE_SOLVES, _EXACT_SOLVES = 8, 4
 # Largest dimension of a Krylov space.
 _KRYLOV = 50
@@ -29,41 +29,43 @@ _KRYLOV = 50
 _LARGEST_CHANGE = 0.2
 # Contact radius, in jump-off radii, below which a step towards jump-off is a step of the radius.
 _NEAR_JUMP_OFF = 1.5
-# Largest fraction of a step from beyond jump-off back into contact that is lost when the step stops at jump-off.
+# A spot past jump-off returns to contact only if reaching jump-off takes at most this fraction of the step.
 _PAST_JUMP_OFF = 0.2
 
 
-def newton_step(equations: Equations, point: Point, size: float) -> tuple[Point, bool, bool]:
+def newton_step(equations: Equations, evaluation: Evaluation, size: float) -> tuple[Evaluation, bool, bool]:
     """Take a Newton step, shortened until the error falls below its present `size`.
 
     Returns
     -------
-    The new point, or the old one if no step reduces the error; whether the error falls; and whether the linear
-    equations had to be solved exactly.
+    The new evaluation, or the old one if no step reduces the error; whether the error falls; and whether the exact
+    matrix was needed.
     """
     for exact in (False, True):
-        step, separation_step = _solve_step(equations, point, exact)
+        step, separation_step = _solve_step(equations, evaluation, exact)
         for halvings in range(_MAX_HALVINGS):
             fraction = 0.5**halvings
-            approach = _take_step(equations, point, fraction * step)
-            new = equations.evaluate(approach, point.separation + fraction * separation_step, point.interaction)
+            approach = _take_step(equations, evaluation, fraction * step)
+            new = equations.evaluate(
+                approach, evaluation.separation + fraction * separation_step, evaluation.interaction
+            )
             if equations.error_size(new) < (1 - 0.1 * fraction) * size:
                 return new, True, exact
-            point = replace(point, interaction=new.interaction)
-    return point, False, True
+            evaluation = replace(evaluation, interaction=new.interaction)
+    return evaluation, False, True
 
 
-def solve_response(equations: Equations, point: Point) -> np.ndarray:
-    """Solve (1 + W' da/d(delta)) x = -1 for x = d(delta)/du, the response of every site to the separation, (n,)."""
+def solve_response(equations: Equations, evaluation: Evaluation) -> np.ndarray:
+    """Solve (1 + W' da/d(delta)) x = -1 for x = d(delta)/du of every site, (n,), with W' = dw/da."""
     sites = equations.sites
     response = np.full(len(sites), -1.0)
-    present, _, exact, approximate = _linearise(equations, point)
+    present, _, exact, approximate = _linearise(equations, evaluation)
     if not len(present):
         return response
     x = sites.response[present]
     for solves in range(_APPROXIMATE_SOLVES + _EXACT_SOLVES):
         defect = -1.0 - x - exact(x)
-        if np.max(np.abs(defect)) <= _STIFFNESS_ERROR:
+        if np.max(np.abs(defect)) <= _RESPONSE_ERROR:
             response[present] = x
             return response
         product, tolerance = (
@@ -73,7 +75,7 @@ def solve_response(equations: Equations, point: Point) -> np.ndarray:
     raise NotConverged(f"the response of {len(present)} spots to the separation was not found")
 
 
-def _linearise(equations, point):
+def _linearise(equations, evaluation):
     """Linearise the displacements.
 
     Returns
@@ -83,12 +85,14 @@ def _linearise(equations, point):
     """
     sites = equations.sites
     present = np.flatnonzero(sites.present)
-    a, R = point.a[present], sites.radius_of_curvature[present]
-    jump_off, approach = sites.jump_off[present], point.approach[present]
+    a, R = evaluation.a[present], sites.radius_of_curvature[present]
+    jump_off_approach, approach = sites.jump_off_approach[present], evaluation.approach[present]
     # A spot that is about to return over jump-off behaves as on the stable branch.
-    approach = np.where(_returns_to_contact(sites, point)[present] & equations.problem.adhesive, jump_off, approach)
-    slope = radius_response(equations.problem.law, a, R, approach, jump_off)
-    tangent = point.interaction.tangent(point.a)
+    approach = np.where(
+        _returns_to_contact(sites, evaluation)[present] & equations.contact.adhesive, jump_off_approach, approach
+    )
+    slope = radius_slope(equations.contact.law, a, R, approach, jump_off_approach)
+    tangent = evaluation.interaction.tangent(evaluation.a)
 
     def radius_change(x):
         change = np.zeros(len(sites))
@@ -104,73 +108,76 @@ def _linearise(equations, point):
     return present, slope, exact, approximate
 
 
-def _solve_step(equations, point, exact):
+def _solve_step(equations, evaluation, exact):
     """Solve the linear equations for the changes of the approaches (n,) and of the separation, m."""
-    problem, sites, control = equations.problem, equations.sites, equations.control
-    present, slope, exact_product, approximate_product = _linearise(equations, point)
+    contact, sites, control = equations.contact, equations.sites, equations.control
+    present, slope, exact_product, approximate_product = _linearise(equations, evaluation)
     product, tolerance = (exact_product, _EXACT_TOLERANCE) if exact else (approximate_product, _LINEAR_TOLERANCE)
     size = len(present)
     step = np.zeros(len(sites))
     if control is None:
-        step[present] = _solve_linear(lambda x: x + product(x), -point.error[present], tolerance)
+        step[present] = _solve_linear(lambda x: x + product(x), -evaluation.error[present], tolerance)
         return step, 0.0
     # The separation is one more unknown. After the change of variables by the last response the bordered matrix is
-    # close to one.
+    # close to the identity matrix.
     last = sites.response[present]
     R = sites.radius_of_curvature[present]
-    gradient = slope * nominal_derivative(problem, control.quantity, point.a[present], R)
+    gradient = slope * nominal_derivative(contact, control.quantity, evaluation.a[present], R)
     rate = float(np.sum(gradient * last))
     if rate == 0:
-        raise NotConverged(f"{control.quantity} does not depend on the separation")
+        raise NotConverged("no contact radius changes with the separation, so the load or area cannot be reached")
 
     def bordered(x):
         y = x[:size] + x[size] * last
         return np.append(y + product(y) + x[size], np.sum(gradient * y) / rate)
 
-    x = _solve_linear(bordered, np.append(-point.error[present], -point.miss / rate), tolerance)
-    largest = _LARGEST_CHANGE * problem.rms_height
+    x = _solve_linear(bordered, np.append(-evaluation.error[present], -evaluation.control_error / rate), tolerance)
+    largest = _LARGEST_CHANGE * contact.rms_height
     separation_step = float(np.clip(x[size], -largest, largest))
     step[present] = x[:size] + separation_step * last
     return step, separation_step
 
 
-def _take_step(equations, point, step):
+def _take_step(equations, evaluation, step):
     """Return the approaches (n,) after a step.
 
     Close to jump-off the radius changes with the square root of the distance from it; in terms of the radius the
-    equations are smooth there. So a step towards jump-off is taken as a step of the radius. A step from beyond jump-off
-    back into contact first stops at jump-off, and then solves the quadratic equation that the radius obeys.
+    equations are smooth there. So a step towards jump-off is taken as a step of the radius. A spot far past jump-off
+    stops at jump-off. A spot a little past it solves a quadratic equation for the square root of its distance from
+    jump-off.
     """
-    approach = point.approach + step
-    if not equations.problem.adhesive:
+    approach = evaluation.approach + step
+    if not equations.contact.adhesive:
         return approach
-    sites, law = equations.sites, equations.problem.law
-    jump_off = sites.jump_off
-    returns = _returns_to_contact(sites, point)
-    approach = np.where((point.approach < jump_off) & ~returns, np.minimum(approach, jump_off), approach)
-    close = np.flatnonzero(sites.present & ((step < 0) & (point.approach > jump_off) | returns))
+    sites, law = equations.sites, equations.contact.law
+    jump_off_approach = sites.jump_off_approach
+    returns = _returns_to_contact(sites, evaluation)
+    approach = np.where(
+        (evaluation.approach < jump_off_approach) & ~returns, np.minimum(approach, jump_off_approach), approach
+    )
+    close = np.flatnonzero(sites.present & ((step < 0) & (evaluation.approach > jump_off_approach) | returns))
     lowest = law.jump_off_radius(sites.radius_of_curvature[close])
-    small = point.a[close] < _NEAR_JUMP_OFF * lowest
+    small = evaluation.a[close] < _NEAR_JUMP_OFF * lowest
     close, lowest = close[small], lowest[small]
-    R, a = sites.radius_of_curvature[close], point.a[close]
-    stable = np.maximum(point.approach, jump_off)[close]
-    change = radius_response(law, a, R, stable, jump_off[close]) * step[close]
+    R, a = sites.radius_of_curvature[close], evaluation.a[close]
+    stable = np.maximum(evaluation.approach, jump_off_approach)[close]
+    change = radius_slope(law, a, R, stable, jump_off_approach[close]) * step[close]
     # Where the radius has reached its lowest value, the approach alone removes the rest of the error.
     rest = 1 - np.minimum((lowest - a) / np.where(change < 0, change, -1.0), 1.0)
     reached = law.approach(np.maximum(a + change, lowest), R)
-    approach[close] = reached + np.where(change < 0, rest * np.minimum(step, -point.error)[close], 0.0)
+    approach[close] = reached + np.where(change < 0, rest * np.minimum(step, -evaluation.error)[close], 0.0)
     back = returns[close]
-    close, distance = close[back], np.maximum(reached[back] - jump_off[close[back]], 1e-300)
-    lacking = point.approach[close] - point.error[close] - jump_off[close]
+    close, distance = close[back], np.maximum(reached[back] - jump_off_approach[close[back]], 1e-300)
+    lacking = evaluation.approach[close] - evaluation.error[close] - jump_off_approach[close]
     slope = lacking / np.sqrt(distance)
-    approach[close] = jump_off[close] + (0.5 * (np.sqrt(slope**2 + 4 * lacking) - slope)) ** 2
+    approach[close] = jump_off_approach[close] + (0.5 * (np.sqrt(slope**2 + 4 * lacking) - slope)) ** 2
     return approach
 
 
-def _returns_to_contact(sites, point):
+def _returns_to_contact(sites, evaluation):
     """Return whether a spot is a little past jump-off and its error drives it back, (n,) bool."""
-    gap = sites.jump_off - point.approach
-    return (sites.status == CONTACT) & (gap >= 0) & (gap < -_PAST_JUMP_OFF * point.error)
+    gap = sites.jump_off_approach - evaluation.approach
+    return (sites.status == CONTACT) & (gap >= 0) & (gap < -_PAST_JUMP_OFF * evaluation.error)
 
 
 def _solve_linear(apply, b, tolerance):

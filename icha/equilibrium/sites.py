@@ -1,4 +1,4 @@
-"""Contact problem, sites where contact exists or may form, and equilibrium states; all of them immutable."""
+"""Contact of asperities, sites where contact exists or may form, and equilibrium states; all of them immutable."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from icha.surfaces.summits import Asperities
 
 
 @dataclass(frozen=True, eq=False)
-class Problem:
+class AsperityContact:
     """Asperities in contact with an elastic half-space.
 
     Attributes
@@ -23,18 +23,18 @@ class Problem:
     asperities : summits of the surface, n of them.
     rms_height : rms height of the surface, the unit of the errors of an equilibrium, m.
     rms_slope : rms slope of the surface.
-    jump_in : (n,) float, approaches at which the asperities jump into contact, m.
+    jump_in_approach : (n,) float, approaches at which the asperities jump into contact, m.
     """
 
     law: JKR
     asperities: Asperities
     rms_height: float
     rms_slope: float = 1.0
-    jump_in: np.ndarray = field(init=False)
+    jump_in_approach: np.ndarray = field(init=False)
 
     def __post_init__(self):
         """Evaluate the jump-in approaches once."""
-        object.__setattr__(self, "jump_in", self.law.jump_in_approach(self.asperities.radius_of_curvature))
+        object.__setattr__(self, "jump_in_approach", self.law.jump_in_approach(self.asperities.radius_of_curvature))
 
     @property
     def area(self) -> float:
@@ -57,16 +57,16 @@ class Problem:
         return self.contact_modulus * self.rms_slope
 
 
-# Status of a site: in contact; without adhesion, a candidate for contact; or removed from the problem.
+# Status of a site: in contact; without adhesion, a candidate for contact; or removed.
 CONTACT, CANDIDATE, REMOVED = 1, 2, 3
-# The half-space is set up again when the number of sites has grown by this factor, or this part of them is removed.
+# The half-space is set up again when the number of sites has grown by this factor, or this fraction of them is removed.
 _GROWTH = 1.5
-_REMOVED_PART = 0.25
+_REMOVED_FRACTION = 0.25
 
 
 @dataclass(frozen=True, eq=False)
-class Union:
-    """Two spots that have coalesced, as they were just before; the union can be undone.
+class MergeRecord:
+    """The two spots from which a union was made, as they were just before.
 
     Attributes
     ----------
@@ -82,7 +82,7 @@ class Union:
     columns: dict[str, np.ndarray]
 
     def asperities(self) -> list[list[int]]:
-        """Return the indices of the asperities of either spot."""
+        """Return two lists: the asperities of the first spot and of the second."""
         return [
             [index] if union is None else [each for spot in union.asperities() for each in spot]
             for index, union in zip(self.columns["asperity"].tolist(), self.columns["union"], strict=True)
@@ -97,10 +97,10 @@ class Sites:
     ----------
     position : (n, 2) float, m.
     height, radius_of_curvature : (n,) float, m.
-    jump_off : (n,) float, approaches at which the spots jump out of contact, m.
+    jump_off_approach : (n,) float, approaches at which the spots jump out of contact, m.
     asperity : (n,) int, index of the asperity; -1 for a union.
     members : (n,) int, number of asperities in the spot.
-    union : (n,) object, `Union` of a site that is one; None for others.
+    union : (n,) object, `MergeRecord` of a union; None for other sites.
     split_number : (n,) int, number of the split that a spot comes from, counted along the path; -1 for others.
     status : (n,) int, CONTACT, CANDIDATE or REMOVED.
     approach : (n,) float, last known approach, m.
@@ -113,7 +113,7 @@ class Sites:
     position: np.ndarray
     height: np.ndarray
     radius_of_curvature: np.ndarray
-    jump_off: np.ndarray
+    jump_off_approach: np.ndarray
     asperity: np.ndarray
     members: np.ndarray
     union: np.ndarray
@@ -133,7 +133,7 @@ class Sites:
         return len(self.height)
 
     @classmethod
-    def none(cls, law: JKR, asperities: Asperities) -> Sites:
+    def empty(cls, law: JKR, asperities: Asperities) -> Sites:
         """Return a table without sites."""
         kinds = {"asperity": int, "members": int, "union": object, "split_number": int, "status": np.int8}
         kinds |= {"was_in_contact": bool}
@@ -148,10 +148,13 @@ class Sites:
         return self.status != REMOVED
 
     def append(self, law: JKR, *, status, was_in_contact, split_number=-1, **more) -> Sites:
-        """Return the table with k more sites; the named arguments hold for all of them, other arrays are (k, ...)."""
+        """Return the table with k more sites.
+
+        status, was_in_contact, split_number : one value for all new sites; all others are arrays of k rows.
+        """
         count = len(more["height"])
         more |= {
-            "jump_off": law.jump_off_approach(more["radius_of_curvature"]),
+            "jump_off_approach": law.jump_off_approach(more["radius_of_curvature"]),
             "split_number": np.full(count, split_number),
             "status": np.full(count, status, dtype=np.int8),
             "response": np.full(count, -1.0),
@@ -169,12 +172,14 @@ class Sites:
         return replace(self, status=status)
 
     def compact(self) -> tuple[Sites, np.ndarray | None]:
-        """Return the table without its removed sites if there are many, and the new index of every site.
+        """Return the table without its removed sites, and the new index of every site.
+
+        This is done if many sites are removed, or if the table has grown by half since the half-space was set up.
 
         The index is (n + 1,) int, -1 for removed sites and in the last place; None if the table is unchanged.
         """
         removed = self.status == REMOVED
-        if len(self) <= _GROWTH * self.arranged and np.count_nonzero(removed) <= _REMOVED_PART * len(self):
+        if len(self) <= _GROWTH * self.arranged and np.count_nonzero(removed) <= _REMOVED_FRACTION * len(self):
             return self, None
         present = np.flatnonzero(~removed)
         index = np.full(len(self) + 1, -1)
@@ -223,13 +228,13 @@ class ContactState:
     separation : mean separation u, m.
     sites : table of sites, n of them.
     contact_radius : (n,) float, zero out of contact, m.
-    site_of_asperity : (asperities,) int, site that an asperity is, or was merged into, or lies under; -1 if free.
+    site_of_asperity : (asperities,) int, site that an asperity is, or was merged into, or lies under; -1 if none.
     last_approach : (asperities,) float, approach of an asperity when it was evaluated last, m.
     last_separation : (asperities,) float, mean separation at that time, m; inf if the approach is not known.
     residual : largest error of the equilibrium, in h_rms.
     jump_ins, jump_offs, coalescences, splits : number of events along the path up to this state.
-    pending : number of free asperities beyond their jump-in approach; they have broken contact at this separation, and
-        may not make it again.
+    barred_count : number of asperities out of contact beyond their jump-in approach; they have broken contact at this
+        separation, and may not make it again.
     history : events of every equilibrium of the path up to this state.
     """
 
@@ -244,11 +249,11 @@ class ContactState:
     jump_offs: int = 0
     coalescences: int = 0
     splits: int = 0
-    pending: int = 0
+    barred_count: int = 0
     history: tuple[Events, ...] = ()
 
     @cached_property
-    def in_contact(self) -> np.ndarray:
+    def contact_index(self) -> np.ndarray:
         """Indices of the sites in contact."""
         return np.flatnonzero(self.sites.status == CONTACT)
 
@@ -256,12 +261,12 @@ class ContactState:
     def spots(self) -> Spots:
         """Sites in contact."""
         names = ("position", "height", "radius_of_curvature", "approach", "members")
-        columns = {name: getattr(self.sites, name)[self.in_contact] for name in names}
-        return Spots(contact_radius=self.contact_radius[self.in_contact], **columns)
+        columns = {name: getattr(self.sites, name)[self.contact_index] for name in names}
+        return Spots(contact_radius=self.contact_radius[self.contact_index], **columns)
 
     @cached_property
     def spot_of_asperity(self) -> np.ndarray:
-        """Index of the spot that each asperity is, or was merged into, or lies under; -1 if free."""
+        """Index of the spot that each asperity is, or was merged into, or lies under; -1 if none."""
         spot = np.full(len(self.sites) + 1, -1)
-        spot[self.in_contact] = np.arange(len(self.in_contact))
+        spot[self.contact_index] = np.arange(len(self.contact_index))
         return spot[self.site_of_asperity]  # -1 takes the last entry

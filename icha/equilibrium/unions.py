@@ -11,24 +11,27 @@ import numpy as np
 
 from icha.asperity.coalescence import disjoint_pairs, equivalent_spots, overlapping_pairs
 from icha.contact.model import COALESCENCE, JUMP_IN, SPLIT
-from icha.equilibrium.equations import Point
+from icha.equilibrium.equations import Evaluation
 from icha.equilibrium.iteration_state import IterationState
-from icha.equilibrium.sites import CANDIDATE, CONTACT, Sites, Union
+from icha.equilibrium.sites import CANDIDATE, CONTACT, MergeRecord, Sites
 from icha.surfaces.square import periodic_difference
 
 
 def merge_overlapping(
-    state: IterationState, point: Point, margin: float = 0.0, *, deep: bool = False
+    state: IterationState, evaluation: Evaluation, margin: float = 0.0, *, deep: bool = False
 ) -> IterationState:
     """Replace overlapping spots by their unions.
+
+    Each spot merges with one other at most; the next round merges the rest.
 
     Parameters
     ----------
     margin : error of the approaches, m; spots merge only if they overlap by more than it explains.
-    deep : whether only spots merge of which one covers the centre of the other.
+    deep : whether only spots merge of which one covers the centre of the other; these merge even if they have just
+        split from one union.
     """
-    sites, law, period, a = state.sites, state.problem.law, state.problem.asperities.cell, point.a
-    pairs = _overlapping_pairs(state, point, margin, deep)
+    sites, law, period, a = state.sites, state.contact.law, state.contact.asperities.cell, evaluation.a
+    pairs = _overlapping_pairs(state, evaluation, margin, deep)
     if not len(pairs):
         return state
     i, j = pairs.T
@@ -61,20 +64,20 @@ def merge_overlapping(
     )
 
 
-def set_union_heights(state: IterationState, point: Point) -> tuple[IterationState, Point]:
+def set_union_heights(state: IterationState, evaluation: Evaluation) -> tuple[IterationState, Evaluation]:
     """Set the heights of new unions to those with which they are in equilibrium."""
     if not len(state.new_unions):
-        return state, point
+        return state, evaluation
     height = state.sites.height.copy()
-    height[state.new_unions] = point.level[state.new_unions]
+    height[state.new_unions] = evaluation.equilibrium_height[state.new_unions]
     sites = replace(state.sites, height=height)
-    error = np.where(sites.present, point.level - height, 0.0)
-    return replace(state, sites=sites, new_unions=np.empty(0, dtype=int)), replace(point, error=error)
+    error = np.where(sites.present, evaluation.equilibrium_height - height, 0.0)
+    return replace(state, sites=sites, new_unions=np.empty(0, dtype=int)), replace(evaluation, error=error)
 
 
-def _overlapping_pairs(state, point, margin, deep):
+def _overlapping_pairs(state, evaluation, margin, deep):
     """Return the pairs (k, 2) of spots that merge; every spot is in one pair at most."""
-    sites, a, interaction = state.sites, point.a, point.interaction
+    sites, a, interaction = state.sites, evaluation.a, evaluation.interaction
     first, second, r = interaction.source, interaction.target, interaction.r
     depth = a[first] + a[second] - r
     present = (a > 0) & sites.present[: len(a)]
@@ -95,13 +98,15 @@ def _overlapping_pairs(state, point, margin, deep):
 
 
 def _record_unions(state, pairs, a, radius):
-    """Return a `Union` for every pair of spots, (k,) object; radius: contact radii of the unions, m."""
+    """Return a `MergeRecord` for every pair of spots, (k,) object; radius: contact radii of the unions, m."""
     unions = np.full(len(pairs), None)
     sites, (i, j) = state.sites, pairs.T
-    offset = periodic_difference(sites.position[j], sites.position[i], state.problem.asperities.cell)
+    offset = periodic_difference(sites.position[j], sites.position[i], state.contact.asperities.cell)
     touching = radius * np.minimum(np.linalg.norm(offset, axis=1) / (a[i] + a[j]), 1.0)
     for k, pair in enumerate(pairs):
-        unions[k] = Union(radius[k], touching[k], a[pair], {name: getattr(sites, name)[pair] for name in Sites.UNITED})
+        unions[k] = MergeRecord(
+            radius[k], touching[k], a[pair], {name: getattr(sites, name)[pair] for name in Sites.UNITED}
+        )
     return unions
 
 
@@ -114,9 +119,9 @@ def _admit_candidates(state, candidates):
     return replace(state, site_of_asperity=site_of_asperity)
 
 
-def split_unions(state: IterationState, point: Point) -> IterationState:
+def split_unions(state: IterationState, evaluation: Evaluation) -> IterationState:
     """Split the unions that are so small that their two spots would no longer overlap."""
-    a, sites = point.a, state.sites
+    a, sites = evaluation.a, state.sites
     touching = np.array([0.0 if union is None else union.touching_radius for union in sites.union[: len(a)]])
     split = np.flatnonzero((sites.status[: len(a)] == CONTACT) & (a < touching))
     for site in split.tolist():
@@ -126,7 +131,7 @@ def split_unions(state: IterationState, point: Point) -> IterationState:
 
 def _split(state, site, a):
     """Replace a union of contact radius a, m, by its two spots, which have shrunk by the same factor."""
-    sites, law, union = state.sites, state.problem.law, state.sites.union[site]
+    sites, law, union = state.sites, state.contact.law, state.sites.union[site]
     contact_radius = union.contact_radius * (a / union.union_radius)
     merged = state.site_of_asperity == site
     site_of_asperity = np.where(merged, -1, state.site_of_asperity)
@@ -146,9 +151,9 @@ def _split(state, site, a):
     return replace(state, sites=sites, site_of_asperity=site_of_asperity, last_separation=last_separation)
 
 
-def absorb_covered(state: IterationState, point: Point) -> IterationState:
+def absorb_covered(state: IterationState, evaluation: Evaluation) -> IterationState:
     """Remove new contacts that lie inside another spot; their asperities then belong to that spot."""
-    sites, a, interaction, old = state.sites, point.a, point.interaction, state.sites.was_in_contact
+    sites, a, interaction, old = state.sites, evaluation.a, evaluation.interaction, state.sites.was_in_contact
     i, j, r = interaction.target, interaction.source, interaction.r
     inside = np.flatnonzero((r < a[j]) & (a[i] > 0) & ~old[i])
     inside = inside[old[j[inside]] | (a[i[inside]] < a[j[inside]])]
@@ -165,6 +170,6 @@ def absorb_covered(state: IterationState, point: Point) -> IterationState:
     state = state.without_jumps_in(sites.asperity[np.unique(i)])
     return replace(
         state,
-        sites=replace(sites.remove(i), approach=point.approach),
+        sites=replace(sites.remove(i), approach=evaluation.approach),
         site_of_asperity=index[site_of_asperity],  # -1 takes the last entry
     )

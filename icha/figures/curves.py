@@ -119,7 +119,7 @@ def cross_look(looks: Looks, contact: Contact, model: str = SHORT_RANGE) -> dict
 
 
 def model_name(dataset: xr.Dataset) -> str:
-    """Return the name in legends of the `shown_model` of a study."""
+    """Return the name of the model that the figures of a study show (`shown_model`), as written in legends."""
     return MODELS[shown_model(dataset)].words
 
 

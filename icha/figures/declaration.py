@@ -1,12 +1,13 @@
-"""The declaration of a figure: its options in a configuration, and the data that it is drawn from.
+"""The declaration of a figure: its options in a configuration, and the files from which it is drawn.
 
 A module `fig<number>_<words>` of this folder is a figure: it has a `DECLARATION` and a function `figure` that draws it.
-Nothing else knows its name, because `icha.figures.registry` finds it. Reading a configuration imports all of them.
-Therefore they import libraries for drawing, and modules that need xarray, only inside the functions that draw.
+`icha.figures.registry` finds the module by its name, so no list of figures exists. Reading a configuration imports the
+modules of all figures. Therefore these modules import libraries for drawing, and modules that need xarray, only inside
+the functions that draw.
 
-The function `figure` takes the data of its `inputs`, and as keywords the `arguments` of its options, which describe
-them. It raises ValueError if the campaign has no such study, run or snapshot, naming those that it has, and
-`icha.figures.select.NothingToDraw` if no run that it shows is complete.
+The function `figure` takes the data of the `inputs`, and the `arguments` of the options as keywords. It raises
+ValueError if the campaign has no such study, run or snapshot; the message names the existing ones. It raises
+`icha.figures.select.NothingToDraw` if no run in the figure is complete.
 """
 
 from __future__ import annotations
@@ -33,20 +34,20 @@ class FigureOptions(Section):
     """The section of a figure in a configuration."""
 
     def problems(self, campaign: Campaign) -> Iterator[Problem]:
-        """Yield what keeps the figure from being drawn although each of its values is valid by itself."""
+        """Yield the problems of the options that are not the problem of a single value, such as an unknown study."""
         yield from ()
 
     def studies_of(self, campaign: Campaign) -> tuple[str, ...]:
-        """Return the studies whose runs it shows."""
+        """Return the studies whose runs the figure shows."""
         return ()
 
     def arguments(self) -> dict[str, Any]:
-        """Return arguments of the function that draws it, other than data."""
+        """Return the arguments of the function that draws the figure, without the data."""
         return self.model_dump(exclude_none=True)
 
 
 def dataset_only(campaign: Campaign, options: FigureOptions, files: results.ResultFiles) -> Inputs:
-    """Return the inputs of a figure of the campaign dataset alone."""
+    """Return the inputs of a figure that needs only the campaign dataset."""
     return {"campaign": files.path(results.DATASET)}
 
 
@@ -79,17 +80,17 @@ class StudyFigure(FigureOptions):
     study: Name = Field(description="Name of the study that is drawn.")
 
     def studies_of(self, campaign: Campaign) -> tuple[str, ...]:
-        """Return the study."""
+        """Return the name of the study."""
         return (self.study,)
 
     def problems(self, campaign: Campaign) -> Iterator[Problem]:
-        """Yield the problem of an unknown study, or those of its own."""
+        """Yield a problem if the study does not exist; else yield the problems of the study."""
         yield from unknown(("study",), self.study, campaign.studies)
         if self.study in campaign.studies:
             yield from self.study_problems(campaign, campaign.studies[self.study])
 
     def study_problems(self, campaign: Campaign, study: Any) -> Iterator[Problem]:
-        """Yield what is requested that the study does not have."""
+        """Yield a problem for each requested surface, seed, material or slope that the study does not have."""
         for key, present in (
             ("surface", study.surfaces),
             ("seed", study.seeds),
@@ -111,11 +112,11 @@ class TruthFigure(StudyFigure):
     )
 
     def studies_of(self, campaign: Campaign) -> tuple[str, ...]:
-        """Return the study, and the one beside it."""
+        """Return the names of the study and of the study `boundary_elements`."""
         return tuple(dict.fromkeys(filter(None, (self.study, self.boundary_elements))))
 
     def problems(self, campaign: Campaign) -> Iterator[Problem]:
-        """Yield the problem of a study beside it that is unknown, or has no runs with boundary elements."""
+        """Also yield a problem if the study `boundary_elements` does not exist or lacks runs with boundary elements."""
         yield from super().problems(campaign)
         if self.boundary_elements is None:
             return
@@ -132,7 +133,7 @@ class SnapshotFigure(StudyFigure):
     snapshot: Snapshot | None = Field(default=None, description="Snapshot of the study. Default: the first one.")
 
     def study_problems(self, campaign: Campaign, study: Any) -> Iterator[Problem]:
-        """Yield in addition the problem of a study without the snapshot."""
+        """Also yield a problem if the study does not have the snapshot."""
         yield from super().study_problems(campaign, study)
         snapshots = campaign.snapshots_of(self.study)
         if snapshots == []:
@@ -143,7 +144,7 @@ class SnapshotFigure(StudyFigure):
             yield ("snapshot",), f"{kind} {value:g}", f"is not kept by study {self.study!r}; expected one of: {kept}"
 
     def arguments(self) -> dict[str, Any]:
-        """Return the snapshot as its kind and target."""
+        """Return the arguments, with the kind and the target of the snapshot instead of the snapshot."""
         arguments = super().arguments()
         if arguments.pop("snapshot", None) is not None:
             arguments["kind"], arguments["target"] = self.snapshot.target
@@ -161,14 +162,14 @@ class RunFigure(StudyFigure):
     )
 
     def arguments(self) -> dict[str, Any]:
-        """Return the surface by its name, because the argument `surface` is its dataset."""
+        """Return the arguments; `surface_name` is the name of the surface, because `surface` is its dataset."""
         arguments = super().arguments()
         if "surface" in arguments:
             arguments["surface_name"] = arguments.pop("surface")
         return arguments
 
     def run(self, campaign: Campaign) -> RunLabels:
-        """Return the run that is shown: the first with adhesion, or the first of all, of those requested."""
+        """Return the first requested run with adhesion; without any, return the first requested run."""
         model = first_model(campaign.studies[self.study].models)
         wanted = self.model_dump(include={"surface", "seed", "rms_slope", "material"}, exclude_none=True)
         runs = [RunLabels(self.study, model, *contact) for contact in campaign.contacts(self.study)]
@@ -180,7 +181,7 @@ class ComparedFigure(StudyFigure):
     """A figure that compares a study's runs with boundary elements."""
 
     def study_problems(self, campaign: Campaign, study: Any) -> Iterator[Problem]:
-        """Yield in addition the problem of a study without boundary elements at the same loads."""
+        """Also yield a problem if the study has no boundary elements at the same loads."""
         yield from super().study_problems(campaign, study)
         if campaign.compares_models(self.study) or is_solved_at_finite_range(campaign, self.study):
             return
@@ -197,29 +198,29 @@ class ComparedFigure(StudyFigure):
 
 
 def is_solved_at_finite_range(campaign: Campaign, study: str) -> bool:
-    """Return whether there are boundary elements at a finite range beside the runs of a study."""
+    """Return whether an entry of `finite_range` solves the contacts of a study."""
     return any(entry.study == study for entry in campaign.finite_range.values())
 
 
 def finite_range_error(campaign: Campaign, study: str, files: results.ResultFiles) -> Inputs:
-    """Return the error against boundary elements at a finite range as an input, if a study has any beside it."""
+    """Return the file of the model error as an input, if an entry of `finite_range` solves the contacts of a study."""
     return {"model_error": files.path(results.MODEL_ERROR)} if is_solved_at_finite_range(campaign, study) else {}
 
 
 def unloading_problems(campaign: Campaign, location: tuple, name: str, *, partly: bool) -> Iterator[Problem]:
-    """Yield the problem of a study that does not unload completely, or if `partly` not at all."""
+    """Yield a problem if a study does not unload completely; with `partly`, only if it does not unload at all."""
     study = campaign.studies.get(name)
     if study is not None and not (study.unload or (partly and study.turning_points)):
         yield location, name, "is not unloaded; expected a study with `unload: true`"
 
 
 def studies_problems(campaign: Campaign, key: str, names: Iterable[str]) -> Iterator[Problem]:
-    """Yield the problems of a list of studies that must unload completely."""
+    """Yield a problem for each study of a list that does not exist or does not unload completely."""
     for index, name in enumerate(names):
         yield from unknown((key, index), name, campaign.studies)
         yield from unloading_problems(campaign, (key, index), name, partly=False)
 
 
 def campaign_and_model_error(campaign: Campaign, options: ComparedFigure, files: results.ResultFiles) -> Inputs:
-    """Return the inputs of a figure of the error of the model; the campaign has the colours of the materials."""
+    """Return the files of the model error and of the campaign dataset, which gives the colours of the materials."""
     return {"campaign": files.path(results.DATASET), "model_error": files.path(results.MODEL_ERROR)}

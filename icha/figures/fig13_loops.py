@@ -248,7 +248,7 @@ def _enlarge(left, right, loops):
 
 
 def _handles(looks, loops, *, marked):
-    """Return what the legend shows, by name; loops are `marked` if slopes share a panel."""
+    """Return the handles of the legend by name; `marked`: whether loops have markers, since slopes share a panel."""
     handles = looks.handles(**_LOOP, **({} if marked else {"marker": "none"}))
     for branch, dashes in BRANCH_DASHES.items():
         handles[branch] = legend_handle(color=GREY, ls=dashes, **_LOOP)

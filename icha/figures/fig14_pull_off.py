@@ -49,7 +49,7 @@ class PullOffFigure(StudyFigure):
         return tuple(dict.fromkeys([self.study, *(self.load_studies or ())]))
 
     def problems(self, campaign: Campaign) -> Iterator[Problem]:
-        """Yield in addition the problems of studies that are unknown or do not unload completely."""
+        """Also yield a problem for each study that does not exist or does not unload completely."""
         yield from studies_problems(campaign, "load_studies", self.load_studies or ())
         yield from super().problems(campaign)
         yield from unloading_problems(campaign, ("study",), self.study, partly=False)

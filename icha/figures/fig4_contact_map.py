@@ -29,7 +29,8 @@ class MapFigure(SnapshotFigure, RunFigure):
 def inputs(campaign: Campaign, options: MapFigure, files: results.ResultFiles) -> Inputs:
     """Return the runs, the topography, and boundary elements of the same state, if there are any.
 
-    Those in the limit of a short range are another run of the study, whose file has the maps; they come first.
+    Boundary elements in the limit of a short range are preferred; their maps are in the file of another run of the
+    study.
     """
     run = options.run(campaign)
     found = {"campaign": files.path(results.DATASET), "surface": files.path(results.SURFACE, run)}

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 
 def inputs(campaign: Campaign, options: StudyFigure, files: results.ResultFiles) -> Inputs:
-    """Return the runs, and theories for their first surface."""
+    """Return the file of the runs, and the file of the theories for the first surface of the study."""
     theories = files.path(results.THEORIES, surface=campaign.studies[options.study].surfaces[0])
     return {"campaign": files.path(results.DATASET), "references": theories}
 

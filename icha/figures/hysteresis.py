@@ -67,7 +67,7 @@ def average_legs(runs: Sequence[Sequence[tuple[str, xr.Dataset]]]) -> list[Leg]:
 def select_unloaded_runs(campaign: xr.DataTree, study: str) -> list[tuple[RunLabels, xr.Dataset]]:
     """Return the runs of a study that unload, without their spots and events, along their mean separation.
 
-    The load does its work along the mean separation even if that is not the mean gap, as on a free square.
+    The work of the load is the integral over the mean separation, also on a free square, whose mean gap is different.
 
     Raises
     ------

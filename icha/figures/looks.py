@@ -133,7 +133,7 @@ class Looks:
         return look if applicable else _pale(look)
 
     def handles(self, **changed: object) -> dict[str, Line2D]:
-        """Return the handles of all names that are not on the scale, with looks that are `changed`."""
+        """Return the handles of all names that are not on the scale; `changed` overrides their looks."""
         first = self.places[0]
         if self.by_place and not self.many_places:
             return {self.name(each): legend_handle(**self.look(each) | changed) for each in self.contacts}
@@ -248,7 +248,7 @@ class Scale:
         self.colours = [to_hex(colour) for colour in mpl.colormaps["viridis"](places)]
 
     def draw(self, figure: Figure, axes: Sequence[Axes]) -> None:
-        """Add the bar beside the panels, with at most `_MOST_TICKS` names."""
+        """Draw the colour bar beside the panels, with at most `_MOST_TICKS` names."""
         from matplotlib.cm import ScalarMappable
         from matplotlib.colors import BoundaryNorm, ListedColormap
 

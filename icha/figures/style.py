@@ -77,7 +77,7 @@ in_style = _style()
 
 
 def new_figure(width: float, height: float) -> Figure:
-    """Return an empty figure that belongs to no window and to no global state; sizes in inches."""
+    """Return an empty figure of a size in inches, without a window and without pyplot's global state."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -144,7 +144,7 @@ def _few_labels() -> type:
 
 
 def legend_handle(x=(), y=(), **look) -> Line2D:
-    """Return a line that belongs to no axes, as legends show it; `look` as for `Axes.plot`."""
+    """Return a line for a legend, without axes; `look` has the keywords of `Axes.plot`."""
     from matplotlib.lines import Line2D
 
     return Line2D(x, y, **look)

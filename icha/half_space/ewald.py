@@ -5,9 +5,9 @@ counter-pressure that keeps the mean displacement zero. The sum is split as Ewal
 evaluated by its Fourier series, (2/(E* q)) erfc(q/(2 alpha)) per mode and cell area, with non-uniform FFTs. The
 short-ranged half is summed pairwise.
 
-A square on a free half-space is not loaded outside the square. It is put into a cell of twice its side, where the
-direct line between two of its points is shorter than that to any image. The displacement by images and counter-pressure
-is subtracted again (`icha.half_space.free_square`), so that the plain sum of F/(pi E* r) remains.
+A square on a free half-space is not loaded outside the square. The square is put into a periodic cell of twice its
+side. In this cell two points of the square are closer to each other than to any image. The displacement by images and
+counter-pressure is subtracted again (`icha.half_space.free_square`), so that the plain sum of F/(pi E* r) remains.
 """
 
 from __future__ import annotations

@@ -235,14 +235,14 @@ def failed_runs(campaign: Campaign, results: Path) -> dict[str, str]:
 
 
 def expected_seconds(items: Iterable[Item], folder: str) -> dict[str, float]:
-    """Return expected core-seconds of each job with its scheduling, by its path with `folder` before it."""
+    """Return the expected core-seconds of each job, with scheduling; keys are the paths of files in `folder`."""
     return {f"{folder}/{item.path}": item.cost.seconds * item.threads + WORKFLOW.job for item in items}
 
 
 def whole_cost(campaign: Campaign, results: Path) -> costs.Cost:
-    """Return expected cost of a whole campaign: seconds on one core, memory of the largest job, disk.
+    """Return the expected cost of a whole campaign: seconds on one core, memory of the largest job, disk.
 
-    It is that of the cost model without calibration, so it is the same on every machine.
+    The cost is not calibrated by finished jobs, so every machine gives the same value.
     """
     items = [replace(item, state=TO_DO) for item in _items(campaign, results)]
     return costs.Cost(time_on(items, 1), memory_on(items, 1), total(items).disk)

@@ -45,7 +45,7 @@ def surface_threads(campaign: Campaign, surface: str) -> int:
 
 
 def _megabytes(program: float, arrays: float, nodes: int) -> int:
-    """Memory of a job, MB: that of its program and of some arrays of `nodes` a side."""
+    """Memory of a job, MB: the memory of its program plus a number of arrays of nodes x nodes values."""
     return int(program + arrays * 8e-6 * nodes**2)
 
 
@@ -92,7 +92,7 @@ def free_disk(folder: Path) -> int:
 
 
 def _memory_shortage(items, cores, available, most):
-    """Describe that parallel jobs need more memory than is available; `most` bytes is what they may take together."""
+    """Describe the missing memory if parallel jobs need more than is available; `most`: their limit together, bytes."""
     needed = memory_on(items, cores, most)
     if needed <= available:
         return None

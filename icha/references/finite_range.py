@@ -300,7 +300,7 @@ class GapContact:
     def _imbalance(self):
         """Largest difference of traction and attraction, over the strength of the interface, where nothing touches.
 
-        The traction of the half-space is E* q/2 times the modes of its displacement; its mean is free.
+        Each mode of the traction is E* q/2 times the same mode of the displacement; the mean traction is unknown.
         """
         gap, n = np.array(self.solver.model["gap"]), self.fine.grid
         q = np.pi * np.hypot(scipy.fft.fftfreq(n, 1 / n)[:, None], scipy.fft.rfftfreq(n, 1 / n)) / self.fine.period
@@ -334,7 +334,7 @@ def _find_gap_at_load(contact, pressure, separation, progress):
 
 
 def _next_gap(tried):
-    """Secant step in the load, limited to the interval between gaps that carry too much and too little."""
+    """Return the next mean gap: a secant step in the load, between the gaps with too much and too little load."""
     gap, error = tried[-1]
     step = _DECAY * (math.log1p(error) if error > -0.9 else -1.0)
     if len(tried) > 1:

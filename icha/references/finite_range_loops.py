@@ -1,10 +1,11 @@
-"""Loading and unloading at a finite range of attraction, by boundary elements: from apart to a load and apart again.
+"""Loading and unloading at a finite range of attraction, with boundary elements, from no contact to no contact.
 
 The mean gap is prescribed, as in a stiff machine. Each solution starts from the one before and so stays on its branch
-until the branch ends; there the surfaces jump, and the energy that the jump frees is lost. Between jumps the work done
-on the contact, minus the integral of the nominal pressure over the mean gap, is the change of its stored energy. On a
-step the two differ by the energy that jumps dissipate, and by the error of the trapezoidal rule. Steps on which they
-differ are halved, down to a limit; the position of a jump within the smallest step remains unknown.
+until the branch ends; at its end the surfaces jump, and the energy that the jump releases is lost. Between jumps the
+work done on the contact, minus the integral of the nominal pressure over the mean gap, is the change of its stored
+energy. On a step the work and the change of the energy differ by the energy that jumps dissipate, and by the error of
+the trapezoidal rule. Steps with a difference are halved, down to a limit; the position of a jump within the smallest
+step remains unknown.
 """
 
 import math
@@ -54,7 +55,7 @@ def finite_range_loop(
     seed: int = -1,
     progress: Callable[[str], None] | None = None,
 ) -> xr.Dataset:
-    """Bring two surfaces from apart to a load and apart again, by boundary elements.
+    """Load two surfaces that are apart up to a load and unload them until they are apart, with boundary elements.
 
     Parameters
     ----------

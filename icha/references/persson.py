@@ -21,7 +21,7 @@ _POINTS = 401
 
 
 def persson_area(reduced_pressure):
-    """A/A0 = erf(sqrt(2) p*) for reduced pressures of any shape (Persson 2001)."""
+    """Compute the contact area fraction erf(sqrt(2) p*) for an array of reduced pressures (Persson 2001)."""
     return erf(np.sqrt(2) * np.asarray(reduced_pressure, float))
 
 
@@ -37,7 +37,7 @@ def persson_pressure_density(pressure, reduced_pressure):
 
 
 def persson_mean_separation(reduced_pressure, spectrum):
-    r"""Mean separation over h_rms at reduced pressures of any shape, from the spectrum of the surface.
+    r"""Compute the mean separation over h_rms from the spectrum of the surface, for an array of reduced pressures.
 
     Yang & Persson (2008): with w(q) = (pi int_{q_L}^q k^3 C(k) dk)^(-1/2) and P = erf(w p/E*),
 
@@ -57,12 +57,12 @@ def persson_mean_separation(reduced_pressure, spectrum):
 def persson_stiffness(reduced_pressure, spectrum):
     r"""Contact stiffness -dp/du times h_rms/(E* h'_rms) at reduced pressures, in the theory of Yang & Persson (2008).
 
-    Derivative of `persson_mean_separation`, in closed form but for the integral over the wave numbers:
+    Derivative of `persson_mean_separation`, in closed form except for the integral over the wave numbers:
 
         -p du/dp = sqrt(pi) int dq q^2 C(q) w(q) [gamma + 3 (1 - gamma) P^2] exp(-(w p/E*)^2).
 
-    For small pressures this is a length u0, so that p falls as exp(-u/u0) and the stiffness is p/u0 (Persson 2007).
-    Parameters as those of `persson_mean_separation`.
+    For small pressures -p du/dp is a constant length u0, so that p falls as exp(-u/u0) and the stiffness is p/u0
+    (Persson 2007). The parameters are the same as for `persson_mean_separation`.
     """
     decay_length = _over_wave_numbers(_share_density, reduced_pressure, spectrum)
     return np.asarray(reduced_pressure, float) / decay_length

@@ -159,7 +159,7 @@ def _mean_power_above(t, n):
 
 
 def _sum_over_summits(of_summit, law, reduced_separation, moments, pulled):
-    """Sum of of_summit(contact radius, radius) over the summits in contact, per area.
+    """Sum a function of the contact radius and the radius of curvature over the summits in contact, per area.
 
     The integral runs over the contact radius, which fixes the approach of a summit and so its height above the plane.
     """

@@ -307,7 +307,7 @@ def encode_map(contact: np.ndarray) -> str:
 
 
 def find_partners(one: xr.Dataset, other: xr.Dataset) -> list[int]:
-    """Find, for every step of a run, the step of another run at the same state of the path; -1 without one.
+    """Find, for every step of a run, the step of another run at the same state of the path, or -1 if there is none.
 
     The partner of a stop is the same stop on the same leg. The partner of another equilibrium is the step on the same
     leg with the nearest mean separation.

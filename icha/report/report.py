@@ -1,7 +1,8 @@
 """The report of a campaign: one HTML page that needs neither network nor other files.
 
-The same data give the same bytes. Times and memory differ from one execution to the next, so they are on another page,
-which this one embeds. Long tables contain their first rows only; all rows are in the data, to which the page links.
+The same data always give exactly the same file. Times and memory differ from one execution to the next, so they are on
+another page, which this one embeds. Long tables contain their first rows only; all rows are in the data, to which the
+page links.
 """
 
 from __future__ import annotations

@@ -27,7 +27,7 @@ LEAST_POWER = 1e-16  # smaller fractions of the largest power are rounding error
 
 
 class Box(NamedTuple):
-    """A box of the graph of origins: its name, a line of text, and the target of its link, if any."""
+    """A box of this graph: its name, a line of text, and the target of its link, if any."""
 
     name: str
     text: str
@@ -35,7 +35,7 @@ class Box(NamedTuple):
 
 
 def build_provenance(studies, surfaces, figures, model_error, files, dataset) -> list[list[Box]]:
-    """Return the columns of the graph of origins: each was made from the columns before it.
+    """Return the columns of the graph that shows which result was made from which; a column depends on those before it.
 
     Parameters
     ----------

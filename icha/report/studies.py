@@ -76,7 +76,7 @@ def summarise_study(campaign: xr.DataTree, name: str, comparison: xr.DataTree | 
 
 
 def _reason(dataset: xr.Dataset, name: str, labels: RunLabels) -> str:
-    """Return why a run failed, or its model is not applicable; empty if not so."""
+    """Return the text of `failure` or `applicability` of a run; empty text if the dataset has no such variable."""
     return str(dataset[name].isel(run_place(dataset, labels)).item()) if name in dataset else ""
 
 
@@ -136,7 +136,7 @@ def collect_states(run: xr.Dataset) -> dict[tuple[str, float], dict[str, float]]
 
 
 def _stops_of(states) -> dict:
-    """Return the stops and the quantities of a table, from the states of its runs."""
+    """Return the targets and the quantities that a table shows, from the states of its runs."""
     keys = dict.fromkeys(key for stops in states for key in stops)
     kind = next((kind for kind, _ in keys), "reduced_pressure")
     targets = sorted(target for each, target in keys if each == kind)
@@ -243,7 +243,7 @@ def _loops(name: str, dataset: xr.Dataset) -> dict:
 
 
 def _along_labels(dataset: xr.Dataset, name: str) -> np.ndarray:
-    """Return a variable along all labels, even if it depends on fewer of them; steps are last."""
+    """Return a variable, repeated along the labels on which it does not depend; the last dimension is the step."""
     return dataset[name].broadcast_like(dataset["status"]).transpose(*LABELS, ...).values
 
 

@@ -1,1 +1,1 @@
-"""What every stage uses and nothing of contact mechanics: whole files, checksums, units, rules for values, cores."""
+"""General tools without contact mechanics: atomic files, checksums, units, rules for values, cores."""

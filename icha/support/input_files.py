@@ -86,8 +86,8 @@ def require_room(needed: float, most: int | None = None) -> None:
 def bounded_memory(most: int | None = None) -> Iterator[None]:
     """Limit the memory that a block allocates, in whatever library, to `most` bytes, by default `most_memory`.
 
-    Raises `TooLarge`; libraries in C may raise their own errors instead. Only Linux supports the limit; elsewhere only
-    declared sizes are checked.
+    Beyond the limit the block raises `TooLarge`; libraries in C may raise their own errors instead. Only Linux supports
+    the limit; on other systems only declared sizes are checked.
     """
     most = most_memory() if most is None else most
     if sys.platform != "linux":

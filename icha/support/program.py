@@ -26,7 +26,7 @@ def is_installed(workflow: Path) -> bool:
 
 
 def package_of(workflow: Path) -> Path:
-    """Folder of the package `icha` of a workflow: in the folder of a clone, beside an installed one."""
+    """Return the folder of the package `icha`: in the clone, or beside the folder of an installed workflow."""
     return (workflow.parent if is_installed(workflow) else workflow) / "icha"
 
 

@@ -46,7 +46,7 @@ class FloatRange:
 
     @property
     def expected(self) -> str:
-        """What a message says is expected."""
+        """Words for the expected values, which messages contain after "expected"."""
         if self.above is None and self.least is None:
             return "a number" if self.most is None else f"a number of at most {_short(self.most)}"
         if self.most is None:

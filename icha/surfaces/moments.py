@@ -1,7 +1,7 @@
 """Spectral moments, with which statistical theories describe a rough surface, and its radial power spectrum.
 
-Moments are those of a profile, averaged over its directions, as for the isotropic surfaces of P. R. Nayak, J. Lubr.
-Technol. 93 (1971) 398-407, doi:10.1115/1.3451608.
+Moments are averages over profiles in all directions, as for the isotropic surfaces of P. R. Nayak, J. Lubr. Technol. 93
+(1971) 398-407, doi:10.1115/1.3451608.
 """
 
 from __future__ import annotations
@@ -58,8 +58,8 @@ def self_affine_full_contact_energy(
 ) -> float:
     """Elastic energy of full contact per area over E* (m) of a self-affine surface of rms slope 1; lengths in m.
 
-    It equals `Surface.full_contact_energy` of the realisations of a `SelfAffineSpectrum`, but needs no modes: long
-    waves are summed, the others integrated.
+    The value equals `Surface.full_contact_energy` of the realisations of a `SelfAffineSpectrum`, but needs no
+    realisation: long waves are summed, and the spectrum of the others is integrated.
     """
     roll, last = period / rolloff_wavelength, period / short_wavelength
     # The cut-off itself is not part of the spectrum, whatever the rounding of the quotient.

@@ -377,7 +377,7 @@ class SummitCoverage:
         """Share of the load, at a mean separation (m), on places without a summit.
 
         The load of a place is estimated as its height above the plane of separation to the power 3/2 (Hertz). If no
-        place is that high, the highest place counts.
+        place is above this plane, only the highest place counts.
         """
         load = np.maximum(self.peak_height - separation, 0.0) ** 1.5
         if not load.any():

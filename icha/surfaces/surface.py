@@ -117,7 +117,7 @@ class Surface:
         """Return results of `function(k2, count, power)` for blocks of all wave vectors 2 pi/L (kx, ky) but zero.
 
         k2 = kx^2 + ky^2; power: |h_q|^2, m^2, both (n, m); count (m,): 2 where the power is that of two opposite wave
-        vectors together, else 1. The heights are one period, also those of a free square.
+        vectors together, else 1. The heights count as one period of a periodic surface, even for a free square.
         """
         n = self.grid
         half = np.empty((n, n // 2 + 1), dtype=complex)

@@ -249,12 +249,12 @@ def assert_consistent(contact, state):
     w = displacement_at(law, period, there, spots.position, a, R)
     approach = contact.asperities.height[free] - state.separation - w
     scale = 2e-7 * contact.rms_height
-    beyond = approach >= contact.jump_in[free] + scale
+    beyond = approach >= contact.jump_in_approach[free] + scale
     if len(spots) and beyond.any():
         distance = [np.hypot(*periodic_difference(spots.position, p, period).T) for p in there[beyond]]
         covered = [np.any(d < spots.contact_radius) for d in distance]
         assert not any(covered)
-    assert np.count_nonzero(beyond) <= state.pending
+    assert np.count_nonzero(beyond) <= state.barred_count
 
 
 def count_rounds(monkeypatch, most):

@@ -246,7 +246,7 @@ def test_a_contact_without_an_equilibrium_is_not_recorded():
     contact = contact_of([HEIGHT], period=20.0, material=Material(1.0, 1.0, 1 / 1.1))
     start = contact.untouched()
     state = contact.equilibrium(start, start.separation - 1e-6)
-    assert (state.pending, len(state.spots)) == (1, 0)
+    assert (state.barred_count, len(state.spots)) == (1, 0)
     assert (state.jump_ins, state.jump_offs, state.history) == (0, 0, ())
 
 

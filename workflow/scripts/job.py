@@ -102,7 +102,7 @@ def _results(snakemake):
 
 
 def _result(results, path):
-    """Return the name of an output for checksums: that of its folder if it is the list of checksums of a folder."""
+    """Return the name of a result in the records of checksums: its path, or the folder of a file SHA256SUMS."""
     file = Path(path).relative_to(results)
     return str(file.parent if file.name == "SHA256SUMS" else file)
 

@@ -57,7 +57,7 @@ class Scan:
         return self.size[0] / columns, self.size[1] / rows
 
     def after(self, heights: np.ndarray, *steps: str, size: tuple[float, float] | None = None) -> "Scan":
-        """Return the scan with other heights after a step, its description, and another size if it has one."""
+        """Return the scan after a step: new heights, the description of the step, and the new size if it changed."""
         return replace(self, heights=heights, size=size or self.size, steps=(*self.steps, *steps))
 
     @property

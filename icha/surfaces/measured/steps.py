@@ -1,6 +1,6 @@
 """Steps from a scan to a surface: crop, trend, missing points, pixels, short waves, edges and grid.
 
-Each step returns the scan after it, as the settings ask for it.
+Each step takes a scan and the settings and returns the changed scan.
 """
 
 import math

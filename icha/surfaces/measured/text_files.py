@@ -1,4 +1,4 @@
-"""Readers of text: a row of heights per line, or x y z; and the format of a text."""
+"""Readers of text files with a row of heights per line or with x y z per line; choice between the two."""
 
 import re
 from dataclasses import dataclass
@@ -72,7 +72,7 @@ def read_matrix(file: SourceFile, settings: Preparation) -> FileContent:
 
 
 def _as_instrument_file(file, settings):
-    """Read the file with SurfaceTopography, which knows many headings; None if its heights are not all of the numbers.
+    """Read the file with SurfaceTopography; None if the heights have no unit or are not the numbers of the file.
 
     SurfaceTopography raises all kinds of errors for texts of other formats.
     """
@@ -110,14 +110,14 @@ def read_xyz(file: SourceFile, settings: Preparation) -> FileContent:
     size = None
     if along_x and along_y and settings.lateral_unit is None:
         size = sides[0] * along_x, sides[1] * along_y
-    order = ", ".join(f"{axis} {titles[axis].column}" for axis in titles)
+    columns = ", ".join(f"{axis} {titles[axis].column}" for axis in titles)
     reordered = titles and sorted(titles, key=lambda axis: titles[axis].column) != ["x", "y", "z"]
     return FileContent(
         heights.reshape(ny, nx),
         units[2] or heading.height_unit,
         size,
         sides,
-        remark=f"columns {order} by their names" if reordered else "",
+        remark=f"columns {columns} by their names" if reordered else "",
         data_known=heading.channel == settings.data,
     )
 

@@ -31,7 +31,7 @@ _ESRI_MISSING = "-9999"
 
 @dataclass(frozen=True)
 class Heading:
-    """Facts that a heading gives; None for each that it does not.
+    """Facts that a heading contains; an attribute is None if the heading does not contain the fact.
 
     Attributes
     ----------

@@ -42,7 +42,7 @@ def open_text(path: Path) -> TextIO:
 
 
 def _guess_encoding(start: bytes) -> str:
-    """Guess the encoding: UTF by its mark or its zeros, else UTF-8, else that of Windows."""
+    """Guess the encoding: UTF-16 or UTF-32 by byte order mark or zero bytes, else UTF-8, else Windows-1252."""
     if start.startswith((b"\xff\xfe\0\0", b"\0\0\xfe\xff")):
         return "utf-32"
     if start.startswith((b"\xff\xfe", b"\xfe\xff")):

@@ -247,7 +247,7 @@ def _find_layout(path: Path) -> Layout | None:
 
 
 def _refuse_damaged_row(line, number, notation):
-    """Refuse the last line of a heading if it is a row of numbers with something else in it, not names of columns."""
+    """Refuse the last line of a heading if it is a damaged row of numbers, and not a row of column names."""
     fields = notation.fields(strip_remark(line))
     wrong = notation.wrong_fields(fields)
     if not wrong or len(fields) < _FEWEST_FIELDS or 2 * len(wrong) > len(fields):
@@ -305,7 +305,7 @@ def _find_image(path, layout, data):
 
 
 def reason_against_table(path: Path) -> str | None:
-    """Explain why a file cannot be read as a table of numbers; None if it does not resemble one."""
+    """Return why a file that resembles a table of numbers cannot be read; None if the file resembles no table."""
     with path.open("rb") as file:
         start = file.read(8)
     for signature, name in _OTHER_COMPRESSION.items():

@@ -4,9 +4,9 @@ A measurement becomes a surface in this order: heights and lengths in metres (`s
 and the steps of `steps`: a square cut out, the trend removed, missing points filled, pixels made square, short waves
 filtered, edges treated as the boundary requires, the grid changed.
 
-SurfaceTopography, which reads the files of instruments, could also remove trends and fill holes. It takes seconds to
-import, which every look at a configuration with a measured surface would cost, and has neither the cosine series of a
-free square nor windows of cells.
+SurfaceTopography, which reads the files of instruments, could also remove trends and fill holes. But its import takes
+seconds, and every command that reads a configuration with a measured surface would take that long. It also has neither
+the cosine series of a free square nor windows of cells.
 """
 
 import os
