@@ -152,7 +152,9 @@ def _compute(solver, surface, material, path, model, seed, progress, kept):
         raise ConvergenceError(record.failure, dataset) from None
     if path.unload:
         pull_off = record.snapshots[-1]["snapshot_step"]
-        loop = summarise_loop(record.steps, pull_off, material, observables.largest_tension, record.unattributed)
+        loop = summarise_loop(
+            record.steps, pull_off, material, observables.summit_pull_off_pressure, record.unattributed
+        )
         loop["uphill_jump_in_count"] = _count_uphill_jumps_in(record)
         dataset = dataset.assign(describe_variables(LOOP, loop))
     return dataset

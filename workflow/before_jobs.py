@@ -262,7 +262,8 @@ def _warn(text: str) -> None:
 def _damaged_records(results: str) -> Iterator[tuple[str, Path]]:
     """Return results whose record of Snakemake is damaged, for example after the disk was full.
 
-    Snakemake stops at such a record, or considers the result up to date. It has no public interface to find them.
+    Snakemake stops at such a record, or considers the result up to date. Snakemake has no public interface that lists
+    damaged records.
     """
     for folder, _, names in os.walk(METADATA):
         for record in (Path(folder, name) for name in names):

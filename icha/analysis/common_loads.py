@@ -201,7 +201,7 @@ def at_common_displacements(legs: Sequence[xr.Dataset]) -> tuple[np.ndarray, dic
     """Evaluate reduced pressure and contact area of an ensemble on one leg of a path, at common displacements.
 
     Displacements are measured from the largest load of the leg, so that the means of two legs meet where the legs meet.
-    Pressure and area of a separated member are zero. Legs that end in contact end where the first of them ends.
+    Pressure and area of a separated member are zero. Legs that end in contact are cut at the end of the shortest one.
 
     Parameters
     ----------

@@ -345,7 +345,7 @@ def _name(labels):
 
 
 def _entry_dataset(campaign, entry, states):
-    """Arrange the states of one entry as arrays along `AXES`, in the order of the labels; failed ones are None."""
+    """Arrange the states of one entry as arrays along `AXES`, in the order of the labels; a failed state is None."""
     studies = sorted({labels.study for labels in states})
     if len(studies) > 1:
         raise ValueError(f"entry {entry}: its solutions are of several studies: {', '.join(studies)}")

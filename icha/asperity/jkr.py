@@ -126,8 +126,8 @@ class JKR:
     def displacement(self, r, a, R):
         """Return the normal displacement of the half-space at distance r from the centre of the spot, m.
 
-        Outside the spot (r >= a) it is eq. (5), inside a^2/(2R) (2 - r^2/a^2) - sqrt(2 pi a gamma/E*). It is zero for
-        a = 0.
+        Outside the spot (r >= a) the displacement is eq. (5), inside it is a^2/(2R) (2 - r^2/a^2) - sqrt(2 pi a
+        gamma/E*). The displacement is zero for a = 0.
         """
         r, a = np.asarray(r, float), np.asarray(a, float)
         with np.errstate(divide="ignore", invalid="ignore"):

@@ -18,7 +18,7 @@ from icha.contact.model import (
     Events,
     count_summits,
     gap_bins,
-    largest_tension,
+    summit_pull_off_pressure,
 )
 from icha.surfaces.moments import LEAST_CELLS_PER_WAVE, cells_per_short_wave
 from icha.surfaces.surface import Surface
@@ -88,10 +88,10 @@ class PatchObservables:
         return [f"about {cells:.2g} grid cells for the shortest waves (at least {LEAST_CELLS_PER_WAVE:g} expected)"]
 
     @property
-    def largest_tension(self) -> float:
+    def summit_pull_off_pressure(self) -> float:
         """Tension of all summits at their pull-off at once, Pa."""
         contact = self.contact
-        return largest_tension(contact.asperities, contact.law.material.surface_energy, contact.area)
+        return summit_pull_off_pressure(contact.asperities, contact.law.material.surface_energy, contact.area)
 
     def _gap_density(self, state, cells):
         """Density of the gap over the nominal area outside contact; with the contact area it sums up to one."""

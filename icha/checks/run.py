@@ -67,7 +67,7 @@ def check_run(run: xr.Dataset, subject: str = "") -> tuple[Check, ...]:
 def check_variables(
     variables: Mapping[Hashable, xr.Variable], attrs: Mapping[str, str], subject: str
 ) -> tuple[Check, ...]:
-    """Check a run that is given by its variables and attributes."""
+    """Return the results of all checks of a run, from its variables and attributes."""
     values = {str(name): variable.values for name, variable in variables.items()}
     sizes = {str(dim): size for variable in variables.values() for dim, size in variable.sizes.items()}
     findings = _check(RunArrays(values, sizes, attrs))

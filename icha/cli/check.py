@@ -15,8 +15,8 @@ def check(
 ) -> None:
     """Check files: documented names, dimensions, units and attributes, and the physics of every result.
 
-    All files are checked in any case. Exit status: 0 if no file has problems, 1 if one has (all problems are printed),
-    2 if ICHA cannot read one.
+    The command checks all files, also after a problem, and prints all problems. Exit status: 0 if no file has problems,
+    1 if a file has problems, 2 if ICHA cannot read a file.
     """
     from icha.datasets.format import CAMPAIGN, RUN, SOLUTION, SURFACE, UnknownFile, identify_file
 

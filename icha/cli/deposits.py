@@ -92,11 +92,11 @@ def reproduce(
     json: Annotated[Path | None, option("Write the comparison to this file.", metavar="FILE")] = None,
     large: Large = False,
 ) -> None:
-    """Compute a deposit again and compare every number with it.
+    """Compute a deposit again and compare every number with the published one.
 
-    The deposit is verified and only read. The installed ICHA runs its configuration; version and packages must be those
-    of the deposit. Nothing in the deposit is executed. Every computed variable is compared: identical, within
-    tolerance, or different. With `--only smallest` this takes minutes.
+    The deposit is verified and not changed. The installed ICHA runs the configuration of the deposit. ICHA and its
+    packages must have the versions of the deposit. Nothing in the deposit is executed. Every computed variable is
+    compared: identical, within tolerance, or different. With `--only smallest` this takes minutes.
 
     Exit status: 0 if all is identical or within tolerance, 1 if not, or if the computation fails or is stopped, 2 if
     the deposit is damaged or missing, or cannot be computed again.

@@ -124,7 +124,7 @@ def simulate(
 
 
 def _refuse_unusual(**values: tuple[str, float | None]) -> None:
-    """Refuse values that are probably typing errors; keys are those of configurations, with option and value."""
+    """Refuse values that are probably typing errors; `values` maps keys of configurations to option and value."""
     from icha.configuration.plausibility import USUAL
 
     for key, (name, value) in values.items():

@@ -67,7 +67,7 @@ def expand_design(campaign: Campaign, content: Mapping) -> tuple[Campaign, list[
 
 
 def _lists(label: str, study: Study) -> dict[str, list[_Located]]:
-    """Return the lists and varied parameters to combine, surfaces first."""
+    """Return the lists and varied parameters of a study that are combined; the surfaces come first."""
     prefix = ("studies", label)
     lists = {
         one: [((*prefix, many, index), value) for index, value in enumerate(getattr(study, many))]
@@ -288,7 +288,7 @@ def value_label(section, name: str) -> str:
 
 
 def _replace_varied_names(campaign: Campaign, origin: Mapping[tuple[str, str], str]) -> Campaign:
-    """Replace names of varied surfaces and materials, in sections beside studies and figures, by their variants."""
+    """Replace names of varied surfaces and materials by their variants, in other sections than studies and figures."""
 
     def variants(section, study, name):
         names = getattr(campaign.studies[study], section) if study in campaign.studies else []

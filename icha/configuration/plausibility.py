@@ -80,7 +80,7 @@ class Unusual(NamedTuple):
 
     @property
     def key(self) -> str:
-        """Key in `confirmed`: all entries of a list have the key of the list."""
+        """Key to write into `confirmed`; for an entry of a list, this is the key of the whole list."""
         return ".".join(entry for entry in self.location if isinstance(entry, str))
 
 

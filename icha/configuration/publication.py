@@ -109,7 +109,7 @@ def _community(value: Any) -> str:
 
 
 def _date(value: Any) -> str:
-    """Refuse text that is not a day of the calendar from 1900 to 2199; YAML may have made a date of it."""
+    """Refuse values that are not a date from 1900 to 2199; the YAML reader may have converted the text to a date."""
     value = value.isoformat() if isinstance(value, datetime.date) else str(value)
     try:
         if not re.fullmatch(r"(19|20|21)[0-9]{2}-[0-9]{2}-[0-9]{2}", value):
@@ -149,7 +149,7 @@ Prose = Annotated[Text, AfterValidator(_prose)]
 
 class _Entry(Section):
     def __repr__(self):
-        """Return the given keys, as messages show them."""
+        """Return the keys that the configuration contains, for messages."""
         return self.model_dump_json(exclude_none=True)
 
 

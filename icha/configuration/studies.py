@@ -150,7 +150,7 @@ class TurningPoint(Section):
     _check = model_validator(mode="after")(exactly_one)
 
     @property
-    def target(self) -> tuple[str, float]:
+    def kind_and_value(self) -> tuple[str, float]:
         """Kind and value (SI units) of the state."""
         ((kind, value),) = self.model_dump(exclude_none=True).items()
         return kind, value
@@ -261,7 +261,7 @@ class Study(Section):
             return [self.targets.last]
         if self.snapshots == EVERY_STOP:
             return self.targets.states
-        return [snapshot.target for snapshot in self.snapshots]
+        return [snapshot.kind_and_value for snapshot in self.snapshots]
 
     def path_settings(self, snapshots: list[tuple[str, float]] | None) -> dict:
         """Return the arguments of the path of the runs (`icha.Path`), without unused ones."""
@@ -269,7 +269,7 @@ class Study(Section):
         if self.unload or self.turning_points:
             settings |= {
                 "unload": self.unload,
-                "turning_points": [point.target for point in self.turning_points],
+                "turning_points": [point.kind_and_value for point in self.turning_points],
                 "control": self.control,
             }
         elif self.control != "separation":
@@ -297,7 +297,7 @@ class Study(Section):
         """Report targets beyond the range of the asperity model."""
         targets = [(("targets", f"{kind}s", k), kind, value) for k, (kind, value) in enumerate(self.targets.states)]
         for key, states in (("snapshots", snapshots), ("turning_points", self.turning_points)):
-            targets += [((key, k, state.target[0]), *state.target) for k, state in enumerate(states)]
+            targets += [((key, k, state.kind_and_value[0]), *state.kind_and_value) for k, state in enumerate(states)]
         for location, kind, value in targets:
             if kind in ASPERITY_RANGES and value > ASPERITY_RANGES[kind].most:
                 yield (
@@ -315,6 +315,6 @@ class Study(Section):
             name, _, index = key.partition("[")
             location, value = (name,), getattr(self, name)
             if index:
-                kind, value = value[int(index.rstrip("]"))].target
+                kind, value = value[int(index.rstrip("]"))].kind_and_value
                 location = (name, int(index.rstrip("]")), kind)
             yield location, value, reason.removeprefix(f"{value!r} ")

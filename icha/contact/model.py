@@ -193,7 +193,7 @@ class Observables(Protocol[S_in]):
         """
 
     @property
-    def largest_tension(self) -> float:
+    def summit_pull_off_pressure(self) -> float:
         """Tension of all summits pulling their most at once, 3/2 pi dgamma sum(R)/A0, Pa."""
 
 
@@ -202,7 +202,7 @@ def count_summits(asperities: Asperities) -> dict[str, int]:
     return {"asperity_count": len(asperities), "unsupported_summit_count": len(asperities.unsupported_height)}
 
 
-def largest_tension(asperities: Asperities, surface_energy: float, area: float) -> float:
+def summit_pull_off_pressure(asperities: Asperities, surface_energy: float, area: float) -> float:
     """Return the tension of all summits pulling their most at once, 3/2 pi dgamma sum(R)/A0, Pa."""
     return 1.5 * np.pi * surface_energy * float(np.sum(asperities.radius_of_curvature)) / area
 

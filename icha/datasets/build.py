@@ -50,7 +50,7 @@ def make_variable(description: Variable, values: Any) -> xr.Variable:
 
 
 def get_values(thing: Any, *names: str) -> dict[str, Any]:
-    """Return attributes of a surface, a material or a spectrum that have the names of variables."""
+    """Return the attributes of a surface, a material or a spectrum with these names, which are names of variables."""
     return {name: getattr(thing, name) for name in names}
 
 

@@ -151,7 +151,7 @@ def loading_stops(data: xr.Dataset) -> xr.DataArray:
 
 
 def find_snapshot(run: xr.Dataset, kind: str | None = None, target: float | None = None) -> int:
-    """Find the first snapshot of a kind and target, of any kind or any target if left out; return its position.
+    """Return the position of the first snapshot of a kind and target; None stands for any kind or any target.
 
     Raises
     ------

@@ -1,8 +1,8 @@
-"""The campaign dataset, written run by run: memory grows with the runs only by a few numbers of each.
+"""The campaign dataset, written run by run, so that only a few numbers of each run stay in memory.
 
-The runs are read one after the other. Facts that are needed of all runs before the first can be written (numbers of
-steps and spots, snapshots, widths of texts) are noted; their values go to a temporary file, from which they are read in
-the order of the dataset, one block of neighbouring runs at a time.
+The runs are read one after the other. Some facts of all runs are needed before the first run can be written: numbers of
+steps and spots, snapshots, widths of texts. These facts stay in memory. The values of the runs go to a temporary file.
+From there they are read in the order of the dataset, one block of neighbouring runs at a time.
 """
 
 import itertools

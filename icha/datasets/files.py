@@ -3,8 +3,8 @@
 A file appears whole or not at all, has the same bytes whenever it is written from the same values, and all its values
 are finite, except where a run is marked as missing or has no more steps.
 
-Files of runs hold many small variables. All are defined before the first one is written, since the library visits all
-of them whenever it changes between defining and writing.
+Files of runs hold many small variables. ICHA defines all variables before it writes the first one. Each change between
+defining and writing takes the netCDF library time for all variables.
 """
 
 from __future__ import annotations
@@ -165,7 +165,7 @@ def read_run(path: str | os.PathLike) -> xr.Dataset:
 
 
 def check_is_run(variables: Container[Hashable], path: str | os.PathLike) -> None:
-    """Refuse a file without the variables that all runs have; `variables` are the names of those that it has."""
+    """Refuse a file without the variables that all runs have; `variables` are the names of the file's variables."""
     for name in ("mean_separation", "nominal_pressure", "contact_area_fraction", "contact_modulus"):
         if name not in variables:
             raise ValueError(f"{path}: not a run dataset, it has no variable {name!r}")

@@ -106,7 +106,7 @@ class SolutionLabels(NamedTuple):
 
 
 def path_fields(labels: RunLabels | ContactLabels | SolutionLabels) -> dict[str, str]:
-    """Return the fields in braces of a path."""
+    """Return the values for the fields in braces of a path pattern."""
     found = {
         _NUMBERS.get(name, name): number_label(value) if name in _NUMBERS else str(value)
         for name, value in labels._asdict().items()

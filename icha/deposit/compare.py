@@ -1,11 +1,12 @@
 """Compare the results of a deposit with those of a rerun, variable by variable.
 
-With the same program, environment and kind of processor, a rerun has the same bytes. On another processor the last
-digits of sums and transforms differ, and the differences grow in what is computed from them. Therefore two numbers are
-the same within tolerance if they differ by at most `TOLERANCE` of the larger one. Where a quantity passes through zero,
-its last digits are those of the larger values of which it is the difference; therefore values below `FLOOR` of the
-variable's largest count as that large. The residual of a solver is not known to any digit: two residuals are the same
-within tolerance if they differ by at most what is allowed of one (`NOISE`).
+With the same program, environment and kind of processor, the files of a rerun are identical byte for byte. On another
+processor the last digits of sums and transforms differ, and the differences grow in later computations. Therefore two
+numbers are the same within tolerance if they differ by at most `TOLERANCE` of the larger one. A value near zero is
+often the difference of two large values, and has their absolute error. Therefore values below `FLOOR` of the variable's
+largest value are compared as if they were that large. All digits of a solver's residual are rounding errors. Therefore
+two residuals are the same within tolerance if they differ by at most the largest residual that the solver accepts
+(`NOISE`).
 
 Everything else has to be equal: integers, text, places of missing values, dimensions, types, attributes. Storage
 (chunks, compression, order in the file) is not compared. Figures and the report are drawn from the compared values, by

@@ -1,10 +1,9 @@
 """The deposit as a Provenance Run RO-Crate: what every file is, and which job made it from what.
 
 Profiles: RO-Crate 1.1 (https://w3id.org/ro/crate/1.1) and Provenance Run Crate 0.5
-(https://w3id.org/ro/wfrun/provenance/0.5), with those that it builds on.
+(https://w3id.org/ro/wfrun/provenance/0.5), with the profiles on which they build.
 
-A job has no times here, and nobody who ran it: the same data have the same crate, whenever and by whomever they are
-made.
+The crate contains neither the times of jobs nor the person who ran them. So the same data always have the same crate.
 """
 
 import hashlib

@@ -111,7 +111,7 @@ def _refuse_changed(results: Path, files: Iterable[str]) -> None:
 
 
 def refuse_mixed(results: Path, campaign: Campaign, recorded: Mapping[str, str]) -> None:
-    """Refuse results that do not belong together: computed with other settings, or not from one another.
+    """Refuse results that were computed with other settings, or from other files than those in the folder.
 
     Parameters
     ----------

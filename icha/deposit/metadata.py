@@ -227,7 +227,8 @@ def summary_of(metadata: dict[str, Any]) -> dict[str, str]:
 def datacite_metadata(publication: Publication) -> dict[str, Any]:
     """Return the metadata after DataCite's schema 4.5 (https://doi.org/10.14454/g8e5-6293), for JSON.
 
-    Without a DOI the publisher is unknown, and `:tba`, DataCite's word for values that will be known later.
+    Without a DOI the publisher is unknown. Then its value is `:tba`, DataCite's word for values that will be known
+    later.
     """
     licence = find_licence(publication.license)
     paper = RelatedIdentifier(identifier=f"arXiv:{MODEL_PAPER.arxiv}", relation="Cites", resource="Preprint")

@@ -113,7 +113,7 @@ def dictionary_csv(entries: Iterable[Entry]) -> str:
 
 
 def file_pattern(path: str) -> str:
-    """Return the path with placeholders for the fields in which files of its kind differ."""
+    """Return the path pattern of a kind of file, such as `surfaces/<surface>/<seed>.nc`."""
     return next((kind for kind in _KINDS if re.fullmatch(re.sub("<.*?>", "[^/]+", kind), path)), path)
 
 

@@ -47,7 +47,7 @@ class DamagedDeposit(ValueError):
 
 @contextlib.contextmanager
 def whole_deposit(path: str | os.PathLike, *, large: bool = False) -> Iterator[Path]:
-    """Verify a deposit and provide its folder; a zip is extracted into a temporary one.
+    """Verify a deposit and provide its folder; a zip is extracted into a temporary folder.
 
     Folders without files do not count, as in git and in the list of checksums.
 

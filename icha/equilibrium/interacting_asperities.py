@@ -9,7 +9,7 @@ import numpy as np
 
 from icha.asperity.jkr import JKR
 from icha.asperity.material import Material
-from icha.contact.model import AREA_FRACTION, PRESSURE, Control, Events, count_summits, largest_tension
+from icha.contact.model import AREA_FRACTION, PRESSURE, Control, Events, count_summits, summit_pull_off_pressure
 from icha.contact.models import DEFAULT_MODEL, MODELS, PathAccuracy
 from icha.equilibrium.distributions import gap_distribution, pressure_distribution
 from icha.equilibrium.equations import nominal_derivative, nominal_value, radius_slope
@@ -194,10 +194,10 @@ class AsperityObservables:
         return reasons
 
     @property
-    def largest_tension(self) -> float:
+    def summit_pull_off_pressure(self) -> float:
         """Tension of all summits pulling their most at once, Pa."""
         contact = self.contact
-        return largest_tension(contact.asperities, contact.law.material.surface_energy, contact.area)
+        return summit_pull_off_pressure(contact.asperities, contact.law.material.surface_energy, contact.area)
 
 
 def contact_of(surface: Surface, material: Material) -> InteractingAsperities:

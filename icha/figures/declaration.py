@@ -138,16 +138,16 @@ class SnapshotFigure(StudyFigure):
         snapshots = campaign.snapshots_of(self.study)
         if snapshots == []:
             yield ("study",), self.study, "keeps no snapshot to draw; expected a study with `snapshots`"
-        elif self.snapshot is not None and self.snapshot.target not in (snapshots or []):
+        elif self.snapshot is not None and self.snapshot.kind_and_value not in (snapshots or []):
             kept = list_names(f"{kind} {value:g}" for kind, value in snapshots or []) or "none, because it names none"
-            kind, value = self.snapshot.target
+            kind, value = self.snapshot.kind_and_value
             yield ("snapshot",), f"{kind} {value:g}", f"is not kept by study {self.study!r}; expected one of: {kept}"
 
     def arguments(self) -> dict[str, Any]:
         """Return the arguments, with the kind and the target of the snapshot instead of the snapshot."""
         arguments = super().arguments()
         if arguments.pop("snapshot", None) is not None:
-            arguments["kind"], arguments["target"] = self.snapshot.target
+            arguments["kind"], arguments["target"] = self.snapshot.kind_and_value
         return arguments
 
 

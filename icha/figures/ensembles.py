@@ -72,7 +72,7 @@ def _changes(known):
 
 
 def _break_lines(breaks, *rows):
-    """Insert NaN before the given positions of each row, so that no line joins means over different members."""
+    """Insert NaN before the given positions of each row, so that no line connects means over different members."""
     return [np.insert(np.asarray(row, float), breaks, np.nan, axis=-1) for row in rows]
 
 

@@ -87,7 +87,7 @@ class _Curve(NamedTuple):
 
     @property
     def has_cohesive_zone(self) -> bool:
-        """True if boundary elements attract outside of contact, so that they have a second area."""
+        """True if the boundary elements have attraction outside of contact, and so a second, energetic area."""
         return self.truth == FINITE_RANGE and float(self.errors["surface_energy"]) > 0
 
 

@@ -170,7 +170,7 @@ def shares(line: Sequence[ContactRuns]) -> dict[str, float]:
 
 
 def _draw_parts(ax, runs, looks):
-    """Draw a bar for every line; return the parts that it consists of."""
+    """Draw a bar for every line; return the names of the parts that occur in the bars."""
     bars = {key: shares(line) for key, line in runs.items()}
     shown = [name for name in PARTS if any(abs(bar[name]) >= _LEAST_SHARE for bar in bars.values())]
     for position, ((contact, applicable), bar) in enumerate(bars.items()):

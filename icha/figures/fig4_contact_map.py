@@ -44,7 +44,7 @@ def finest_solution(campaign: Campaign, options: MapFigure) -> SolutionLabels | 
     """Return the finest solution at a finite range of attraction of the state that is drawn, if any."""
     targets = campaign.snapshots_of(options.study) or [campaign.studies[options.study].targets.last]
     if options.snapshot is not None:
-        targets = [options.snapshot.target]
+        targets = [options.snapshot.kind_and_value]
     if {kind for kind, _ in targets} != {"reduced_pressure"}:
         return None
     _, value = min(targets)  # the first one on the path

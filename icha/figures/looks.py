@@ -1,8 +1,9 @@
 """Colours and markers of lines, the same in all figures of a campaign.
 
-A colour is a material, a marker a model: closed shapes are asperities, open ones are without adhesion, crosses are
-boundary elements. If a figure has several surfaces and slopes, the shapes of the closed markers distinguish them. If
-there are many materials, or many surfaces and slopes, they have the colours of a scale instead.
+A colour stands for a material, a marker for a model. Closed markers are asperities with adhesion, open markers
+asperities without adhesion, crosses boundary elements. If a figure has several surfaces and slopes, the shapes of the
+closed markers distinguish them. If there are many materials, or many surfaces and slopes, the colours of a scale
+distinguish them instead.
 """
 
 from __future__ import annotations
@@ -159,7 +160,7 @@ class Looks:
         return ", ".join([*words, slope_label(slope)] if slope is not None and len(slopes) > 1 else words)
 
     def name(self, contact: Contact) -> str:
-        """Return the name of a line among those of its figure."""
+        """Return the name of a line, which distinguishes it from the other lines of the figure."""
         material, *place = contact
         place = self.place_name(tuple(place))
         # A single material is not named if surfaces and slopes have the colours.
@@ -178,7 +179,7 @@ def looks_of_studies(campaign: xr.DataTree, studies: Sequence[str], contacts: It
 def material_colours(campaign: xr.DataTree) -> dict[str, str]:
     """Return a colour for every material of a campaign dataset, in the order in which its studies name them.
 
-    No two materials of a study have the same one, unless it has more of them than there are colours.
+    Materials of one study have different colours, unless the study has more materials than there are colours.
     """
     studies = [node["material"].values.tolist() for node in campaign.children.values()]
     colours: dict[str, str] = {}

@@ -22,7 +22,7 @@ _NUMBERED = re.compile(r"fig(\d+)_")
 
 
 def figure_number(name: str) -> int:
-    """Return the number of a figure, which is that in its name."""
+    """Return the number of a figure, which is part of its name."""
     return int(_NUMBERED.match(name)[1])
 
 
@@ -65,7 +65,7 @@ def draw_figure(
 
 
 def _read(files):
-    """Return the dataset or tree of a netCDF file, or a list of those of several files; of other files the path."""
+    """Return the dataset or tree of a netCDF file, a list for several files, or the path of any other file."""
     from icha.datasets.files import has_groups, read_campaign, read_dataset
 
     if not isinstance(files, str | os.PathLike):

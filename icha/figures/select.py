@@ -101,7 +101,7 @@ def asked_seeds(study: xr.Dataset, labels: RunLabels) -> int:
 
 
 def is_applicable(run: xr.Dataset) -> bool:
-    """Return whether the asperity model is applicable to a run, as far as known."""
+    """Return whether a run has no known reason against the use of the asperity model."""
     return not run.attrs.get("applicability")
 
 
@@ -191,7 +191,7 @@ def path_steps(run: xr.Dataset) -> xr.Dataset:
 
 
 def branches(run: xr.Dataset) -> Iterator[tuple[str, xr.Dataset]]:
-    """Yield branch and steps of every leg of a run in order; a leg begins with the last step of the one before."""
+    """Yield the branch and the steps of every leg of a run; a leg begins with the last step of the previous leg."""
     legs = run["leg"].values
     for leg in np.unique(legs):
         steps = np.flatnonzero(legs == leg)
@@ -274,7 +274,7 @@ def finite_range_errors(model_error: xr.DataTree | None, study: str) -> list[xr.
 
 
 def errors_of_run(entries: Iterable[xr.Dataset], labels: RunLabels, *names: str) -> Iterator[xr.Dataset]:
-    """Yield those of some entries of a model error that have a run, at its labels of these names."""
+    """Yield the errors of a run from those entries of a model error that contain it; `names`: labels to select by."""
     for errors in entries:
         try:
             yield errors.isel(place_of(errors, {name: getattr(labels, name) for name in names}))

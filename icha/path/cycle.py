@@ -39,8 +39,8 @@ def follow_cycle(
 ) -> Generator[Waypoint, TargetFunction | None, None]:
     """Yield all equilibria of a path that continues after the first loading, without their energy balances.
 
-    A target that is sent in answer to one of them is met as well, if it comes before the others; its waypoint has it
-    as target.
+    In answer to a waypoint the caller may send one more target (`generator.send`). It is met too if it comes before the
+    others; its waypoint has it as target.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ def follow_cycle(
     yield waypoint_between(start, 0)
     cycle = _Cycle(contact, longest, progress, start)
     if contact.adhesive:
-        cycle.step_length = cycle.shortest
+        cycle.step_length = cycle.event_length
     else:
         cycle.stations = [start.separation + _ABOVE_CONTACT * contact.rms_height]
     yield from cycle.follow_leg(0, targets)
@@ -72,8 +72,9 @@ def follow_cycle(
     for leg, turn in enumerate(path.turning_points, start=1):
         target = TargetFunction(turn, contact)
         if (target.excess(cycle.state) > 0) != (leg % 2 == 1):
-            cycle.leg = leg
-            raise cycle.path_error(NotConverged(f"leg {leg} begins after the turning point {turn.describe()}"))
+            cycle.leg, name = leg, "unloading" if leg % 2 else "loading"
+            reason = f"leg {leg} ({name}) starts already beyond the turning point {turn.describe()}"
+            raise cycle.path_error(NotConverged(reason))
         yield from cycle.follow_leg(leg, [target])
         progress.report_position(f"turning point {turn.describe()}", cycle.state)
     if path.unload:
@@ -96,8 +97,8 @@ class _Cycle:
     state : last equilibrium.
     leg : number of the leg, even on loading and odd on unloading.
     step_length : length of the next step, m.
-    event_at : first known position of an event that is not resolved yet, as direction times separation, m.
-    event_width : length of a step that resolves it, m.
+    event_at : end of the shortest step known to contain an unresolved event, as direction times separation, m.
+    resolving_length : length of a step that resolves it, m.
     smooth_length : length of steps without events, m.
     accuracy : sums over all steps so far, and the accuracy that they require.
     stations : separations visited on loading, which the path will visit again, ascending, m.
@@ -110,13 +111,13 @@ class _Cycle:
     leg: int = 0
     step_length: float = np.nan
     event_at: float = np.inf
-    event_width: float = 0.0
+    resolving_length: float = 0.0
     smooth_length: float = 0.0
     accuracy: StepAccuracy = field(init=False)
     stations: list[float] = field(default_factory=list)
 
     def __post_init__(self):
-        """Begin with the longest step."""
+        """Set the longest step as the default, and the sums to zero."""
         self.step_length, self.accuracy = self.longest, StepAccuracy(self.contact, self.longest)
 
     @property
@@ -125,8 +126,8 @@ class _Cycle:
         return self.leg % 2 == 0
 
     @property
-    def shortest(self) -> float:
-        """Length of a step that makes the first contact or breaks the last one, m."""
+    def event_length(self) -> float:
+        """Length of a step at which an event counts as resolved, m."""
         return self.contact.path_accuracy.event * self.contact.rms_height
 
     @property
@@ -135,7 +136,7 @@ class _Cycle:
         return -1 if self.loading else 1
 
     def path_error(self, *failures: NotConverged) -> NotConverged:
-        """Return the error of a path that ends here."""
+        """Return the exception for a path that cannot continue."""
         return self.progress.path_error(self.state, self.loading, *failures)
 
     def follow_leg(
@@ -144,13 +145,13 @@ class _Cycle:
         """Yield the equilibria of a leg until all targets are met or, with `until_apart`, until nothing touches."""
         self.leg, self.event_at, self.smooth_length = leg, np.inf, 0.0
         pending, sent = PendingTargets(targets, self.direction), None
-        visited, width_limit = [self.state.separation], np.inf
+        visited, length_limit = [self.state.separation], np.inf
         while pending or until_apart:
             if not self.loading and self._is_apart():
                 if until_apart:
                     return
-                raise self.path_error(self._separation_error(pending.next_of_each_kind[0]))
-            state, step = self.find_next(min(self._next_width(), width_limit))
+                raise self.path_error(self._apart_too_early(pending.next_of_each_kind[0]))
+            state, step = self.find_next(min(self._distance_to_station(), length_limit))
             candidates = [*pending.next_of_each_kind, sent] if sent else pending.next_of_each_kind
             try:
                 target, met = find_first_target(candidates, self.state, state, self.direction)
@@ -158,75 +159,76 @@ class _Cycle:
                 if jump.target is sent:
                     sent = None
                     continue
-                pending.remove(jump.target)
+                pending.drop_next(jump.target.target.kind)
                 if not until_apart:
                     self.progress.skipped.append(jump)
                     if leg:
                         raise self.path_error() from None
                 continue
             except NotConverged as failure:
-                width_limit = self._halve(abs(step.width), failure)
+                length_limit = self._halve(abs(step.separation_change), failure)
                 continue
             if met is not state:
                 step = Step.between(self.contact, self.state, met)
             listed = None if target is sent else target
             self.progress.require_validity(self.state, met, listed, pending, self.loading)
-            # The first contact forms in the shortest step; after that the longest one is tried.
+            # The first contact forms in a step of `event_length`; after that the longest one is tried.
             first = leg == 0 and len(visited) == 1
             self.step_length = self.longest if first else self._next_length(step, met)
             self.accuracy.add(step, met)
             self.progress.record_equilibrium(met, self.loading)
-            self.state, width_limit = met, np.inf
+            self.state, length_limit = met, np.inf
             if self._is_new_station(met.separation, visited[-1]):
                 visited.append(met.separation)
             if listed is not None:
-                pending.remove(listed)
+                pending.drop_next(listed.target.kind)
                 if leg == 0:
                     self.progress.record_target(listed.target, met)
             waypoint = waypoint_between(met, leg, step) if target is None else Waypoint(target.target, met, leg, step)
             sent = yield waypoint
         if self.loading:
-            # An inner loop adds no stations within the range of those before it.
+            # An inner loop adds only separations below all earlier stations.
             lowest = min(self.stations, default=np.inf)
             new = (separation for separation in [*visited, self.state.separation] if separation < lowest)
             self.stations = sorted({*self.stations, *new})
 
-    def find_next(self, width: float) -> tuple[State, Step]:
+    def find_next(self, length: float) -> tuple[State, Step]:
         """Find the next equilibrium, so close that the work up to it is known, and the step to it.
 
-        The step is halved until an equilibrium is found and the work is known, or until it is the shortest one. A step
-        in which the tension has a new maximum ends at the maximum.
+        The step is halved until an equilibrium is found, and the work is known or the step is no longer than
+        `event_length`. A step in which the tension has a new maximum ends at the maximum.
 
-        width : length of the step that is tried first, m.
+        length : length of the step that is tried first, m.
         """
         start, accuracy = self.state, self.accuracy
         while True:
             try:
-                state = self._find_equilibrium(start.separation + self.direction * width, width)
+                state = self._find_equilibrium(start.separation + self.direction * length, length)
             except NotConverged as failure:
-                width = self._halve(width, failure)
+                length = self._halve(length, failure)
                 continue
             step = Step.between(self.contact, start, state)
             # Within the error of an equilibrium an event may happen in a long step and not in a short one.
-            passed = step.has_jump and self.direction * start.separation + self.shortest >= self.event_at
-            sharp = width <= self.shortest or passed
+            passed = step.has_jump and self.direction * start.separation + self.event_length >= self.event_at
+            sharp = length <= self.event_length or passed
             if sharp or (accuracy.is_work_known(state, step) and accuracy.is_tension_known(start, state, step)):
                 if step.has_jump:
                     self.event_at = np.inf
-                weakest = None if sharp else accuracy.find_largest_tension(start, state, step)
-                if weakest is None:
+                tension_peak = None if sharp else accuracy.locate_largest_tension(start, state, step)
+                if tension_peak is None:
                     return state, step
-                width = weakest - start.separation
+                length = tension_peak - start.separation
             else:
                 if step.has_jump:
                     self.event_at = min(self.event_at, self.direction * state.separation)
-                    self.event_width = 0.5 * width * min(1.0, accuracy.unknown_work(step) / (step.unresolved or np.inf))
+                    allowed = accuracy.allowed_unknown_work(step)
+                    self.resolving_length = 0.5 * length * min(1.0, allowed / (step.unresolved or np.inf))
                 else:
-                    self.smooth_length = min(self.smooth_length, 0.5 * width)
-                width *= 0.5
-            self.step_length = min(self.step_length, width)
+                    self.smooth_length = min(self.smooth_length, 0.5 * length)
+                length *= 0.5
+            self.step_length = min(self.step_length, length)
 
-    def _find_equilibrium(self, separation, width):
+    def _find_equilibrium(self, separation, length):
         """Find the equilibrium at a separation.
 
         On unloading all spots may lose their equilibrium together before any of them has reached its own jump-off. Then
@@ -236,25 +238,30 @@ class _Cycle:
         try:
             state = contact.equilibrium(start, separation)
             if separation > start.separation and contact.is_unstable(state):
-                raise NotConverged("spots would approach as the surfaces part: the equilibrium is unstable")
+                raise NotConverged("spots would approach as the surfaces move apart: the equilibrium is unstable")
             return state
         except NotConverged as failure:
             first, count = failure, 1
-        if not self.loading and contact.adhesive and width < CLOSE_TO_A_JUMP * contact.rms_height:
+        if not self.loading and contact.adhesive and length < CLOSE_TO_A_JUMP * contact.rms_height:
             while count <= contact.spot_count(start):
                 with suppress(NotConverged):
                     return contact.equilibrium(start, separation, let_go=count)
                 count *= 2
         raise first
 
-    def _halve(self, width, failure):
+    def _halve(self, length, failure):
         """Halve the step after a failed solve."""
-        width = self.progress.halve(width, failure, self.state, self.loading)
-        self.step_length = min(self.step_length, width)
-        return width
+        length = self.progress.halve(length, failure, self.state, self.loading)
+        self.step_length = min(self.step_length, length)
+        return length
 
     def _next_length(self, step, state):
-        """Return the length of the step after one to a state: twice as long, or as far as its errors allow."""
+        """Return the length of the step after one that ends in a state, m.
+
+        Without predicted steps, twice the last length. After an event, at least the length of steps without events.
+        Before a known event, half the distance to it, and all of it once it is short enough. Else twice the last length
+        if the error of the step allows it.
+        """
         longer = min(self.longest, 2 * self.step_length)
         if not self.contact.path_accuracy.predicts_steps:
             return longer
@@ -262,31 +269,34 @@ class _Cycle:
             return max(longer, self.smooth_length)
         distance = self.event_at - self.direction * state.separation
         if 0 < distance < np.inf:
-            return distance if distance <= self.event_width else 0.5 * distance
-        self.smooth_length = max(self.smooth_length, abs(step.width))
+            return distance if distance <= self.resolving_length else 0.5 * distance
+        self.smooth_length = max(self.smooth_length, abs(step.separation_change))
         return longer if self.accuracy.allows_twice_the_length(step) else self.step_length
 
     def _is_apart(self):
-        """Return whether nothing touches, at least as far up as where contact was about to be made first."""
+        """Return whether nothing touches, and the separation is at least that of first contact."""
         if self.contact.spot_count(self.state):
             return False
         highest = self.contact.untouched().separation - SAME_SEPARATION * self.contact.rms_height
         return self.state.separation >= highest
 
     def _is_new_station(self, separation, last):
-        """Return whether a separation is far enough from the last station: not all those around an event are used."""
+        """Return whether a separation is far enough from the last visited one.
+
+        So the many short steps around an event do not all become stations.
+        """
         contact = self.contact
         between = self.longest / 64 if contact.adhesive else SAME_SEPARATION * contact.rms_height
         return abs(separation - last) > between
 
-    def _next_width(self):
+    def _distance_to_station(self):
         """Return the distance to the next station, m; without one the length of a step."""
         at, same, stations = self.state.separation, SAME_SEPARATION * self.contact.rms_height, self.stations
         k = bisect_left(stations, at - same) - 1 if self.loading else bisect_right(stations, at + same)
         return abs(stations[k] - at) if 0 <= k < len(stations) else self.step_length
 
-    def _separation_error(self, target):
-        """Return the error of surfaces that part before a turning point; for a load, with the largest tension."""
+    def _apart_too_early(self, target):
+        """Return the exception for surfaces that are apart before a turning point."""
         reason = f"the surfaces are apart before the turning point {target.target.describe()}"
         if target.target.kind in LOADS:
             tension = max(0.0, -self.accuracy.lowest_pressure / target.target.quantity.scale(self.contact))

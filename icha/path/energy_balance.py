@@ -16,30 +16,30 @@ from icha.asperity.material import Material
 from icha.contact.model import COALESCENCE, JUMP_IN, JUMP_OFF, SPLIT, ContactModel, Events, State
 from icha.path.targets import BETWEEN, Target
 
-# In these functions width is the change of the separation in a step, m; slope and end_slope are dp/du at its ends,
-# Pa/m.
+# In these functions du and dp are the changes of the separation (m) and of the pressure (Pa) in a step; slope and
+# end_slope are dp/du at its ends, Pa/m.
 
 
-def pressure_jump(width, change, slope, end_slope):
+def pressure_jump(du, dp, slope, end_slope):
     """Return the part of a change of pressure that the tangents at both ends of the step do not explain, Pa."""
-    return change - 0.5 * width * (slope + end_slope)
+    return dp - 0.5 * du * (slope + end_slope)
 
 
-def unresolved_work(width, pressure_jump):
+def unresolved_work(du, pressure_jump):
     """Bound the error of the work of a step whose events may happen anywhere in it, J/m^2."""
-    return 0.5 * abs(width * pressure_jump)
+    return 0.5 * abs(du * pressure_jump)
 
 
-def integration_error(width, slope, end_slope):
-    """Bound the error of the work of a step without events, J/m^2."""
-    return width**2 * abs(end_slope - slope) / 24
+def integration_error(du, slope, end_slope):
+    """Estimate the error of the work of a step without events, J/m^2."""
+    return du**2 * abs(end_slope - slope) / 24
 
 
-# A loss of more than this part of the work of its step is a loss by jumps, not an error of the model's interaction.
+# A loss of more than this fraction of the work of its step is a loss by jumps, not an error of the model's interaction.
 _CERTAIN_LOSS = 0.1
 
 
-def _beside_full_contact(width, p, q, slope, end_slope):
+def _beside_full_contact(du, p, q, slope, end_slope):
     """Pressures, slopes and integration error of a step from or to full contact.
 
     Full contact is infinitely stiff: its pressure does no work, and jumps where it closes or opens. The pressure at its
@@ -48,8 +48,8 @@ def _beside_full_contact(width, p, q, slope, end_slope):
     if np.isinf(slope) and np.isinf(end_slope):
         return p, q, 0.0, 0.0, 0.0
     if np.isinf(slope):
-        return q - width * end_slope, q, end_slope, end_slope, 0.5 * width**2 * abs(end_slope)
-    return p, p + width * slope, slope, slope, 0.5 * width**2 * abs(slope)
+        return q - du * end_slope, q, end_slope, end_slope, 0.5 * du**2 * abs(end_slope)
+    return p, p + du * slope, slope, slope, 0.5 * du**2 * abs(slope)
 
 
 @dataclass(frozen=True)
@@ -58,16 +58,16 @@ class Step:
 
     Attributes
     ----------
-    width : change of the mean separation, m.
+    separation_change : change of the mean separation, m.
     work : work done on the contact, -(integral of p du), J/m^2.
     stored : change of the stored energy, J/m^2.
     pressure_jump : change of the pressure by events, Pa.
-    integration_error : bound of the error of the work without events, J/m^2.
+    integration_error : estimated error of the work without events, J/m^2.
     has_jump : whether there are events that may change the pressure.
     events : events of the step.
     """
 
-    width: float
+    separation_change: float
     work: float
     stored: float
     pressure_jump: float
@@ -83,19 +83,19 @@ class Step:
         happened in the middle of the step.
         """
         events = contact.events_between(before, after)
-        width = after.separation - before.separation
+        du = after.separation - before.separation
         p, q = contact.pressure(before), contact.pressure(after)
         slope, end_slope = -contact.stiffness(before), -contact.stiffness(after)
-        error = integration_error(width, slope, end_slope)
+        error = integration_error(du, slope, end_slope)
         if np.isinf(slope) or np.isinf(end_slope):
-            p, q, slope, end_slope, error = _beside_full_contact(width, p, q, slope, end_slope)
+            p, q, slope, end_slope, error = _beside_full_contact(du, p, q, slope, end_slope)
         # Without adhesion contact forms and breaks without a jump of the pressure.
         jumps = len(events) if contact.adhesive else events.count(COALESCENCE) + events.count(SPLIT)
         return cls(
-            width=width,
-            work=-(0.5 * width * (p + q) + width**2 * (slope - end_slope) / 12),
+            separation_change=du,
+            work=-(0.5 * du * (p + q) + du**2 * (slope - end_slope) / 12),
             stored=contact.stored_energy(after) - contact.stored_energy(before),
-            pressure_jump=pressure_jump(width, q - p, slope, end_slope) if jumps else 0.0,
+            pressure_jump=pressure_jump(du, q - p, slope, end_slope) if jumps else 0.0,
             integration_error=error,
             has_jump=bool(jumps),
             events=events,
@@ -114,7 +114,7 @@ class Step:
     @property
     def unresolved(self) -> float:
         """Bound of the error of the work because events may happen anywhere in the step, J/m^2."""
-        return unresolved_work(self.width, self.pressure_jump)
+        return unresolved_work(self.separation_change, self.pressure_jump)
 
     def jump_energy(self, contact: ContactModel) -> float:
         """Return the energy that the jumps release, each as if its spot were alone, J/m^2."""
@@ -215,40 +215,40 @@ _LOSSES = ("by_jump_in", "by_jump_off", "by_coalescence", "by_load_jump")
 
 
 def summarise_loop(
-    steps: Sequence[Mapping[str, float]],
-    pull_off: int,
+    rows: Sequence[Mapping[str, float]],
+    pull_off_row: int,
     material: Material,
-    largest_tension: float,
+    summit_pull_off_pressure: float,
     unattributed: float,
 ) -> dict[str, float]:
     """Return pull-off, detachment and losses of a closed loop, by the names of their variables.
 
     Parameters
     ----------
-    steps : equilibria of the path in order, each with pressure, separation, area and energies by their names.
-    pull_off : index of the step with the largest tension of the last unloading.
+    rows : equilibria of the path in order, each with pressure, separation, area and energies by their names.
+    pull_off_row : index of the row with the largest tension of the last unloading.
     material : half-space and interface.
-    largest_tension : tension of all summits pulling their most at once, Pa.
+    summit_pull_off_pressure : tension of all summits pulling their most at once, Pa.
     unattributed : loss that belongs to no kind of event, J/m^2.
     """
-    last, adhesive = steps[-1], material.surface_energy > 0
-    touching = steps[max((k for k, step in enumerate(steps) if step["spot_count"]), default=0)]
-    tension = max(0.0, -steps[pull_off]["nominal_pressure"])
+    last, adhesive = rows[-1], material.surface_energy > 0
+    touching = rows[max((k for k, row in enumerate(rows) if row["spot_count"]), default=0)]
+    tension = max(0.0, -rows[pull_off_row]["nominal_pressure"])
     # No energy is stored at either end of the loop.
     loss = last["work"]
     losses = {f"loss_{name}": last[f"dissipated_{name}"] for name in _LOSSES}
     strength = 16 / (9 * np.sqrt(3)) * material.surface_energy / material.interaction_range
     return {
         "pull_off_pressure": tension,
-        "pull_off_separation": steps[pull_off]["mean_separation"],
+        "pull_off_separation": rows[pull_off_row]["mean_separation"],
         "pull_off_over_strength": tension / strength if adhesive else 0.0,
-        "pull_off_over_summits": tension / largest_tension if adhesive else 0.0,
+        "pull_off_over_summits": tension / summit_pull_off_pressure if adhesive else 0.0,
         "detachment_pressure": touching["nominal_pressure"],
         "detachment_separation": touching["mean_separation"],
         "hysteresis_loss": loss,
         "hysteresis_loss_over_surface_energy": loss / material.surface_energy if adhesive else 0.0,
         **losses,
         "loss_unattributed": unattributed,
-        "largest_contact_area_fraction": max(step["contact_area_fraction"] for step in steps),
-        "largest_reduced_pressure": max(step["reduced_pressure"] for step in steps),
+        "largest_contact_area_fraction": max(row["contact_area_fraction"] for row in rows),
+        "largest_reduced_pressure": max(row["reduced_pressure"] for row in rows),
     }

@@ -11,25 +11,26 @@ from icha.path.stops import SAME_EXCESS, TargetFunction
 from icha.path.targets import BETWEEN, LOAD_CONTROL, REDUCED_PRESSURE, Path, Target
 
 
-def follow(contact: ContactModel, path: Path, progress: Callable[[str], None] | None = None) -> Iterator[Waypoint]:
+def follow(contact: ContactModel, path: Path, report: Callable[[str], None] | None = None) -> Iterator[Waypoint]:
     """Follow a path and yield its waypoints in the order in which they are met.
 
     A path that ends with the first loading yields its targets; a cyclic path yields all its equilibria.
 
     Parameters
     ----------
-    contact : contact problem.
+    contact : contact to follow.
     path : targets and turning points.
-    progress : called with a line of text at every target.
+    report : called with a line of text at every target.
 
     Raises
     ------
     NotConverged
-        If an equilibrium is not found even with short steps, or the model does not cover a target. Targets that lie
-        inside a jump are left out; on the first loading those after them are yielded before the error is raised.
+        If an equilibrium is not found even with short steps, or the model does not cover a state of the path. If a
+        target lies inside a jump: on the first loading after the other targets have been met; at a turning point at
+        once. The last unloading leaves such targets out without an error.
     """
     longest = path.max_step * contact.rms_height
-    record = PathProgress(contact, len(path.targets), longest, progress)
+    record = PathProgress(contact, len(path.targets), longest, report)
     if not path.cyclic:
         return first_loading(contact, [TargetFunction(target, contact) for target in path.targets], longest, record)
     waypoints = follow_cycle(contact, path, longest, record)
@@ -59,7 +60,7 @@ def select_load_control(
 
     Parameters
     ----------
-    contact : contact problem.
+    contact : contact of the cycle.
     cycle : generator of waypoints under separation control, which takes a target to meet in addition to its own.
     """
     visited: State | None = None

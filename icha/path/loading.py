@@ -31,7 +31,7 @@ class PathProgress:
     reached : number of targets met so far.
     skipped : errors of the targets that lie inside jumps.
     mark : separation from which equilibria are counted, m.
-    idle : number of equilibria since the last target, or since the separation `mark`, within a longest step.
+    idle : number of equilibria since the last target or since `mark` was set.
     """
 
     contact: ContactModel
@@ -72,6 +72,9 @@ class PathProgress:
     ) -> None:
         """Raise `NotConverged` if the model does not cover the state after a step.
 
+        The mean planes may meet in a state that meets a target, because the range of targets is limited already; and
+        with a model that covers full contact.
+
         target : the target that the state meets, if there is one; pending : targets that are still to be met.
         """
         contact = self.contact
@@ -92,13 +95,14 @@ class PathProgress:
         return step / 2
 
     def path_error(self, state: State, loading: bool, *failures: NotConverged) -> NotConverged:
-        """Return the error of a path that ends in a state; it names surfaces that stick together by adhesion."""
+        """Return the exception for a path that cannot continue; it adds a note if the surface is sticky."""
         contact, failures = self.contact, (*self.skipped, *failures)
         sticky = ""
         # Adhesion alone has spread the contact, or prevents the first equilibrium.
         no_equilibrium = contact.spot_count(state) == 0 and not any(isinstance(each, InsideJump) for each in failures)
         if contact.adhesive and loading and (contact.pressure(state) < 0 or no_equilibrium):
-            sticky = "; the load is still tensile: the surface is sticky, adhesion pulls it towards full contact"
+            reason = "there is no equilibrium after first contact" if no_equilibrium else "the load is still tensile"
+            sticky = f"; {reason}: the surface is sticky, adhesion pulls it towards full contact"
         return NotConverged(
             f"at a mean separation of {state.separation / contact.rms_height:.4f} h_rms, "
             f"A/A0 = {contact.area_fraction(state):.3g}, after {self.reached} of {self.total} stops: "
@@ -108,8 +112,8 @@ class PathProgress:
 
 # Number of attempts to reach a target in one step, before it is bracketed by two states.
 _DIRECT_ATTEMPTS = 2
-# A step to a target that failed is shortened to this part if it is long, that is longer than `_LONG` longest steps.
-_FIRST_PART, _LONG = 0.6, 0.1
+# A step to a target that failed is shortened to this fraction if it is long, that is longer than `_LONG` longest steps.
+_FIRST_FRACTION, _LONG = 0.6, 0.1
 # Number of equilibria after a failed step until steps become longer again: a step that failed usually fails again.
 _PATIENCE = 8
 
@@ -131,7 +135,7 @@ def first_loading(
         As in `icha.path.follow.follow`.
     """
     state = first_contact = contact.untouched()
-    pending, step, failed_trials, found = PendingTargets(targets, -1), longest, 0, 0
+    pending, step, failed_trials, successes = PendingTargets(targets, -1), longest, 0, 0
     target: TargetFunction | None
     while pending:
         if contact.spot_count(state) == 0 and state.separation > first_contact.separation:
@@ -146,26 +150,26 @@ def first_loading(
                     # Try a shorter step first; if that fails too, the target is bracketed by two states.
                     failed_trials = failed_trials + 1 if distance > _LONG * longest else _DIRECT_ATTEMPTS
                     if failed_trials < _DIRECT_ATTEMPTS:
-                        step, found = _FIRST_PART * distance, 0
+                        step, successes = _FIRST_FRACTION * distance, 0
                     continue
             else:
                 after = contact.equilibrium(state, state.separation - step)
                 target, after = find_first_target(pending.next_of_each_kind, state, after, -1)
         except InsideJump as jump:
-            pending.remove(jump.target)
+            pending.drop_next(jump.target.target.kind)
             progress.skipped.append(jump)
             state, failed_trials = jump.before, 0
             continue
         except NotConverged as failure:
-            step, found = progress.halve(step, failure, state, loading=True), 0
+            step, successes = progress.halve(step, failure, state, loading=True), 0
             continue
-        found += 1
-        step = min(longest, 2 * step) if found >= _PATIENCE else step
+        successes += 1
+        step = min(longest, 2 * step) if successes >= _PATIENCE else step
         progress.require_validity(state, after, target, pending, loading=True)
         state = after
         progress.record_equilibrium(state, loading=True)
         if target is not None:
-            pending.remove(target)
+            pending.drop_next(target.target.kind)
             failed_trials = 0
             progress.record_target(target.target, state)
             yield Waypoint(target.target, state)

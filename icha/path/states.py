@@ -26,7 +26,7 @@ class Snapshot(Section):
     _check = model_validator(mode="after")(exactly_one)
 
     @property
-    def target(self) -> tuple[str, float]:
+    def kind_and_value(self) -> tuple[str, float]:
         """Kind and value (SI units) of the state."""
         ((kind, value),) = self.model_dump(exclude_none=True).items()
         return kind, value

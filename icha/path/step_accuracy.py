@@ -15,8 +15,11 @@ UNION_STEP = 1 / 16
 # Largest integration error of a step without events, relative to the work so far, unless work and change of energy
 # agree.
 _CURVED_WORK = 1e-4
-# Smallest scale of the losses in tension, relative to the work so far.
-_LEAST_LOSS = 1e-2
+# Scale of the losses in tension, relative to the energy that jumps have released: errors of the work up to 1e-3 of that
+# energy (10 times `_CURVED_WORK`) are allowed. And its smallest value, relative to the work so far.
+_LOSS_SCALE, _LEAST_LOSS = 10.0, 1e-2
+# Longest step, relative to the longest one of the path, whose balance of energy is not examined.
+_UNEXAMINED_STEP = 1 / 256
 # Largest error of the largest tension at an event, relative to it.
 _MISSED_TENSION = 1e-3
 
@@ -29,95 +32,99 @@ class StepAccuracy:
     ----------
     contact : contact that the path follows.
     longest : longest step of the separation, m.
-    effort : sum of work and losses so far, without their signs, J/m^2.
+    total_work : sum of work and losses so far, without their signs, J/m^2.
     jump_energy : energy released by jumps so far, each as if its spot were alone, J/m^2.
     lowest_pressure : lowest nominal pressure so far, at most zero, Pa.
     """
 
     contact: ContactModel
     longest: float
-    effort: float = 0.0
+    total_work: float = 0.0
     jump_energy: float = 0.0
     lowest_pressure: float = 0.0
 
     def add(self, step: Step, state: State) -> None:
-        """Add a step to a state to the sums."""
-        self.effort = self.effort_after(step)
+        """Update the sums with a step; `state` is its end."""
+        self.total_work = self.total_work_after(step)
         self.jump_energy += step.jump_energy(self.contact)
         self.lowest_pressure = min(self.lowest_pressure, self.contact.pressure(state))
 
-    def effort_after(self, step: Step) -> float:
+    def total_work_after(self, step: Step) -> float:
         """Return the sum of work and losses with one more step, J/m^2."""
-        return self.effort + (abs(step.work) + abs(step.loss))
+        return self.total_work + (abs(step.work) + abs(step.loss))
 
     def allows_twice_the_length(self, step: Step) -> bool:
         """Return whether a step of twice the length would be accurate: its error grows with the cube of its length."""
-        return 8 * step.integration_error <= _CURVED_WORK * self.effort_after(step)
+        return 8 * step.integration_error <= _CURVED_WORK * self.total_work_after(step)
 
     def is_work_known(self, state, step):
         """Return whether the work of a step is known well enough.
 
         It is not if the events of the step, which may happen anywhere in it, leave too much of the work open; if spots
         unite in a long step; or if the integral of the pressure is inaccurate and does not agree with the change of the
-        stored energy in a step without events.
+        stored energy in a step without events. Steps up to 1/256 of the longest one are exempt from the last test.
         """
-        width = abs(step.width)
-        if step.unresolved > self.unknown_work(step):
+        length = abs(step.separation_change)
+        if step.unresolved > self.allowed_unknown_work(step):
             return False
         # The union of two spots depends on how far they overlap when it is found.
-        if step.has_union and width > UNION_STEP * self.longest:
+        if step.has_union and length > UNION_STEP * self.longest:
             return False
         accuracy = self.contact.path_accuracy
-        scale = effort = self.effort_after(step)
-        if step.width > 0 and self.contact.pressure(state) < 0:
+        scale = total_work = self.total_work_after(step)
+        if step.separation_change > 0 and self.contact.pressure(state) < 0:
             # In compression loading and unloading visit the same stations, so that their errors cancel. In tension
             # they do not: the error is relative to the losses.
-            scale = min(effort, max(10 * self.jump_energy, _LEAST_LOSS * effort))
+            scale = min(total_work, max(_LOSS_SCALE * self.jump_energy, _LEAST_LOSS * total_work))
         unbalanced = step.integration_error > _CURVED_WORK * scale and abs(step.loss) > accuracy.balance * scale
-        return step.has_jump or not unbalanced or width <= self.longest / 256
+        return step.has_jump or not unbalanced or length <= _UNEXAMINED_STEP * self.longest
 
-    def unknown_work(self, step):
+    def allowed_unknown_work(self, step):
         """Return the largest work that the events of a step may leave unknown, J/m^2."""
-        effort = self.effort_after(step)
+        total_work = self.total_work_after(step)
         released = UNRESOLVED_LOSS * (self.jump_energy + step.jump_energy(self.contact))
-        return max(released, self.contact.path_accuracy.loss * effort) if released else UNRESOLVED_WORK * effort
+        return max(released, self.contact.path_accuracy.loss * total_work) if released else UNRESOLVED_WORK * total_work
 
     def is_tension_known(self, start, state, step):
-        """Return whether the largest tension of a step is known well enough, as far as its events decide it."""
+        """Return whether the largest tension of a step is known well enough.
+
+        It is not if events may have hidden a larger tension.
+        """
         contact = self.contact
-        if step.width < 0 or not step.pressure_jump:
+        if step.separation_change < 0 or not step.pressure_jump:
             return True
         if contact.adhesive and contact.spot_count(start) and not contact.spot_count(state):
             return False  # the last contact breaks: found as sharply as possible
         # The pressure may have fallen along its tangent up to the event.
         p, slope = contact.pressure(start), -contact.stiffness(start)
-        lowest, found = min(p, p + step.width * slope), min(p, contact.pressure(state))
+        lowest, found = min(p, p + step.separation_change * slope), min(p, contact.pressure(state))
         return lowest >= self.lowest_pressure or found - lowest <= _MISSED_TENSION * abs(lowest)
 
-    def find_largest_tension(self, start, state, step):
+    def locate_largest_tension(self, start, state, step):
         """Return the separation at which the tension is largest between two states without an event, m.
 
-        None if the tension has no maximum there, or a smaller one than before.
+        None if the tension has no maximum there, a smaller one than before, or one that the ends already give to the
+        required accuracy.
         """
         contact = self.contact
         slope, end_slope = (-contact.stiffness(each) for each in (start, state))
-        if step.width < 0 or step.pressure_jump or not slope < 0 < end_slope:
+        if step.separation_change < 0 or step.pressure_jump or not slope < 0 < end_slope:
             return None
         p, q = (contact.pressure(each) for each in (start, state))
         # The tangents meet below the curve.
-        meet = (q - end_slope * step.width - p) / (slope - end_slope)
+        meet = (q - end_slope * step.separation_change - p) / (slope - end_slope)
         lowest = p + slope * meet
         if lowest >= self.lowest_pressure or min(p, q) - lowest <= contact.path_accuracy.tension * abs(lowest):
             return None
-        lowest_at = _minimum_of_cubic(step.width, (p, q), (slope, end_slope))
+        lowest_at = _minimum_of_cubic(step.separation_change, (p, q), (slope, end_slope))
         return start.separation + (meet if lowest_at is None else lowest_at)
 
 
-def _minimum_of_cubic(width, values, slopes):
-    """Return where the cubic with these values and slopes at 0 and `width` has its lowest turn between; or None."""
+def _minimum_of_cubic(length, values, slopes):
+    """Return the lowest stationary point of the cubic with these values and slopes at 0 and `length`, or None."""
     # The import takes long, and loading does not need it.
     from scipy.interpolate import CubicHermiteSpline
 
-    curve = CubicHermiteSpline([0.0, width], values, slopes)
-    turns = [u for u in curve.derivative().roots(extrapolate=False) if 0 < u < width]
-    return min(turns, key=curve, default=None)
+    curve = CubicHermiteSpline([0.0, length], values, slopes)
+    stationary = [u for u in curve.derivative().roots(extrapolate=False) if 0 < u < length]
+    return min(stationary, key=curve, default=None)

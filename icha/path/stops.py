@@ -13,7 +13,7 @@ from icha.path.targets import LEAST_PRESSURE, MEAN_SEPARATION, Target
 SAME_EXCESS = 1e-9
 # Largest difference of two separations, in h_rms, that is due to rounding. A bracket as narrow as this holds a jump.
 SAME_SEPARATION = 1e-10
-# Widest bracket, in h_rms, in which a failed solve means that there is a jump: spots have infinite slopes there.
+# Widest bracket, in h_rms, in which a failed solve means that there is a jump: da/d(delta) is infinite there.
 CLOSE_TO_A_JUMP = 1e-4
 # Largest number of times that a bracket is halved.
 _MAX_HALVINGS = 80
@@ -36,7 +36,10 @@ class TargetFunction:
     contact: ContactModel
 
     def excess(self, state: State) -> float:
-        """Return the relative excess over the target; separations count in h_rms, zero load in the least load."""
+        """Return the relative excess over the target.
+
+        Separations count in h_rms; for a zero load the unit is LEAST_PRESSURE.
+        """
         quantity, value = self.target.quantity, self.target.value
         if quantity.controlled is None:
             return (value - state.separation) / self.contact.rms_height
@@ -85,9 +88,9 @@ class PendingTargets:
         """The next target of every kind."""
         return [pending[-1] for pending in self._by_kind.values() if pending]
 
-    def remove(self, target: TargetFunction) -> None:
-        """Remove the next target of its kind."""
-        self._by_kind[target.target.kind].pop()
+    def drop_next(self, kind: str) -> None:
+        """Drop the next target of a kind."""
+        self._by_kind[kind].pop()
 
 
 class InsideJump(NotConverged):

@@ -47,7 +47,7 @@ class TargetQuantity:
     pressure_unit: str = ""
 
     def scale(self, contact: ContactModel) -> float:
-        """Return the controlled quantity at a value of 1."""
+        """Return the factor from the value to the controlled quantity."""
         return getattr(contact, self.pressure_unit) if self.pressure_unit else 1.0
 
     def evaluate(self, contact: ContactModel, state: State) -> float:
@@ -223,7 +223,10 @@ def _validate_snapshots(snapshots):
 
 
 def _validate_turning_points(turning_points, last):
-    """Return the turning points; those of one kind must alternate below and above each other."""
+    """Return the turning points.
+
+    Each must lie below the one before of its kind on unloading, above it on loading; separations the reverse.
+    """
     turns = []
     for k, (label, kind, value) in enumerate(_label_pairs("turning_points", turning_points)):
         unloading = k % 2 == 0
@@ -261,7 +264,7 @@ def _label_pairs(name, pairs):
 
 
 def _require_loads(targets, continues):
-    """Raise an error for whatever has no meaning where the load is imposed."""
+    """Require load targets only, and a path that unloads or turns."""
     for target in targets:
         if target.kind not in LOADS:
             raise ValueError(

@@ -242,8 +242,9 @@ def _solve_nonadhesive(fine, material, pressure, tolerance):
 class GapContact:
     """Contact at given mean gaps; each solution starts from the last one, the first from `gap` (m).
 
-    Tamaas divides its error by the load of the contact, so it does not stop where nothing touches. It is therefore
-    interrupted now and then, and a gap that is open everywhere is checked against the law of the interface.
+    Tamaas divides its error by the load of the contact, so its solver does not stop if no node is in contact. Therefore
+    ICHA interrupts the solver from time to time. If the gap is open everywhere, ICHA checks it against the law of the
+    interface.
     """
 
     def __init__(self, fine, material, tolerance, gap=None):
@@ -298,7 +299,7 @@ class GapContact:
         return np.min(self.solver.model["gap"]) > 0
 
     def _imbalance(self):
-        """Largest difference of traction and attraction, over the strength of the interface, where nothing touches.
+        """Return the largest difference between traction and attraction, over the strength, if no node is in contact.
 
         Each mode of the traction is E* q/2 times the same mode of the displacement; the mean traction is unknown.
         """

@@ -135,8 +135,8 @@ class _LoopSolver:
     def work_error(self, before, after):
         """Error of the work of a step by the trapezoidal rule, J/m^2: the smaller of two estimates.
 
-        On a branch it is the work minus the change of the stored energy; where the pressure jumps it is at most half
-        the change of the pressure times the step.
+        On a branch the error is the work minus the change of the stored energy. Where the pressure jumps, the error is
+        at most half the change of the pressure times the step.
         """
         records = [self.record(before), self.record(after)]
         return min(abs(_dissipated(records)[0]), _jump_position_error(records)[0])

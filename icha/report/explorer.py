@@ -1,7 +1,7 @@
 """The page for exploring a campaign: one HTML file that needs neither network nor other files.
 
 It contains the library plotly.js, and a short script (`templates/explorer.js`) with the data of every contact. The same
-results and choices give the same bytes.
+results and choices always give exactly the same file.
 """
 
 from __future__ import annotations

@@ -183,7 +183,7 @@ def _finite(variable: xr.DataArray) -> np.ndarray:
 
 
 def _scatter(values: np.ndarray):
-    """Return the mean, and half its 95 % interval (five seeds or more) or the extremes (fewer)."""
+    """Return the mean, and half its 95 % interval for five seeds or more, else the smallest and largest value."""
     if not len(values):
         return None
     over = ensemble(values)

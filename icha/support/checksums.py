@@ -117,7 +117,7 @@ def stale(
 
     @cache
     def content(path):
-        """SHA-256 of an input, empty if it is missing; a file of the configuration has no sidecar."""
+        """Return the SHA-256 of an input, or empty text if the file does not exist."""
         with contextlib.suppress(FileNotFoundError):
             return known(path).sha256 or sha256_of(Path(results, path))
         return ""

@@ -1,7 +1,7 @@
 """Input files from unknown sources: which are opened, the memory limit of reading, traps in HDF5 files, tables.
 
-A small file can declare, or unpack to, any size. Readers compare declared sizes with the limit (`require_room`) and
-read within it (`bounded_memory`), with whatever library.
+A small file can declare a very large array, or unpack to one. Readers compare declared sizes with the limit
+(`require_room`) and read within it (`bounded_memory`), with whatever library.
 """
 
 import csv
@@ -137,7 +137,7 @@ def refuse_traps(path: str | os.PathLike) -> None:
         groups, count = {h5py.h5o.get_info(file.id).addr}, 0
 
         def trap(name, link):
-            """Return a reason to refuse the file, which ends the visit, or None."""
+            """Return a reason to refuse the file, or None; h5py stops visiting links at the first reason."""
             nonlocal count
             count += 1
             if count > _MOST_NAMES or name.count(b"/") >= _DEEPEST:

@@ -73,7 +73,7 @@ def test_the_whole_challenge():
     assert len(areas) == 20 and areas[-1] == 0.1
     np.testing.assert_allclose(np.diff(np.log(areas)), np.log(areas[-1] / areas[0]) / 19, rtol=0.03)
     pressure = challenge["reference_pressure_Pa"] / challenge["contact_modulus_Pa"] / challenge["rms_slope"]
-    assert [snapshot.target for snapshot in study.snapshots] == [("reduced_pressure", pytest.approx(pressure))]
+    assert [snapshot.kind_and_value for snapshot in study.snapshots] == [("reduced_pressure", pytest.approx(pressure))]
 
 
 def test_tabor_parameters_of_the_tabor_campaign():

@@ -387,7 +387,9 @@ def test_a_step_that_fails_is_halved_whatever_the_one_before(stride):
     cycle = _Cycle(contact, 1.5, PathProgress(contact, 1, 1.5), start, leg=1)
     cycle.step_length = stride
     state, step = cycle.find_next(1.0)
-    assert step.width == pytest.approx(0.5) and state.separation == start.separation + step.width
+    assert (
+        step.separation_change == pytest.approx(0.5) and state.separation == start.separation + step.separation_change
+    )
 
 
 def test_a_load_that_is_not_met_before_a_station_is_met_in_shorter_steps():

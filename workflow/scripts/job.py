@@ -19,7 +19,7 @@ SNAKEMAKE = "ICHA_SNAKEMAKE"
 
 
 def _solver_errors() -> list[type[Exception]]:
-    """Return the errors of solvers that did not converge, of modules that this job has imported."""
+    """Return the error classes for solvers that did not converge, from the modules that this job has imported."""
     names = {
         "icha.simulation": "ConvergenceError",
         "icha.contact.model": "NotConverged",

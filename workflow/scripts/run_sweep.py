@@ -26,8 +26,8 @@ def run_sweep(
     """Compute a run and write its dataset.
 
     The file of a failed run contains the stops that were reached, and the reason; the campaign continues, and its
-    verdict lists the run. Unexpected errors are treated in the same way, since they can only come from surface,
-    material and path.
+    verdict lists the run. After an unexpected error the campaign also continues, because only the surface, the material
+    and the path of this run can be the cause.
 
     Parameters
     ----------

@@ -8,7 +8,7 @@ from icha.support.atomic_files import whole_file
 
 
 def write_configuration(output, *, text, copies, sha256):
-    """Write the configuration, and copy the files that it names; `copies` maps copies to files with these checksums."""
+    """Write the configuration and copy its input files; `copies`: file by copy, `sha256`: checksums of the files."""
     for (copy, file), expected in zip(copies.items(), sha256, strict=True):
         with whole_file(copy) as temporary:
             shutil.copyfile(file, temporary)

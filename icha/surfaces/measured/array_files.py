@@ -175,14 +175,15 @@ def _is_map(shape):
 def find_maps(shapes: Mapping[Any, tuple[int, ...]]) -> list:
     """Return the names of the arrays that can be maps of heights.
 
-    Lines and single numbers of two dimensions, as which MATLAB stores them, count only without another array.
+    MATLAB stores lines and single numbers as two-dimensional arrays. Their names are returned only if the file has no
+    other array.
     """
     maps = [name for name, shape in shapes.items() if _is_map(shape)]
     return [name for name in maps if min(shapes[name][-2:]) > 2] or maps
 
 
 def _unit_of(attributes):
-    """Return the metres of the unit in a variable's attributes; None if it has none of length."""
+    """Return the unit in a variable's attributes, in metres; None without a unit of length."""
     text = attributes.get("units", attributes.get("unit"))
     if isinstance(text, bytes):
         text = text.decode("utf-8", "replace")

@@ -100,7 +100,7 @@ def put_y_first(heights: np.ndarray, settings: Preparation) -> np.ndarray:
 def regular_ticks(values: np.ndarray, axis: str) -> tuple[np.ndarray, int, float]:
     """Return the index (n,) of every coordinate on a regular scale, and the number and distance of its ticks.
 
-    Raises ValueError, with `axis` as their name, if the coordinates are on no such scale.
+    Raises ValueError if the coordinates are not on a regular scale; `axis` is their name in the message.
     """
     if not np.all(np.isfinite(values)):
         raise ValueError(f"{axis} is not finite everywhere")

@@ -176,7 +176,7 @@ def _ticks(values, axis):
 
 
 def _mark_missing(heights, heading):
-    """Replace the numbers that, by the heading, stand for missing heights by nan."""
+    """Replace by nan the numbers that stand for missing heights according to the heading."""
     for number in heading.missing:
         heights = np.where(np.isclose(heights, number, rtol=_FEW_DIGITS, atol=0), np.nan, heights)
     return heights

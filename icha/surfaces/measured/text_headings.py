@@ -96,7 +96,7 @@ def _entries(lines):
 
 
 def _image_sides(lines):
-    """Width and height of the first image of Gwyddion, as they are written; empty without its heading."""
+    """Return the texts of width and height of the first image of Gwyddion; an empty list without Gwyddion's heading."""
     for line, following in itertools.pairwise(lines):
         if (found := WIDTH.match(line)) and ":" in following:
             return [found[2].strip(), following.partition(":")[2].strip()]
@@ -104,7 +104,7 @@ def _image_sides(lines):
 
 
 def _sizes(image_sides, entries, shape):
-    """Size in m, and size in an unknown unit; None for each that the heading does not give."""
+    """Return the size in m and the size in an unknown unit; a size that the heading does not contain is None."""
     rows, columns = shape
     sides = [_length(text) for text in image_sides]
     if sides and all(side and side[1] for side in sides):

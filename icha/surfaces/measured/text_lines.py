@@ -126,8 +126,8 @@ def are_decimal_between_blanks(text: str) -> bool:
 def are_halves_of_decimals(rows: list[list[str]]) -> bool:
     """Tell whether the columns are in turn the digits before and after decimal commas.
 
-    The digits after a comma have no sign, and each column has one number of them. They differ from integers if some of
-    them begin with a zero, or if the columns before have other numbers of digits.
+    The digits after a comma have no sign, and each column has one number of them. A column of such digits differs from
+    a column of integers: some numbers begin with a zero, or the numbers in the column before have different lengths.
     """
     # A row whose last field is empty is shorter.
     width = max(map(len, rows))
