@@ -14,7 +14,8 @@ from icha.figures.declaration import Campaign, Declaration, Inputs, RunFigure, S
 from icha.figures.looks import NOT_APPLICABLE_ALONE
 from icha.figures.maps import average_blocks, draw_spots, draw_whole, wrap_circles
 from icha.figures.select import is_applicable, run_on_topography
-from icha.figures.style import choose_unit, format_number, in_style, material_label, new_panels
+from icha.figures.style import format_number, in_style, material_label, new_panels
+from icha.support.formatting import choose_unit
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -12,7 +12,8 @@ from icha.figures.legends import legend_below
 from icha.figures.looks import NOT_APPLICABLE_ALONE, Scale
 from icha.figures.maps import draw_spots, wrap_circles
 from icha.figures.select import is_applicable, pick, select_runs, snapshot_label
-from icha.figures.style import choose_unit, in_style, new_panels, slope_label
+from icha.figures.style import in_style, new_panels, slope_label
+from icha.support.formatting import choose_unit
 from icha.support.values import Label, Problem, Seed
 
 if TYPE_CHECKING:

@@ -11,8 +11,8 @@ from icha.datasets.campaign import loading_stops, reduced_gap, run_place, runs_o
 from icha.datasets.labels import LABELS, RunLabels, labels_at, slopes_of
 from icha.datasets.variables.campaign import COMPLETE, COMPUTED_RUNS, FAILED_CHECKS, INCOMPLETE, MISSING, RAGGED
 from icha.figures.select import asked_seeds, path_steps
-from icha.figures.style import choose_unit, format_quantity
 from icha.report.template import MOST_ROWS, format_scientific
+from icha.support.formatting import choose_unit, format_quantity
 from icha.support.statistics import ENOUGH, ensemble
 
 # Quantities in a table by the kind of its stops: two of pressure, contact area and mean gap.
