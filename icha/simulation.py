@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 from threadpoolctl import threadpool_limits
 
-from icha.asperity.full_contact import FULL_CONTACT_BELOW, full_contact_energy_ratio
+from icha.asperity.full_contact import FULL_CONTACT_BELOW, full_contact_energy_ratio, theoretical_strength
 from icha.asperity.material import Material
 from icha.asperity.stickiness import stickiness
 from icha.checks.run import check_run, reasons_of_failure
@@ -389,6 +389,8 @@ def _target_unit(kinds: set[str], named_by: str) -> dict:
 def _surface_values(surface: Surface, material: Material, seed: int) -> dict:
     """Return the values of the surface and the material."""
     moments, (skewness, kurtosis) = spectral_moments(surface), height_statistics(surface)
+    complete = surface.complete_contact_pressure * material.contact_modulus
+    strength = theoretical_strength(material.surface_energy, material.interaction_range)
     return {
         **get_values(material, *MATERIAL),
         **get_values(surface, *ROUGHNESS, "period", "boundary", "grid"),
@@ -402,6 +404,9 @@ def _surface_values(surface: Surface, material: Material, seed: int) -> dict:
         "full_contact_energy_ratio": full_contact_energy_ratio(
             surface.full_contact_energy, material.contact_modulus, material.surface_energy
         ),
+        "complete_contact_pressure": complete,
+        "interface_strength": strength,
+        "full_contact_opening_pressure": complete - strength,
         "height_skewness": skewness,
         "height_kurtosis": kurtosis,
         "slope_anisotropy": slope_anisotropy(surface),

@@ -229,7 +229,7 @@ class CampaignResults:
 
 
 class _Wildcards(dict):
-    """Wildcards as functions of rules expect them."""
+    """Wildcards in the form that the functions of rules expect."""
 
     __getattr__ = dict.__getitem__
 

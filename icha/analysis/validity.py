@@ -13,13 +13,13 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from icha.asperity.full_contact import FULL_CONTACT_BELOW, HIGH_PULL_OFF_BELOW, MEANING
+from icha.asperity.full_contact import FULL_CONTACT_BELOW, HIGH_PULL_OFF_BELOW, MEANING, expected_behaviour
 from icha.asperity.material import WU_HOLDS_FROM
 from icha.contact.models import DEFAULT_MODEL, MODELS
 from icha.datasets.attributes import reasons_not_applicable
 from icha.datasets.labels import LABELS
 from icha.datasets.variables.campaign import COMPUTED_RUNS
-from icha.support.formatting import format_count
+from icha.support.formatting import format_count, format_quantity
 from icha.surfaces.moments import RESOLVED_CELLS, cells_per_short_wave, error_of_cells
 
 if TYPE_CHECKING:
@@ -34,6 +34,8 @@ VALIDATION = {
 _VALIDATED = "on seven self-affine surfaces, p* from 0.001 to 0.1 (page on validation)"
 
 _RATIO = "full_contact_energy_ratio"
+# Pressure for complete contact and strength of the interface of a case, Pa, where they are known.
+COMPLETE, STRENGTH = "complete_contact_pressure", "interface_strength"
 
 # Share of single spots outside the range of Wu's formula above which a case is named; every surface has some.
 _FEW = 0.05
@@ -125,7 +127,7 @@ class Case(NamedTuple):
     Attributes
     ----------
     model, surface, material : names.
-    facts : values by the names of `VALIDATED`, with the ratio of energies.
+    facts : values by the names of `VALIDATED`, with the ratio of energies; `COMPLETE` and `STRENGTH` where known.
     """
 
     model: str
@@ -175,7 +177,17 @@ def _full_contact(cases):
     if not adhesive:
         return
     lowest = min(adhesive, key=lambda case: case.ratio)
-    text = f"U_full/dgamma is about {lowest.ratio:.3g} or more ({lowest.material} on {lowest.surface}); {MEANING}"
+    text = (
+        f"{expected_behaviour(lowest.ratio)}; U_full/dgamma is about {lowest.ratio:.3g} or more "
+        f"({lowest.material} on {lowest.surface}), {MEANING}"
+    )
+    if COMPLETE in lowest.facts:
+        pressures = lowest.facts[COMPLETE], lowest.facts[COMPLETE] - lowest.facts[STRENGTH], lowest.facts[STRENGTH]
+        complete, opening, strength = (format_quantity(pressure, "Pa") for pressure in pressures)
+        text += (
+            f"; full contact is complete at about {complete} without adhesion and opens at {opening} (strength of the "
+            f"interface: {strength})"
+        )
     if any(MODELS[case.model].by_summits and case.ratio < FULL_CONTACT_BELOW for case in cases):
         text += f"; the asperity model is not applicable below {FULL_CONTACT_BELOW:g}"
     yield Statement("adhesion", text, lowest.ratio >= HIGH_PULL_OFF_BELOW)
@@ -268,7 +280,7 @@ def _not_applicable(campaign):
 
 def _cases(study):
     """Yield the cases of the computed runs of a study."""
-    measured = [name for name in VALIDATED if name in study]
+    measured = [name for name in (*VALIDATED, COMPLETE, STRENGTH) if name in study]
     status = study["status"].transpose(*LABELS)
     values = {
         name: study[name].broadcast_like(status).transpose(*LABELS).values
@@ -310,8 +322,8 @@ def _describe_shares(shares):
 def _outside(study):
     """Yield surface, material and the largest share of single spots outside the range of Wu's formula.
 
-    The share is that at the end of the first loading, the largest over seeds and slopes; None without adhesion, where
-    nothing jumps.
+    The share is taken at the end of the first loading; it is the largest over seeds and slopes. Without adhesion no
+    spot jumps, and the share is None.
     """
     runs = study[["status", "leg", "outside_wu_fraction", "surface_energy"]].sel(model=DEFAULT_MODEL)
     status = runs["status"].transpose(*LABELS[1:]).values

@@ -9,6 +9,7 @@ from importlib.metadata import version
 
 import numpy as np
 
+from icha.asperity.full_contact import theoretical_strength
 from icha.asperity.jkr import JKR
 from icha.asperity.material import Material
 from icha.boundary_elements.adhesive import Summits, solve_adhesive_contact
@@ -249,11 +250,6 @@ class BoundaryElements(FullContactProblem):
         return self._energy_of_cells(state) if self.adhesive else np.zeros(len(state.cells))
 
 
-def theoretical_strength(material: Material) -> float:
-    """Largest tension of an interface with the attraction of Lennard-Jones' law, 16/(9 sqrt(3)) dgamma/range, Pa."""
-    return 16 / (9 * np.sqrt(3)) * material.surface_energy / material.interaction_range
-
-
 def contact_of(surface: Surface, material: Material) -> BoundaryElements:
     """Contact of a surface and a material.
 
@@ -273,7 +269,7 @@ def contact_of(surface: Surface, material: Material) -> BoundaryElements:
         -jump_in / h,
         law.contact_radius(jump_in, asperities.radius_of_curvature) / h,
     )
-    strength = theoretical_strength(material) / material.contact_modulus
+    strength = theoretical_strength(material.surface_energy, material.interaction_range) / material.contact_modulus
     front = Front(material.surface_energy / (material.contact_modulus * h), strength)
     if 0 < front.critical_opening < _SMALLEST_OPENING * np.abs(surface.heights).max() / h:
         raise ValueError(

@@ -119,8 +119,8 @@ def finite_stiffness(run) -> np.ndarray:
 def work_error(run) -> float:
     """Bound the error of the work of a path by the tolerances of its equilibria, J/m^2.
 
-    An error of the separation is an error of the pressure, times the stiffness. An error of the stiffness enters as the
-    stiffness does, by the cubic through both ends of a step.
+    An error of the separation, times the stiffness, is an error of the pressure. An error of the stiffness changes the
+    cubic through both ends of a step, whose integral is the work.
     """
     width, stiffness = np.abs(np.diff(run["mean_separation"])), finite_stiffness(run)
     ends = np.abs(stiffness[1:]) + np.abs(stiffness[:-1])

@@ -65,7 +65,7 @@ Folder = Annotated[
 
 
 def count_cores(cores: str | None) -> int:
-    """Return the number of cores that the option `--cores` means."""
+    """Return the number of cores from the option `--cores`."""
     if cores == "all":
         return os.cpu_count() or 1
     return int(cores) if cores else 2

@@ -46,7 +46,7 @@ def show(
 
 def print_run(run, file: Path) -> None:
     """Print the model, material and surface of a run, and its results."""
-    from icha.figures.style import format_quantity
+    from icha.support.formatting import format_quantity
 
     def value(variable, unit=None):
         number = float(run[variable])
@@ -98,7 +98,7 @@ def print_run(run, file: Path) -> None:
 def _print_surface(surface, file: Path) -> None:
     """Print attributes and statistics of a surface; those of a scan as measured, too."""
     from icha.datasets.surface_file import measured_scale
-    from icha.figures.style import format_quantity
+    from icha.support.formatting import format_quantity
 
     echo(f"{file}: {printable(surface.attrs.get('title', 'surface'))}")
     for key in ("summary", "boundary", "source_file", "preparation"):

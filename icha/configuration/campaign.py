@@ -167,7 +167,7 @@ class Campaign(Section):
         return getattr(self.topography(surface) or self.surfaces[surface], "grid", None)
 
     def period(self, surface: str) -> float:
-        """Return the side of a surface whose grid is known, m."""
+        """Return the side of a surface, m, if its grid is known."""
         return (self.topography(surface) or self.surfaces[surface]).period
 
     def snapshots_of(self, study: str) -> list[tuple[str, float]] | None:
@@ -197,7 +197,7 @@ class Campaign(Section):
         return list(filter(is_asked_for, self._contacts[entry.study]))
 
     def problems(self) -> Iterator[Problem]:
-        """Report why the campaign cannot be run although each value is valid.
+        """Yield the reasons why the campaign cannot run, although each single value is valid.
 
         Problems that depend on measured slopes or on grids of files are left out until these are known.
         """

@@ -135,7 +135,7 @@ def _too_many_beside(campaign: Campaign) -> Iterator[Problem]:
 
 
 def _excess(section: str, counts: Mapping[str, int], what: str, most: int) -> Iterator[Problem]:
-    """Report entries of a section that ask for more than `most`, each by itself or all of them together."""
+    """Yield a problem if an entry of a section, or all entries together, request more than `most`."""
     large = {label: count for label, count in counts.items() if count > most}
     for label, count in large.items():
         yield (section, label), NOTHING, f"asks for {count} {what}; expected at most {most}"
@@ -155,7 +155,7 @@ def _study_problems(campaign: Campaign, label: str, study: Study) -> Iterator[Pr
     lists, cases = _lists(label, study), study.cases or []
 
     def values(one):
-        """Return the located values of a list, and of the cases that replace its entries."""
+        """Return the values of a list with their locations, and the values of the cases that replace its entries."""
         located = (((*prefix, "cases", index, one), getattr(case, one)) for index, case in enumerate(cases))
         return [*lists[one], *((location, value) for location, value in located if value is not None)]
 

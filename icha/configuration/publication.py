@@ -49,7 +49,7 @@ def _prose(value: str) -> str:
 
 
 def _orcid(value: str) -> str:
-    """Refuse an ORCID of the wrong form or with a wrong check digit (ISO 7064 mod 11-2); its address is accepted."""
+    """Refuse an ORCID of a wrong form or with a wrong check digit (ISO 7064 mod 11-2); a web address is accepted."""
     plain = re.sub(r"^https?://orcid\.org/", "", str(value))
     total = 0
     for digit in plain.replace("-", "")[:-1]:

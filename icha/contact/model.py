@@ -203,7 +203,7 @@ def count_summits(asperities: Asperities) -> dict[str, int]:
 
 
 def summit_pull_off_pressure(asperities: Asperities, surface_energy: float, area: float) -> float:
-    """Return the tension of all summits pulling their most at once, 3/2 pi dgamma sum(R)/A0, Pa."""
+    """Return the tension if all summits pulled with their pull-off force at once, 3/2 pi dgamma sum(R)/A0, Pa."""
     return 1.5 * np.pi * surface_energy * float(np.sum(asperities.radius_of_curvature)) / area
 
 

@@ -59,7 +59,7 @@ def stack_rows(
 ) -> dict[str, np.ndarray]:
     """Stack rows of values, one for each position along a dimension, to arrays of the variables that begin with it.
 
-    `sizes` are those of further dimensions.
+    `sizes` gives the sizes of further dimensions.
     """
     names = [name for name, described in table.items() if described.dims[:1] == (dim,) and name != dim]
     shapes = {name: (len(rows), *(sizes[each] for each in table[name].dims[1:])) for name in names}

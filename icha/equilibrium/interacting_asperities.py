@@ -138,7 +138,7 @@ class AsperityObservables:
     surface: Surface
 
     def of_contact(self) -> dict:
-        """Return what is the same in all states."""
+        """Return the values that are the same in all states."""
         return count_summits(self.contact.asperities)
 
     def of_step(self, state: ContactState) -> dict:

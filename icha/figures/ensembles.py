@@ -137,7 +137,7 @@ def draw_points(
     positive: bool,
     asked: int | np.ndarray = 0,
 ) -> ErrorbarContainer:
-    """Draw the means of an ensemble with bars, or with its members if these are few.
+    """Draw the means of an ensemble with bars, or with the single members if there are few.
 
     A line joins neighbouring points only if they are means over the same members.
 
@@ -212,7 +212,7 @@ class Points:
         return np.isfinite(self.members[0]).sum(axis=0).tolist()
 
     def draw(self, axes: Axes, look: dict, quantity: int = 1) -> ErrorbarContainer:
-        """Draw one of the quantities against the first."""
+        """Draw one of the quantities against the first quantity."""
         return draw_points(axes, self.members[0], self.members[quantity], look, positive=True, asked=self.asked)
 
 

@@ -186,7 +186,7 @@ _AREAS = _Axis("reduced_pressure", "contact_area_fraction", PRESSURE_LABEL, AREA
 
 
 def _draw(ax, loop, look, axis, *, turn, lines):
-    """Draw a loop and a mark at its pull-off; mark its first turn if `turn` or if the loop lacks seeds."""
+    """Draw a loop and a mark at its pull-off; with `turn`, or if seeds are missing, mark its first turning point."""
     colour = look["color"]
     for leg in loop.legs:
         x, y = leg.values[axis.x], leg.values[axis.y]
@@ -215,7 +215,7 @@ def _draw(ax, loop, look, axis, *, turn, lines):
 
 
 def _enlarge(left, right, loops):
-    """Add insets around zero load, if there is tension but it is small."""
+    """Add insets around zero load, if the largest tension is positive but small."""
     from matplotlib.ticker import MaxNLocator
 
     legs = [leg.values for loop, _ in loops for leg in loop.legs]

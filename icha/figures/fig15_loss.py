@@ -15,7 +15,8 @@ from icha.figures.hysteresis import name_model, select_detached_lines
 from icha.figures.legends import legend_below
 from icha.figures.looks import looks_of_studies
 from icha.figures.select import ContactRuns, NothingToDraw
-from icha.figures.style import GREY, choose_unit, in_style, logarithmic_axes, new_panels
+from icha.figures.style import GREY, in_style, logarithmic_axes, new_panels
+from icha.support.formatting import choose_unit
 from icha.support.values import Flag, Problem, list_of_names
 
 if TYPE_CHECKING:

@@ -200,7 +200,7 @@ def _gap_densities(edges, densities, grid):
 
 
 def _join_bins(edges, contents, least):
-    """Join bins until all members together have the least content; return lower and upper edges, and densities."""
+    """Join bins until the members together have a content of `least` in each; return edges and densities."""
     bounds, gathered = [0], 0.0
     for k, content in enumerate(contents.sum(axis=0)):
         gathered += content

@@ -14,7 +14,8 @@ from icha.figures.declaration import Campaign, Declaration, Inputs, RunFigure, S
 from icha.figures.looks import NOT_APPLICABLE_ALONE
 from icha.figures.maps import average_blocks, draw_spots, draw_whole, wrap_circles
 from icha.figures.select import is_applicable, run_on_topography
-from icha.figures.style import choose_unit, format_number, in_style, material_label, new_panels
+from icha.figures.style import format_number, in_style, material_label, new_panels
+from icha.support.formatting import choose_unit
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -143,7 +144,7 @@ class _Solved(NamedTuple):
 
 
 def _solved(labels, run, at, pressure, truth, solution):
-    """Return the state of boundary elements that is a run's snapshot `at`; None if they ended before."""
+    """Return the state of boundary elements at the snapshot `at` of a run; None if their path ended before it."""
     from icha.analysis.model_error import check_same_contact, state_of
     from icha.datasets.campaign import find_snapshot
 

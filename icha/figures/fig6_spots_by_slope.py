@@ -12,7 +12,8 @@ from icha.figures.legends import legend_below
 from icha.figures.looks import NOT_APPLICABLE_ALONE, Scale
 from icha.figures.maps import draw_spots, wrap_circles
 from icha.figures.select import is_applicable, pick, select_runs, snapshot_label
-from icha.figures.style import choose_unit, in_style, new_panels, slope_label
+from icha.figures.style import in_style, new_panels, slope_label
+from icha.support.formatting import choose_unit
 from icha.support.values import Label, Problem, Seed
 
 if TYPE_CHECKING:
@@ -28,7 +29,7 @@ class SlopesFigure(StudyFigure):
     material: Label | None = Field(default=None, description="Material to show. Default: the first of the study.")
 
     def study_problems(self, campaign: Campaign, study: Any) -> Iterator[Problem]:
-        """Yield in addition the problem of a study without snapshots of both kinds."""
+        """Also yield a problem if the study does not have snapshots of both kinds."""
         yield from super().study_problems(campaign, study)
         kinds = [kind for kind, _ in campaign.snapshots_of(self.study) or []]
         for kind in ("relative_load", "area_fraction"):

@@ -13,7 +13,8 @@ from icha.figures.declaration import Declaration, SnapshotFigure
 from icha.figures.ensembles import draw_members
 from icha.figures.looks import MODEL_MARKERS, TRUTH_LINE
 from icha.figures.select import select_snapshots
-from icha.figures.style import choose_unit, in_style, logarithmic_axes, new_panels
+from icha.figures.style import in_style, logarithmic_axes, new_panels
+from icha.support.formatting import choose_unit
 
 if TYPE_CHECKING:
     import xarray as xr

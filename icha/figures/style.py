@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from icha.support.atomic_files import whole_file
+from icha.support.formatting import choose_unit, format_quantity
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -164,22 +165,6 @@ def format_number(value: float) -> str:
     mantissa = f"{value / 10.0**exponent:.3g}"
     power = f"10^{{{exponent}}}"
     return f"${power}$" if mantissa == "1" else rf"${mantissa}\times{power}$"
-
-
-_PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
-
-
-def choose_unit(value: float, unit: str) -> tuple[float, str]:
-    """Return factor and name of the prefixed unit in which `value` (SI) lies between 1 and 1000."""
-    exponent = 0 if value == 0 else int(np.floor(np.log10(abs(value)) / 3 + 1e-12)) * 3
-    exponent = min(max(exponent, min(_PREFIXES)), max(_PREFIXES))
-    return 10.0**-exponent, f"{_PREFIXES[exponent]}{unit}"
-
-
-def format_quantity(value: float, unit: str) -> str:
-    """Return a value with a prefixed unit, such as `25 MPa`."""
-    factor, name = choose_unit(value, unit)
-    return f"{value * factor:.4g} {name}"
 
 
 # Variables that distinguish materials, with their symbols and units.

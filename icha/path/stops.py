@@ -136,10 +136,7 @@ def find_target_state(target: TargetFunction, before: State, after: State) -> St
     for halvings in range(_MAX_HALVINGS):
         width = sign * (before.separation - after.separation)
         if width <= SAME_SEPARATION * contact.rms_height:
-            try:
-                return target.solve(after, after.separation)
-            except NotConverged:
-                raise InsideJump(target, before, after) from None
+            return _solve_after_jump(target, before, after)
         if halvings < _TRIALS or halvings & (halvings - 1) == 0:
             with suppress(NotConverged):
                 found = target.solve(before, _guess_separation(target, before, after))
@@ -151,11 +148,22 @@ def find_target_state(target: TargetFunction, before: State, after: State) -> St
             if width > CLOSE_TO_A_JUMP * contact.rms_height:
                 raise
             raise InsideJump(target, before, after) from None
+        if not 0 < sign * (before.separation - middle.separation) < width:
+            # Between full contact and its first gap there are no states.
+            return _solve_after_jump(target, before, after)
         if sign * target.excess(middle) >= 0:
             after = middle
         else:
             before = middle
     raise NotConverged(f"{target.target.describe()} was not met after {_MAX_HALVINGS} halvings of the step")
+
+
+def _solve_after_jump(target, before, after):
+    """Solve for a target on the branch after a jump; raise `InsideJump` if the branch does not meet it."""
+    try:
+        return target.solve(after, after.separation)
+    except NotConverged:
+        raise InsideJump(target, before, after) from None
 
 
 def _guess_separation(target, before, after):

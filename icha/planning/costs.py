@@ -138,7 +138,7 @@ def _memory_before(grid):
 
 
 def surface_cost(grid: int) -> Cost:
-    """Cost of a topography of `grid` nodes a side."""
+    """Return the cost of a topography with `grid` nodes along a side."""
     heights = _DOUBLE * grid**2
     # Compression saves about a sixth of the heights.
     compression = 0.84 if grid**2 in COMPRESSED_SIZES else 1.0

@@ -4,7 +4,17 @@ import math
 from functools import cache
 from pathlib import Path
 
-from icha.analysis.validity import Case, Statement, describe_sticky, join_first, statements, statements_on_dataset
+from icha.analysis.validity import (
+    COMPLETE,
+    STRENGTH,
+    Case,
+    Statement,
+    describe_sticky,
+    join_first,
+    statements,
+    statements_on_dataset,
+)
+from icha.asperity.full_contact import gaussian_complete_pressure, theoretical_strength
 from icha.asperity.material import WU_HOLDS_FROM, Material
 from icha.asperity.stickiness import stickiness
 from icha.configuration.campaign import Campaign
@@ -71,6 +81,15 @@ def rms_curvature(campaign: Campaign, name: str) -> float:
     return math.sqrt(moments.m4 / (2 * moments.m2))
 
 
+def complete_contact_pressure(campaign: Campaign, name: str) -> float:
+    """Pressure over E* at which contact with a surface of rms slope 1 is complete; an estimate for a random one."""
+    section = campaign.surfaces[name]
+    if isinstance(section, SelfAffineSurface):
+        return gaussian_complete_pressure(section.period / section.lengths_and_hurst[2])
+    surface = _read(section)
+    return surface.complete_contact_pressure / surface.rms_slope
+
+
 def surface_facts(campaign: Campaign, name: str) -> dict[str, float]:
     """Properties of a surface by the names of `icha.analysis.validity.VALIDATED`.
 
@@ -117,13 +136,19 @@ def expected_validity(campaign: Campaign) -> list[Statement]:
     """State the expected validity, with the Tabor parameter of the mean summit of a Gaussian surface."""
     facts = cache(lambda surface: surface_facts(campaign, surface))
     curvature = cache(lambda surface: rms_curvature(campaign, surface))
+    complete = cache(lambda surface: complete_contact_pressure(campaign, surface))
     cases, tabor, sticky = [], {}, {}
     for case in run_cases(campaign):
         section = campaign.materials[case.material]
         ratio = energy_ratio(campaign, case)
         # Only the asperity model depends on how close a surface is to those of the validation.
         known = facts(case.surface) if MODELS[case.model].by_summits else {}
-        cases.append(Case(case.model, case.surface, case.material, {**known, "full_contact_energy_ratio": ratio}))
+        of_full_contact = {
+            "full_contact_energy_ratio": ratio,
+            COMPLETE: complete(case.surface) * case.rms_slope * section.contact_modulus,
+            STRENGTH: theoretical_strength(section.surface_energy, section.interaction_range),
+        }
+        cases.append(Case(case.model, case.surface, case.material, known | of_full_contact))
         if MODELS[case.model].by_summits and section.surface_energy > 0:
             material = Material(section.contact_modulus, section.surface_energy, section.interaction_range)
             curved = curvature(case.surface) * case.rms_slope

@@ -42,7 +42,7 @@ def bush_gibson_thomas_area(reduced_pressure):
 
 
 class GaussianSummits(NamedTuple):
-    """Summits as spheres of one radius at Gaussian heights.
+    """Summits that are spheres of the same radius with Gaussian heights.
 
     Attributes
     ----------

@@ -309,8 +309,8 @@ def encode_map(contact: np.ndarray) -> str:
 def find_partners(one: xr.Dataset, other: xr.Dataset) -> list[int]:
     """Find, for every step of a run, the step of another run at the same state of the path, or -1 if there is none.
 
-    The partner of a stop is the same stop on the same leg. The partner of another equilibrium is the step on the same
-    leg with the nearest mean separation.
+    The partner of a stop is the stop of the other run with the same target on the same leg. The partner of another
+    equilibrium is the step on the same leg with the nearest mean separation.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Times and memory of the jobs of a campaign; on their own page, since they differ from one execution to the next."""
+"""Times and memory of the jobs of a campaign, on a separate page, because they differ from execution to execution."""
 
 from __future__ import annotations
 

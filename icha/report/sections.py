@@ -17,8 +17,8 @@ from icha.datasets.surface_file import measured_scale
 from icha.datasets.variables.model_error import SHORT_RANGE
 from icha.figures.legends import legend_below, named_handles
 from icha.figures.looks import MOST_COLOURS, Scale
-from icha.figures.style import COLOURS, TWO_COLUMNS, format_quantity, in_style, logarithmic_axes, new_figure
-from icha.support.formatting import format_count
+from icha.figures.style import COLOURS, TWO_COLUMNS, in_style, logarithmic_axes, new_figure
+from icha.support.formatting import format_count, format_quantity
 from icha.support.statistics import ENOUGH, ensemble
 
 MOST_STUDIES = 8  # in the graph; more studies share one box
@@ -85,7 +85,7 @@ def read_surface_statistics(path: str | os.PathLike) -> xr.Dataset:
 
 
 def summarise_surface(surface: xr.Dataset) -> dict:
-    """Return name, parameters and statistics of a surface file; those of a scan as measured."""
+    """Return name, parameters and statistics of a surface file; for a scan, the statistics of the measured heights."""
     lengths = ("period", "rolloff_wavelength", "short_wavelength")
     scale = measured_scale(surface)
     return {

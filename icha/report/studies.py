@@ -11,8 +11,8 @@ from icha.datasets.campaign import loading_stops, reduced_gap, run_place, runs_o
 from icha.datasets.labels import LABELS, RunLabels, labels_at, slopes_of
 from icha.datasets.variables.campaign import COMPLETE, COMPUTED_RUNS, FAILED_CHECKS, INCOMPLETE, MISSING, RAGGED
 from icha.figures.select import asked_seeds, path_steps
-from icha.figures.style import choose_unit, format_quantity
 from icha.report.template import MOST_ROWS, format_scientific
+from icha.support.formatting import choose_unit, format_quantity
 from icha.support.statistics import ENOUGH, ensemble
 
 # Quantities in a table by the kind of its stops: two of pressure, contact area and mean gap.
@@ -204,7 +204,7 @@ def _mean(values: np.ndarray, form) -> Markup:
 def _range(values: np.ndarray, form) -> Markup | str:
     """Format the 95 % interval of a mean, or the extremes of fewer than five values; nothing without scatter.
 
-    If the interval of positive values would reach below zero, it is that of the logarithm.
+    If the interval of positive values would reach below zero, the interval of the logarithm is used.
     """
     over = ensemble(values)
     # Loads are met exactly, but for rounding errors.

@@ -37,6 +37,22 @@ def size(count: float) -> str:
     return f"{count:.0f} B"
 
 
+_SI_PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
+
+
+def choose_unit(value: float, unit: str) -> tuple[float, str]:
+    """Return factor and name of the prefixed unit in which `value` (SI) lies between 1 and 1000."""
+    exponent = 0 if value == 0 else math.floor(math.log10(abs(value)) / 3 + 1e-12) * 3
+    exponent = min(max(exponent, min(_SI_PREFIXES)), max(_SI_PREFIXES))
+    return 10.0**-exponent, f"{_SI_PREFIXES[exponent]}{unit}"
+
+
+def format_quantity(value: float, unit: str) -> str:
+    """Return a value with a prefixed unit, such as `25 MPa`."""
+    factor, name = choose_unit(value, unit)
+    return f"{value * factor:.4g} {name}"
+
+
 def duration(seconds: float) -> str:
     """Format seconds to two digits, such as `4.2 s`, `3.3 min`, `14 h` or `5.2 days`."""
     for factor, unit, least in ((86400, "days", 100 * 3600), (3600, "h", 3600), (60, "min", 60)):

@@ -191,6 +191,23 @@ class Surface:
 
         return math.pi / (2 * self.period) * sum(self.by_wave_vector(sums))
 
+    @property
+    def complete_contact_pressure(self) -> float:
+        """Nominal pressure over E* at which contact is complete without adhesion.
+
+        It is the largest tension in full contact at zero load, where p(q) = q E* h(q)/2. A free square is part of the
+        periodic surface that it forms with its mirror images.
+        """
+        if self.free:
+            modes = scipy.fft.dctn(self.heights, workers=1)
+            k = np.arange(self.grid)
+            modes *= np.pi / (2 * self.period) * np.hypot(k[:, None], k)
+            return -float(scipy.fft.idctn(modes, workers=1, overwrite_x=True).min())
+        modes = scipy.fft.rfft2(self.heights, workers=1)
+        k = np.fft.fftfreq(self.grid, 1 / self.grid)
+        modes *= np.pi / self.period * np.hypot(k[:, None], k[: modes.shape[1]])
+        return -float(scipy.fft.irfft2(modes, s=self.heights.shape, workers=1, overwrite_x=True).min())
+
     def scaled_to_rms_slope(self, rms_slope: float) -> Surface:
         """Return the same topography with its heights multiplied to the spectral rms slope `rms_slope`."""
         rms_slope = SLOPE.validate("rms_slope", rms_slope)

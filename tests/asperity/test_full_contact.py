@@ -7,7 +7,7 @@ import pytest
 import scipy.fft
 
 import icha
-from icha.asperity.full_contact import full_contact_energy_ratio
+from icha.asperity.full_contact import full_contact_energy_ratio, gaussian_complete_pressure
 from icha.datasets.campaign import campaign_tree, select_run
 from icha.datasets.files import read_run, write_dataset
 from icha.datasets.format import RUN, problems_with_file
@@ -106,3 +106,21 @@ def test_an_infinite_ratio_is_a_value_of_every_file(tmp_path):
         write_dataset(run.assign(full_contact_energy_ratio=-run["full_contact_energy_ratio"]), tmp_path / "no.nc")
     with pytest.raises(ValueError, match="'stickiness' holds 1 of 1 values that are not finite"):
         write_dataset(run.assign(stickiness=run["stickiness"] + np.inf), tmp_path / "no.nc")
+
+
+@pytest.mark.parametrize("boundary", ["periodic", "free"])
+def test_a_wave_is_complete_at_johnsons_pressure(boundary):
+    """pi E* Delta/lambda, K. L. Johnson, Int. J. Solids Struct. 32 (1995) 423; a free square ends at crests here."""
+    at = np.arange(64) / 64 if boundary == "periodic" else (np.arange(64) + 0.5) / 64
+    wave = icha.Surface(1e-6 * np.add.outer(np.cos(2 * np.pi * at), np.zeros(64)), 10e-6, boundary)
+    assert wave.complete_contact_pressure == pytest.approx(np.pi / 10, rel=2e-3)
+
+
+@pytest.mark.parametrize(("rolloff", "waves", "hurst"), [(5, 64, 0.8), (4, 16, 0.8), (1, 33, 0.5)])
+def test_estimate_of_the_pressure_for_complete_contact(rolloff, waves, hurst):
+    """Within a tenth of the mean of eight realisations."""
+    spectrum = icha.SelfAffineSpectrum(
+        period=1e-4, rolloff_wavelength=1e-4 / rolloff, short_wavelength=1e-4 / waves, hurst=hurst, rms_slope=1.0
+    )
+    pressures = [spectrum.realise(grid=8 * waves, seed=seed).complete_contact_pressure for seed in range(1, 9)]
+    assert gaussian_complete_pressure(waves) == pytest.approx(np.mean(pressures), rel=0.1)

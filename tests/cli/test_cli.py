@@ -27,11 +27,11 @@ from icha.configuration.load import load_configuration
 from icha.datasets.campaign_file import write_campaign
 from icha.datasets.files import read_dataset, write_dataset
 from icha.datasets.surface_file import write_surface
-from icha.figures.style import format_quantity
 from icha.planning.ownership import claim, find_conflict
 from icha.planning.plan import CHANGED, DAMAGED, DONE, FAILED, TO_DO, failed_runs, plan, time_on, total
 from icha.references.theories import reference_dataset
 from icha.support.checksums import damaged, write_checksum
+from icha.support.formatting import format_quantity
 from icha.surfaces.spectrum import SelfAffineSpectrum
 
 HEAVY = ["scipy", "pandas", "xarray", "matplotlib", "netCDF4", "snakemake"]

@@ -21,13 +21,14 @@ from icha.datasets.surface_file import write_surface
 from icha.figures import fig1_jkr
 from icha.figures.captions import caption_of
 from icha.figures.select import path_steps
-from icha.figures.style import format_quantity, save
+from icha.figures.style import save
 from icha.report import report, studies
 from icha.report.report import ReportFigure, write_report
 from icha.report.run_times import Benchmark, read_benchmark, write_times, write_times_page
 from icha.report.sections import _draw_spectra, read_surface_statistics
 from icha.report.studies import _range, collect_states
 from icha.report.template import format_scientific
+from icha.support.formatting import format_quantity
 
 FIGURES = tuple(f"figures/fig1_jkr.{ending}" for ending in ("png", "pdf"))
 

@@ -258,7 +258,7 @@ def _refuse_damaged_row(line, number, notation):
 
 
 def _decide_on_commas(notation, lines, count):
-    """Decide by all known lines of `count` fields whether commas are decimal; raise UnfitTopography if in doubt."""
+    """Decide from all known lines with `count` fields whether commas are decimal; if unclear, raise UnfitTopography."""
     rows = [notation.fields(text) for line in lines[:_LONGEST_HEADING] if (text := strip_remark(line))]
     rows = [row[: _column_count(row)] for row in rows if len(row) == count]
     fields = [field for row in rows for field in row]
