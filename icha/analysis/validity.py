@@ -320,7 +320,7 @@ def _describe_shares(shares):
 
 
 def _outside(study):
-    """Yield surface, material and the largest share of single spots outside the range of Wu's formula.
+    """Yield, for each surface and material, the largest share of single spots outside the range of Wu's formula.
 
     The share is taken at the end of the first loading; it is the largest over seeds and slopes. Without adhesion no
     spot jumps, and the share is None.

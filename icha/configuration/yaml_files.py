@@ -70,7 +70,7 @@ def _text_of(path: Path) -> str:
 
 
 class _Loader(yaml.SafeLoader):
-    """A loader that refuses repeated keys, tags and excessive sizes.
+    """A loader that refuses tags, repeated keys and excessive sizes.
 
     Aliases count with all of their values, because a few lines of aliases of aliases can have billions.
     """
@@ -180,7 +180,7 @@ def _find_defaults(content: Mapping) -> Iterator[tuple[str, Mapping, dict]]:
 
 
 def apply_defaults(content: Mapping) -> dict:
-    """Return `content` with its `defaults` in the entries; surfaces take the keys of their kind."""
+    """Return `content` with its `defaults` filled into the entries; a surface gets only those that its kind has."""
     result = deepcopy(dict(content))
     for section, given, entries in _find_defaults(result):
         for name, entry in entries.items():

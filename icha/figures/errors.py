@@ -179,7 +179,7 @@ def _words(curve, same, looks, *, own_rows):
 
 
 def _draw_curve(row, curve, quantities, look, apart, counts):
-    """Draw a curve in all panels of a row; return its handle, and add to `counts` numbers of seeds of its points."""
+    """Draw a curve in all panels of a row; return its handle, and add the number of seeds of each point to `counts`."""
     p, asked = curve.errors["reduced_pressure"].values * apart, int(asked_of_entry(curve.errors))
     errors = curve.errors.transpose("seed", ...)
     for ax, quantity in zip(row, quantities, strict=True):

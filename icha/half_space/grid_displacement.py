@@ -48,7 +48,7 @@ def row_blocks(grid: int) -> list[slice]:
 
 @dataclass(frozen=True, eq=False)
 class DisplacementField:
-    """Displacement w of the half-space by m spots at the nodes of a regular grid, the sum of eq. (9).
+    """Displacement w of the half-space at the nodes of a regular grid, due to m spots: the sum of eq. (9).
 
     It is periodic and has zero mean; on a free half-space it is the plain sum over the spots. Inside a spot its own
     part is the displacement under its contact.

@@ -125,7 +125,7 @@ def _dataset(folder: Path) -> Path:
 
 
 def _contacts(labels: list[RunLabels], only: Mapping[str, Collection]) -> list[list[RunLabels]]:
-    """Group runs by contact, in the order of models; the first seed of each contact precedes the others."""
+    """Group runs that differ in their model only. The groups with the first seed of each contact come first."""
     for name, values in only.items():
         known = list(dict.fromkeys(getattr(run, name) for run in labels))
         if unknown := [value for value in values if value not in known]:

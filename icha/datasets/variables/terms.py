@@ -46,7 +46,7 @@ _TYPES = {"int": int, "int8": np.int8, "int32": np.int32, "text": str}
 def read_tables(
     name: str, known: Mapping[str, Variable] = {}, attributes: Mapping[str, Mapping[str, Any]] = {}, **texts: str
 ) -> dict[str, Table]:
-    """Read the tables of a text file of this folder, by their headings; `terms.txt` describes the format.
+    """Return the tables of a text file of this folder by heading; `terms.txt` describes the format.
 
     Parameters
     ----------
