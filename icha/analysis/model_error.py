@@ -201,7 +201,7 @@ def _snapshot_at(run, load):
 
 
 def _as_solution(run, step, load):
-    """Rename a state of a boundary-element run as a solution, with distributions and map if it has a snapshot.
+    """Return a state of a boundary-element run as a solution; a snapshot also has distributions and a map.
 
     Nothing acts outside the edge of such a contact, so its areas of all definitions are equal.
     """

@@ -46,5 +46,5 @@ class Material:
         return self.surface_energy / self.contact_modulus
 
     def tabor_parameter(self, R: np.ndarray | float) -> np.ndarray:
-        """Return (gamma^2 R/E*^2)^(1/3)/epsilon for radii of curvature R, m; after eq. (3)."""
+        """Return the Tabor parameter (gamma^2 R/E*^2)^(1/3)/epsilon for radii of curvature R, m; see eq. (3)."""
         return np.cbrt(self.adhesion_length**2 * R) / self.interaction_range

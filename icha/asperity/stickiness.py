@@ -10,7 +10,7 @@ REPULSIVE_AREA_SLOPE = 2.0
 
 
 def stickiness(moments: SpectralMoments, material: Material) -> float:
-    r"""Return attraction over repulsion where surfaces touch: above 1 surfaces stick, without adhesion it is 0.
+    r"""Return the ratio of attraction to repulsion in contact; surfaces above 1 stick, and without adhesion it is 0.
 
     L. Pastewka and M. O. Robbins, PNAS 111 (2014) 3298-3303, doi:10.1073/pnas.1320846111. The contact, of area A, feels
     the mean repulsive pressure h' E*/kappa with kappa = 2. Around it lies the area of a gap less than the range r of

@@ -89,7 +89,7 @@ class Measurement(Section):
         return self
 
     def problems(self, campaign: Any) -> Iterator[Problem]:
-        """Report names that its `icha.configuration.campaign.Campaign` does not define."""
+        """Report names that the `icha.configuration.campaign.Campaign` does not define."""
         yield from unknown(("study",), self.study, campaign.studies)
         if self.material is not None:
             yield from unknown(("material",), self.material, campaign.materials)

@@ -90,7 +90,7 @@ S_in = TypeVar("S_in", bound=State, contravariant=True)
 
 
 class ContactModel(Protocol[S]):
-    """Contact problem, immutable, whose equilibria follow from each other along a path; its nominal area is A0."""
+    """Contact, immutable, whose equilibria follow from each other along a path; its nominal area is A0."""
 
     @property
     def adhesive(self) -> bool:

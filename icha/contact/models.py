@@ -167,5 +167,5 @@ def model_of(attributes: Mapping[str, str]) -> Model:
 
 
 def first_model(models: Iterable[str]) -> str:
-    """Return the first of some models in the order of `MODELS`, where only one is shown."""
+    """Return the first of some models in the order of `MODELS`, for places that show only one model."""
     return min(models, key=list(MODELS).index)

@@ -305,7 +305,7 @@ def write_campaign(
 
 
 def _write(group: Group, spool: BinaryIO) -> None:
-    """Write all values of a group, those of the runs from the spool, block by block."""
+    """Write all values of a group; the values of the runs are read from the temporary file, block by block."""
     for variable, values in group.known:
         variable[...] = values
     for variable, reasons in group.texts:

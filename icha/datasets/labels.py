@@ -29,7 +29,7 @@ _SAME_SLOPE = 1e-9
 
 
 def model_folder(model: str) -> str:
-    """Return the folder of a model before the name of a run's file, with a slash, or nothing."""
+    """Return the folder of a model in the path of a run, with a slash; empty text if the model has no folder."""
     return MODELS[model].folder
 
 

@@ -192,7 +192,7 @@ def _compare_variables(a: netCDF4.Variable, b: netCDF4.Variable, name: str) -> I
 
 
 def _compare_attributes(a, b, name: str) -> Iterator[Difference]:
-    """Compare the attributes of two variables or groups, numbers among them as those of variables."""
+    """Compare the attributes of two variables or groups; numbers are compared with the tolerance of variables."""
     for key, one, other in _paired(*({key: each.getncattr(key) for key in each.ncattrs()} for each in (a, b))):
         if one is None or other is None:
             yield Difference(name, DIFFERENT, f"attribute {key}: {'extra' if one is None else 'missing'}")

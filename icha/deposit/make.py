@@ -1,7 +1,7 @@
 """Making a deposit, as a folder and a zip: results with all that others need to understand, verify and reproduce them.
 
-The same results of the same revision give the same bytes: the only times and the only names of people, machines and
-folders are those in the results, the configuration and the source.
+The same results and the same revision always give exactly the same files. A deposit adds no times and no names of
+people, machines or folders to those in the results, the configuration and the source.
 """
 
 import json

@@ -152,7 +152,7 @@ class SnapshotFigure(StudyFigure):
 
 
 class RunFigure(StudyFigure):
-    """A figure of one run; what is left out is the study's first."""
+    """A figure of one run; options that are left out take the study's first value."""
 
     surface: Label | None = Field(default=None, description="Surface to show.")
     seed: Seed | None = Field(default=None, description="Seed to show.")

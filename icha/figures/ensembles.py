@@ -137,7 +137,7 @@ def draw_points(
     positive: bool,
     asked: int | np.ndarray = 0,
 ) -> ErrorbarContainer:
-    """Draw the means of an ensemble with bars, or with its members if these are few.
+    """Draw the means of an ensemble with bars, or with the single members if there are few.
 
     A line joins neighbouring points only if they are means over the same members.
 

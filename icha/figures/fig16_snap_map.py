@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 
 class SnapMapFigure(RunFigure):
-    """A figure of the events of one run; what is left out is the study's first."""
+    """A figure of the events of one run; options that are left out take the study's first value."""
 
     def problems(self, campaign: Campaign) -> Iterator[Problem]:
         """Yield the problem of a study that does not unload."""

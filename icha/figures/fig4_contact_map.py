@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 class MapFigure(SnapshotFigure, RunFigure):
-    """A figure of one snapshot of one run; what is left out is the study's first."""
+    """A figure of one snapshot of one run; options that are left out take the study's first value."""
 
 
 def inputs(campaign: Campaign, options: MapFigure, files: results.ResultFiles) -> Inputs:

@@ -29,7 +29,7 @@ class SlopesFigure(StudyFigure):
     material: Label | None = Field(default=None, description="Material to show. Default: the first of the study.")
 
     def study_problems(self, campaign: Campaign, study: Any) -> Iterator[Problem]:
-        """Yield in addition the problem of a study without snapshots of both kinds."""
+        """Also yield a problem if the study does not have snapshots of both kinds."""
         yield from super().study_problems(campaign, study)
         kinds = [kind for kind, _ in campaign.snapshots_of(self.study) or []]
         for kind in ("relative_load", "area_fraction"):

@@ -73,7 +73,7 @@ class DisplacementField:
 
     @property
     def _cell(self):
-        """Period of the sum, m: for a single square twice its side; the effect of images is subtracted then."""
+        """Period of the sum, m. For a single square, this is twice its side, and the effect of images is subtracted."""
         return cell_of(self.period, self.free)
 
     @property

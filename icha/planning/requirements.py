@@ -118,7 +118,7 @@ def _disk_shortage(items, results, available):
 
 
 def find_shortages(items: Collection[Item], cores: int, results: Path, profile: Mapping) -> list[str]:
-    """Describe what this machine lacks for the jobs to be done.
+    """Describe the memory or disk space that this machine lacks for the remaining jobs.
 
     `profile` holds the settings of a profile of Snakemake: the executor, and the memory that jobs may take together.
     """

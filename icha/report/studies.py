@@ -204,7 +204,7 @@ def _mean(values: np.ndarray, form) -> Markup:
 def _range(values: np.ndarray, form) -> Markup | str:
     """Format the 95 % interval of a mean, or the extremes of fewer than five values; nothing without scatter.
 
-    If the interval of positive values would reach below zero, it is that of the logarithm.
+    If the interval of positive values would reach below zero, the interval of the logarithm is used.
     """
     over = ensemble(values)
     # Loads are met exactly, but for rounding errors.

@@ -61,7 +61,7 @@ def whole_file(path: str | os.PathLike, *, lasting: bool = True) -> Iterator[Pat
 
 
 def move_only_while_owned() -> None:
-    """From now on, move files into place only while the call that started this process owns the results; for jobs."""
+    """For jobs: from now on, write results only while the call that started this process owns the results."""
     global _moving
     _moving = while_owned
 

@@ -1,8 +1,8 @@
 """Checksum sidecars of results: they tell whether a result is whole, and from what it was made.
 
-The sidecar of `results/<campaign>/<path>` is `results/<campaign>/checksums/<path>.json`. It holds SHA-256, size and
-modification time of the file or folder. A file with the same size and time is trusted, any other one is hashed. Errors
-of the storage change neither; they are found where every file is hashed (`thorough`).
+The sidecar of `results/<campaign>/<path>` is `results/<campaign>/checksums/<path>.json`. It contains the SHA-256, the
+size and the modification time of the file or folder. A file with the same size and time is trusted, any other one is
+hashed. Errors of the storage change neither; they are found where every file is hashed (`thorough`).
 
 A sidecar without its result means that the result existed, or was about to be written, and must be made again.
 

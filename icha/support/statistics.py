@@ -29,9 +29,9 @@ class Ensemble(NamedTuple):
     def band(self, *, positive: bool = False) -> tuple[np.ndarray, np.ndarray]:
         """Confidence interval of the mean m: m ± c, or m exp(± c/m) for a `positive` quantity.
 
-        The second is the interval of the logarithm of the mean, whose standard error is, to first order, that of the
-        mean over the mean (delta method). It stays above zero and tends to the first as c vanishes. It needs a positive
-        mean; the first is used otherwise.
+        The second interval is that of the logarithm of the mean. The standard error of the logarithm is, to first
+        order, the standard error of the mean divided by the mean (delta method). The second interval stays above zero,
+        and tends to the first one as c vanishes. If the mean is not positive, the first interval is used.
         """
         above = (self.mean > 0) & positive
         factor = np.exp(np.divide(self.confidence, self.mean, out=np.zeros_like(self.mean), where=above))

@@ -200,7 +200,7 @@ class Surface:
         """
         if self.free:
             modes = scipy.fft.dctn(self.heights, workers=1)
-            k = np.arange(self.grid)
+            k: np.ndarray = np.arange(self.grid)
             modes *= np.pi / (2 * self.period) * np.hypot(k[:, None], k)
             return -float(scipy.fft.idctn(modes, workers=1, overwrite_x=True).min())
         modes = scipy.fft.rfft2(self.heights, workers=1)

@@ -89,7 +89,7 @@ def _resembles(line, others):
 
 
 def _equal_step(line: np.ndarray, *, rounded: bool = True) -> float | None:
-    """Step of a line of equal steps, whose first number may be anything; None if the steps are not equal.
+    """Return the step of a line of numbers, whose first may be any number; None if the steps are not equal.
 
     rounded : whether the steps may differ by the last digit that is written.
     """
