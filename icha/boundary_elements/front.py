@@ -30,6 +30,8 @@ from scipy.sparse import csr_array
 # larger. With it circular patches follow JKR, wherever they lie on the grid (docs/short_range.md).
 _ROW_COMPLIANCE, _BOND_FACTOR = 1.7316, 3.5
 COMPLIANCE = _BOND_FACTOR * _ROW_COMPLIANCE
+# Compliance at the front in preconditioners: that of a bond less that of the half-space.
+NET_COMPLIANCE = 0.6 * COMPLIANCE
 # Width and reach of the stencil in cells, and the weight of the perimeter in the work of adhesion, from JKR patches.
 _WIDTH, _REACH = 1.5, 5
 PERIMETER = 0.7
@@ -107,9 +109,16 @@ def reported_area_gradient(fraction: np.ndarray, mean_fraction: np.ndarray) -> n
     return np.where(share > _SMALLEST_SHARE, gradient, _SMALLEST_SHARE)
 
 
+def bond_compliance(fraction: np.ndarray) -> np.ndarray:
+    """Compliance of the bond of cells with given fractions, h/E*."""
+    return COMPLIANCE * (1 / fraction - 1)
+
+
 @dataclass(frozen=True)
 class Front:
-    """Front of a contact.
+    """Linear cohesive law of a front, which is written out only in this module.
+
+    Fraction f, strength s, tension t and opening g of a cell obey t = f s and g = C s (1 - f).
 
     Parameters
     ----------
@@ -137,3 +146,33 @@ class Front:
     def strength_change(self, strengths: np.ndarray, mean_fraction_change: np.ndarray) -> np.ndarray:
         """Change of the strengths with that of the mean fractions."""
         return self.strength**2 * PERIMETER / strengths * mean_fraction_change
+
+    def tension(self, strengths: np.ndarray, fraction: np.ndarray) -> np.ndarray:
+        """Tension of cells at the front, in E*."""
+        return strengths * fraction
+
+    def tension_change(
+        self, strengths: np.ndarray, fraction: np.ndarray, strengths_change: np.ndarray, fraction_change: np.ndarray
+    ) -> np.ndarray:
+        """Change of the tension with those of strength and fraction."""
+        return strengths * fraction_change + fraction * strengths_change
+
+    def opening(self, strengths: np.ndarray, fraction: np.ndarray) -> np.ndarray:
+        """Gap of cells at the front, in cells."""
+        return COMPLIANCE * strengths * (1 - fraction)
+
+    def opening_change(self, strengths_change: np.ndarray, tension_change: np.ndarray) -> np.ndarray:
+        """Change of the gap with those of strength and tension, in single precision."""
+        return np.float32(COMPLIANCE) * (strengths_change - tension_change)
+
+    def intensity(self, fraction: np.ndarray, pressure: np.ndarray, mean_fraction: np.ndarray) -> np.ndarray:
+        """Stress intensity of cells in contact divided by the critical one: tension divided by that of the law."""
+        return -pressure / self.tension(self.strengths(mean_fraction), fraction)
+
+    def relative_gap(self, gap: np.ndarray, mean_fraction: np.ndarray) -> np.ndarray:
+        """Gap of open cells divided by the one at which they are open, g/g_c; below 1 they close."""
+        return gap / (COMPLIANCE * self.strengths(mean_fraction))
+
+    def adhesion_energy(self, fraction: np.ndarray, mean_fraction: np.ndarray) -> float:
+        """Work of adhesion of all cells, in E* cells^3."""
+        return self.adhesion_length * float(np.sum(adhesive_areas(fraction, mean_fraction)))

@@ -23,7 +23,7 @@ from icha.boundary_elements.elastic_contact import (
     Topography,
     solve_bonded_contact,
 )
-from icha.boundary_elements.front import COMPLIANCE, Front, adhesive_areas, neighbour_weights
+from icha.boundary_elements.front import NET_COMPLIANCE, Front, neighbour_weights
 from icha.boundary_elements.half_space import FullGrid, HalfSpace
 from icha.contact.model import FullContact, NotConverged
 from icha.contact.models import MODELS, REFERENCE_MODEL
@@ -69,8 +69,6 @@ TOLERANCES = FrontTolerances()
 _MAX_STEPS, _MAX_KRYLOV, _MAX_LOCAL_RELAXATIONS, _LARGEST_DAMPING = 400, 60, 5, 1e8
 # Relative rounding error of an energy, and of the work of a step.
 _ENERGY_ROUNDING, _WORK_ROUNDING = 1e-12, 1e-11
-# Compliance at the front in the preconditioner: that of a bond less that of the half-space, divided by the bond's.
-_NET_COMPLIANCE = 0.6
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,10 +120,10 @@ def find_active_cells(front: Front, state: AdhesiveContact) -> ActiveCells:
     strength of the interface.
     """
     grid, gap = state.gap.shape[-1], state.gap.ravel()
-    tension = -state.pressure / (state.fraction * front.strengths(state.mean_fraction))
-    relative_gap = gap[state.rim] / (COMPLIANCE * front.strengths(state.mean_fraction_rim))
+    intensity = front.intensity(state.fraction, state.pressure, state.mean_fraction)
+    relative_gap = front.relative_gap(gap[state.rim], state.mean_fraction_rim)
     closed = mask_of(state.cells[state.fraction >= 1], state.gap.shape).ravel()
-    opening = tension > 1
+    opening = intensity > 1
     at_edge = ~np.all(closed[adjacent(state.cells[opening], grid)], axis=0) | (state.fraction[opening] < 1)
     opening[opening] = at_edge | (-state.pressure[opening] > front.interface_strength)
     closing = relative_gap < 1
@@ -135,8 +133,8 @@ def find_active_cells(front: Front, state: AdhesiveContact) -> ActiveCells:
         (state.fraction, 0.0),
         (state.pressure, 0.0),
         (state.mean_fraction, state.mean_fraction_rim[closing]),
-        (tension, relative_gap[closing]),
-        (opening | ((tension < 1) & (state.fraction < 1)), True),
+        (intensity, relative_gap[closing]),
+        (opening | ((intensity < 1) & (state.fraction < 1)), True),
     )
     return ActiveCells(cells, fraction, pressure, gap[cells], mean_fraction, intensity, free)
 
@@ -170,12 +168,10 @@ class FrontProblem:
     def energy(self, state: AdhesiveContact) -> float:
         """Elastic energy less the work of adhesion, in E* cells^3."""
         # Pairs of a window cell and an outside cell count twice in w, so the background is added once more.
-        mean_fraction = (
-            state.mean_fraction
-            if self.background is None
-            else state.mean_fraction + self.background.ravel()[state.cells]
-        )
-        return state.energy - self.front.adhesion_length * float(np.sum(adhesive_areas(state.fraction, mean_fraction)))
+        mean_fraction = state.mean_fraction
+        if self.background is not None:
+            mean_fraction = mean_fraction + self.background.ravel()[state.cells]
+        return state.energy - self.front.adhesion_energy(state.fraction, mean_fraction)
 
     def is_lower(self, new: AdhesiveContact, old: AdhesiveContact) -> bool:
         """Whether a state is not above another in energy, within the errors of both."""
@@ -334,11 +330,11 @@ def newton_step(problem: FrontProblem, active: ActiveCells, damping: float) -> t
     linear = LinearisedFront(problem.space, front, active, active.mean_fraction, at_front, local)
     # Go to the tension that the law wants at the present fraction, and from there along the law.
     strengths = front.strengths(active.mean_fraction)
-    missing = np.where(at_front, strengths * active.fraction + active.pressure, 0.0)
+    missing = np.where(at_front, front.tension(strengths, active.fraction) + active.pressure, 0.0)
     moved = linear.operator.displacement(missing.astype(np.float32))
-    bond = np.where(at_front, COMPLIANCE * strengths * (1 - active.fraction), 0.0)
+    opening = np.where(at_front, front.opening(strengths, active.fraction), 0.0)
     accuracy = float(np.clip(active.residual, *TOLERANCES.linear))
-    change, pressure_change = linear.solve(moved + bond - active.gap, accuracy)
+    change, pressure_change = linear.solve(moved + opening - active.gap, accuracy)
     return change, pressure_change - missing
 
 
@@ -390,10 +386,10 @@ class LinearisedFront:
         solution, residual = np.zeros_like(right), right
         while not error <= accuracy * norm:
             part = max(accuracy * float(norm / error), self.operator.error)
-            solution = solution + gmres(self._displacement, self._approximate_inverse, residual, part)
+            solution = solution + gmres(self._left_side, self._approximate_inverse, residual, part)
             if accuracy >= 10 * self.operator.error:
                 break
-            residual = right - self._displacement(solution, FullGrid(self.space, self.cells))
+            residual = right - self._left_side(solution, FullGrid(self.space, self.cells))
             before, error = error, np.linalg.norm(residual)
             if not error <= LARGEST_REMAINDER * before:
                 break
@@ -405,25 +401,27 @@ class LinearisedFront:
         return fraction, scale * pressure.astype(float)
 
     def _pressures(self, unknowns):
-        """Return changes of pressure, (k,); of the strengths and tensions at the front."""
+        """Return changes of pressure, (k,), and of the strengths and tensions at the front."""
         fraction = unknowns[self.at_front] / self.unit
         if not len(fraction):
             return unknowns, fraction, fraction
         stronger = self.front.strength_change(self.strengths, self.weights @ fraction)
-        tension = self.strengths * fraction + self.fraction * stronger
+        tension = self.front.tension_change(self.strengths, self.fraction, stronger, fraction)
         pressure = unknowns.copy()
         pressure[self.at_front] = -tension
         return pressure, stronger, tension
 
-    def _displacement(self, unknowns, operator=None):
+    def _left_side(self, unknowns, operator=None):
+        """Displacement less the change of opening by the law."""
         pressure, stronger, tension = self._pressures(unknowns)
         result = (operator or self.operator).displacement(pressure)
-        result[self.at_front] += np.float32(COMPLIANCE) * (self.damping_factor * tension - stronger)
+        result[self.at_front] -= self.front.opening_change(stronger, self.damping_factor * tension)
         return result
 
     def _approximate_inverse(self, right):
+        """Preconditioner: half-space at closed cells, a constant at the edge."""
         result = self.operator.approximate_inverse(np.where(self.closed, right, np.float32(0)))
-        result[self.at_front] = right[self.at_front] / np.float32(_NET_COMPLIANCE * COMPLIANCE)
+        result[self.at_front] = right[self.at_front] / np.float32(NET_COMPLIANCE)
         return result
 
 
