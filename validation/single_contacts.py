@@ -48,7 +48,7 @@ def sphere_loop(
     surface, top = bump(grid, _PERIOD, offset)
     contact, exact = contact_of(surface, material), SphereInCell(material, 1.0, _PERIOD)
     radius = exact.contact_radius(approaches[0])
-    state = contact.released(disc(grid, _PERIOD, radius, offset), top - approaches[0])
+    state = contact.relax_region(disc(grid, _PERIOD, radius, offset), top - approaches[0])
     for branch, approach in itertools.chain(
         (("unloading", one) for one in approaches), (("loading", one) for one in approaches[-2::-1])
     ):
@@ -73,7 +73,7 @@ def sphere_under_load(grid: int, offset=(0.0, 0.0), forces: Sequence[float] = (8
     contact, exact = contact_of(surface, MATERIAL), SphereInCell(MATERIAL, 1.0, _PERIOD)
     radius = exact.loaded_radius(forces[0])
     start = top - float(exact.approach(radius))
-    state = contact.released(disc(grid, _PERIOD, radius, offset), start)
+    state = contact.relax_region(disc(grid, _PERIOD, radius, offset), start)
     for force in forces:
         state = contact.equilibrium(state, state.separation, Control(PRESSURE, force / contact.area))
         radius = exact.loaded_radius(force)
@@ -116,7 +116,7 @@ def sphere_pull_off(grid: int, offset=(0.0, 0.0), step: float = 0.05) -> dict:
     surface, top = bump(grid, _PERIOD, offset)
     contact, exact = contact_of(surface, MATERIAL), SphereInCell(MATERIAL, 1.0, _PERIOD)
     first = -0.5
-    state = contact.released(disc(grid, _PERIOD, exact.contact_radius(first), offset), top - first)
+    state = contact.relax_region(disc(grid, _PERIOD, exact.contact_radius(first), offset), top - first)
     force, last = largest_tension(contact, state, step)
     return {
         "grid": grid,
@@ -158,7 +158,7 @@ def ellipse(grid: int, angle: float, approaches: Sequence[float] = (2.0, 1.0, 0.
     surface, top = bump(grid, _PERIOD, (0.3, 0.1), radii, math.radians(angle))
     contact = contact_of(surface, MATERIAL)
     start = SphereInCell(MATERIAL, 1.0, _PERIOD).contact_radius(approaches[0])
-    state = contact.released(disc(grid, _PERIOD, start), top - approaches[0])
+    state = contact.relax_region(disc(grid, _PERIOD, start), top - approaches[0])
     rows = []
     for approach in approaches:
         state = contact.equilibrium(state, top - approach)
@@ -181,7 +181,7 @@ def flat_punch(grid: int, cells: float, square: bool = False) -> dict:
     surface, face = punch(grid, period, radius, 10 * let_go, square)
     contact = contact_of(surface, MATERIAL)
     base = float(surface.heights.max())
-    state = contact.released(face, base + 0.02 * let_go)
+    state = contact.relax_region(face, base + 0.02 * let_go)
     compliance = 0.02 * let_go / -force_and_area(contact, state)[0]
     tension, _ = largest_tension(contact, state, 0.1 * let_go)
     nodes = math.sqrt(np.count_nonzero(face) / math.pi) * spacing
@@ -204,7 +204,7 @@ def row_of_strips(grid: int, half_width: float) -> dict:
     surface, face = strips(grid, period, exact.half_width, 10 * let_go)
     contact = contact_of(surface, MATERIAL)
     base = float(surface.heights.max())
-    state = contact.released(face, base + 0.02 * let_go)
+    state = contact.relax_region(face, base + 0.02 * let_go)
     compliance = 0.02 * let_go / -contact.pressure(state)
     tension, _ = largest_tension(contact, state, 0.1 * let_go)
     return {
@@ -229,7 +229,7 @@ def sinusoid(grid: int, alpha: float, psi: Sequence[float] = (0.3, 0.5, 0.8, 1.1
     contact = contact_of(wave(grid, period, amplitude), material)
     x = (np.arange(grid) - grid // 2) / grid
     start = np.broadcast_to(np.abs(x) <= psi[0] / math.pi, (grid, grid))
-    state = contact.released(start, float(exact.separation(psi[0])))
+    state = contact.relax_region(start, float(exact.separation(psi[0])))
     unit = exact.full_contact_pressure
     for branch, one in (*(("loading", one) for one in psi), *(("unloading", one) for one in psi[-2::-1])):
         try:
@@ -261,7 +261,7 @@ def crack(grid: int, radii: Sequence[float] = (0.2, 0.16, 0.12), amplitude: floa
     contact = contact_of(wave(grid, 1.0, amplitude, dimensions=2), material)
     x = np.minimum(np.arange(grid), grid - np.arange(grid)) / grid  # from the trough, at the cell's corner
     distance = np.hypot(x[:, None], x)
-    state = contact.released(distance > radii[0], exact.separation(radii[0]))
+    state = contact.relax_region(distance > radii[0], exact.separation(radii[0]))
     for c in radii:
         state = contact.equilibrium(state, exact.separation(c))
         area = 1 - contact.area_fraction(state)
@@ -287,7 +287,7 @@ def pair(grid: int, distance: float = 6.0, approaches: Sequence[float] = (1.5, 0
     radius = float(JKR(MATERIAL).contact_radius(approaches[0], 1.0))
     half = distance / 2 / surface.spacing
     region = disc(grid, period, radius, (-half, 0.0)) | disc(grid, period, radius, (half, 0.0))
-    state, spots = contact.released(region, top - approaches[0]), asperities.untouched()
+    state, spots = contact.relax_region(region, top - approaches[0]), asperities.untouched()
     for approach in approaches:
         state = contact.equilibrium(state, top - approach)
         spots = asperities.equilibrium(spots, top - approaches[0])

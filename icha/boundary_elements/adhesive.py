@@ -12,12 +12,12 @@ from icha.boundary_elements.front_solver import FrontProblem, relax_front
 from icha.boundary_elements.local_relaxation import relax_in_windows
 from icha.contact.model import NotConverged
 
-# Residual of the front, and distance within the reach of the attraction over the critical opening, at which new contact
-# forms: first where it is clear, then where it is certain.
+# Residual of the front at which we look for new contact, and how far below the reach of the attraction the gap must be,
+# in units of the critical opening: where new contact is clear. Then the residual at which it is certain.
 _CLEAR_RESIDUAL, _CLEAR_DISTANCE, _CERTAIN_RESIDUAL = 3e-2, 0.02, 1e-3
-# Accuracy of displacements, over the critical opening, in rounds of new contact.
+# Accuracy of displacements, in units of the critical opening, in rounds of new contact.
 _ROUND_ACCURACY = 1e-2
-# Rounds of new contact: they end, but there may be as many as cells.
+# Safety limit of the rounds of new contact; in theory there can be one round per cell.
 _MAX_ROUNDS = 1000
 
 
@@ -49,19 +49,23 @@ class Summits:
             touched[(row + offset[rows]) % grid, (column + offset[columns]) % grid] = True
         return np.flatnonzero(touched)
 
-    def within_reach(self, state: AdhesiveContact, margin: float) -> tuple[np.ndarray, np.ndarray]:
-        """Summits out of contact within reach by more than a margin, (k,) bool; and cells that overlap likewise."""
+    def find_within_reach(self, state: AdhesiveContact, margin: float) -> tuple[np.ndarray, np.ndarray]:
+        """Find summits out of contact that are in reach by more than a margin, (k,) bool; and cells that overlap so."""
         gap, touched = state.gap.ravel(), mask_of(state.cells, state.gap.shape).ravel()
         within = (gap[self.cell] - self.above - self.reach < -margin) & ~touched[self.cell]
-        # Surfaces also touch where they overlap without a summit; next to a front this is up to the front.
+        # Surfaces also touch where they overlap without a summit.
+        # Neighbours of the contact are left to the front solver.
         touched[state.rim] = True
         return within, np.flatnonzero((gap < -margin) & ~touched)
 
     def new_contact(
         self, state: AdhesiveContact, margin: float, tried: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, int]:
-        """Contact that forms at places not tried before: its cells, the places, and how many are within reach."""
-        within, overlapping = self.within_reach(state, margin)
+        """Find new contact at places not tried before: its cells, the places, and a number.
+
+        The number is that of all places within reach (summits and overlapping cells), tried ones included.
+        """
+        within, overlapping = self.find_within_reach(state, margin)
         places = np.union1d(self.cell[within], overlapping)
         new = places[~tried[places]]
         jumping = within & ~tried[self.cell]
@@ -71,9 +75,9 @@ class Summits:
 def solve_adhesive_contact(
     problem: FrontProblem, summits: Summits, contact: Contact, tolerance: float, *, close: bool = False
 ) -> tuple[AdhesiveContact, int]:
-    """Solve the contact at a separation: relax the fronts, and form contact at all summits within reach.
+    """Solve the contact at a separation: relax the fronts, and form contact at all places within reach.
 
-    A summit that loses its new contact again stays open.
+    A place that loses its new contact again stays open.
 
     Parameters
     ----------
@@ -85,7 +89,7 @@ def solve_adhesive_contact(
 
     Returns
     -------
-    The contact, and the number of summits within reach that stayed open.
+    The contact, and the number of places within reach (summits and overlapping cells) that stayed open.
 
     Raises
     ------
@@ -128,7 +132,7 @@ def solve_adhesive_contact(
 
 def _form_contact(problem, contact, formed):
     """Close cells (m,); relax the fronts around them in windows and solve the elastic contact if windows pay."""
-    closed = contact.with_closed(formed)
+    closed = contact.close_cells(formed)
     relaxed = relax_in_windows(problem.space, problem.front, problem.separation, closed, contact.gap, formed)
     if relaxed is None:
         return closed

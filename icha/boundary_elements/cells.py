@@ -39,7 +39,7 @@ def adjacent(cells: np.ndarray, grid: int) -> np.ndarray:
 def merge_cells(
     cells: np.ndarray, others: np.ndarray, *values: tuple[np.ndarray, np.ndarray | float]
 ) -> tuple[np.ndarray, ...]:
-    """Merge two lists of cells without common ones.
+    """Merge two disjoint lists of cells.
 
     Parameters
     ----------

@@ -35,7 +35,7 @@ from icha.contact.models import MODELS, REFERENCE_MODEL, PathAccuracy
 from icha.surfaces.summits import locate_summits
 from icha.surfaces.surface import Surface
 
-# Smallest critical opening over the largest height; below, rounding of the heights hides it.
+# Smallest critical opening divided by the largest height; below, rounding of the heights hides it.
 _SMALLEST_OPENING = 1e-4
 # Largest change of a fraction of contact for which rates predict the next state.
 _LARGEST_PREDICTION = 0.25
@@ -113,24 +113,24 @@ class BoundaryElements(FullContactProblem):
         """Observables of the states on a surface."""
         return PatchObservables(self, surface)
 
-    def released(self, region: np.ndarray, separation: float) -> CellState:
-        """Equilibrium at a separation (m) to which a contact of a given region, (n, n) of bool, relaxes."""
+    def relax_region(self, region: np.ndarray, separation: float) -> CellState:
+        """Relax a contact of a given region, (n, n) of bool, to equilibrium at a separation (m)."""
         cells = np.flatnonzero(region)
         nothing = np.zeros(len(cells))
         return self.equilibrium(CellState(separation, cells, nothing + 1, nothing, nothing), separation)
 
     def pressure(self, state: CellState) -> float:
-        """Force over nominal area, Pa; negative in tension."""
+        """Force divided by the nominal area, Pa; negative in tension."""
         return float(np.sum(state.pressure)) / self.heights.size
 
     def area_fraction(self, state: CellState) -> float:
-        """Contact area over nominal area."""
+        """Contact area divided by the nominal area."""
         return float(np.sum(self.area_of_cells(state))) / self.heights.size
 
     def area_of_cells(self, state: CellState) -> np.ndarray:
         """Contact area of each cell in contact, (k,), in cells; less than its fraction along the perimeter."""
         if self.adhesive:
-            return reported_areas(state.fraction, state.around)
+            return reported_areas(state.fraction, state.mean_fraction)
         return 1 - BEYOND_EDGES * free_edges(state.cells, self.space.grid)
 
     def gap(self, state: CellState) -> np.ndarray:
@@ -143,11 +143,11 @@ class BoundaryElements(FullContactProblem):
         return self.space.field(state.cells, state.fraction)
 
     def mean_gap(self, state: CellState) -> float:
-        """Mean gap over the nominal area, m: the mean separation, since the mean plane is not displaced."""
+        """Mean gap, m: the mean separation, since the mean plane is not displaced."""
         return state.separation
 
     def spot_count(self, state: CellState) -> int:
-        """Return number of patches."""
+        """Count the contact patches, the spots of this model."""
         return label_patches(state.cells, self.space.grid)[1]
 
     def stiffness(self, state: CellState) -> float:
@@ -159,7 +159,7 @@ class BoundaryElements(FullContactProblem):
         return state.pressure_slope if quantity == PRESSURE else state.area_slope
 
     def stored_energy(self, state: CellState) -> float:
-        """Elastic energy less that of adhesion over nominal area, J/m^2; zero out of contact."""
+        """Elastic energy less that of adhesion, divided by the nominal area, J/m^2; zero out of contact."""
         return float(np.sum(self._energy_of_cells(state))) / self.heights.size
 
     def is_unstable(self, state: CellState) -> bool:
@@ -179,7 +179,7 @@ class BoundaryElements(FullContactProblem):
         change = state.rates[0] * distance
         if not np.abs(change).max() <= _LARGEST_PREDICTION:  # or not finite
             return contact
-        return contact.after_step(change, state.rates[1] * distance)
+        return contact.apply_step(change, state.rates[1] * distance)
 
     def _solve(self, state, separation, residual=TOLERANCES.front, *, close=False, same_slopes=False):
         """Equilibrium at a separation (m), to a residual of the front; arguments as of `ControlProblem.solve`."""
@@ -193,7 +193,7 @@ class BoundaryElements(FullContactProblem):
             solved.cells,
             solved.fraction,
             solved.pressure * self.contact_modulus,
-            solved.around,
+            solved.mean_fraction,
             front_residual=find_active_cells(self.front, solved).residual,
             gap_residual=self._gap_residual(solved),
             pending=pending,
@@ -223,30 +223,31 @@ class BoundaryElements(FullContactProblem):
 
     def _events(self, before, after):
         """Events between two consecutive states."""
-        return patch_events(before, after, self._released_energy, self.summits.cell, self.space.grid, self.spacing)
+        return patch_events(before, after, self._jump_energy, self.summits.cell, self.space.grid, self.spacing)
 
     def _with_slopes(self, state, accuracy):
         """State with the derivatives of pressure and area."""
         if not len(state.cells):
             return state
-        contact = Contact(state.cells, state.fraction, state.pressure)
-        fraction, pressure = rates_with_separation(self.space, self.front, contact, state.around, accuracy)
-        cells = self.heights.size * self.spacing
-        stiffer = float(np.sum(pressure)) * self.contact_modulus / cells
+        contact = Contact(state.cells, state.fraction, state.pressure / self.contact_modulus)
+        fraction, pressure = rates_with_separation(self.space, self.front, contact, state.mean_fraction, accuracy)
+        scale = self.heights.size * self.spacing
+        pressure_slope = float(np.sum(pressure)) * self.contact_modulus / scale
         if self.adhesive:
-            wider = float(np.sum(reported_area_gradient(state.fraction, state.around) * fraction)) / cells
+            gradient = reported_area_gradient(state.fraction, state.mean_fraction)
+            area_slope = float(np.sum(gradient * fraction)) / scale
         else:
             # Whole cells come and go; on average the area grows about in proportion to the load.
-            wider = self.area_fraction(state) * stiffer / self.pressure(state)
-        return replace(state, pressure_slope=stiffer, area_slope=wider, rates=(fraction, pressure))
+            area_slope = self.area_fraction(state) * pressure_slope / self.pressure(state)
+        return replace(state, pressure_slope=pressure_slope, area_slope=area_slope, rates=(fraction, pressure))
 
     def _energy_of_cells(self, state):
         """Elastic energy less that of adhesion of each cell in contact, (k,), J/m^2."""
         elastic = 0.5 * state.pressure * (self.heights.ravel()[state.cells] - state.separation)
-        return elastic - self.law.material.surface_energy * adhesive_areas(state.fraction, state.around)
+        return elastic - self.law.material.surface_energy * adhesive_areas(state.fraction, state.mean_fraction)
 
-    def _released_energy(self, state):
-        """Energy that each cell would release if its patch jumped, J/m^2; without adhesion nothing jumps."""
+    def _jump_energy(self, state):
+        """Energy of each cell, J/m^2; `patch_events` applies the sign. Zero without adhesion: nothing jumps."""
         return self._energy_of_cells(state) if self.adhesive else np.zeros(len(state.cells))
 
 
@@ -273,8 +274,8 @@ def contact_of(surface: Surface, material: Material) -> BoundaryElements:
     front = Front(material.surface_energy / (material.contact_modulus * h), strength)
     if 0 < front.critical_opening < _SMALLEST_OPENING * np.abs(surface.heights).max() / h:
         raise ValueError(
-            f"surface_energy: {material.surface_energy:g} J/m^2 has no effect at the heights of this surface, of up to "
-            f"{np.abs(surface.heights).max():g} m; expected zero or a larger value"
+            f"surface_energy: {material.surface_energy:g} J/m^2 is too small: rounding of heights up to "
+            f"{np.abs(surface.heights).max():g} m hides the adhesion. Use zero or a larger value"
         )
     space = HalfSpace.of(surface.grid)
     topography = Topography.of(surface.heights / h)
@@ -286,6 +287,6 @@ def contact_of(surface: Surface, material: Material) -> BoundaryElements:
 def resumable(contact: BoundaryElements, folder: pathlib.Path) -> CheckpointedContact:
     """Contact whose equilibria are saved in a folder, so that an interrupted path can resume."""
     programs = [(name, version(name)) for name in ("icha", "numpy", "scipy")]
-    others = repr((contact.spacing, contact.law.material, programs)).encode()
+    others = repr((contact.spacing, contact.law.material, programs, CellState.__match_args__)).encode()
     of = hashlib.sha256(contact.heights.tobytes() + others).hexdigest()
     return CheckpointedContact(contact, of[:32], folder, pack, unpack)

@@ -16,14 +16,14 @@ import numpy as np
 
 from icha.boundary_elements.cells import adjacent, mask_of, merge_cells
 from icha.boundary_elements.elastic_contact import (
-    LEAST_GAIN,
+    LARGEST_REMAINDER,
     NO_CONTACT,
     AdhesiveContact,
     Contact,
     Topography,
-    solve_adhesive_fractions,
+    solve_bonded_contact,
 )
-from icha.boundary_elements.front import COMPLIANCE, Front, adhesive_areas, neighbour_weights
+from icha.boundary_elements.front import NET_COMPLIANCE, Front, neighbour_weights
 from icha.boundary_elements.half_space import FullGrid, HalfSpace
 from icha.contact.model import FullContact, NotConverged
 from icha.contact.models import MODELS, REFERENCE_MODEL
@@ -33,21 +33,23 @@ from icha.contact.models import MODELS, REFERENCE_MODEL
 class FrontTolerances:
     """Tolerances of the front; measured effects in docs/short_range.md.
 
-    The residual of a cell is |K/K_c - 1| with K/K_c = sqrt(G/dgamma). Errors of displacements are over the critical
-    opening.
+    The residual of a cell is |K/K_c - 1| with K/K_c = sqrt(G/dgamma). Errors of displacements are in units of the
+    critical opening.
 
     Parameters
     ----------
     front : residual of a converged front; the grid's own error of areas and loads is some 1e-3.
     stagnation : largest residual at which a front that cannot move on is accepted; above, it has not converged.
     displacement : error of a converged contact.
-    moving_displacement : error while the front moves, over its residual; at most this.
+    moving_displacement : largest error of the first steps. After a step, the allowed error is
+        residual * min(moving_displacement, max(residual, linear[0])).
     certain_displacement : error at which energies of states that differ little can be compared.
     linear : error of the linearised equations: the front's residual, but between these two.
-    local : residual from which cells are relaxed locally and damped.
+    local : residual above which cells are relaxed locally and damped.
     few : part of the front; fewer cells above `local_few` are relaxed locally on their own.
-    local_few : residual from which so few cells are relaxed locally.
-    damping : first damping of bonds where a step leads up in energy; twice where most of the front is unstable.
+    local_few : residual above which so few cells are relaxed locally.
+    damping : first damping of bonds where a step leads up in energy; twice if most of the front is
+        far from equilibrium at the start.
     """
 
     front: float = 1e-6
@@ -67,23 +69,22 @@ TOLERANCES = FrontTolerances()
 _MAX_STEPS, _MAX_KRYLOV, _MAX_LOCAL_RELAXATIONS, _LARGEST_DAMPING = 400, 60, 5, 1e8
 # Relative rounding error of an energy, and of the work of a step.
 _ENERGY_ROUNDING, _WORK_ROUNDING = 1e-12, 1e-11
-# Compliance at the front in the preconditioner: that of a bond less that of the half-space, over the bond's.
-_NET_COMPLIANCE = 0.6
 
 
 @dataclass(frozen=True, eq=False)
 class ActiveCells(Contact):
-    """Cells that take part in a step: those in contact, and cells of the rim that close.
+    """Cells that take part in a step: those in contact, and cells of the rim that close, with fraction 0.
 
     Parameters
     ----------
-    gap, around : (k,), gap and mean fraction around each cell.
-    intensity : (k,), stress intensity at the front over the critical one, K/K_c = sqrt(G/dgamma).
+    gap : (k,), in cells.
+    mean_fraction : (k,), as of `AdhesiveContact`.
+    intensity : (k,), stress intensity at the front divided by the critical one, K/K_c = sqrt(G/dgamma).
     free : (k,) bool, whether the front may move there.
     """
 
     gap: np.ndarray
-    around: np.ndarray
+    mean_fraction: np.ndarray
     intensity: np.ndarray
     free: np.ndarray
 
@@ -115,26 +116,27 @@ class ActiveCells(Contact):
 def find_active_cells(front: Front, state: AdhesiveContact) -> ActiveCells:
     """Find the cells of a state that take part in a step.
 
-    Closed cells open at the edge of contact, or where their tension reaches the strength of the interface.
+    A closed cell can start to open only if one of its four neighbours is not closed, or if its tension exceeds the
+    strength of the interface.
     """
     grid, gap = state.gap.shape[-1], state.gap.ravel()
-    tension = -state.pressure / (state.fraction * front.strengths(state.around))
-    closing_force = gap[state.rim] / (COMPLIANCE * front.strengths(state.around_rim))
+    intensity = front.intensity(state.fraction, state.pressure, state.mean_fraction)
+    relative_gap = front.relative_gap(gap[state.rim], state.mean_fraction_rim)
     closed = mask_of(state.cells[state.fraction >= 1], state.gap.shape).ravel()
-    opening = tension > 1
+    opening = intensity > 1
     at_edge = ~np.all(closed[adjacent(state.cells[opening], grid)], axis=0) | (state.fraction[opening] < 1)
     opening[opening] = at_edge | (-state.pressure[opening] > front.interface_strength)
-    closing = closing_force < 1
-    cells, fraction, pressure, around, intensity, free = merge_cells(
+    closing = relative_gap < 1
+    cells, fraction, pressure, mean_fraction, intensity, free = merge_cells(
         state.cells,
         state.rim[closing],
         (state.fraction, 0.0),
         (state.pressure, 0.0),
-        (state.around, state.around_rim[closing]),
-        (tension, closing_force[closing]),
-        (opening | ((tension < 1) & (state.fraction < 1)), True),
+        (state.mean_fraction, state.mean_fraction_rim[closing]),
+        (intensity, relative_gap[closing]),
+        (opening | ((intensity < 1) & (state.fraction < 1)), True),
     )
-    return ActiveCells(cells, fraction, pressure, gap[cells], around, intensity, free)
+    return ActiveCells(cells, fraction, pressure, gap[cells], mean_fraction, intensity, free)
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,7 +147,7 @@ class FrontProblem:
     ----------
     space, front, topography : half-space, law of the front, heights.
     separation : mean separation, in cells.
-    background : in windows, mean fraction around each cell due to contact outside; else None.
+    background : in windows, part of the mean fraction that is due to contact outside; else None.
     """
 
     space: HalfSpace
@@ -155,21 +157,21 @@ class FrontProblem:
     background: np.ndarray | None = None
 
     def solve_elastic(self, contact: Contact, accuracy: float) -> AdhesiveContact:
-        """Solve the elastic contact of given fractions, to an accuracy over the critical opening."""
+        """Solve the pressures as `solve_bonded_contact`, to an accuracy in units of the critical opening."""
         tolerance = accuracy * self.front.critical_opening
-        return solve_adhesive_fractions(
-            self.space, self.topography, self.separation, contact, tolerance, self.background
-        )
+        return solve_bonded_contact(self.space, self.topography, self.separation, contact, tolerance, self.background)
 
     def accuracy(self, state: AdhesiveContact) -> float:
-        """Accuracy of the displacement of a state, over the critical opening."""
+        """Accuracy of the displacement of a state, in units of the critical opening."""
         return state.tolerance / self.front.critical_opening
 
     def energy(self, state: AdhesiveContact) -> float:
         """Elastic energy less the work of adhesion, in E* cells^3."""
-        # Contact outside of a window and in it lose perimeter alike where they meet.
-        around = state.around if self.background is None else state.around + self.background.ravel()[state.cells]
-        return state.energy - self.front.adhesion_length * float(np.sum(adhesive_areas(state.fraction, around)))
+        # Pairs of a window cell and an outside cell count twice in w, so the background is added once more.
+        mean_fraction = state.mean_fraction
+        if self.background is not None:
+            mean_fraction = mean_fraction + self.background.ravel()[state.cells]
+        return state.energy - self.front.adhesion_energy(state.fraction, mean_fraction)
 
     def is_lower(self, new: AdhesiveContact, old: AdhesiveContact) -> bool:
         """Whether a state is not above another in energy, within the errors of both."""
@@ -200,7 +202,10 @@ def relax_front(
     Raises
     ------
     NotConverged
-        If the front stagnates at a residual above TOLERANCES.stagnation.
+        If the front stagnates at a residual above TOLERANCES.stagnation, or still has one after _MAX_STEPS steps if
+        max_steps is not given.
+    FullContact
+        If the contact covers the surface.
     """
     relaxation = FrontRelaxation(problem, contact, close)
     for _ in range(max_steps or _MAX_STEPS):
@@ -233,7 +238,7 @@ class FrontRelaxation:
     ----------
     state : the contact of the last step.
     damping : of the bonds in the next step.
-    coarsest : largest error of the displacement, over the critical opening.
+    coarsest : largest error of the displacement, in units of the critical opening.
     local_relaxations : number since the last step of the whole front.
     """
 
@@ -252,7 +257,7 @@ class FrontRelaxation:
         return self.problem.accuracy(self.state) <= TOLERANCES.displacement
 
     def refine(self, accuracy: float = TOLERANCES.displacement) -> None:
-        """Solve for the pressures again, to an accuracy over the critical opening."""
+        """Solve for the pressures again, to an accuracy in units of the critical opening."""
         accuracy = max(accuracy, TOLERANCES.displacement)
         self.state = self.problem.solve_elastic(self.state, accuracy)
 
@@ -295,7 +300,7 @@ class FrontRelaxation:
         # Short steps cost as much as long ones: after two lengths, more damping finds a better direction.
         for length in (1.0, 0.5) if self.coarsest <= TOLERANCES.certain_displacement else (1.0,):
             try:
-                new = problem.solve_elastic(active.after_step(length * change, length * pressure_change), accuracy)
+                new = problem.solve_elastic(active.apply_step(length * change, length * pressure_change), accuracy)
             except FullContact:
                 # The gap has a given volume: it does not close.
                 continue
@@ -307,7 +312,7 @@ class FrontRelaxation:
         self._damp(8)
 
     def _damp(self, factor: float) -> None:
-        """Raise the damping; energies of coarse pressures may be the reason, so refine these first."""
+        """Solve the pressures more accurately and raise the damping, both at once."""
         if self.coarsest > TOLERANCES.certain_displacement:
             self.coarsest = TOLERANCES.certain_displacement
         if self.problem.accuracy(self.state) > TOLERANCES.displacement:
@@ -322,23 +327,23 @@ def newton_step(problem: FrontProblem, active: ActiveCells, damping: float) -> t
     front, at_front = problem.front, active.at_front
     # A running front needs shorter steps.
     local = np.where(np.abs(active.intensity - 1) > TOLERANCES.local, max(damping, 2 * TOLERANCES.damping), damping)
-    linear = LinearisedFront(problem.space, front, active, active.around, at_front, local)
+    linear = LinearisedFront(problem.space, front, active, active.mean_fraction, at_front, local)
     # Go to the tension that the law wants at the present fraction, and from there along the law.
-    strengths = front.strengths(active.around)
-    missing = np.where(at_front, strengths * active.fraction + active.pressure, 0.0)
+    strengths = front.strengths(active.mean_fraction)
+    missing = np.where(at_front, front.tension(strengths, active.fraction) + active.pressure, 0.0)
     moved = linear.operator.displacement(missing.astype(np.float32))
-    bond = np.where(at_front, COMPLIANCE * strengths * (1 - active.fraction), 0.0)
+    opening = np.where(at_front, front.opening(strengths, active.fraction), 0.0)
     accuracy = float(np.clip(active.residual, *TOLERANCES.linear))
-    change, pressure_change = linear.solve(moved + bond - active.gap, accuracy)
+    change, pressure_change = linear.solve(moved + opening - active.gap, accuracy)
     return change, pressure_change - missing
 
 
 def rates_with_separation(
-    space: HalfSpace, front: Front, contact: Contact, around: np.ndarray, accuracy: float
+    space: HalfSpace, front: Front, contact: Contact, mean_fraction: np.ndarray, accuracy: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Rates of fraction and pressure, (k,), with the mean separation: per cell, and in E* per cell."""
-    linear = LinearisedFront(space, front, contact, around, contact.fraction < 1, np.zeros(len(around)))
-    return linear.solve(np.full(len(around), -1.0), accuracy)
+    """Rates of fraction and pressure (E*), (k,), per unit of separation (one cell length)."""
+    linear = LinearisedFront(space, front, contact, mean_fraction, contact.fraction < 1, np.zeros(len(mean_fraction)))
+    return linear.solve(np.full(len(mean_fraction), -1.0), accuracy)
 
 
 class LinearisedFront:
@@ -352,17 +357,17 @@ class LinearisedFront:
         space: HalfSpace,
         front: Front,
         contact: Contact,
-        around: np.ndarray,
+        mean_fraction: np.ndarray,
         at_front: np.ndarray,
         damping: np.ndarray,
     ):
-        """Linearise at a contact, with mean fractions around, which cells are at the front, and damping, (k,) each."""
+        """Linearise at a contact, with mean fractions, which cells are at the front, and damping, (k,) each."""
         self.space, self.front, self.cells = space, front, contact.cells
         self.closed, self.at_front = ~at_front, np.flatnonzero(at_front)
-        self.strengths = front.strengths(around[self.at_front]).astype(np.float32)
+        self.strengths = front.strengths(mean_fraction[self.at_front]).astype(np.float32)
         self.fraction = contact.fraction[self.at_front].astype(np.float32)
-        self.softening = (1 + damping[self.at_front]).astype(np.float32)
-        self.operator = space.restricted_to(contact.cells)
+        self.damping_factor = (1 + damping[self.at_front]).astype(np.float32)
+        self.operator = space.restrict_to(contact.cells)
         self.weights = neighbour_weights(contact.cells[self.at_front], space.shape)
         self.unit = np.float32(front.strength or 1.0)
 
@@ -381,12 +386,12 @@ class LinearisedFront:
         solution, residual = np.zeros_like(right), right
         while not error <= accuracy * norm:
             part = max(accuracy * float(norm / error), self.operator.error)
-            solution = solution + gmres(self._displacement, self._approximate_inverse, residual, part)
+            solution = solution + gmres(self._left_side, self._approximate_inverse, residual, part)
             if accuracy >= 10 * self.operator.error:
                 break
-            residual = right - self._displacement(solution, FullGrid(self.space, self.cells))
+            residual = right - self._left_side(solution, FullGrid(self.space, self.cells))
             before, error = error, np.linalg.norm(residual)
-            if not error <= LEAST_GAIN * before:
+            if not error <= LARGEST_REMAINDER * before:
                 break
         if not np.isfinite(solution).all():
             raise NotConverged(f"the linear equations of {len(self.cells)} cells have no finite solution")
@@ -396,25 +401,27 @@ class LinearisedFront:
         return fraction, scale * pressure.astype(float)
 
     def _pressures(self, unknowns):
-        """Return changes of pressure, (k,); of the strengths and tensions at the front."""
+        """Return changes of pressure, (k,), and of the strengths and tensions at the front."""
         fraction = unknowns[self.at_front] / self.unit
         if not len(fraction):
             return unknowns, fraction, fraction
         stronger = self.front.strength_change(self.strengths, self.weights @ fraction)
-        tension = self.strengths * fraction + self.fraction * stronger
+        tension = self.front.tension_change(self.strengths, self.fraction, stronger, fraction)
         pressure = unknowns.copy()
         pressure[self.at_front] = -tension
         return pressure, stronger, tension
 
-    def _displacement(self, unknowns, operator=None):
+    def _left_side(self, unknowns, operator=None):
+        """Displacement less the change of opening by the law."""
         pressure, stronger, tension = self._pressures(unknowns)
         result = (operator or self.operator).displacement(pressure)
-        result[self.at_front] += np.float32(COMPLIANCE) * (self.softening * tension - stronger)
+        result[self.at_front] -= self.front.opening_change(stronger, self.damping_factor * tension)
         return result
 
     def _approximate_inverse(self, right):
+        """Preconditioner: half-space at closed cells, a constant at the edge."""
         result = self.operator.approximate_inverse(np.where(self.closed, right, np.float32(0)))
-        result[self.at_front] = right[self.at_front] / np.float32(_NET_COMPLIANCE * COMPLIANCE)
+        result[self.at_front] = right[self.at_front] / np.float32(NET_COMPLIANCE)
         return result
 
 

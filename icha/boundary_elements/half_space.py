@@ -18,7 +18,7 @@ from numpy.typing import DTypeLike
 from icha.boundary_elements import transforms
 from icha.boundary_elements.tiles import TiledGrid
 
-# Approximate inverse for the mean pressure, over that for the longest wave.
+# Approximate inverse for the mean pressure, divided by that for the longest wave.
 _MEAN_STIFFNESS = 0.3
 
 
@@ -61,7 +61,7 @@ class HalfSpace:
     def displacement(
         self, cells: np.ndarray, pressure: np.ndarray, at: np.ndarray | None = None, out: np.ndarray | None = None
     ) -> np.ndarray:
-        """Displacement away from the load, of zero mean.
+        """Displacement, positive into the half-space, of zero mean.
 
         Parameters
         ----------
@@ -102,7 +102,7 @@ class HalfSpace:
         field.ravel()[cells] = values
         return field
 
-    def restricted_to(self, cells: np.ndarray) -> Operator:
+    def restrict_to(self, cells: np.ndarray) -> Operator:
         """Operator between pressures and displacements of cells (k,), ascending, for iterative solvers."""
         large = len(self.shape) == 2 and self.size * np.float32().itemsize >= transforms.CACHE
         return (TiledGrid.of(cells, self.grid) if large else None) or FullGrid(self, cells)
@@ -113,7 +113,7 @@ class Operator(Protocol):
 
     @property
     def error(self) -> float:
-        """Largest error of a displacement, over the largest displacement."""
+        """Largest error of a displacement, divided by the largest displacement."""
 
     def displacement(self, pressure: np.ndarray) -> np.ndarray:
         """Displacements (k,) under pressures (k,)."""

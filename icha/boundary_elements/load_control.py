@@ -18,16 +18,18 @@ if TYPE_CHECKING:
 
 # Relative error of a load or area that is met: below that at which a path recognises a stop, 1e-9.
 _MET = 5e-10
-# Relative error from which trials are solved to the tolerances of an equilibrium, and from which slopes are reused.
+# Relative errors below which trials are solved to the tolerances of an equilibrium, and below which slopes are reused.
 _CLOSE, _SAME_SLOPES = 1e-3, 1e-4
 # Residuals of the front in the first coarse trial, and in those after it.
 _FIRST_RESIDUAL, _RESIDUAL = 3e-2, 1e-3
 # Separations that differ by less, in h_rms, are the same.
 _SAME_SEPARATION = 1e-13
-# Unit of the error of a load of zero, over stiffness times h_rms: attraction and repulsion of about this size cancel.
+# Unit of the error of a load of zero, divided by stiffness times h_rms: attraction and repulsion of about this size
+# cancel.
 _ZERO_LOAD = 1e-2
 _MAX_TRIALS, _MAX_ATTEMPTS = 30, 4
-# Change of the mean gap between trials where the target may lie in full contact: over the mean gap, and in h_rms.
+# Largest change of the mean gap between trials where the target may lie in full contact: as a part of the mean gap,
+# and in h_rms.
 _CLOSING, _LONGEST = 0.5, 0.1
 
 
@@ -166,7 +168,8 @@ def bracket_loosely(
     contact, start, residual = problem.contact, bracket.before, _FIRST_RESIDUAL
     control_is_load = problem.control.quantity == PRESSURE
     close = _CLOSE * scale if contact.adhesive else problem.tolerance(scale)
-    for _ in range(_MAX_TRIALS if contact.adhesive else 2 * _MAX_TRIALS):
+    trials = _MAX_TRIALS if contact.adhesive else 2 * _MAX_TRIALS
+    for _ in range(trials):
         trial, residual = problem.solve(start, separation, residual), _RESIDUAL
         error = problem.error(trial)
         if abs(error) <= close:
@@ -183,7 +186,7 @@ def bracket_loosely(
             separation = (1 - _CLOSING) * trial.separation
             if separation < contact.smallest_gap:
                 raise FullContact("the mean gap vanishes")
-    raise NotConverged(f"{_MAX_TRIALS} trials do not bracket it")
+    raise NotConverged(f"{trials} trials do not bracket it")
 
 
 def iterate_secant(problem: ControlProblem, bracket: Bracket, trial: CellState, scale: float) -> tuple[CellState, bool]:

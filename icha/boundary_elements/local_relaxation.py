@@ -17,7 +17,7 @@ from scipy.ndimage import find_objects
 
 from icha.boundary_elements.cells import BLOCK, blocks_around, find_among, merge_cells
 from icha.boundary_elements.elastic_contact import Contact, Topography
-from icha.boundary_elements.front import Front, mean_around
+from icha.boundary_elements.front import Front, average_fractions
 from icha.boundary_elements.front_solver import FrontProblem, relax_front
 from icha.boundary_elements.half_space import HalfSpace, by_precision
 from icha.boundary_elements.patches import label_patches
@@ -33,7 +33,14 @@ _TOLERANCE = 1e-4
 
 
 class _Extent(NamedTuple):
-    """How far around a cell the front may move, in cells; largest area of windows over the grid's; number of steps."""
+    """Extent of windows.
+
+    Parameters
+    ----------
+    reach : how far around a cell the front may move, in cells.
+    cover : largest area of all windows, divided by the grid's.
+    max_steps : number of steps.
+    """
 
     reach: int
     cover: float
@@ -65,13 +72,13 @@ def relax_in_windows(
     else:
         return None
     windows = list(places.windows(space.grid))
-    around = mean_around(space.field(contact.cells, contact.fraction, np.float32)).ravel()
+    mean_fraction = average_fractions(space.field(contact.cells, contact.fraction, np.float32)).ravel()
     kernels = {side: window_kernel(space.grid, side) for side in {cells.shape[-1] for cells, _ in windows}}
 
     def relax(window):
         cells, free = window
         small = HalfSpace(cells.shape, *kernels[cells.shape[-1]])
-        return _relax_window(small, front, separation, contact, gap, around, cells, free, extent.max_steps)
+        return _relax_window(small, front, separation, contact, gap, mean_fraction, cells, free, extent.max_steps)
 
     found = on_cores(relax, windows)
     moved = np.zeros(space.size, dtype=bool)
@@ -92,17 +99,18 @@ def relax_in_windows(
     )
 
 
-def _relax_window(small, front, separation, contact, gap, around, windows, free, max_steps):
+def _relax_window(small, front, separation, contact, gap, mean_fraction, windows, free, max_steps):
     """Cells of the grid in contact in some windows, with fractions and pressures, relaxed; None if not converged."""
     cells = windows[free]
     touching, index = find_among(cells, contact.cells)
     inside = np.flatnonzero(free)[touching]
     start = Contact(inside, contact.fraction[index], contact.pressure[index])
-    # The displacement by fixed pressures outside counts as part of the heights; what may not move is far away.
+    # The displacement by fixed pressures outside counts as part of the heights. Frozen cells are lowered so that they
+    # cannot touch.
     displacement = small.displacement(inside, start.pressure)
     lowest = separation - 10 * front.critical_opening - 2 * np.abs(displacement).max()
     heights = Topography.of(np.where(free, displacement + separation - gap.ravel()[windows], lowest))
-    background = around[windows] - mean_around(small.field(inside, start.fraction))
+    background = mean_fraction[windows] - average_fractions(small.field(inside, start.fraction))
     problem = FrontProblem(small, front, heights, separation, background)
     try:
         relaxed = relax_front(problem, start, _TOLERANCE, max_steps=max_steps)
@@ -134,7 +142,7 @@ class Places(NamedTuple):
         boxes = _cut(labels, _boxes(labels))
         ends = np.array([[(side.start, side.stop) for side in box] for box in boxes], int).reshape(-1, 2, 2)
         widths = BLOCK * np.max(ends[:, :, 1] - ends[:, :, 0], axis=1, initial=0)
-        # Boxes that were cut into pieces are empty.
+        # Boxes cut into pieces get no window of their own (side 0).
         sides = np.array([*_SIDES, 0])[np.searchsorted(np.array(_SIDES) // 2, widths)]
         return cls(labels, np.sum(ends, axis=2) * BLOCK // 2, sides)
 

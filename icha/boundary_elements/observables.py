@@ -64,9 +64,9 @@ class PatchObservables:
 
     def of_snapshot(self, state: CellState) -> dict:
         """Distributions of gap and pressure, patches, and maps of contact and pressure."""
-        cells = self.contact.area_of_cells(state)
-        gap = self._gap_density(state, cells)
-        pressure, mean = self._pressure_density(state, cells)
+        areas = self.contact.area_of_cells(state)
+        gap = self._gap_density(state, areas)
+        pressure, mean = self._pressure_density(state, areas)
         field = self.contact.space.field
         return {
             "overlap_fraction": 0.0,
@@ -76,7 +76,7 @@ class PatchObservables:
             "pressure_bin_mean": mean,
             "contact_map": field(state.cells, state.fraction, np.float32),
             "contact_pressure": field(state.cells, state.pressure, np.float32),
-            **self._patches(state, cells),
+            **self._patches(state, areas),
         }
 
     def reasons_against(self, separations: Iterable[float], pressed: CellState | None) -> list[str]:
@@ -93,19 +93,19 @@ class PatchObservables:
         contact = self.contact
         return summit_pull_off_pressure(contact.asperities, contact.law.material.surface_energy, contact.area)
 
-    def _gap_density(self, state, cells):
+    def _gap_density(self, state, areas):
         """Density of the gap over the nominal area outside contact; with the contact area it sums up to one."""
         edges_of_bins = gap_bins(self.surface)
         gap = np.clip(self.contact.gap(state), 0.0, edges_of_bins[-1])
-        outside = 1 - self.contact.space.field(state.cells, cells)
+        outside = 1 - self.contact.space.field(state.cells, areas)
         content, _ = np.histogram(gap, edges_of_bins, weights=outside)
         return content / gap.size / np.diff(edges_of_bins)
 
-    def _pressure_density(self, state, cells):
+    def _pressure_density(self, state, areas):
         """Density of the pressure over the nominal area, and its mean in each bin."""
         edges_of_bins = PRESSURE_BINS * self.contact.pressure_unit
         # The force of a cell acts on its fraction in contact, scaled by one factor to the contact area.
-        weight = state.fraction * (np.sum(cells) / (np.sum(state.fraction) or 1.0))
+        weight = state.fraction * (np.sum(areas) / (np.sum(state.fraction) or 1.0))
         pressure = state.pressure / weight
         counted = np.clip(pressure, edges_of_bins[0], edges_of_bins[-1])
         content, _ = np.histogram(counted, edges_of_bins, weights=weight)
@@ -113,7 +113,7 @@ class PatchObservables:
         mean = np.divide(force, content, out=np.zeros(len(content)), where=content > 0)
         return content / self.contact.heights.size / np.diff(edges_of_bins), mean
 
-    def _patches(self, state, cells):
+    def _patches(self, state, areas):
         """Patches: centre of area, area, perimeter, force, summits, and the curvature of the highest summit."""
         contact, h = self.contact, self.contact.spacing
         grid = contact.space.grid
@@ -122,10 +122,10 @@ class PatchObservables:
         def sums(weight):
             return np.bincount(labels, weight, count + 1)[1:]
 
-        area = sums(cells) * h**2
+        area = sums(areas) * h**2
         of_summit = labels_at(contact.summits.cell, state.cells, labels)
         order = np.argsort(contact.asperities.height, kind="stable")
-        # A patch without a summit counts as a cap of the surface's mean curvature.
+        # A patch without a summit counts as a cap of the surface's rms curvature.
         radius = np.full(count + 1, 1 / self.surface.rms_curvature)
         radius[of_summit[order]] = contact.asperities.radius_of_curvature[order]
         centre = patch_centres(state.cells, grid, labels, count, state.fraction) * h

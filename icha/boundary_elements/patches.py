@@ -21,9 +21,9 @@ class CellState:
     ----------
     separation : mean separation u, m.
     cells : (k,) int, cells in contact, ascending.
-    fraction : (k,), of each cell that is in contact.
+    fraction : (k,), share of the cell's area that is in contact, 0 < f <= 1.
     pressure : (k,), mean of each cell, Pa; negative in tension.
-    around : (k,), mean fraction around each cell.
+    mean_fraction : (k,), Gaussian mean of the fractions, the cell itself included.
     pressure_slope, area_slope : derivatives of nominal pressure (Pa/m) and area fraction (1/m) with the separation,
         with moving fronts.
     rates : derivatives of fraction and pressure, (k,) each, per cell and in E* per cell; None if unknown.
@@ -37,7 +37,7 @@ class CellState:
     cells: np.ndarray
     fraction: np.ndarray
     pressure: np.ndarray
-    around: np.ndarray
+    mean_fraction: np.ndarray
     pressure_slope: float = 0.0
     area_slope: float = 0.0
     rates: tuple[np.ndarray, np.ndarray] | None = None
@@ -64,8 +64,8 @@ def unpack(arrays: dict[str, np.ndarray], before: CellState) -> CellState:
     return CellState(**values, rates=rates, history=(*before.history, events) if len(events) else before.history)
 
 
-# Overestimate of a counted area per free edge, over the area of a cell (Yastrebov, Anciaux & Molinari, Tribol. Int. 114
-# (2017) 161, eq. 9).
+# Overestimate of a counted area per free edge, divided by the area of a cell (Yastrebov, Anciaux & Molinari, Tribol.
+# Int. 114 (2017) 161, eq. 9).
 BEYOND_EDGES = (np.pi - 1 + np.log(2)) / 24
 
 
@@ -133,7 +133,8 @@ def patch_events(
 
     Parameters
     ----------
-    energy_of_cells : energy that each cell, (k,), of a state would set free in a jump, J/m^2.
+    energy_of_cells : energy of each cell, (k,), of a state, J/m^2. A patch that jumps off releases its energy, one that
+        jumps in the negative of it.
     summits : (m,) int, their cells.
     grid, spacing : cells along a side, and size of a cell in m.
     """

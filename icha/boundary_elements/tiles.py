@@ -27,7 +27,8 @@ COARSENING, _ORDER = 4, 4
 _NODES = TILE // COARSENING
 # Ewald parameter per cell: what is cut off and what the coarse grid misses are then both below `error`.
 _ALPHA = 2.3 / REACH
-# Largest area of all tiles over the grid's for which they are faster; on grids whose transforms run on several cores.
+# Largest area of all tiles, divided by the grid's, for which they are faster; the second on grids whose transforms run
+# on several cores.
 _LARGEST_COVER, _LARGEST_COVER_LARGE = 0.6, 1.2
 # Tiles that are transformed together, in the cache.
 _BATCH = 8
@@ -54,7 +55,7 @@ class TiledGrid:
     nodes: np.ndarray
     covered: np.ndarray
 
-    # Largest error of a displacement, over the largest displacement.
+    # Largest error of a displacement, divided by the largest displacement.
     error = 1e-3
 
     @classmethod
@@ -81,7 +82,7 @@ class TiledGrid:
         number[nodes] = np.arange(len(nodes))
         return cls(grid, len(tiles), sources, targets, nodes, number[covered])
 
-    def sums(self, values: np.ndarray, modes: np.ndarray) -> np.ndarray:
+    def convolve_short(self, values: np.ndarray, modes: np.ndarray) -> np.ndarray:
         """Convolve values (k,) on the cells with a kernel of range REACH, given by its modes (TILE, TILE//2 + 1)."""
         result = np.empty_like(values)
         self._convolve(modes, values, result)
@@ -89,7 +90,7 @@ class TiledGrid:
 
     def approximate_inverse(self, displacement: np.ndarray) -> np.ndarray:
         """Pressures (k,) for displacements (k,), approximately."""
-        return self.sums(displacement, _inverse_modes())
+        return self.convolve_short(displacement, _inverse_modes())
 
     def displacement(self, pressure: np.ndarray) -> np.ndarray:
         """Displacements (k,) under pressures (k,), in single precision."""

@@ -6,8 +6,8 @@ from scipy.ndimage import maximum_filter
 
 from icha.boundary_elements import local_relaxation as module
 from icha.boundary_elements.contact import contact_of
-from icha.boundary_elements.elastic_contact import Contact, solve_adhesive_fractions
-from icha.boundary_elements.front import mean_around, neighbour_weights
+from icha.boundary_elements.elastic_contact import Contact, solve_bonded_contact
+from icha.boundary_elements.front import average_fractions, neighbour_weights
 from icha.boundary_elements.front_solver import find_active_cells
 from icha.boundary_elements.half_space import HalfSpace
 from validation.rough_contacts import SOFT, rough
@@ -58,7 +58,7 @@ def test_weights_between_cells_are_those_of_the_stencil(shape):
     rng = np.random.default_rng(2)
     cells = np.sort(rng.choice(space.size, 900, replace=False))
     fraction = rng.random(900)
-    expected = mean_around(space.field(cells, fraction)).ravel()[cells]
+    expected = average_fractions(space.field(cells, fraction)).ravel()[cells]
     np.testing.assert_allclose(neighbour_weights(cells, shape) @ fraction, expected, rtol=0, atol=1e-6)
 
 
@@ -75,7 +75,7 @@ def test_a_front_disturbed_in_one_place_comes_to_rest_there_and_nothing_else_mov
     near = np.all(np.minimum(apart, GRID - apart) <= 2, axis=0)
     fraction = np.where(near, 1.0, state.fraction)
     start = Contact(state.cells, fraction, pressure)
-    disturbed = solve_adhesive_fractions(contact.space, contact.topography, u, start, tolerance)
+    disturbed = solve_bonded_contact(contact.space, contact.topography, u, start, tolerance)
     active = find_active_cells(contact.front, disturbed)
     moving = active.cells[active.residuals > 0.03]
     assert len(moving) and active.residual > 0.1

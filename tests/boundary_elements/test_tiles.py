@@ -29,7 +29,7 @@ def test_sums_nearby_are_those_of_cells_one_by_one(grid):
     values = rng.normal(size=len(cells))
     tiles = TiledGrid.of(cells, grid)
     assert 1 < tiles.count and sum(len(which) for which, _ in tiles.sources.batches) > len(cells)
-    found = tiles.sums(values, np.fft.rfft2(kernel).real)
+    found = tiles.convolve_short(values, np.fft.rfft2(kernel).real)
 
     row, column = np.divmod(cells, grid)
     for at in rng.choice(len(cells), 200, replace=False):
