@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from icha.contact.model import ContactModel, State
 from icha.path.energy_balance import Step
 from icha.path.targets import UNRESOLVED_LOSS
@@ -108,7 +110,8 @@ class StepAccuracy:
         """
         contact = self.contact
         slope, end_slope = (-contact.stiffness(each) for each in (start, state))
-        if step.separation_change < 0 or step.pressure_jump or not slope < 0 < end_slope:
+        # Full contact is infinitely stiff, and its largest tension, at which it opens, is a state of the path.
+        if step.separation_change < 0 or step.pressure_jump or not -np.inf < slope < 0 < end_slope:
             return None
         p, q = (contact.pressure(each) for each in (start, state))
         # The tangents meet below the curve.

@@ -93,6 +93,16 @@ def test_targets_beyond_asperities_are_for_boundary_elements_only():
     assert float(run.reduced_pressure[0]) == pytest.approx(0.2)
 
 
+def test_a_wave_without_summits_closes_by_itself_and_opens_at_the_strength_of_its_interface():
+    at = np.arange(32) / 32 * 2 * np.pi
+    wave = icha.Surface(1e-6 * np.add.outer(0 * at, np.cos(at)), 1e-5)
+    sticky = icha.Material(1e6, 0.02, 1e-8)
+    run = icha.simulate(wave, sticky, icha.Path([0.01, 1.0], unload=True), model="boundary_elements")
+    assert run.contact_area_fraction.max() == 1 and run.contact_area_fraction[-1] == 0
+    assert float(run.pull_off_pressure) == pytest.approx(-float(run.full_contact_opening_pressure), rel=1e-6)
+    assert run.attrs.get("failed_checks", "") == ""
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("number", range(8))
 def test_random_loops_end(number):

@@ -123,7 +123,7 @@ def test_sphere_in_the_middle_of_a_cell_can_be_pulled_off(centre):
     """Symmetric cells come to their limits together: the front must be let run when its equilibrium is lost."""
     material = icha.Material(contact_modulus=1e6, surface_energy=1e-2, interaction_range=20e-9)
     path = icha.Path(reduced_pressures=[1e-3], unload=True, max_step=0.5)
-    run = icha.simulate(sphere(48, centre), material, path, model="boundary_elements")
+    run = icha.simulate(sphere(64, centre), material, path, model="boundary_elements")
     pull_off = float(run.pull_off_pressure) * 1e-8
     assert pull_off == pytest.approx(1.5 * np.pi * 1e-2 * 200e-6, rel=0.01)
     assert float(run.loss_by_jump_off) > 0 and run.contact_area_fraction.values[-1] == 0
