@@ -31,7 +31,7 @@ from icha.contact.models import MODELS, REFERENCE_MODEL
 
 @dataclass(frozen=True)
 class FrontTolerances:
-    """Tolerances of the front; measured effects in docs/short_range.md.
+    """Tolerances of the front.
 
     The residual of a cell is |K/K_c - 1| with K/K_c = sqrt(G/dgamma). Errors of displacements are in units of the
     critical opening.

@@ -13,7 +13,9 @@ from icha.boundary_elements.elastic_contact import Topography
 from icha.boundary_elements.front import Front
 from icha.boundary_elements.half_space import HalfSpace
 from icha.boundary_elements.patches import CellState
+from icha.contact.model import MaterialUnits
 from icha.surfaces.summits import Asperities
+from icha.surfaces.surface import full_contact_pressure
 
 # Mean gap, in h_rms, below which contact is full: the pressures of smaller gaps are lost in rounding.
 _SMALLEST_GAP = 1e-4
@@ -22,7 +24,7 @@ ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class FullContactProblem:
+class FullContactProblem(MaterialUnits):
     """A periodic rough surface against a half-space, in full contact or about to leave it.
 
     Parameters
@@ -46,30 +48,15 @@ class FullContactProblem:
     front: Front
     summits: Summits
 
-    @property
-    def adhesive(self) -> bool:
-        """Whether contact forms and breaks in jumps."""
-        return self.law.material.surface_energy > 0
-
-    @property
-    def contact_modulus(self) -> float:
-        """E*, Pa."""
-        return self.law.material.contact_modulus
-
-    @property
-    def pressure_unit(self) -> float:
-        """E* h'_rms, Pa."""
-        return self.contact_modulus * self.rms_slope
-
     @cached_property
     def full_contact_pressure(self) -> np.ndarray:
         """Pressure of full contact less its mean, (n, n), Pa."""
-        return self.contact_modulus * self.space.full_contact_pressure(self.topography.double)
+        return self.contact_modulus * full_contact_pressure(self.heights, len(self.heights) * self.spacing)
 
     @property
     def interface_strength(self) -> float:
         """Tension at which contact opens without a front: the theoretical strength of the interface, Pa."""
-        return self.front.interface_strength * self.contact_modulus if self.adhesive else 0.0
+        return self.front.interface_strength * self.contact_modulus
 
     @property
     def smallest_gap(self) -> float:

@@ -88,14 +88,6 @@ class HalfSpace:
             return field if at is None else field.ravel()[at]
         return transforms.filter_by_blocks(self.grid, cells, values, factor, at, out)
 
-    def full_contact_pressure(self, heights: np.ndarray) -> np.ndarray:
-        """Pressure (n, n), in E* and of zero mean, at which the half-space follows heights (n, n): q h(q)/2."""
-        compliance = self.compliance[np.dtype(float)]
-        modes = scipy.fft.rfft2(heights, workers=1)
-        modes[0, 0] = 0.0
-        modes.ravel()[1:] /= compliance.ravel()[1:]
-        return scipy.fft.irfft2(modes, s=self.shape, overwrite_x=True, workers=1)
-
     def field(self, cells: np.ndarray, values: np.ndarray | float, dtype: DTypeLike = float) -> np.ndarray:
         """Field with given values on cells (k,), and zero elsewhere."""
         field: np.ndarray = np.zeros(self.shape, dtype)

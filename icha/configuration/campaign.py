@@ -47,6 +47,7 @@ class Topography(NamedTuple):
     rms_slope : None if no study asks for it.
     sha256 : checksum of the file.
     full_contact_energy : U_full/E* at rms slope 1, m; NaN without adhesion.
+    complete_contact_pressure : pressure over E* for complete contact at rms slope 1; NaN without adhesion.
     """
 
     grid: int
@@ -54,6 +55,7 @@ class Topography(NamedTuple):
     rms_slope: float | None
     sha256: str
     full_contact_energy: float
+    complete_contact_pressure: float
 
 
 class Defaults(Section):

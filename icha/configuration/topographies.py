@@ -67,23 +67,28 @@ def _facts(path: str, version: tuple[int, int] | None, preparation: str) -> Topo
 
     prepared = prepared_topography(path, json.loads(preparation))
     surface = prepared.surface
-    energy = surface.full_contact_energy / surface.rms_slope**2
-    return Topography(surface.grid, surface.period, _rounded(surface.rms_slope), prepared.source_sha256, energy)
+    slope = _rounded(surface.rms_slope)
+    return Topography(surface.grid, surface.period, slope, prepared.source_sha256, *_full_contact(surface))
 
 
 def _inspect_map(surface: FileSurface, *, with_slope: bool, with_energy: bool) -> Topography:
     from icha.surfaces.measured.array_files import read_height_map
 
     heights = read_height_map(surface.path, surface.height_unit)
-    slope, energy = None, math.nan
+    slope, full_contact = None, (math.nan, math.nan)
     if with_slope or with_energy:
         # Imports SciPy's transforms, which other calls do not need.
         from icha.surfaces.surface import Surface
 
         topography = Surface(heights, surface.period)
         slope = _rounded(topography.rms_slope) if with_slope else None
-        energy = topography.full_contact_energy / topography.rms_slope**2 if with_energy else math.nan
-    return Topography(len(heights), surface.period, slope, sha256_of(Path(surface.path)), energy)
+        full_contact = _full_contact(topography) if with_energy else full_contact
+    return Topography(len(heights), surface.period, slope, sha256_of(Path(surface.path)), *full_contact)
+
+
+def _full_contact(surface):
+    """Energy (m) and complete pressure of full contact over E*, at rms slope 1."""
+    return surface.full_contact_energy / surface.rms_slope**2, surface.complete_contact_pressure / surface.rms_slope
 
 
 def _rounded(slope: float) -> float:

@@ -8,13 +8,13 @@ from functools import cached_property
 import numpy as np
 
 from icha.asperity.jkr import JKR
-from icha.contact.model import Events
+from icha.contact.model import Events, MaterialUnits
 from icha.half_space.ewald import PointHalfSpace
 from icha.surfaces.summits import Asperities
 
 
 @dataclass(frozen=True, eq=False)
-class AsperityContact:
+class AsperityContact(MaterialUnits):
     """Asperities in contact with an elastic half-space.
 
     Attributes
@@ -40,21 +40,6 @@ class AsperityContact:
     def area(self) -> float:
         """Nominal contact area A0, m^2."""
         return self.asperities.period**2
-
-    @property
-    def adhesive(self) -> bool:
-        """True if contact forms and breaks in jumps."""
-        return self.law.material.surface_energy > 0
-
-    @property
-    def contact_modulus(self) -> float:
-        """E*, Pa."""
-        return self.law.material.contact_modulus
-
-    @property
-    def pressure_unit(self) -> float:
-        """E* h'_rms, Pa."""
-        return self.contact_modulus * self.rms_slope
 
 
 # Status of a site: in contact; without adhesion, a candidate for contact; or removed.

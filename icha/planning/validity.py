@@ -82,12 +82,11 @@ def rms_curvature(campaign: Campaign, name: str) -> float:
 
 
 def complete_contact_pressure(campaign: Campaign, name: str) -> float:
-    """Pressure over E* at which contact with a surface of rms slope 1 is complete; an estimate for a random one."""
+    """Pressure over E* for complete contact with a surface of rms slope 1; an estimate for a random one."""
     section = campaign.surfaces[name]
     if isinstance(section, SelfAffineSurface):
         return gaussian_complete_pressure(section.period / section.lengths_and_hurst[2])
-    surface = _read(section)
-    return surface.complete_contact_pressure / surface.rms_slope
+    return campaign.topography(name).complete_contact_pressure
 
 
 def surface_facts(campaign: Campaign, name: str) -> dict[str, float]:

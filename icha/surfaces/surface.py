@@ -195,18 +195,10 @@ class Surface:
     def complete_contact_pressure(self) -> float:
         """Nominal pressure over E* at which contact is complete without adhesion.
 
-        It is the largest tension in full contact at zero load, where p(q) = q E* h(q)/2. A free square is part of the
-        periodic surface that it forms with its mirror images.
+        It is the largest tension in full contact at zero load. A free square is part of the periodic surface that it
+        forms with its mirror images.
         """
-        if self.free:
-            modes = scipy.fft.dctn(self.heights, workers=1)
-            k: np.ndarray = np.arange(self.grid)
-            modes *= np.pi / (2 * self.period) * np.hypot(k[:, None], k)
-            return -float(scipy.fft.idctn(modes, workers=1, overwrite_x=True).min())
-        modes = scipy.fft.rfft2(self.heights, workers=1)
-        k = np.fft.fftfreq(self.grid, 1 / self.grid)
-        modes *= np.pi / self.period * np.hypot(k[:, None], k[: modes.shape[1]])
-        return -float(scipy.fft.irfft2(modes, s=self.heights.shape, workers=1, overwrite_x=True).min())
+        return -float(full_contact_pressure(self.heights, self.period, free=self.free).min())
 
     def scaled_to_rms_slope(self, rms_slope: float) -> Surface:
         """Return the same topography with its heights multiplied to the spectral rms slope `rms_slope`."""
@@ -232,6 +224,25 @@ class Surface:
         for axis in (0, 1):
             heights = resample(heights, factor * self.grid, axis=axis)
         return Surface(heights, self.period)
+
+
+def full_contact_pressure(heights: np.ndarray, period: float, *, free: bool = False) -> np.ndarray:
+    """Return the pressure over E* of full contact at zero load, (n, n): p(q) = q E* h(q)/2.
+
+    Parameters
+    ----------
+    heights : (n, n), m.
+    period : side of the square, m.
+    free : whether the heights continue by their mirror images instead of periodically.
+    """
+    n = len(heights)
+    if free:
+        modes, k = scipy.fft.dctn(heights, workers=1), np.arange(n)
+        modes *= np.pi / (2 * period) * np.hypot(k[:, None], k)
+        return scipy.fft.idctn(modes, workers=1, overwrite_x=True)
+    modes, each = scipy.fft.rfft2(heights, workers=1), np.fft.fftfreq(n, 1 / n)
+    modes *= np.pi / period * np.hypot(each[:, None], each[: modes.shape[1]])
+    return scipy.fft.irfft2(modes, s=heights.shape, workers=1, overwrite_x=True)
 
 
 def edges_fit(heights: np.ndarray) -> bool:
