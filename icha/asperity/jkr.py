@@ -235,3 +235,25 @@ class JKR:
 def wu_gap(tabor_parameter: np.ndarray | float) -> np.ndarray | float:
     """Return Wu's gap at the jump into contact over the range of attraction, 2.641 mu^(3/7), eq. (3)."""
     return 2.641 * tabor_parameter ** (3 / 7)
+
+
+class MaterialUnits:
+    """Properties of a contact that follow from the law of a spot and the rms slope of the surface."""
+
+    law: JKR
+    rms_slope: float
+
+    @property
+    def adhesive(self) -> bool:
+        """True if contact forms and breaks in jumps."""
+        return self.law.material.surface_energy > 0
+
+    @property
+    def contact_modulus(self) -> float:
+        """E*, Pa."""
+        return self.law.material.contact_modulus
+
+    @property
+    def pressure_unit(self) -> float:
+        """E* h'_rms, Pa."""
+        return self.contact_modulus * self.rms_slope

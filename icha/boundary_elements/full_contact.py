@@ -7,13 +7,12 @@ from functools import cached_property
 
 import numpy as np
 
-from icha.asperity.jkr import JKR
+from icha.asperity.jkr import JKR, MaterialUnits
 from icha.boundary_elements.adhesive import Summits
 from icha.boundary_elements.elastic_contact import Topography
 from icha.boundary_elements.front import Front
 from icha.boundary_elements.half_space import HalfSpace
 from icha.boundary_elements.patches import CellState
-from icha.contact.model import MaterialUnits
 from icha.surfaces.summits import Asperities
 from icha.surfaces.surface import full_contact_pressure
 

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 import numpy as np
 
 if TYPE_CHECKING:
-    from icha.asperity.jkr import JKR
     from icha.contact.models import PathAccuracy
     from icha.surfaces.summits import Asperities
     from icha.surfaces.surface import Surface
@@ -88,28 +87,6 @@ class State(Protocol):
 
 S = TypeVar("S", bound=State)
 S_in = TypeVar("S_in", bound=State, contravariant=True)
-
-
-class MaterialUnits:
-    """Properties of a contact that follow from the law of a spot and the rms slope of the surface."""
-
-    law: JKR
-    rms_slope: float
-
-    @property
-    def adhesive(self) -> bool:
-        """True if contact forms and breaks in jumps."""
-        return self.law.material.surface_energy > 0
-
-    @property
-    def contact_modulus(self) -> float:
-        """E*, Pa."""
-        return self.law.material.contact_modulus
-
-    @property
-    def pressure_unit(self) -> float:
-        """E* h'_rms, Pa."""
-        return self.contact_modulus * self.rms_slope
 
 
 class ContactModel(Protocol[S]):

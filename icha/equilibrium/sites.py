@@ -7,8 +7,8 @@ from functools import cached_property
 
 import numpy as np
 
-from icha.asperity.jkr import JKR
-from icha.contact.model import Events, MaterialUnits
+from icha.asperity.jkr import JKR, MaterialUnits
+from icha.contact.model import Events
 from icha.half_space.ewald import PointHalfSpace
 from icha.surfaces.summits import Asperities
 
