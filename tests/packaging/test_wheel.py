@@ -16,7 +16,7 @@ from conftest import REPOSITORY
 
 from icha.datasets.campaign import campaign_tree
 from icha.datasets.files import write_dataset
-from icha.deposit.program import constraints
+from icha.deposit.program import locked_versions
 
 pytestmark = pytest.mark.slow
 
@@ -116,7 +116,8 @@ def built(tmp_path_factory):
 def install(built, tmp_path_factory):
     """Install the wheel, with an extra, in an empty environment, in the versions of the lock."""
     locked = tmp_path_factory.mktemp("locked") / "locked.txt"
-    locked.write_text("\n".join(constraints((REPOSITORY / "uv.lock").read_text())))
+    versions = locked_versions((REPOSITORY / "uv.lock").read_text())
+    locked.write_text("\n".join(f"{name}=={version}" for name, version in versions.items()))
 
     def installed(name, extra=""):
         place = tmp_path_factory.mktemp("environments") / name
