@@ -17,9 +17,9 @@ import numpy as np
 import pytest
 import small_campaign as small
 import yaml
-from bare_campaign import CAMPAIGN as BARE
 from conftest import REPOSITORY, copy_project, snakemake_command
 from outside_validators import problems_with
+from tiny_campaign import CAMPAIGN as TINY
 from traces import traces
 from typer.testing import CliRunner
 
@@ -265,7 +265,7 @@ def campaign(tmp_path):
     """A campaign and its results: runs and a dataset that belong together, and all checks passed."""
     results = tmp_path / "results"
     results.mkdir()
-    (results / "config.used.yaml").write_text(BARE + PUBLICATION)
+    (results / "config.used.yaml").write_text(TINY + PUBLICATION)
     campaign = load_configuration(results / "config.used.yaml").campaign
     files, runs = campaign_files(campaign), []
     for path, case in files.runs.items():
@@ -368,13 +368,13 @@ def test_results_that_do_not_belong_together_are_refused(campaign):
     files = campaign_files(campaign)
     recorded = dict.fromkeys([*files.runs, files.dataset], ASKED)
     refuse_mixed(results, campaign, recorded)
-    with pytest.raises(ValueError, match=r"dataset/small.nc: the workflow has recorded another job for it"):
+    with pytest.raises(ValueError, match=r"dataset/tiny.nc: the workflow has recorded another job for it"):
         refuse_mixed(results, campaign, recorded | {files.dataset: hash_parameters(["1"])})
     # A run of an older program, with the right settings.
     path, case = next(iter(files.runs.items()))
     run = small.run(1, material="hertz").assign_attrs(config_sha256=run_sha256(campaign, case), summary="Older")
     write(results, path, run)
-    with pytest.raises(ValueError, match=f"dataset/small.nc: it was made from another version of {path}"):
+    with pytest.raises(ValueError, match=f"dataset/tiny.nc: it was made from another version of {path}"):
         refuse_mixed(results, campaign, recorded)
     write(results, path, run.assign_attrs(config_sha256="a" * 64))
     with pytest.raises(ValueError, match=f"{path}: it was not computed with the settings of this campaign"):

@@ -8,9 +8,9 @@ import tarfile
 import zipfile
 from pathlib import Path
 
-import bare_campaign
 import pytest
 import small_campaign as small
+import tiny_campaign
 import yaml
 from conftest import REPOSITORY
 
@@ -68,7 +68,7 @@ icha.simulate("surface", 1, 2)
 icha.Path(reduced_pressure=[1e-3])
 """
 
-CAMPAIGN = f"""{bare_campaign.CAMPAIGN.replace("small", "tiny", 1).replace("[1, 2]", "[1]")}
+CAMPAIGN = f"""{tiny_campaign.CAMPAIGN.replace("[1, 2]", "[1]").replace("[bare, soft]", "[bare]")}
 publication:
   version: "1.0.0"
   date: 2026-01-31
