@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 from threadpoolctl import threadpool_limits
 
-from icha.asperity.full_contact import FULL_CONTACT_BELOW, full_contact_energy_ratio, theoretical_strength
+from icha.asperity.full_contact import FULL_CONTACT_BELOW, full_contact_energy_ratio
 from icha.asperity.material import Material
 from icha.asperity.stickiness import stickiness
 from icha.checks.run import check_run, reasons_of_failure
@@ -148,7 +148,8 @@ def _compute(solver, surface, material, path, model, seed, progress, kept):
         record = _record_path(contact, observables, path, progress)
         loading = [step["mean_separation"] for step in record.steps if step["leg"] == 0]
         reasons = observables.reasons_against(loading, record.pressed)
-        dataset = _dataset(surface, material, path, model, seed, record, contact.asperities, reasons)
+        values = observables.of_contact()
+        dataset = _dataset(surface, material, path, model, seed, record, contact.asperities, reasons, values)
     if record.failure:
         raise ConvergenceError(record.failure, dataset) from None
     if path.unload:
@@ -172,15 +173,16 @@ def empty_run(
     record, summits = _PathRecord(reason), locate_summits(surface)
     coverage = SummitCoverage.of(surface, summits)
     reasons = coverage.reasons_against([surface.rms_height]) if MODELS[model].by_summits else []
-    return _dataset(surface, material, path, model, seed, record, summits, reasons)
+    return _dataset(surface, material, path, model, seed, record, summits, reasons, {})
 
 
-def _dataset(surface, material, path, name, seed, record, summits, reasons):
+def _dataset(surface, material, path, name, seed, record, summits, reasons, of_contact):
     """Build the dataset of a run without the summary of its loop."""
     table = RUN | FURTHER[name]
     values = {
         **_path_values(table, path, record, surface.grid),
         **_surface_values(surface, material, seed),
+        **of_contact,
         "asperity_count": len(summits),
         "unsupported_summit_count": len(summits.unsupported_height),
         **bin_values("gap", gap_bins(surface)),
@@ -397,9 +399,8 @@ def _surface_values(surface: Surface, material: Material, seed: int) -> dict:
     """Return the values of the surface and the material."""
     moments, (skewness, kurtosis) = spectral_moments(surface), height_statistics(surface)
     complete = surface.complete_contact_pressure * material.contact_modulus
-    strength = theoretical_strength(material.surface_energy, material.interaction_range)
     return {
-        **get_values(material, *MATERIAL),
+        **get_values(material, *MATERIAL, "flaw_radius"),
         **get_values(surface, *ROUGHNESS, "period", "boundary", "grid"),
         "seed": seed,
         "spectral_moment_0": moments.m0,
@@ -412,8 +413,9 @@ def _surface_values(surface: Surface, material: Material, seed: int) -> dict:
             surface.full_contact_energy, material.contact_modulus, material.surface_energy
         ),
         "complete_contact_pressure": complete,
-        "interface_strength": strength,
-        "full_contact_opening_pressure": complete - strength,
+        "theoretical_strength": material.theoretical_strength,
+        "interface_strength": material.interface_strength,
+        "full_contact_opening_pressure": complete - material.interface_strength,
         "height_skewness": skewness,
         "height_kurtosis": kurtosis,
         "slope_anisotropy": slope_anisotropy(surface),

@@ -24,6 +24,10 @@ class PatchObservables:
     contact: BoundaryElements
     surface: Surface
 
+    def of_contact(self) -> dict:
+        """Return the largest tension that the grid resolves at a straight edge of contact."""
+        return {"resolved_tension": self.contact.front.strength * self.contact.contact_modulus}
+
     def of_step(self, state: CellState) -> dict:
         """Residuals of the equilibrium, and the share of summits outside the range of Wu's formula."""
         contact = self.contact

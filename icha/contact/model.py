@@ -188,6 +188,9 @@ class ContactModel(Protocol[S]):
 class Observables(Protocol[S_in]):
     """Observables of a contact, by the names of the variables of a run (`icha.datasets.variables.run`)."""
 
+    def of_contact(self) -> dict[str, Any]:
+        """Return the values that are the same in all states."""
+
     def of_step(self, state: S_in) -> dict[str, Any]:
         """Return the values that a run records of every state."""
 

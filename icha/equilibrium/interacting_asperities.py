@@ -113,6 +113,10 @@ class AsperityObservables:
     contact: InteractingAsperities
     surface: Surface
 
+    def of_contact(self) -> dict:
+        """Return nothing: all values that are the same in all states follow from the surface and the material."""
+        return {}
+
     def of_step(self, state: ContactState) -> dict:
         """Return the residual, and the fraction of single spots outside the range of Wu's formula."""
         law, spots = self.contact.law, state.spots
