@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 from threadpoolctl import threadpool_limits
 
-from icha.asperity.full_contact import FULL_CONTACT_BELOW, full_contact_energy_ratio, theoretical_strength
+from icha.asperity.full_contact import FULL_CONTACT_BELOW, full_contact_energy_ratio
 from icha.asperity.material import Material
 from icha.asperity.stickiness import stickiness
 from icha.checks.run import check_run, reasons_of_failure
@@ -390,9 +390,8 @@ def _surface_values(surface: Surface, material: Material, seed: int) -> dict:
     """Return the values of the surface and the material."""
     moments, (skewness, kurtosis) = spectral_moments(surface), height_statistics(surface)
     complete = surface.complete_contact_pressure * material.contact_modulus
-    strength = theoretical_strength(material.surface_energy, material.interaction_range)
     return {
-        **get_values(material, *MATERIAL),
+        **get_values(material, *MATERIAL, "flaw_radius"),
         **get_values(surface, *ROUGHNESS, "period", "boundary", "grid"),
         "seed": seed,
         "spectral_moment_0": moments.m0,
@@ -405,8 +404,9 @@ def _surface_values(surface: Surface, material: Material, seed: int) -> dict:
             surface.full_contact_energy, material.contact_modulus, material.surface_energy
         ),
         "complete_contact_pressure": complete,
-        "interface_strength": strength,
-        "full_contact_opening_pressure": complete - strength,
+        "theoretical_strength": material.theoretical_strength,
+        "interface_strength": material.interface_strength,
+        "full_contact_opening_pressure": complete - material.interface_strength,
         "height_skewness": skewness,
         "height_kurtosis": kurtosis,
         "slope_anisotropy": slope_anisotropy(surface),

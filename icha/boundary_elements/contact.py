@@ -9,7 +9,6 @@ from importlib.metadata import version
 
 import numpy as np
 
-from icha.asperity.full_contact import theoretical_strength
 from icha.asperity.jkr import JKR
 from icha.asperity.material import Material
 from icha.boundary_elements.adhesive import Summits, solve_adhesive_contact
@@ -270,7 +269,7 @@ def contact_of(surface: Surface, material: Material) -> BoundaryElements:
         -jump_in / h,
         law.contact_radius(jump_in, asperities.radius_of_curvature) / h,
     )
-    strength = theoretical_strength(material.surface_energy, material.interaction_range) / material.contact_modulus
+    strength = material.interface_strength / material.contact_modulus
     front = Front(material.surface_energy / (material.contact_modulus * h), strength)
     if 0 < front.critical_opening < _SMALLEST_OPENING * np.abs(surface.heights).max() / h:
         raise ValueError(

@@ -35,8 +35,11 @@ class PatchObservables:
     surface: Surface
 
     def of_contact(self) -> dict:
-        """Values that all states have in common."""
-        return count_summits(self.contact.asperities)
+        """Numbers of summits, and the largest tension that the grid resolves at a straight edge of contact."""
+        contact = self.contact
+        return count_summits(contact.asperities) | {
+            "resolved_tension": contact.front.strength * contact.contact_modulus
+        }
 
     def of_step(self, state: CellState) -> dict:
         """Residuals of the equilibrium, events so far, and the share of summits outside the range of Wu's formula."""

@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from icha.asperity.full_contact import theoretical_strength
 from icha.asperity.material import Material
 from icha.contact.model import COALESCENCE, JUMP_IN, JUMP_OFF, SPLIT, ContactModel, Events, State
 from icha.path.targets import BETWEEN, Target
@@ -238,11 +237,10 @@ def summarise_loop(
     # No energy is stored at either end of the loop.
     loss = last["work"]
     losses = {f"loss_{name}": last[f"dissipated_{name}"] for name in _LOSSES}
-    strength = theoretical_strength(material.surface_energy, material.interaction_range)
     return {
         "pull_off_pressure": tension,
         "pull_off_separation": rows[pull_off_row]["mean_separation"],
-        "pull_off_over_strength": tension / strength if adhesive else 0.0,
+        "pull_off_over_strength": tension / material.interface_strength if adhesive else 0.0,
         "pull_off_over_summits": tension / summit_pull_off_pressure if summit_pull_off_pressure else 0.0,
         "detachment_pressure": touching["nominal_pressure"],
         "detachment_separation": touching["mean_separation"],

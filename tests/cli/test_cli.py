@@ -14,6 +14,7 @@ import pytest
 import small_campaign as small
 import yaml
 from conftest import REPOSITORY
+from tiny_campaign import CAMPAIGN as TINY
 from typer.testing import CliRunner
 
 from icha.analysis.checks import check_campaign, write_checks
@@ -36,24 +37,6 @@ from icha.surfaces.spectrum import SelfAffineSpectrum
 HEAVY = ["scipy", "pandas", "xarray", "matplotlib", "netCDF4", "snakemake"]
 CAMPAIGNS = Path("config/campaigns")
 STARTED = 77  # exit status that stands for a started Snakemake
-TINY = """
-name: tiny
-title: Tiny
-summary: For tests.
-license: CC0-1.0
-surfaces:
-  rough: {kind: self_affine, period: 100 um, rolloff_wavelength: 40 um, short_wavelength: 14.3 um, hurst: 0.8, grid: 32}
-materials:
-  bare: {contact_modulus: 25 MPa, surface_energy: 0 mJ/m^2, interaction_range: 2 nm}
-  soft: {contact_modulus: 25 MPa, surface_energy: 50 mJ/m^2, interaction_range: 2 nm}
-studies:
-  load:
-    surfaces: [rough]
-    seeds: [1, 2]
-    rms_slopes: [1.0]
-    materials: [bare, soft]
-    targets: {reduced_pressures: [1.0e-3, 1.0e-2]}
-"""
 
 
 def output(*arguments, status=0, **options):
