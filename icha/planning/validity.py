@@ -6,7 +6,10 @@ from pathlib import Path
 
 from icha.analysis.validity import (
     COMPLETE,
+    RESOLVED,
+    SPACING,
     STRENGTH,
+    THEORETICAL,
     Case,
     Statement,
     describe_sticky,
@@ -14,9 +17,10 @@ from icha.analysis.validity import (
     statements,
     statements_on_dataset,
 )
-from icha.asperity.full_contact import gaussian_complete_pressure, theoretical_strength
+from icha.asperity.full_contact import gaussian_complete_pressure
 from icha.asperity.material import WU_HOLDS_FROM, Material
 from icha.asperity.stickiness import stickiness
+from icha.boundary_elements.front import Front
 from icha.configuration.campaign import Campaign
 from icha.configuration.cases import run_cases
 from icha.configuration.plausibility import energy_ratio
@@ -114,20 +118,21 @@ def expected_validity(campaign: Campaign) -> list[Statement]:
     facts_of = cache(lambda surface: surface_facts(campaign, surface))
     cases, tabor, sticky = [], {}, {}
     for case in run_cases(campaign):
-        section, facts, by_summits = (
-            campaign.materials[case.material],
-            facts_of(case.surface),
-            MODELS[case.model].by_summits,
-        )
+        facts, by_summits = facts_of(case.surface), MODELS[case.model].by_summits
+        material = Material(**campaign.materials[case.material].model_dump(exclude_none=True))
         # Only the asperity model depends on how close a surface is to those of the validation.
         known = (facts if by_summits else {}) | {
             "full_contact_energy_ratio": energy_ratio(campaign, case),
-            COMPLETE: facts[COMPLETE] * case.rms_slope * section.contact_modulus,
-            STRENGTH: theoretical_strength(section.surface_energy, section.interaction_range),
+            COMPLETE: facts[COMPLETE] * case.rms_slope * material.contact_modulus,
+            STRENGTH: material.interface_strength,
+            THEORETICAL: material.theoretical_strength,
         }
+        if MODELS[case.model].by_cells:
+            spacing = campaign.period(case.surface) / campaign.grid(case.surface)
+            tension = Front(material.adhesion_length / spacing).strength * material.contact_modulus
+            known |= {RESOLVED: tension, SPACING: spacing}
         cases.append(Case(case.model, case.surface, case.material, known))
-        if by_summits and section.surface_energy > 0:
-            material = Material(**section.model_dump())
+        if by_summits and material.surface_energy > 0:
             curvature = facts["rms_curvature"] * case.rms_slope
             tabor_parameter = float(material.tabor_parameter(_SUMMIT_RADIUS / curvature))
             tabor.setdefault((case.material, case.surface), []).append(tabor_parameter)
