@@ -13,8 +13,9 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from typer import confirm
 
-from icha.cli.project import FAILED, Anyway, Cores, Large, UserError, confirm, echo, option, shorten_path
+from icha.cli.project import FAILED, Anyway, Cores, Large, UserError, echo, option, shorten_path
 from icha.cli.run import run
 from icha.support import formatting
 from icha.support.formatting import format_count, printable
