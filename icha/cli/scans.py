@@ -157,9 +157,7 @@ def read_measured_section(path: Path, data: str | None, folder: Path) -> Measure
     scan, assumed, missing, sides = _load(path, data)
     rows, columns = scan.heights.shape
     gaps = int(np.count_nonzero(~np.isfinite(scan.heights)))
-    periodic = scan.format == "fourier"
-    boundary, detrend = ("periodic", "none") if periodic else ("free", "tilt")
-    settings = {"format": "auto", "boundary": boundary, "data": data, "detrend": detrend, "missing": "fill"} | assumed
+    settings = {"format": "auto", "boundary": "free", "data": data, "detrend": "tilt", "missing": "fill"} | assumed
     try:
         resolution = examine_scan(path, settings)
     except UnfitTopography as error:
@@ -175,8 +173,7 @@ def read_measured_section(path: Path, data: str | None, folder: Path) -> Measure
         lines.append(f"missing: fill                # {gaps} points have no height; `refuse` makes that an error")
     advice = {} if missing else format_advice(resolution.advice)
     name = re.sub("[^a-z0-9_-]+", "_", path.stem.lower()).strip("_") or "measured"
-    if not periodic:
-        missing = missing | {"boundary": "what surrounds the scan: free, window, mirror or periodic"}
+    missing = missing | {"boundary": "what surrounds the scan: free, window, mirror or periodic"}
     guessed = GUESSED_TEXT | {"size": [f"{columns} um", f"{rows} um"]}
     filled_in = {key: guessed[key] for key in missing}
     path = Path(os.path.relpath(path.resolve(), folder.resolve())).as_posix()
