@@ -1,16 +1,16 @@
-# Needs git, make and Python >= 3.11 with venv and pip; everything else is installed, locked, into .venv.
+# Needs git, make and Python >= 3.11 with venv and pip. Locked versions of everything else are installed in .venv.
 
 PYTHON ?= python3
 CORES ?= 2
 CONFIG ?=
-# Of the random cases of tests/test_every_case_ends.py, a hundred each.
+# Series of random cases in tests/test_every_case_ends.py; each series has a hundred cases.
 SERIES ?= 1
 
 export PATH := $(CURDIR)/.venv/bin:$(PATH)
 export UV_PYTHON_DOWNLOADS := never
 export UV_PROJECT_ENVIRONMENT := $(CURDIR)/.venv
 export UV_NO_PROGRESS := 1
-# Libraries are compiled once, even where Python is told to write no bytecode.
+# Compile libraries once, even if PYTHONDONTWRITEBYTECODE is set.
 export UV_COMPILE_BYTECODE := 1
 unexport VIRTUAL_ENV PYTHONPATH PYTHONHOME
 
@@ -18,32 +18,32 @@ unexport VIRTUAL_ENV PYTHONPATH PYTHONHOME
 .PHONY: help publish environment tamaas slurm-environment run validation hysteresis test test-all random-cases audit wheel lint format schema docs linkcheck benchmarks short-range error-sources faults validators-environment validate clean
 
 help:
-	@echo "make run     run the campaign of config/config.yaml (or of CONFIG=FILE) on $(CORES) cores"
-	@echo "make publish make the deposit of that campaign, and before it what is missing; docs/howto/publish.md"
-	@echo "make validation  run campaign validation (two hours) and write the tables and figures of docs/validation.md"
-	@echo "make hysteresis  run campaign hysteresis (forty minutes) and write the tables and figures of docs/hysteresis.md"
-	@echo "make tamaas  install Tamaas as well, for boundary elements at finite ranges (campaign validation, tests)"
-	@echo "make test    run the quick tests (three minutes): physics, every rule, wrong input"
-	@echo "make test-all  run them with more random cases, and all others: kills, resumption, Slurm, browser, deposits"
-	@echo "make random-cases  two thousand random runs, of which make test-all has a hundred (another one: SERIES=7)"
-	@echo "make audit   ask whether vulnerabilities of the locked packages are known (part of test-all; needs network)"
-	@echo "make wheel   build the sdist, and from it the wheel, in dist/"
-	@echo "make lint    check style of Python code and workflow"
-	@echo "make format  put Python code and workflow into that style"
-	@echo "make schema  write the configuration's JSON schema and config/README.md's tables from its model"
-	@echo "make docs    build the documentation as a site in docs/_build/html; broken links within it are errors"
-	@echo "make linkcheck  check the documentation's links to other sites"
-	@echo "make benchmarks  measure ICHA and boundary-element codes (four hours; OPTIONS='--only icha'); docs/benchmarks.md"
-	@echo "make short-range  hold boundary elements in the limit of short range against what is known (ten minutes); docs/short_range.md"
-	@echo "make error-sources  solve variants between the model and boundary elements (half an hour); docs/error_sources.md"
-	@echo "make faults  kill, damage and starve a small campaign (an hour or two, as root); docs/faults.md"
-	@echo "make slurm-environment  install Snakemake with its executor for Slurm in .venv-slurm; docs/howto/cluster.md"
-	@echo "make validate DEPOSIT=FOLDER_OR_ZIP  put a deposit to the validators of others, without network"
-	@echo "make clean   remove results, Snakemake's records and the built documentation (not the environment)"
+	@echo "make run            run the campaign of config/config.yaml, or of CONFIG=FILE, on $(CORES) cores"
+	@echo "make publish        run that campaign and make its deposit; see docs/howto/publish.md"
+	@echo "make validation     run the campaign validation (two hours) and write the tables and figures of docs/validation.md"
+	@echo "make hysteresis     run the campaign hysteresis (forty minutes) and write the tables and figures of docs/hysteresis.md"
+	@echo "make tamaas         install Tamaas for boundary elements at finite ranges (campaign validation, tests)"
+	@echo "make test           run the quick tests (three minutes): physics, every rule, wrong input"
+	@echo "make test-all       run all tests: more random cases, kills, resumption, Slurm, a browser, deposits"
+	@echo "make random-cases   run two thousand random cases; make test-all runs a hundred of them (SERIES=7: other ones)"
+	@echo "make audit          check the locked packages for known vulnerabilities (part of make test-all; needs network)"
+	@echo "make wheel          build the sdist, and the wheel from the sdist, in dist/"
+	@echo "make lint           check the style of the Python code and the workflow"
+	@echo "make format         format the Python code and the workflow"
+	@echo "make schema         write the JSON schema of the configuration, and the tables of config/README.md"
+	@echo "make docs           build the documentation as a website in docs/_build/html; broken internal links are errors"
+	@echo "make linkcheck      check the links of the documentation to other websites"
+	@echo "make benchmarks     measure ICHA and other codes (four hours; OPTIONS='--only icha'); see docs/benchmarks.md"
+	@echo "make short-range    compare boundary elements with closed forms (ten minutes); see docs/short_range.md"
+	@echo "make error-sources  compute variants between both models (half an hour); see docs/error_sources.md"
+	@echo "make faults         kill jobs, damage files, fill disks (one to two hours, as root); see docs/faults.md"
+	@echo "make slurm-environment  install Snakemake and its Slurm executor in .venv-slurm; see docs/howto/cluster.md"
+	@echo "make validate DEPOSIT=FOLDER_OR_ZIP  check a deposit with programs of other projects, without network"
+	@echo "make clean          remove results, the records of Snakemake and the built documentation, not the environment"
 
 environment: .venv/.installed
 
-# Whatever is installed is what its checksum says: uv by the list of pip, all else by uv.lock and lists like it.
+# Checksums of all installed files are verified: pip verifies uv, and uv verifies everything else.
 .venv-tools/bin/uv: workflow/envs/uv.txt
 	$(PYTHON) -c 'import sys; sys.exit(None if sys.version_info >= (3, 11) else "ICHA needs Python 3.11 or newer")'
 	$(PYTHON) -m venv .venv-tools
@@ -54,14 +54,14 @@ environment: .venv/.installed
 	.venv-tools/bin/uv sync --quiet --locked $(if $(wildcard .venv/.tamaas),,--no-group tamaas) --python $(PYTHON)
 	@touch $@
 
-# What is there once stays there.
+# Once Tamaas is installed, later updates of the environment keep it.
 .venv/.tamaas: .venv/.installed
 	.venv-tools/bin/uv sync --quiet --locked --python $(PYTHON)
 	@touch $@
 
 tamaas: .venv/.tamaas
 
-# An environment of its own, for what Snakemake needs to talk to Slurm slows every start. See docs/howto/cluster.md.
+# In a separate environment, because the Slurm executor makes every start of Snakemake slower.
 .venv-slurm/.installed: .venv-tools/bin/uv pyproject.toml uv.lock profiles/slurm/executor/pyproject.toml
 	UV_PROJECT_ENVIRONMENT=$(CURDIR)/.venv-slurm .venv-tools/bin/uv sync --quiet --locked --no-default-groups --extra slurm --extra tamaas --python $(PYTHON)
 	.venv-tools/bin/uv pip install --quiet --no-deps --python .venv-slurm/bin/python --editable profiles/slurm/executor
@@ -75,7 +75,7 @@ run: environment
 publish: environment
 	@icha run $(CONFIG) publish --cores $(CORES)
 
-# What ICHA is held against, for the pages of the documentation: each target writes tables that a page includes.
+# Comparisons of ICHA with other results. Each target writes tables that a page of the documentation includes.
 validation: tamaas
 	$(MAKE) run CONFIG=config/campaigns/validation.yaml
 	python -m validation.model_error
@@ -91,8 +91,8 @@ short-range error-sources: tamaas
 test: tamaas
 	pytest -n $(CORES) --dist worksteal -m "not slow" $(THOROUGH)
 
-# The quick tests with more random cases, and with what they cover of the physics (pyproject.toml, tool.coverage); then
-# the slow ones, in one process more than there are cores, since many of them wait.
+# First the quick tests with more random cases and the coverage of the physics (tool.coverage in pyproject.toml). Then
+# the slow tests, in one process more than there are cores, because many of them wait.
 test-all: THOROUGH = --hypothesis-profile thorough --cov --cov-report=term
 test-all: test audit
 	pytest -n $$(($(CORES) + 1)) --dist loadfile -m slow --series $(SERIES)
@@ -101,11 +101,11 @@ random-cases: SERIES = 1-20
 random-cases: environment
 	pytest -n $(CORES) --dist worksteal --hypothesis-profile thorough --series $(SERIES) tests/test_every_case_ends.py
 
-# Known vulnerabilities of the locked packages, by the database OSV; skipped, with the reason, where it cannot be asked.
+# Looks up the locked packages in the database OSV. Without a network the audit is skipped with a message.
 audit: environment
 	@python tests/packaging/audit.py $(OPTIONS)
 
-# From the sdist, so that nothing that it lacks is in the wheel.
+# The wheel is built from the sdist, so that a file missing in the sdist is also missing in the wheel.
 wheel: .venv-tools/bin/uv
 	rm -rf dist
 	.venv-tools/bin/uv build --quiet
@@ -134,7 +134,7 @@ docs: environment
 linkcheck: environment
 	sphinx-build --quiet --keep-going -b linkcheck docs docs/_build/linkcheck
 
-# The codes compared with have an environment of their own; where aspher cannot be built, the page says so.
+# The other codes are in a separate environment. If aspher cannot be built, it is omitted.
 .venv-benchmarks/.installed: .venv-tools/bin/uv benchmarks/requirements.txt benchmarks/requirements-aspher.txt
 	.venv-tools/bin/uv venv --quiet --clear --python $(PYTHON) .venv-benchmarks
 	.venv-tools/bin/uv pip sync --quiet --require-hashes --python .venv-benchmarks/bin/python benchmarks/requirements.txt
@@ -148,7 +148,7 @@ benchmarks: tamaas .venv-benchmarks/.installed
 faults: tamaas
 	python -m validation.faults $(OPTIONS)
 
-# The validators have an environment of their own, for some of them need an old jsonschema.
+# The validators are in a separate environment, because some of them need an old version of jsonschema.
 .venv-validators/.installed: .venv-tools/bin/uv tests/validators/requirements.txt
 	.venv-tools/bin/uv venv --quiet --clear --python $(PYTHON) .venv-validators
 	.venv-tools/bin/uv pip sync --quiet --require-hashes --python .venv-validators/bin/python tests/validators/requirements.txt
@@ -156,12 +156,12 @@ faults: tamaas
 
 validators-environment: .venv-validators/.installed
 
-# Neither make nor the shell reads what is in a name.
+# Neither make nor the shell interprets special characters in the name of a deposit.
 override DEPOSIT := $(value DEPOSIT)
 export DEPOSIT
 
 validate: validators-environment
-	@.venv-validators/bin/python tests/validators/validate.py $(OPTIONS) -- "$${DEPOSIT:?needed: a folder or zip}"
+	@.venv-validators/bin/python tests/validators/validate.py $(OPTIONS) -- "$${DEPOSIT:?expected DEPOSIT=FOLDER_OR_ZIP}"
 
 clean:
 	rm -rf .snakemake docs/_build

@@ -13,6 +13,9 @@ from icha.surfaces.summits import find_summits
 class Patches(AsperityObservables):
     """Observables of asperities, with residuals and maps."""
 
+    def of_contact(self):
+        return super().of_contact() | {"resolved_tension": 1e6}
+
     def of_step(self, state):
         return super().of_step(state) | {"front_residual": 1e-9, "gap_residual": 1e-9}
 

@@ -34,8 +34,11 @@ VALIDATION = {
 _VALIDATED = "on seven self-affine surfaces, p* from 0.001 to 0.1 (page on validation)"
 
 _RATIO = "full_contact_energy_ratio"
-# Pressure for complete contact and strength of the interface of a case, Pa, where they are known.
-COMPLETE, STRENGTH = "complete_contact_pressure", "interface_strength"
+# Of a case, where they are known: pressure for complete contact, strength of the interface with and without its flaw,
+# largest tension that the grid resolves, Pa; size of its cells, m.
+COMPLETE, STRENGTH, THEORETICAL = "complete_contact_pressure", "interface_strength", "theoretical_strength"
+RESOLVED, SPACING = "resolved_tension", "spacing"
+_OF_FULL_CONTACT = (COMPLETE, STRENGTH, THEORETICAL, RESOLVED)
 
 # Share of single spots outside the range of Wu's formula above which a case is named; every surface has some.
 _FEW = 0.05
@@ -184,13 +187,26 @@ def _full_contact(cases):
     if COMPLETE in lowest.facts:
         pressures = lowest.facts[COMPLETE], lowest.facts[COMPLETE] - lowest.facts[STRENGTH], lowest.facts[STRENGTH]
         complete, opening, strength = (format_quantity(pressure, "Pa") for pressure in pressures)
+        if lowest.facts[STRENGTH] < lowest.facts[THEORETICAL]:
+            strength += f", that of its flaw; without the flaw {format_quantity(lowest.facts[THEORETICAL], 'Pa')}"
         text += (
             f"; full contact is complete at about {complete} without adhesion and opens at {opening} (strength of the "
-            f"interface: {strength})"
+            f"interface: {strength}){_unresolved_strength(lowest.facts)}"
         )
     if any(MODELS[case.model].by_summits and case.ratio < FULL_CONTACT_BELOW for case in cases):
         text += f"; the asperity model is not applicable below {FULL_CONTACT_BELOW:g}"
     yield Statement("adhesion", text, lowest.ratio >= HIGH_PULL_OFF_BELOW)
+
+
+def _unresolved_strength(facts):
+    """Describe the grid that would resolve the strength of the interface at the edge of contact; "" if it does."""
+    if not 0 < facts.get(RESOLVED, math.inf) < facts[STRENGTH]:
+        return ""
+    needed = facts[SPACING] * (facts[RESOLVED] / facts[STRENGTH]) ** 2
+    return (
+        f"; at the edge of contact the grid resolves tensions up to {format_quantity(facts[RESOLVED], 'Pa')}, cells of "
+        f"{format_quantity(needed, 'm')} would resolve the strength"
+    )
 
 
 def _resolution(cases):
@@ -280,11 +296,11 @@ def _not_applicable(campaign):
 
 def _cases(study):
     """Yield the cases of the computed runs of a study."""
-    measured = [name for name in (*VALIDATED, COMPLETE, STRENGTH) if name in study]
+    measured = [name for name in (*VALIDATED, *_OF_FULL_CONTACT) if name in study]
     status = study["status"].transpose(*LABELS)
     values = {
         name: study[name].broadcast_like(status).transpose(*LABELS).values
-        for name in (*measured, "grid", "asperity_count", "boundary")
+        for name in (*measured, "period", "grid", "asperity_count", "boundary")
     }
     unsupported = np.zeros(status.shape)
     if "unsupported_summit_count" in study:  # campaigns of earlier versions lack it
@@ -293,6 +309,7 @@ def _cases(study):
     for at in map(tuple, np.argwhere(np.isin(status.values, COMPUTED_RUNS))):
         model, surface, _, _, material = (str(values[index]) for values, index in zip(labels, at, strict=True))
         facts = {name: float(values[name][at]) for name in measured}
+        facts[SPACING] = values["period"][at] / values["grid"][at]
         summits = values["asperity_count"][at] + unsupported[at]
         facts["nodes_per_short_wave"] = cells_per_short_wave(values["grid"][at], summits)
         facts["unsupported_summits"] = float(unsupported[at] / max(summits, 1))

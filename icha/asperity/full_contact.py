@@ -39,6 +39,21 @@ def theoretical_strength(surface_energy: float, interaction_range: float) -> flo
     return 16 / (9 * math.sqrt(3)) * surface_energy / interaction_range
 
 
+def flaw_strength(contact_modulus: float, surface_energy: float, flaw_radius: float) -> float:
+    """Return the tension at which a penny-shaped crack in the interface grows, sqrt(pi E* dgamma/(2 a)), Pa.
+
+    Its stress intensity K = 2 sigma sqrt(a/pi) reaches the energy release rate K^2/(2 E*) = dgamma
+    (I. N. Sneddon, Proc. R. Soc. A 187 (1946) 229-260, for one of two bodies rigid).
+
+    Parameters
+    ----------
+    contact_modulus : E*, Pa.
+    surface_energy : dgamma, J/m^2.
+    flaw_radius : a, m.
+    """
+    return math.sqrt(math.pi * contact_modulus * surface_energy / (2 * flaw_radius))
+
+
 def gaussian_complete_pressure(waves: float) -> float:
     """Estimate the pressure over E* h'_rms at which contact with a Gaussian surface is complete without adhesion.
 

@@ -9,7 +9,6 @@ from importlib.metadata import version
 
 import numpy as np
 
-from icha.asperity.full_contact import theoretical_strength
 from icha.asperity.jkr import JKR
 from icha.asperity.material import Material
 from icha.boundary_elements.adhesive import Summits, solve_adhesive_contact
@@ -30,7 +29,7 @@ from icha.boundary_elements.patches import (
     unpack,
 )
 from icha.contact.checkpoints import CheckpointedContact
-from icha.contact.model import AREA_FRACTION, PRESSURE, Control, Events, NotConverged
+from icha.contact.model import AREA_FRACTION, PRESSURE, Control, NotConverged
 from icha.contact.models import MODELS, REFERENCE_MODEL, PathAccuracy
 from icha.surfaces.summits import locate_summits
 from icha.surfaces.surface import Surface
@@ -166,10 +165,6 @@ class BoundaryElements(FullContactProblem):
         """Return False: every equilibrium is a minimum of energy."""
         return False
 
-    def events_between(self, before: CellState, after: CellState) -> Events:
-        """Events on the path from one state to a later one."""
-        return Events.concatenate(after.history[len(before.history) :])
-
     def _predict(self, state, separation):
         """Contact of a state, moved along its rates to a separation (m) if that is close."""
         contact = Contact(state.cells, state.fraction, state.pressure / self.contact_modulus)
@@ -270,7 +265,7 @@ def contact_of(surface: Surface, material: Material) -> BoundaryElements:
         -jump_in / h,
         law.contact_radius(jump_in, asperities.radius_of_curvature) / h,
     )
-    strength = theoretical_strength(material.surface_energy, material.interaction_range) / material.contact_modulus
+    strength = material.interface_strength / material.contact_modulus
     front = Front(material.surface_energy / (material.contact_modulus * h), strength)
     if 0 < front.critical_opening < _SMALLEST_OPENING * np.abs(surface.heights).max() / h:
         raise ValueError(

@@ -87,7 +87,7 @@ class BesideStudy(Section):
         """Report materials whose attraction the grid of a surface does not resolve."""
         spacing = campaign.period(surface) / (campaign.grid(surface) * self.refinement)
         for label in materials:
-            material = Material(**campaign.materials[label].model_dump())
+            material = Material(**campaign.materials[label].model_dump(exclude_none=True))
             if problem := resolution_problem(material, spacing):
                 yield ("materials",), label, f"on surface {surface!r}: {problem}"
 

@@ -49,7 +49,7 @@ def surface_settings(campaign: Campaign, name: str) -> dict:
     """Return the settings of a topography, without its seed and file, in SI units."""
     surface = campaign.surfaces[name]
     if surface.random:
-        return surface.model_dump()
+        return surface.model_dump(exclude_none=True)
     if isinstance(surface, MeasuredSurface):
         return {"kind": surface.kind} | surface.preparation
     return {"kind": surface.kind, "period": surface.period, "metres_per_unit": surface.height_unit}
@@ -58,7 +58,7 @@ def surface_settings(campaign: Campaign, name: str) -> dict:
 def run_settings(campaign: Campaign, case: RunLabels) -> dict:
     """Return the settings that determine the numbers of a run, in SI units, without unused ones."""
     return {
-        "material": campaign.materials[case.material].model_dump(),
+        "material": campaign.materials[case.material].model_dump(exclude_none=True),
         "path": campaign.studies[case.study].path_settings(campaign.snapshots_of(case.study)),
         "rms_slope": case.rms_slope,
         "seed": case.seed,
@@ -81,7 +81,7 @@ def loop_settings(campaign: Campaign, case: ContactLabels) -> dict:
 def _solver_settings(campaign: Campaign, entry: BesideStudy, case: SolutionLabels | ContactLabels) -> dict:
     """Return the settings of boundary elements without their loads."""
     return {
-        "material": campaign.materials[case.material].model_dump(),
+        "material": campaign.materials[case.material].model_dump(exclude_none=True),
         "rms_slope": case.rms_slope,
         "seed": case.seed,
         "refinement": entry.refinement,
@@ -93,7 +93,7 @@ def adhesive_contacts(campaign: Campaign, surface: str) -> list[dict]:
     """Return the slopes and adhesive materials of the runs on a surface, each once."""
     pairs = dict.fromkeys((case.rms_slope, case.material) for case in run_cases(campaign) if case.surface == surface)
     return [
-        {"rms_slope": rms_slope, "name": name, "material": campaign.materials[name].model_dump()}
+        {"rms_slope": rms_slope, "name": name, "material": campaign.materials[name].model_dump(exclude_none=True)}
         for rms_slope, name in pairs
         if campaign.materials[name].surface_energy > 0
     ]

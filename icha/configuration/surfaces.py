@@ -34,6 +34,12 @@ class MaterialSection(Section):
         description="Range ε of the attraction, which sets the separation at which asperities jump into contact. The "
         "Tabor parameter of a surface with rms curvature 1/R is μ = (RΔγ²/E*²)^(1/3)/ε."
     )
+    flaw_radius: Length | None = Field(
+        default=None,
+        description="Radius a of the largest flaw of the interface. Full contact then opens at √(πE*Δγ/(2a)), the "
+        "tension at which a penny-shaped crack grows, if this is less than the theoretical strength 1.03 Δγ/ε. "
+        "Default: no flaw.",
+    )
 
 
 def _unit_of_length(value: Any) -> float:

@@ -147,6 +147,12 @@ MODELS = {
                 "largest gap in contact, or overlap out of contact, over h_rms",
                 "float64",
             ),
+            "resolved_tension": (
+                (),
+                "Pa",
+                "largest tension that the grid resolves at the edge of contact; 0 without adhesion",
+                "float64",
+            ),
             "contact_map": (_MAP, "1", "part of the cell that is in contact", "float32"),
             "contact_pressure": (_MAP, "Pa", "pressure in the cell, negative in tension", "float32"),
         },

@@ -144,12 +144,12 @@ def refuse_mixed(results: Path, campaign: Campaign, recorded: Mapping[str, str])
 
 def _describe(staging: Path, files: Sequence[str], campaign: Campaign, revision: str, cost: Cost) -> None:
     """Write licence, citation, metadata, data dictionary and page of the deposit."""
-    publication, dictionary = campaign.deposit_metadata(), data_dictionary(staging, files)
+    publication = campaign.deposit_metadata()
     _write(staging / "LICENSE.txt", find_licence(publication.license).page())
     _write(staging / "CITATION.cff", citation_cff(publication, revision))
     for name, metadata in ((ZENODO, zenodo_metadata(publication)), ("datacite.json", datacite_metadata(publication))):
         _write(staging / name, json.dumps(metadata, indent=1, ensure_ascii=False, allow_nan=False) + "\n")
-    _write(staging / "data_dictionary.csv", dictionary_csv(dictionary))
+    _write(staging / "data_dictionary.csv", dictionary_csv(data_dictionary(staging, files)))
     error = staging / "aggregated/model_error.nc"
     # Opened and not loaded, because the dataset may be large and the page shows little of it.
     with xr.open_datatree(staging / f"dataset/{campaign.name}.nc", engine="netcdf4") as dataset:
@@ -159,7 +159,6 @@ def _describe(staging: Path, files: Sequence[str], campaign: Campaign, revision:
             dataset=dataset,
             checks=read_checks(staging / "checks.json"),
             model_error=read_campaign(error) if error.is_file() else None,
-            dictionary=dictionary,
             sizes={path: (staging / path).stat().st_size for path in files_of(staging)},
             cost=cost,
         )

@@ -269,18 +269,17 @@ def datacite_metadata(publication: Publication) -> dict[str, Any]:
 
 
 def _datacite_creator(author: Author) -> dict[str, Any]:
-    orcid = {"nameIdentifier": author.orcid_address, "nameIdentifierScheme": "ORCID", "schemeUri": "https://orcid.org"}
-    organisation = {"nameIdentifier": author.ror, "nameIdentifierScheme": "ROR", "schemeUri": _ROR}
-    affiliation = {"name": author.affiliation}
-    if author.ror:
-        affiliation |= {"affiliationIdentifier": author.ror, "affiliationIdentifierScheme": "ROR", "schemeUri": _ROR}
+    orcid, ror = (author.orcid_address, "ORCID", "https://orcid.org"), (author.ror, "ROR", _ROR)
+    name, place = ("nameIdentifier", "nameIdentifierScheme"), ("affiliationIdentifier", "affiliationIdentifierScheme")
+    identifier = dict(zip((*name, "schemeUri"), orcid if author.is_person else ror, strict=True))
+    affiliation = dict(zip((*place, "schemeUri"), ror, strict=True)) if author.ror else {}
     return {
         "name": author.sorted_name,
         "nameType": "Personal" if author.is_person else "Organizational",
         "givenName": author.given_names,
         "familyName": author.family_names,
-        "nameIdentifiers": [orcid] if author.orcid else [organisation] if author.ror and not author.is_person else [],
-        "affiliation": [affiliation] if author.affiliation else [],
+        "nameIdentifiers": [identifier] if identifier["nameIdentifier"] else [],
+        "affiliation": [{"name": author.affiliation} | affiliation] if author.affiliation else [],
     }
 
 

@@ -107,19 +107,10 @@ class Zenodo:
         """Return an existing draft."""
         content = self._call("GET", f"/api/deposit/depositions/{quote(number, safe='')}")
         if content.get("submitted") is True or content.get("state") == "done":
-            raise ZenodoError(f"{number} is published already. Use --new-version-of {number} for a new version of it")
-        return self._draft(content)
-
-    def new_version(self, number: str) -> Draft:
-        """Make a draft of a new version of a published record; it begins with the files of the previous version."""
-        content = self._call("POST", f"/api/deposit/depositions/{quote(number, safe='')}/actions/newversion")
-        found = _text(content, "links", "latest_draft").rstrip("/").rpartition("/")[2]
-        if found in ("", number):
             raise ZenodoError(
-                f"{self.address} returns no draft of a new version of {number}. If a draft exists already, continue it "
-                "with --draft"
+                f"{number} is published already. Make a draft of a new version on its page, and upload with --draft"
             )
-        return self.draft(found)
+        return self._draft(content)
 
     def describe(self, draft: Draft, metadata: Mapping) -> None:
         """Set the metadata of a draft, as https://developers.zenodo.org/#representation lists them."""
@@ -140,12 +131,6 @@ class Zenodo:
         """Remove a file of a draft."""
         identifier, _ = draft.files[name]
         self._call("DELETE", f"/api/deposit/depositions/{draft.number}/files/{quote(identifier, safe='')}")
-
-    def publish(self, draft: Draft) -> tuple[str, str]:
-        """Publish a draft, which cannot be undone; return its page and DOI."""
-        content = self._call("POST", f"/api/deposit/depositions/{draft.number}/actions/publish")
-        page = _text(content, "links", "record_html") or f"{self.address}/records/{draft.number}"
-        return page, _text(content, "doi") or draft.doi
 
     def _draft(self, content: Mapping) -> Draft:
         number, bucket = _text(content, "id"), _text(content, "links", "bucket")
@@ -193,8 +178,6 @@ class Zenodo:
         advice = _ADVICE.get(answer.status_code, "").format(self.address)
         if answer.status_code in _FAILING:
             advice = "it is busy or has failed; try again in a while"
-        elif answer.status_code == 400 and path.endswith("/newversion"):
-            advice = "if a draft of a new version exists already, continue it with --draft"
         reason = self._plain(answer.text or answer.reason)
         return f"{self.address} refuses {path} ({answer.status_code}): {'; '.join(filter(None, (reason, advice)))}"
 

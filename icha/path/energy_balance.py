@@ -12,9 +12,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from icha.asperity.full_contact import theoretical_strength
 from icha.asperity.material import Material
-from icha.contact.model import COALESCENCE, JUMP_IN, JUMP_OFF, SPLIT, ContactModel, Events, State
+from icha.contact.model import COALESCENCE, JUMP_IN, JUMP_OFF, SPLIT, ContactModel, Events, State, events_between
 from icha.path.targets import BETWEEN, Target
 
 # In these functions du and dp are the changes of the separation (m) and of the pressure (Pa) in a step; slope and
@@ -83,7 +82,7 @@ class Step:
         The pressure is integrated as the cubic with the pressures and stiffnesses at both ends; jumps count as if they
         happened in the middle of the step.
         """
-        events = contact.events_between(before, after)
+        events = events_between(before, after)
         du = after.separation - before.separation
         p, q = contact.pressure(before), contact.pressure(after)
         slope, end_slope = -contact.stiffness(before), -contact.stiffness(after)
@@ -238,11 +237,10 @@ def summarise_loop(
     # No energy is stored at either end of the loop.
     loss = last["work"]
     losses = {f"loss_{name}": last[f"dissipated_{name}"] for name in _LOSSES}
-    strength = theoretical_strength(material.surface_energy, material.interaction_range)
     return {
         "pull_off_pressure": tension,
         "pull_off_separation": rows[pull_off_row]["mean_separation"],
-        "pull_off_over_strength": tension / strength if adhesive else 0.0,
+        "pull_off_over_strength": tension / material.interface_strength if adhesive else 0.0,
         "pull_off_over_summits": tension / summit_pull_off_pressure if summit_pull_off_pressure else 0.0,
         "detachment_pressure": touching["nominal_pressure"],
         "detachment_separation": touching["mean_separation"],

@@ -6,7 +6,10 @@ from pathlib import Path
 
 from icha.analysis.validity import (
     COMPLETE,
+    RESOLVED,
+    SPACING,
     STRENGTH,
+    THEORETICAL,
     Case,
     Statement,
     describe_sticky,
@@ -14,9 +17,10 @@ from icha.analysis.validity import (
     statements,
     statements_on_dataset,
 )
-from icha.asperity.full_contact import gaussian_complete_pressure, theoretical_strength
+from icha.asperity.full_contact import gaussian_complete_pressure
 from icha.asperity.material import WU_HOLDS_FROM, Material
 from icha.asperity.stickiness import stickiness
+from icha.boundary_elements.front import Front
 from icha.configuration.campaign import Campaign
 from icha.configuration.cases import run_cases
 from icha.configuration.plausibility import energy_ratio
@@ -139,17 +143,22 @@ def expected_validity(campaign: Campaign) -> list[Statement]:
     cases, tabor, sticky = [], {}, {}
     for case in run_cases(campaign):
         section = campaign.materials[case.material]
+        material = Material(**section.model_dump(exclude_none=True))
         ratio = energy_ratio(campaign, case)
         # Only the asperity model depends on how close a surface is to those of the validation.
         known = facts(case.surface) if MODELS[case.model].by_summits else {}
         of_full_contact = {
             "full_contact_energy_ratio": ratio,
             COMPLETE: complete(case.surface) * case.rms_slope * section.contact_modulus,
-            STRENGTH: theoretical_strength(section.surface_energy, section.interaction_range),
+            STRENGTH: material.interface_strength,
+            THEORETICAL: material.theoretical_strength,
         }
+        if MODELS[case.model].by_cells:
+            spacing = campaign.period(case.surface) / campaign.grid(case.surface)
+            tension = Front(material.adhesion_length / spacing).strength * material.contact_modulus
+            of_full_contact |= {RESOLVED: tension, SPACING: spacing}
         cases.append(Case(case.model, case.surface, case.material, known | of_full_contact))
         if MODELS[case.model].by_summits and section.surface_energy > 0:
-            material = Material(section.contact_modulus, section.surface_energy, section.interaction_range)
             curved = curvature(case.surface) * case.rms_slope
             tabor_parameter = float(material.tabor_parameter(_SUMMIT_RADIUS / curved))
             tabor.setdefault((case.material, case.surface), []).append(tabor_parameter)

@@ -124,3 +124,15 @@ def test_estimate_of_the_pressure_for_complete_contact(rolloff, waves, hurst):
     )
     pressures = [spectrum.realise(grid=8 * waves, seed=seed).complete_contact_pressure for seed in range(1, 9)]
     assert gaussian_complete_pressure(waves) == pytest.approx(np.mean(pressures), rel=0.1)
+
+
+def test_a_flaw_lowers_the_strength_to_that_of_a_penny_shaped_crack():
+    """The stress intensity 2 sigma sqrt(a/pi) of the crack then has the energy release rate K^2/(2 E*) = dgamma."""
+    modulus, energy, radius = 2e6, 0.05, 1e-6
+    strength = icha.Material(modulus, energy, 2e-9, radius).interface_strength
+    assert (2 * strength * math.sqrt(radius / math.pi)) ** 2 / (2 * modulus) == pytest.approx(energy)
+    # A flaw smaller than the range of attraction does not weaken the interface.
+    flawless = icha.Material(modulus, energy, 2e-9).interface_strength
+    assert icha.Material(modulus, energy, 2e-9, 1e-11).interface_strength == flawless
+    with pytest.raises(ValueError, match="flaw_radius"):
+        icha.Material(modulus, energy, 2e-9, -1e-6)

@@ -103,6 +103,18 @@ def test_a_wave_without_summits_closes_by_itself_and_opens_at_the_strength_of_it
     assert run.attrs.get("failed_checks", "") == ""
 
 
+def test_full_contact_opens_at_the_strength_of_its_flaw():
+    at = np.arange(32) / 32 * 2 * np.pi
+    wave = icha.Surface(1e-6 * np.add.outer(0 * at, np.cos(at)), 1e-5)
+    material = icha.Material(1e6, 0.2, 1e-8, flaw_radius=1e-6)
+    run = icha.simulate(wave, material, icha.Path([0.01, 1.0], unload=True), model="boundary_elements")
+    flaw = np.sqrt(np.pi * 1e6 * 0.2 / (2 * 1e-6))
+    assert float(run.interface_strength) == pytest.approx(flaw) and flaw < float(run.theoretical_strength)
+    opening = float(run.complete_contact_pressure) - flaw
+    full = run.contact_area_fraction.values == 1
+    assert float(run.nominal_pressure.values[full].min()) == pytest.approx(opening, rel=1e-6)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("number", range(8))
 def test_random_loops_end(number):

@@ -9,28 +9,15 @@ import time
 
 import pytest
 from conftest import REPOSITORY, copy_project, modules_of, snakemake
+from tiny_campaign import CAMPAIGN as TINY
 
 from icha.cli.run import _planned_jobs, _reason_in
 
-CAMPAIGN = """
-name: tiny
-title: Tiny
-summary: For tests.
-license: CC0-1.0
-confirmed: [studies.load.models]
-surfaces:
-  rough: {kind: self_affine, period: 100 um, rolloff_wavelength: 50 um, short_wavelength: 20 um, hurst: 0.8, grid: 32}
-materials:
-  bare: {contact_modulus: 25 MPa, surface_energy: 0 mJ/m^2, interaction_range: 2 nm}
-  sticky: {contact_modulus: 10 kPa, surface_energy: 500 mJ/m^2, interaction_range: 2 nm}
-studies:
-  load:
-    surfaces: [rough]
-    seeds: [1]
-    rms_slopes: [1.0]
-    materials: [bare, sticky]
-    targets: {reduced_pressures: [1.0e-3, 1.0e-2]}
-"""
+# The material sticks so strongly that its runs fail.
+STICKY = "sticky: {contact_modulus: 10 kPa, surface_energy: 500 mJ/m^2"
+CAMPAIGN = TINY.replace("soft: {contact_modulus: 25 MPa, surface_energy: 50 mJ/m^2", STICKY)
+CAMPAIGN = CAMPAIGN.replace("[bare, soft]", "[bare, sticky]").replace("[1, 2]", "[1]")
+CAMPAIGN += "confirmed: [studies.load.models]\n"
 # At the start of `run_sweep`: a bug in the program.
 CRASH = '    if material["surface_energy"] == 0:\n        raise RuntimeError("a bug in the program")\n'
 # Enough runs that a call has not ended when it is stopped.

@@ -175,7 +175,7 @@ def test_commands_show_and_check_the_file(tmp_path, form):
         write_campaign(crops.runs().items(), file, attrs=attrs)
     else:
         write_dataset(tree, file)
-    shown = CliRunner().invoke(app, ["show", str(file), "--plot", str(tmp_path / "a.png")])
+    shown = CliRunner().invoke(app, ["show", str(file)])
     assert shown.exit_code == 0, shown.output
     assert "12 complete" in shown.output
     checked = CliRunner().invoke(app, ["check", str(file)])

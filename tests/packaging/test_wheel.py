@@ -8,15 +8,15 @@ import tarfile
 import zipfile
 from pathlib import Path
 
-import bare_campaign
 import pytest
 import small_campaign as small
+import tiny_campaign
 import yaml
 from conftest import REPOSITORY
 
 from icha.datasets.campaign import campaign_tree
 from icha.datasets.files import write_dataset
-from icha.deposit.program import constraints
+from icha.deposit.program import locked_versions
 
 pytestmark = pytest.mark.slow
 
@@ -68,7 +68,7 @@ icha.simulate("surface", 1, 2)
 icha.Path(reduced_pressure=[1e-3])
 """
 
-CAMPAIGN = f"""{bare_campaign.CAMPAIGN.replace("small", "tiny", 1).replace("[1, 2]", "[1]")}
+CAMPAIGN = f"""{tiny_campaign.CAMPAIGN.replace("[1, 2]", "[1]").replace("[bare, soft]", "[bare]")}
 publication:
   version: "1.0.0"
   date: 2026-01-31
@@ -116,7 +116,8 @@ def built(tmp_path_factory):
 def install(built, tmp_path_factory):
     """Install the wheel, with an extra, in an empty environment, in the versions of the lock."""
     locked = tmp_path_factory.mktemp("locked") / "locked.txt"
-    locked.write_text("\n".join(constraints((REPOSITORY / "uv.lock").read_text())))
+    versions = locked_versions((REPOSITORY / "uv.lock").read_text())
+    locked.write_text("\n".join(f"{name}=={version}" for name, version in versions.items()))
 
     def installed(name, extra=""):
         place = tmp_path_factory.mktemp("environments") / name

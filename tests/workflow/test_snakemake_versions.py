@@ -13,10 +13,10 @@ from pathlib import Path
 
 import pytest
 import snakemake as installed
-from bare_campaign import CAMPAIGN
 from conftest import REPOSITORY, modules_of
 from packaging.requirements import Requirement
 from packaging.version import Version
+from tiny_campaign import CAMPAIGN
 
 
 def bounds():
@@ -45,15 +45,15 @@ def test_a_campaign_with_the_lowest_version(tmp_path):
         done = subprocess.run([uv, *command], capture_output=True, text=True)
         if done.returncode:
             (pytest.fail if os.environ.get("ICHA_REQUIRE_SNAKEMAKE") == "1" else pytest.skip)(done.stderr)
-    (tmp_path / "small.yaml").write_text(CAMPAIGN)
+    (tmp_path / "tiny.yaml").write_text(CAMPAIGN)
     command = [python, "-m", "snakemake", "--snakefile", REPOSITORY / "Snakefile", "--directory", tmp_path, "dataset"]
     for said in ("12 of 12 steps", "Nothing to be done"):
         done = subprocess.run(
-            [*map(str, command), "report", "--configfile", str(tmp_path / "small.yaml")],
+            [*map(str, command), "report", "--configfile", str(tmp_path / "tiny.yaml")],
             env=os.environ | {"PYTHONPATH": modules_of(REPOSITORY)},
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             text=True,
         )
         assert done.returncode == 0 and said in done.stdout, done.stdout
-    assert Path(tmp_path, "results/small/report.html").is_file()
+    assert Path(tmp_path, "results/tiny/report.html").is_file()

@@ -8,12 +8,12 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-from bare_campaign import CAMPAIGN
 from conftest import REPOSITORY, copy_project, snakemake
+from tiny_campaign import CAMPAIGN
 
 from icha.support.checksums import damaged, hash_parameters, sha256_as_written, write_checksum
 
-CONFIGURATION = "config/campaigns/small.yaml"
+CONFIGURATION = "config/campaigns/tiny.yaml"
 RESULTS = Path("results/tiny")
 METADATA, INCOMPLETE = Path(".snakemake/metadata"), Path(".snakemake/incomplete")
 
@@ -109,6 +109,6 @@ def test_unchanged_results_without_the_workflows_records_are_left_alone(tmp_path
     assert not any(records.iterdir())
     dataset("--touch", "--forceall")
     named = {urlsafe_b64decode(file.name).decode() for file in records.iterdir()}
-    assert {f"results/small/{path}" for path in ("runs/load/rough/seed1/slope1/bare.nc", "dataset/small.nc")} <= named
-    assert damaged(project / "results/small", thorough=True) == []
+    assert {f"results/tiny/{path}" for path in ("runs/load/rough/seed1/slope1/bare.nc", "dataset/tiny.nc")} <= named
+    assert damaged(project / "results/tiny", thorough=True) == []
     assert "Nothing to be done" in dataset()

@@ -37,7 +37,8 @@ _TOPOGRAPHY = ("surface", "seed", "rms_slope")
 # The labels with which a variable of the runs varies; all five where it is not listed. The snapshots' targets are those
 # of the study's path; the bins are fixed in units of h_rms and of E* h'_rms.
 VARIES_WITH = {
-    **dict.fromkeys(("contact_modulus", "surface_energy", "interaction_range"), ("material",)),
+    **dict.fromkeys(("contact_modulus", "surface_energy", "interaction_range", "flaw_radius"), ("material",)),
+    **dict.fromkeys(("theoretical_strength", "interface_strength"), ("material",)),
     **dict.fromkeys(("rms_height", "rms_curvature", "nayak_parameter"), _TOPOGRAPHY),
     **dict.fromkeys(("spectral_moment_0", "spectral_moment_2", "spectral_moment_4"), _TOPOGRAPHY),
     **dict.fromkeys(("height_skewness", "height_kurtosis", "slope_anisotropy"), _TOPOGRAPHY),
