@@ -19,6 +19,7 @@ from icha.contact.model import (
     GAP_BINS,
     JUMP_IN,
     PRESSURE_BINS,
+    BeyondModel,
     ContactModel,
     Events,
     NotConverged,
@@ -62,7 +63,8 @@ _STICKINESS_PAPER = "L. Pastewka and M. O. Robbins, PNAS 111 (2014) 3298-3303, d
 class ConvergenceError(RuntimeError):
     """Error: the path could not be followed to its end.
 
-    `dataset` holds the targets that were reached, and the reason in its attribute `incomplete`.
+    `dataset` holds the targets that were reached, and the reason in its attribute `incomplete`, or
+    `beyond_model` if the path leaves the range of the model.
     """
 
     def __init__(self, message: str, dataset: xr.Dataset):
@@ -118,7 +120,8 @@ def simulate(
         If an argument has the wrong type, the model is unknown, a target is out of range on this surface, the surface
         has no summits, or the model does not cover it.
     ConvergenceError
-        If an equilibrium is not found or a target cannot be reached; its `dataset` holds the targets before.
+        If an equilibrium is not found, a target cannot be reached, or the path leaves the range of the model; its
+        `dataset` holds the targets before.
     """
     _check_arguments(surface, material, path)
     if model not in tuple(MODELS):
@@ -145,7 +148,10 @@ def _compute(solver, surface, material, path, model, seed, progress, kept):
         observables = contact.observables(surface)
         if kept is not None:
             contact = solver.resumable(contact, kept)
-        record = _record_path(contact, observables, path, progress)
+        reachable = path
+        if MODELS[model].by_summits:
+            reachable = path.up_to(lambda target: _is_within_asperity_range(target, surface.rms_slope))
+        record = _record_path(contact, observables, path, reachable, progress)
         loading = [step["mean_separation"] for step in record.steps if step["leg"] == 0]
         reasons = observables.reasons_against(loading, record.pressed)
         values = observables.of_contact()
@@ -197,7 +203,9 @@ def _dataset(surface, material, path, name, seed, record, summits, reasons, of_c
     else:
         applicability = f"{MODELS[name].words} not applicable: {'; '.join(reasons)}" if reasons else ""
     dataset.attrs["applicability"] = applicability
-    return dataset.assign_attrs(incomplete=record.failure) if record.failure else dataset
+    if not record.failure:
+        return dataset
+    return dataset.assign_attrs({"beyond_model" if record.beyond_model else "incomplete": record.failure})
 
 
 def asperity_applicability(
@@ -244,15 +252,22 @@ def _check_arguments(surface, material, path):
 
 
 def _check_asperity_range(surface, path):
-    """Raise `ValueError` for targets beyond the asperity model."""
-    for target in (*path.targets, *path.turning_points):
+    """Raise `ValueError` if the first target or a turning point is beyond the asperity model."""
+    for target in (path.targets[0], *path.turning_points):
         if target.kind in ASPERITY_RANGES and target.value > 0:
             ASPERITY_RANGES[target.kind].validate(f"path: {target.kind}", target.value)
-        if target.kind == RELATIVE_LOAD and target.value > MAX_REDUCED_PRESSURE * surface.rms_slope:
+        if not _is_within_asperity_range(target, surface.rms_slope):
             raise ValueError(
                 f"path: {RELATIVE_LOAD} = {target.value!r} on a surface of rms slope {surface.rms_slope:.4g} is beyond "
                 f"the range of the asperity model; expected a reduced pressure of at most {MAX_REDUCED_PRESSURE}"
             )
+
+
+def _is_within_asperity_range(target, rms_slope):
+    """Return whether a target is within the range of the asperity model."""
+    if target.kind == RELATIVE_LOAD:
+        return target.value <= MAX_REDUCED_PRESSURE * rms_slope
+    return target.kind not in ASPERITY_RANGES or target.value <= ASPERITY_RANGES[target.kind].most
 
 
 @dataclass
@@ -262,6 +277,7 @@ class _PathRecord:
     Attributes
     ----------
     failure : reason why the path ends early; empty if it does not.
+    beyond_model : whether it ends early because it leaves the range of the model.
     steps, snapshots : one row of values for every step and snapshot, by the names of the variables.
     events : events of every step.
     unattributed : loss that belongs to no kind of event, J/m^2.
@@ -269,6 +285,7 @@ class _PathRecord:
     """
 
     failure: str = ""
+    beyond_model: bool = False
     steps: list[dict] = field(default_factory=list)
     snapshots: list[dict] = field(default_factory=list)
     events: list[Events] = field(default_factory=list)
@@ -285,8 +302,14 @@ def _count_uphill_jumps_in(record: _PathRecord) -> int:
     )
 
 
-def _record_path(contact, observables, path, progress) -> _PathRecord:
-    """Follow a path and record its steps, snapshots and events."""
+def _record_path(contact, observables, path, reachable, progress) -> _PathRecord:
+    """Follow a path and record its steps, snapshots and events.
+
+    reachable : the path without targets beyond the range of the model. If it lacks any, loading ends after its last
+        one.
+    """
+    left_out = [target for target in path.targets if target not in reachable.targets]
+    remaining = len(reachable.targets)
     record, before, weakest, largest = _PathRecord(), contact.untouched(), None, 0.0
     counts = np.zeros(len(EVENT_KINDS), int)
 
@@ -295,7 +318,7 @@ def _record_path(contact, observables, path, progress) -> _PathRecord:
         record.snapshots.append(_require_finite(row | observables.of_snapshot(state)))
 
     try:
-        for waypoint in follow(contact, path, progress):
+        for waypoint in follow(contact, reachable, progress):
             state, index = waypoint.state, len(record.steps)
             events = events_between(before, state)
             counts = counts + events.counts()
@@ -313,10 +336,13 @@ def _record_path(contact, observables, path, progress) -> _PathRecord:
             tension = waypoint.leg, -step["nominal_pressure"]
             if weakest is None or tension > weakest[0]:
                 weakest = tension, state, index
+            remaining -= waypoint.target in reachable.targets
+            if left_out and not remaining:
+                raise BeyondModel(f"before {left_out[0].describe()}, outside the range of the model")
         if path.unload:
             record_snapshot(Target(PULL_OFF, 0.0), *weakest[1:])
     except NotConverged as error:
-        record.failure = f"the path ends {error}"
+        record.failure, record.beyond_model = f"the path ends {error}", isinstance(error, BeyondModel)
     return record
 
 

@@ -55,7 +55,8 @@ def check_campaign(tree: xr.DataTree, expected: Iterable[RunLabels | tuple] | No
         if reason := attrs.get("incomplete") or attrs.get("failed_checks"):
             checks.append(Check(COMPLETED, 1.0, 0.0, False, reason, str(labels)))
             continue
-        checks.append(Check(COMPLETED, 0.0, 0.0, True, "the run reached the end of its path", str(labels)))
+        end = attrs.get("beyond_model", "the run reached the end of its path")
+        checks.append(Check(COMPLETED, 0.0, 0.0, True, end, str(labels)))
         checks.extend(check_variables(variables, attrs, str(labels)))
     return tuple(checks)
 

@@ -11,7 +11,7 @@ from icha.datasets.attributes import DERIVED, combine_attributes
 from icha.datasets.build import make_variable
 from icha.datasets.campaign import loading_stops, reduced_gap
 from icha.datasets.labels import LABELS
-from icha.datasets.variables.campaign import COMPLETE, COMPUTED_RUNS, MISSING
+from icha.datasets.variables.campaign import COMPUTED_RUNS, LOADED_RUNS, MISSING
 from icha.datasets.variables.terms import TERMS, Variable
 from icha.support.statistics import ensemble
 
@@ -89,7 +89,7 @@ def compare_runs(study: xr.Dataset, *, attrs: Mapping[str, str] = {}) -> xr.Data
     in no mean. `seed_count` is the number of seeds in the means, `asked_seed_count` the number of seeds asked for. One
     seed alone has no deviation and no confidence interval.
     """
-    complete = study["status"].transpose(*LABELS).values == COMPLETE
+    complete = np.isin(study["status"].transpose(*LABELS).values, LOADED_RUNS)
     averaged = complete & _is_applicable(study)
     asked = np.isin(study["status"].transpose(*LABELS).values, (*COMPUTED_RUNS, MISSING))
     variables = {"status": study["status"]}

@@ -170,7 +170,7 @@ def statements(
     found += _resolution(cases)
     of_asperities = [case for case in cases if MODELS[case.model].by_summits]
     if of_asperities:
-        found += [_surfaces(of_asperities), _accuracy(of_asperities)]
+        found += [_surfaces(of_asperities), _accuracy(of_asperities, len(of_asperities) < len(cases))]
     return found
 
 
@@ -234,7 +234,7 @@ def _surfaces(cases):
     return Statement("surfaces", join_first(descriptions, ". "))
 
 
-def _accuracy(cases):
+def _accuracy(cases, measured):
     """State the error of the asperity model, which is known for surfaces and materials within the validation."""
     unknown, adhesive = {}, set()
     for case in cases:
@@ -249,10 +249,8 @@ def _accuracy(cases):
     if not unknown:
         return Statement("accuracy", known)
     reasons = join_first((f"{name}: {'; '.join(found)}" for name, found in unknown.items()), ". ")
-    text = (
-        f"the accuracy {'of the others' if adhesive else 'of this campaign'} is unknown ({reasons}); "
-        "`models: [asperities, boundary_elements]` measures it"
-    )
+    advice = "figures 2 and 10 show it" if measured else "`models: [asperities, boundary_elements]` measures it"
+    text = f"the accuracy {'of the others' if adhesive else 'of this campaign'} is unknown ({reasons}); {advice}"
     return Statement("accuracy", f"{known}; {text}" if known else text, False)
 
 

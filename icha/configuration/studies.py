@@ -262,13 +262,15 @@ class Study(Section):
 
     def problems(self, snapshots: list[tuple[str, float]] | None) -> Iterator[Problem]:
         """Yield the reasons why the study cannot run with these snapshots (`Campaign.snapshots_of`)."""
-        ranges = ASPERITY_RANGES if DEFAULT_MODEL in self.models else {}
+        alone = self.models == [DEFAULT_MODEL]
         # The smallest slope makes the largest reduced pressure.
         slope = min((slope for slope in self.rms_slopes if slope != MEASURED), default=math.inf)
-        most = (MAX_REDUCED_PRESSURE if ranges else LARGEST_REDUCED_PRESSURE) * slope
+        most = (MAX_REDUCED_PRESSURE if alone else LARGEST_REDUCED_PRESSURE) * slope
         for location, kind, value in self._states():
-            if kind in ranges and value > ranges[kind].most:
-                reason = f"is out of range; expected {ranges[kind].expected}, or models: [boundary_elements]"
+            # Beside another model asperities end loading at the limit of their range, but they must begin it.
+            needed = alone or (DEFAULT_MODEL in self.models and (location[-1] == 0 or location[0] == "turning_points"))
+            if needed and kind in ASPERITY_RANGES and value > ASPERITY_RANGES[kind].most:
+                reason = f"is out of range; expected {ASPERITY_RANGES[kind].expected}, or models: [boundary_elements]"
                 yield location, value, reason
             if kind == RELATIVE_LOAD and value > most:
                 reason = f"at rms slope {slope:g} is a reduced pressure of {value / slope:g}"

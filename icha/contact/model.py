@@ -35,6 +35,10 @@ class NotConverged(Exception):
     """Error: an equilibrium was not found."""
 
 
+class BeyondModel(NotConverged):
+    """The path leaves the range of the model, which is a result and not a failure of the solver."""
+
+
 class FullContact(NotConverged):
     """Error: the contact has spread over the whole surface."""
 

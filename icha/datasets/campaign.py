@@ -11,7 +11,15 @@ from icha.datasets.campaign_file import write_campaign
 from icha.datasets.campaign_runs import LabelledRun
 from icha.datasets.files import read_campaign
 from icha.datasets.labels import LABELS, RunLabels, labels_at, place_of, slopes_at
-from icha.datasets.variables.campaign import COMPUTED_RUNS, FAILED_CHECKS, INCOMPLETE, MISSING, NOT_IN_DESIGN, RAGGED
+from icha.datasets.variables.campaign import (
+    BEYOND_MODEL,
+    COMPUTED_RUNS,
+    FAILED_CHECKS,
+    INCOMPLETE,
+    MISSING,
+    NOT_IN_DESIGN,
+    RAGGED,
+)
 from icha.datasets.variables.run import FURTHER
 from icha.path.targets import BETWEEN
 
@@ -70,7 +78,8 @@ def run_place(study: xr.Dataset, labels: RunLabels) -> dict[str, int]:
 def select_run(tree: xr.DataTree, labels: RunLabels | tuple) -> xr.Dataset:
     """Select one run of a campaign dataset, with its steps and its spots.
 
-    Its attributes are those of its file: `incomplete` is why it ended early, `failed_checks` which checks failed,
+    Its attributes are those of its file: `incomplete` is why it failed, `beyond_model` why it
+    ended at the limit of its model, `failed_checks` which checks failed,
     `applicability` why its model is not applicable.
 
     Raises
@@ -97,8 +106,8 @@ def variables_of_run(tree: xr.DataTree, labels: RunLabels | tuple) -> tuple[dict
         raise ValueError(f"{labels}: this run is {'missing' if int(status) == MISSING else 'not in the design'}")
     index |= {dim: _ragged_slice(study, dim, place) for dim in RAGGED if dim in study.dims}
     index |= {"step": slice(0, int(steps))}
-    incomplete = int(status) == INCOMPLETE
-    if incomplete:
+    ended_early = int(status) in (INCOMPLETE, BEYOND_MODEL)
+    if ended_early:
         overlap = study.variables["overlap_fraction"].transpose(*LABELS, "snapshot")[place].values
         index["snapshot"] = np.flatnonzero(np.isfinite(overlap))
     left_out = {*_OF_EVERY_CAMPAIGN, "applicability", *(f"{dim}_{label}" for dim in RAGGED for label in LABELS)}
@@ -108,19 +117,20 @@ def variables_of_run(tree: xr.DataTree, labels: RunLabels | tuple) -> tuple[dict
         if name in left_out:
             continue
         variable = of_study[tuple(index.get(dim, slice(None)) for dim in of_study.dims)].load()
-        if incomplete and variable.ndim == 0 and variable.dtype.kind == "f" and np.isnan(variable.values):
+        if ended_early and variable.ndim == 0 and variable.dtype.kind == "f" and np.isnan(variable.values):
             continue  # not known of a run that ended early
         if variable.dtype.kind == "f" and variable.encoding.get("dtype") == np.dtype("int32"):
             # Stored as a float because other runs lack it.
             variable = xr.Variable(variable.dims, variable.values.astype(np.int32), variable.attrs)
-        if incomplete and name in ("snapshot", "spot_snapshot"):
+        if ended_early and name in ("snapshot", "spot_snapshot"):
             # Number its snapshots without those that only other runs have.
             numbers = np.searchsorted(index["snapshot"], variable.values)
             variable = xr.Variable(variable.dims, numbers, variable.attrs)
         variables[name] = variable
     attrs = study.attrs | {"contact_model": labels.model}
-    if int(status) in (INCOMPLETE, FAILED_CHECKS):
-        attrs["incomplete" if incomplete else "failed_checks"] = failure.item()
+    attribute = {INCOMPLETE: "incomplete", BEYOND_MODEL: "beyond_model", FAILED_CHECKS: "failed_checks"}
+    if int(status) in attribute:
+        attrs[attribute[int(status)]] = failure.item()
     if "applicability" in study.variables:  # which campaigns of earlier versions lack
         attrs["applicability"] = study.variables["applicability"].transpose(*LABELS)[place].item()
     return variables, attrs

@@ -16,6 +16,7 @@ import xarray as xr
 from icha.datasets.files import characters, check_is_run, is_refused, is_text, not_finite, read_run, readable
 from icha.datasets.labels import LABELS, RunLabels, arrange_slopes, slope_dims
 from icha.datasets.variables.campaign import (
+    BEYOND_MODEL,
     COMPLETE,
     FAILED_CHECKS,
     INCOMPLETE,
@@ -35,7 +36,8 @@ LabelledRun = tuple[RunLabels | tuple, xr.Dataset | str | os.PathLike]
 _DIMS = {name: description.dims for name, description in (RUN | OF_MODELS | CYCLE | LOOP).items()}
 # HDF5 lists dimensions among the variables. The name of a dimension of texts contains the number of characters.
 _DIMENSION = re.compile("|".join([*sorted({dim for dims in _DIMS.values() for dim in dims}), r"string\d+"]))
-_ATTRIBUTES = ("contact_model", "config_sha256", "incomplete", "failed_checks", "applicability")
+_ENDED_EARLY = (INCOMPLETE, BEYOND_MODEL)
+_ATTRIBUTES = ("contact_model", "config_sha256", "incomplete", "failed_checks", "beyond_model", "applicability")
 
 
 def read_run_values(path: str | os.PathLike) -> tuple[Values, dict[str, str]]:
@@ -80,8 +82,9 @@ class Entry(NamedTuple):
     names : names of its variables.
     sizes : sizes of its dimensions, by name.
     snapshots : kind and target of its snapshots.
-    failure : why it did not reach its end; an empty text if it did.
-    failed_checks, applicability : attributes of its dataset.
+    status : its status, if it has all snapshots of its study.
+    failure : why it is not complete; an empty text if it is.
+    applicability : attribute of its dataset.
     """
 
     labels: RunLabels
@@ -89,8 +92,8 @@ class Entry(NamedTuple):
     names: frozenset[str]
     sizes: dict[str, int]
     snapshots: tuple[tuple[bytes, float], ...]
+    status: int
     failure: str
-    failed_checks: str
     applicability: str
 
 
@@ -150,15 +153,15 @@ def spool_runs(
             stored.setdefault(names, names),
             stored.setdefault(tuple(sorted(sizes.items())), sizes),
             stored.setdefault(snapshots, snapshots),
-            _failure(values, attrs),
-            *(str(attrs.get(name, "")) for name in ("failed_checks", "applicability")),
+            *_status_and_failure(values, attrs),
+            str(attrs.get("applicability", "")),
         )
         pickle.dump(values, spool, protocol=5)
         for name, (_, v) in values.items():
             if is_text(v.dtype):
                 members.widths[name] = max(members.widths.get(name, 1), v.shape[-1])
         # A run that ended early may lack the variables that describe the end of its path.
-        rank = ("incomplete" not in attrs, sizes.get("step", 0))
+        rank = (not {"incomplete", "beyond_model"} & set(attrs), sizes.get("step", 0))
         if labels.model not in members.samples or rank > members.samples[labels.model][0]:
             members.samples[labels.model] = rank, source
     if not studies:
@@ -187,12 +190,14 @@ def _values_of(run: xr.Dataset) -> tuple[Values, dict]:
     return values, run.attrs
 
 
-def _failure(values: Values, attrs: Mapping) -> str:
-    """Explain why a run did not reach its end; an empty text if it did."""
-    if "incomplete" in attrs:
-        return str(attrs["incomplete"])
+def _status_and_failure(values: Values, attrs: Mapping) -> tuple[int, str]:
+    """Return the status of a run, and why it is not complete; an empty text if it is."""
+    by_attribute = {"incomplete": INCOMPLETE, "beyond_model": BEYOND_MODEL, "failed_checks": FAILED_CHECKS}
+    for name, status in by_attribute.items():
+        if name in attrs:
+            return status, str(attrs[name])
     failed = int(np.sum(values["converged"][1] != 1)) if "converged" in values else 0
-    return f"{failed} of its steps did not converge" if failed else ""
+    return (INCOMPLETE, f"{failed} of its steps did not converge") if failed else (COMPLETE, "")
 
 
 def _refuse_wrong_values(labels: RunLabels, values: Values, attrs: Mapping) -> None:
@@ -322,26 +327,23 @@ def _arrange_study(name: str, members: Members, design: list[RunLabels]) -> Arra
         array[tuple(positions.T)] = list(values)
         return array
 
-    failures = [
-        each.failure or (len(each.snapshots) != len(snapshots)) * f"{len(each.snapshots)} of {len(snapshots)} snapshots"
-        for each in entries
-    ]
     found = [
-        INCOMPLETE if failure else FAILED_CHECKS if entry.failed_checks else COMPLETE
-        for entry, failure in zip(entries, failures, strict=True)
+        (INCOMPLETE, f"{len(entry.snapshots)} of {len(snapshots)} snapshots")
+        if entry.status in (COMPLETE, FAILED_CHECKS) and len(entry.snapshots) != len(snapshots)
+        else (entry.status, entry.failure)
+        for entry in entries
     ]
-    status = spread(found, NOT_IN_DESIGN, np.int8)
+    status = spread((status for status, _ in found), NOT_IN_DESIGN, np.int8)
     asked = np.zeros(shape, bool)
     asked[tuple(np.transpose(list(position.values())))] = True
     status[asked & (status == NOT_IN_DESIGN)] = MISSING
-    reasons = (failure or entry.failed_checks for entry, failure in zip(entries, failures, strict=True))
     return Arrangement(
         name=name,
         known=axes
         | {
             "status": status,
             "step_count": spread(_sizes(entries, "step"), 0, np.int32),
-            "failure": spread(reasons, "", object),
+            "failure": spread((failure for _, failure in found), "", object),
             "applicability": spread((entry.applicability for entry in entries), "", object),
         },
         variables={key: variable for key, variable in variables.items() if key not in LABELS},
@@ -384,7 +386,7 @@ def _snapshots(entries: list[Entry]) -> dict[tuple[bytes, float], int]:
 
     Runs may meet their stops, and take their snapshots, in different orders (a load and an area, for instance).
     """
-    longest = max(entries, key=lambda entry: (not entry.failure, entry.sizes.get("step", 0)))
+    longest = max(entries, key=lambda entry: (entry.status not in _ENDED_EARLY, entry.sizes.get("step", 0)))
     known = dict.fromkeys(itertools.chain(longest.snapshots, *(entry.snapshots for entry in entries)))
     return {each: k for k, each in enumerate(known)}
 
@@ -395,7 +397,7 @@ def _refuse_unequal(entries: list[Entry], samples: Mapping[str, xr.Dataset], siz
     names = {model: ragged | set(sample.variables) for model, sample in samples.items()}
     for entry in entries:
         expected = names[entry.labels.model]
-        if unequal := (entry.names - expected) | ((ragged if entry.failure else expected) - entry.names):
+        if unequal := (entry.names - expected) | ((ragged if entry.status in _ENDED_EARLY else expected) - entry.names):
             listed = ", ".join(sorted(unequal))
             raise ValueError(f"{entry.labels}: variables differ from those of the study's other runs: {listed}")
         for dim, size in sizes.items():

@@ -78,13 +78,13 @@ def select_runs(
     import xarray as xr
 
     from icha.datasets.campaign import reduced_gap, runs_of_status, select_run
-    from icha.datasets.variables.campaign import COMPLETE, RAGGED
+    from icha.datasets.variables.campaign import LOADED_RUNS, RAGGED
 
     if study not in campaign.children:
         raise ValueError(f"no study {study!r} in this campaign; expected one of: {', '.join(campaign.children)}")
     dataset = campaign[study].to_dataset()
     wanted = model or shown_model(dataset)
-    found = [labels for labels in runs_of_status(dataset, study, (COMPLETE,)) if labels.model == wanted]
+    found = [labels for labels in runs_of_status(dataset, study, LOADED_RUNS) if labels.model == wanted]
     if not found and model is None:
         raise NothingToDraw(f"study {study}: no run is complete")
     if not ragged:

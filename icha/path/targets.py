@@ -1,7 +1,10 @@
 """Targets of a path: mean separations, loads or areas with their ranges, and turning points."""
 
+from __future__ import annotations
+
+import copy
 import itertools
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 from icha.contact.model import AREA_FRACTION as CONTROLLED_AREA
@@ -184,6 +187,12 @@ class Path:
         vars(self).update(
             targets=tuple(targets), turning_points=turns, unload=unload, control=control, max_step=max_step
         )
+
+    def up_to(self, admits: Callable[[Target], bool]) -> Path:
+        """Return the path with those of its targets that are admitted."""
+        path = copy.copy(self)
+        vars(path).update(targets=tuple(filter(admits, self.targets)))
+        return path
 
     @property
     def cyclic(self) -> bool:

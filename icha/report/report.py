@@ -118,7 +118,8 @@ def _link(folder: Path, target: str | os.PathLike | None) -> str | None:
 
 def _campaign_values(campaign: xr.DataTree, studies: list[dict]) -> dict:
     """Return what the page prints about the campaign as a whole."""
-    totals = {name: sum(study[name] for study in studies) for name in ("asked", "complete", "failed", "missing")}
+    counted = ("asked", "complete", "beyond_model", "failed", "missing")
+    totals = {name: sum(study[name] for study in studies) for name in counted}
     return {
         "title": campaign.attrs.get("title", "Rough contact campaign"),
         "summary": campaign.attrs.get("summary", ""),

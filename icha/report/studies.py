@@ -9,7 +9,16 @@ from markupsafe import Markup
 from icha.checks.findings import IDENTITY_LIMIT
 from icha.datasets.campaign import loading_stops, reduced_gap, run_place, runs_of_status, select_run
 from icha.datasets.labels import LABELS, RunLabels, labels_at, slopes_of
-from icha.datasets.variables.campaign import COMPLETE, COMPUTED_RUNS, FAILED_CHECKS, INCOMPLETE, MISSING, RAGGED
+from icha.datasets.variables.campaign import (
+    BEYOND_MODEL,
+    COMPLETE,
+    COMPUTED_RUNS,
+    FAILED_CHECKS,
+    INCOMPLETE,
+    LOADED_RUNS,
+    MISSING,
+    RAGGED,
+)
 from icha.figures.select import asked_seeds, path_steps
 from icha.report.template import MOST_ROWS, format_scientific
 from icha.support.formatting import choose_unit, format_quantity
@@ -45,7 +54,7 @@ def summarise_study(campaign: xr.DataTree, name: str, comparison: xr.DataTree | 
     status = dataset["status"].values
     axes = {label: dataset[label].values.tolist() for label in LABELS} | {"rms_slope": slopes_of(dataset)}
     complete, incomplete, failed_checks, missing = (
-        runs_of_status(dataset, name, (kind,)) for kind in (COMPLETE, INCOMPLETE, FAILED_CHECKS, MISSING)
+        runs_of_status(dataset, name, kinds) for kinds in (LOADED_RUNS, (INCOMPLETE,), (FAILED_CHECKS,), (MISSING,))
     )
     failed = [*incomplete, *failed_checks]
     reasons = [(labels, _reason(dataset, "applicability", labels)) for labels in complete]
@@ -57,6 +66,7 @@ def summarise_study(campaign: xr.DataTree, name: str, comparison: xr.DataTree | 
         "name": name,
         "asked": int(np.isin(status, (*COMPUTED_RUNS, MISSING)).sum()),
         "complete": len(complete),
+        "beyond_model": int((status == BEYOND_MODEL).sum()),
         "failed": len(failed),
         "missing": len(missing),
         "combinations": status.size,

@@ -31,6 +31,16 @@ def test_without_the_key_runs_are_by_asperities_and_as_they_were(load):
         assert run_sha256(both, case) == run_sha256(plain, case)
 
 
+def test_beside_boundary_elements_targets_may_lie_beyond_asperities(load):
+    """Asperities end loading at the limit of their range, but they must begin it."""
+    beyond = {"studies.one.targets.reduced_pressures": [0.1, 0.5]}
+    assert load(BOTH | beyond) and load(ALONE | beyond)
+    with pytest.raises(ConfigurationError, match=r"targets\.reduced_pressures\[1\]: 0\.5 is out of range"):
+        load(beyond)
+    with pytest.raises(ConfigurationError, match=r"targets\.reduced_pressures\[0\]: 0\.2 is out of range"):
+        load(BOTH | {"studies.one.targets.reduced_pressures": [0.2, 0.5]})
+
+
 def test_other_models_have_a_folder_of_their_own(load):
     campaign = load(BOTH).campaign
     assert [case.path for case in run_cases(campaign)] == [

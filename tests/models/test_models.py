@@ -12,6 +12,7 @@ import xarray as xr
 import icha
 from icha.analysis.checks import check_campaign
 from icha.analysis.common_loads import compare_runs
+from icha.analysis.model_error import model_error
 from icha.checks.run import check_run
 from icha.contact.models import DEFAULT_MODEL, MODELS, REFERENCE_MODEL
 from icha.datasets.campaign import campaign_tree, run_labels, select_run
@@ -19,6 +20,7 @@ from icha.datasets.campaign_file import write_campaign
 from icha.datasets.files import read_campaign, read_run, write_dataset
 from icha.datasets.format import CAMPAIGN, RUN, identify_file, problems_with_file
 from icha.datasets.labels import LABELS, RunLabels
+from icha.datasets.variables.campaign import BEYOND_MODEL, COMPLETE
 from icha.datasets.variables.run import FURTHER, OF_MODELS
 from icha.figures.looks import MODEL_MARKERS
 from icha.figures.select import select_runs
@@ -144,6 +146,29 @@ def test_a_failed_run_of_boundary_elements_leaves_the_others_whole(runs):
         np.testing.assert_array_equal(
             select_run(tree, labels(DEFAULT_MODEL))["spot_x"], runs[labels(DEFAULT_MODEL)]["spot_x"]
         )
+
+
+def test_asperities_end_at_the_limit_of_their_range_beside_boundary_elements(tmp_path):
+    path = icha.Path([0.05, 0.1, 0.3], unload=True, snapshots=[("reduced_pressure", 0.3)])
+    whole = icha.simulate(small.surface(1), small.MATERIALS["hertz"], path, model=REFERENCE_MODEL, seed=1)
+    with pytest.raises(icha.ConvergenceError) as caught:
+        icha.simulate(small.surface(1), small.MATERIALS["hertz"], path, seed=1)
+    ended = caught.value.dataset
+    both = {labels(DEFAULT_MODEL, "hertz"): ended, labels(REFERENCE_MODEL, "hertz"): whole}
+    tree = campaign_tree(both.items())
+    study = tree["one"].to_dataset()
+    assert study["status"].values.ravel().tolist() == [BEYOND_MODEL, COMPLETE]
+    assert "outside the range of the model" in study["failure"].values.ravel()[0]
+    assert select_run(tree, labels(DEFAULT_MODEL, "hertz")).attrs["beyond_model"] == ended.attrs["beyond_model"]
+    assert all(check.passed for check in check_campaign(tree))
+    # The first loading is a result, which figures and comparisons show.
+    ((_, drawn),) = select_runs(tree, "one")
+    assert drawn["reduced_pressure"].values.max() == pytest.approx(0.1)
+    assert float(compare_runs(study)["reduced_pressure"].max()) == pytest.approx(0.1)
+    errors = model_error(tree, runs=[(labels(REFERENCE_MODEL, "hertz"), whole)])["one"]
+    known = np.isfinite(errors["contact_area_fraction"].values.ravel())
+    assert known.tolist() == [True, True, False]
+    write_dataset(xr.DataTree.from_dict({"/one": errors.to_dataset()}), tmp_path / "model_error.nc")
 
 
 def test_fronts_are_checked(runs):

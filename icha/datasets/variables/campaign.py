@@ -5,10 +5,12 @@ import numpy as np
 from icha.datasets.variables.terms import Variable, bin_table, read_tables
 
 # Only complete runs are results. A run with failed checks has all of its values, which are not to be used.
-COMPLETE, INCOMPLETE, MISSING, NOT_IN_DESIGN, FAILED_CHECKS = range(5)
-STATUS_MEANINGS = ("complete", "incomplete", "missing", "not_in_design", "failed_checks")
-# Status of runs that have a file.
-COMPUTED_RUNS = (COMPLETE, INCOMPLETE, FAILED_CHECKS)
+COMPLETE, INCOMPLETE, MISSING, NOT_IN_DESIGN, FAILED_CHECKS, BEYOND_MODEL = range(6)
+STATUS_MEANINGS = ("complete", "incomplete", "missing", "not_in_design", "failed_checks", "beyond_the_model")
+# Status of runs that have a file, and of those whose first loading is a result: a path that leaves the range of its
+# model is one up to there.
+COMPUTED_RUNS = (COMPLETE, INCOMPLETE, FAILED_CHECKS, BEYOND_MODEL)
+LOADED_RUNS = (COMPLETE, BEYOND_MODEL)
 
 _ATTRIBUTES = {
     "status": {
