@@ -16,7 +16,6 @@ libraries and fonts that may differ. If only figures or the report differ, the c
 difference.
 """
 
-import json
 import os
 import textwrap
 from collections import Counter, defaultdict
@@ -29,7 +28,6 @@ import numpy as np
 
 from icha.checks.run import FRONT_LIMIT, RESIDUAL_LIMIT
 from icha.deposit.verify import COMPUTED, files_of
-from icha.support.atomic_files import whole_file
 from icha.support.checksums import sha256_of
 from icha.support.formatting import printable
 from icha.support.input_files import refuse_traps
@@ -141,7 +139,7 @@ def _differences(deposit: Path, rerun: Path) -> Iterator[Difference]:
         with netCDF4.Dataset(deposit) as a, netCDF4.Dataset(rerun) as b:
             yield from _compare_groups(a, b, "")
     else:
-        yield Difference("", DIFFERENT, "other bytes")
+        yield Difference("", DIFFERENT, "the bytes differ")
 
 
 def _compare_groups(a: netCDF4.Dataset, b: netCDF4.Dataset, path: str) -> Iterator[Difference]:
@@ -154,9 +152,9 @@ def _compare_groups(a: netCDF4.Dataset, b: netCDF4.Dataset, path: str) -> Iterat
     for compare, members, kind in ((_compare_variables, "variables", ""), (_compare_groups, "groups", " (group)")):
         for name, one, other in _paired(getattr(a, members), getattr(b, members)):
             if one is None:
-                yield Difference(f"{path}/{name}{kind}", EXTRA, "the deposit has none")
+                yield Difference(f"{path}/{name}{kind}", EXTRA, "only in the rerun")
             elif other is None:
-                yield Difference(f"{path}/{name}{kind}", MISSING, "the rerun has none")
+                yield Difference(f"{path}/{name}{kind}", MISSING, "only in the deposit")
             else:
                 yield from compare(one, other, f"{path}/{name}")
 
@@ -269,18 +267,3 @@ def _lines(comparison: Comparison, within: bool) -> list[str]:
         files = path if len(found) == 1 else f"{len(found)} files, most in {path}"
         lines.append((-deviation, f"{place}: {verdict}, {detail}" + (f" ({files})" if place != path else "")))
     return [line for _, line in sorted(lines)]
-
-
-def write_json(comparison: Comparison, path: str | os.PathLike) -> None:
-    """Write all differences to a JSON file; infinite deviations are null."""
-
-    def entry(each: Difference) -> dict:
-        return each._asdict() | {"deviation": each.deviation if np.isfinite(each.deviation) else None}
-
-    files = [
-        {"path": file.path, "verdict": file.verdict, "variables": list(map(entry, file.differences))}
-        for file in comparison.files
-    ]
-    content = {"verdict": comparison.verdict, "tolerance": TOLERANCE, "files": files}
-    with whole_file(path) as temporary:
-        temporary.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
