@@ -1,4 +1,4 @@
-"""The executor that forks jobs, on a workflow of a few scripts and with a package that is soon imported."""
+"""The executor that forks jobs, on a workflow of a few scripts, with a small package in the place of `icha`."""
 
 import json
 import os
@@ -58,7 +58,7 @@ if snakemake.wildcards.how == "1":
     sys.exit("a message")
 os.kill(os.getpid(), signal.SIGKILL)
 """
-# What the process that jobs are forked from has is no job's own.
+# Memory of the process that jobs are forked from, which does not count as memory of a job.
 ASKED = """
 BALLAST = b"x" * (200 << 20)
 """
@@ -67,7 +67,7 @@ ballast = b"y" * (int(snakemake.wildcards.megabytes) << 20)
 del ballast
 open(snakemake.output[0], "w").close()
 """
-# Only the first one takes long.
+# Only the first run of this job takes long.
 LONG = """
 import os, time
 first = not os.path.exists("pids")
@@ -80,7 +80,7 @@ open(snakemake.output[0], "w").close()
 
 @pytest.fixture(scope="module")
 def workflow(tmp_path_factory):
-    """Start Snakemake on this workflow."""
+    """Return a function that starts Snakemake on this workflow."""
     folder = tmp_path_factory.mktemp("executor")
     files = {"Snakefile": SNAKEFILE, "icha/__init__.py": "", "icha/asked.py": ASKED, "icha/broken.py": "raise OSError"}
     files["icha/support/program.py"] = (REPOSITORY / "icha/support/program.py").read_text()
@@ -107,30 +107,30 @@ def workflow(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def call(workflow):
-    """One call with jobs that do well, that need memory and that fail; what it prints, and its exit status."""
+    """Return the output and the status of one call whose jobs succeed, need memory or fail."""
     process = workflow("all", "heavy0.txt", "heavy100.txt", "wrong3", "wrong1", "wrong9")
     return process.communicate(timeout=120)[0], process.returncode
 
 
-def test_jobs_are_forks_that_are_told_what_snakemake_tells_them(workflow, call):
+def test_jobs_are_forks_with_the_settings_of_snakemake(workflow, call):
     said, _ = call
     assert (workflow.folder / "alone.txt").exists(), said
     told, again, alone = ((workflow.folder / f"{name}.txt").read_text().split() for name in ("told", "again", "alone"))
     assert told[:7] == ["True", "beside", "1", "1", "red", "told", str(workflow.folder)], said
     assert again[7] == told[7] and (told[8], again[8]) == ("told.log", "again.log")
-    # A job of two threads runs by itself.
+    # A job of two threads is not a fork.
     assert alone[:1] == ["False"] and alone[3] == "2" and alone[7] != told[7]
     assert float((workflow.folder / "told.jsonl").read_text().split('"max_rss": ')[1].split(",")[0]) > 1
 
 
-def test_the_memory_of_a_job_is_its_own_at_its_peak(workflow, call):
+def test_the_peak_memory_of_a_job_excludes_shared_memory(workflow, call):
     took = {name: json.loads((workflow.folder / f"heavy{name}.jsonl").read_text()) for name in (0, 100)}
     assert took[0]["max_rss"] > 200, call
     assert took[0]["max_uss"] < 50
     assert 100 < took[100]["max_uss"] < 150
 
 
-def test_jobs_that_fail_are_told_with_how_they_ended(call):
+def test_failed_jobs_are_reported_with_their_exit_status(call):
     said, status = call
     assert status == 1
     assert "wrong.py ended with status 1." in said and "a message" in said
@@ -138,21 +138,9 @@ def test_jobs_that_fail_are_told_with_how_they_ended(call):
     assert "Traceback" not in said
 
 
-@pytest.mark.slow
-def test_jobs_run_by_themselves_where_nothing_can_be_forked(workflow, tmp_path):
-    """For one, where the path of temporary files is too long for a socket."""
-    folder = tmp_path / ("long" * 30)
-    folder.mkdir()
-    (workflow.folder / "told.txt").unlink(missing_ok=True)
-    process = workflow("told.txt", TMPDIR=str(folder))
-    said = process.communicate(timeout=120)[0]
-    assert process.returncode == 0 and "the fork server cannot be started" in said
-    assert (workflow.folder / "told.txt").read_text().startswith("False"), said
-
-
 @pytest.fixture
 def long(workflow):
-    """A call whose job takes long; its process and that which it was forked from."""
+    """Return Snakemake, a job that takes long, and the process from which the job was forked."""
     for name in ("pids", "long.txt"):
         (workflow.folder / name).unlink(missing_ok=True)
     process = workflow("long.txt")
@@ -171,7 +159,7 @@ def test_all_processes_end_with_snakemake(long):
 
 
 @pytest.mark.slow
-def test_a_job_whose_fork_server_is_killed_ends_and_is_run_by_the_next_call(workflow, long):
+def test_the_next_call_repeats_a_job_whose_fork_server_was_killed(workflow, long):
     process, job, server = long
     os.kill(server, signal.SIGKILL)
     wait_for(lambda: not is_alive(job))
@@ -181,7 +169,7 @@ def test_a_job_whose_fork_server_is_killed_ends_and_is_run_by_the_next_call(work
 
 
 @pytest.mark.slow
-def test_a_call_that_is_interrupted_ends_its_jobs(workflow, long):
+def test_an_interrupted_call_ends_its_jobs(workflow, long):
     process, job, _ = long
     os.kill(job, signal.SIGINT)  # as from a terminal, to all processes
     process.send_signal(signal.SIGINT)

@@ -91,7 +91,7 @@ def test_comments_docstrings_formatting_and_touch_run_nothing_nor_does_a_fresh_c
     ("path", "rules", "some"),
     [
         ("icha/boundary_elements/contact.py", WHAT_FOLLOWS_RUNS, {"run": 6 + 1}),
-        ("icha/figures/fig3_distributions.py", {"figure", "report_page"}, {"figure": 1}),
+        ("icha/figures/fig13_loops.py", {"figure", "report_page"}, {"figure": 1}),
     ],
 )
 def test_a_statement_runs_what_its_module_is_part_of(path, rules, some, own, edit):
