@@ -81,7 +81,7 @@ class Place:
         if call == "icha run":
             program = [sys.executable, "-c", "from icha.cli import main; main()", "run", str(CONFIGURATION)]
             program += ["--anyway"]  # also on disks that are too small
-            return [*program, *self.targets, "--plain", "--cores", "2", "--directory", str(self.folder)]
+            return [*program, *self.targets, "--cores", "2", "--directory", str(self.folder)]
         program = [sys.executable, "-m", "snakemake", *self.targets, "--cores", "2", "--configfile", str(CONFIGURATION)]
         return [*program, "--snakefile", str(self.project / "Snakefile"), "--directory", str(self.folder)]
 

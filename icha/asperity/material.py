@@ -40,7 +40,7 @@ class Material:
         object.__setattr__(self, "contact_modulus", CONTACT_MODULUS.validate("contact_modulus", self.contact_modulus))
         object.__setattr__(self, "surface_energy", SURFACE_ENERGY.validate("surface_energy", self.surface_energy))
         object.__setattr__(self, "interaction_range", LENGTH.validate("interaction_range", self.interaction_range))
-        if self.flaw_radius:
+        if self.flaw_radius != 0:
             object.__setattr__(self, "flaw_radius", LENGTH.validate("flaw_radius", self.flaw_radius))
         if self.surface_energy:
             ADHESION_LENGTH.validate("surface_energy over contact_modulus", self.adhesion_length)

@@ -13,8 +13,9 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from typer import confirm
 
-from icha.cli.project import FAILED, Anyway, Cores, Large, UserError, confirm, echo, option, shorten_path
+from icha.cli.project import FAILED, Anyway, Cores, Large, UserError, echo, option, shorten_path
 from icha.cli.run import run
 from icha.support import formatting
 from icha.support.formatting import format_count, printable
@@ -89,7 +90,6 @@ def reproduce(
     ] = None,
     cores: Cores = None,
     anyway: Anyway = False,
-    json: Annotated[Path | None, option("Write the comparison to this file.", metavar="FILE")] = None,
     large: Large = False,
 ) -> None:
     """Compute a deposit again and compare every number with the published one.
@@ -101,7 +101,7 @@ def reproduce(
     Exit status: 0 if all is identical or within tolerance, 1 if not, or if the computation fails or is stopped, 2 if
     the deposit is damaged or missing, or cannot be computed again.
     """
-    from icha.deposit.compare import compare_folders, write_json
+    from icha.deposit.compare import compare_folders
     from icha.deposit.reproduce import RerunError, add_surfaces, campaign_name, find_runs, prepare_rerun
     from icha.deposit.verify import DamagedDeposit
 
@@ -134,8 +134,6 @@ def reproduce(
         shutil.rmtree(target)
     else:
         echo(f"new results: {shorten_path(results)}")
-    if json:
-        write_json(comparison, json)
     if not reproduced:
         raise typer.Exit(FAILED)
 
@@ -204,27 +202,21 @@ def upload(
         bool, typer.Option("--sandbox", help="Upload to sandbox.zenodo.org, for tests; it needs another token.")
     ] = False,
     url: Annotated[str | None, option("Upload to another server with Zenodo's deposit API: https://….")] = None,
-    new_version_of: Annotated[
-        int | None, option("Upload as a new version of this record of yours.", metavar="ID")
-    ] = None,
     draft: Annotated[
         int | None,
         option(
             "Upload into this draft, for example after a failed upload; files in it are not sent again.", metavar="ID"
         ),
     ] = None,
-    publish: Annotated[
-        bool, typer.Option("--publish", help="Also publish it, after another question. This cannot be undone.")
-    ] = False,
     yes: Annotated[bool, typer.Option("--yes", "-y", help="Do not ask for confirmation.")] = False,
     large: Large = False,
 ) -> None:
     """Send a deposit to Zenodo as a draft, after printing what is sent where and asking for confirmation.
 
     The deposit is verified first. The upload consists of the zip, README.md and ro-crate-metadata.json; title, authors,
-    licence and so on are those of the deposit. Without --publish it remains a draft, which you can inspect, change and
-    publish on its page. The environment variable ZENODO_TOKEN must hold a token with the scopes deposit:write and
-    deposit:actions. Nothing is sent before you confirm.
+    licence and so on are those of the deposit. You can inspect, change and publish the draft on its page. The
+    environment variable ZENODO_TOKEN must hold a token with the scopes deposit:write and deposit:actions. Nothing is
+    sent before you confirm.
 
     Exit status: 0 if everything was sent, 1 if not, 2 if it cannot be sent.
     """
@@ -232,8 +224,8 @@ def upload(
     from icha.deposit.upload import SANDBOX, ZENODO, Zenodo, server_address
     from icha.deposit.verify import CRATE, README, DamagedDeposit
 
-    if (sandbox and url) or (draft and new_version_of):
-        raise UserError("--sandbox and --url, and --draft and --new-version-of, exclude each other; use one of them")
+    if sandbox and url:
+        raise UserError("--sandbox and --url exclude each other; use one of them")
     archive = deposit.resolve().with_name(f"{deposit.resolve().name}.zip") if deposit.is_dir() else deposit
     try:
         address = server_address(url or (SANDBOX if sandbox else ZENODO))
@@ -242,10 +234,7 @@ def upload(
             metadata = read_zenodo_metadata(folder)
             _refuse_foreign_doi(metadata, draft)
             files = [archive, folder / README, folder / CRATE]
-            target = (
-                f"draft {draft}" if draft else f"new version of {new_version_of}" if new_version_of else "new draft"
-            )
-            rows = {"to": f"{address}, {target}", **summary_of(metadata)}
+            rows = {"to": f"{address}, {f'draft {draft}' if draft else 'new draft'}", **summary_of(metadata)}
             for path in files:
                 size = path.stat().st_size
                 rows[path.name] = f"{formatting.size(size)} ({size:,} bytes)"
@@ -255,7 +244,7 @@ def upload(
             if not yes and not confirm("Send it?"):
                 echo("Nothing was sent.")
                 raise typer.Exit(FAILED)
-            _send(server, files, metadata, draft, new_version_of, publish, yes)
+            _send(server, files, metadata, draft)
     except DamagedDeposit as damaged:
         raise UserError(f"{archive}: the deposit is damaged; nothing was sent:\n{_listed(damaged.args)}") from None
     except ValueError as error:
@@ -283,21 +272,18 @@ def _refuse_foreign_doi(metadata: dict, draft: int | None) -> None:
         )
 
 
-def _send(server, files, metadata, number, new_version_of, publish, yes) -> None:
+def _send(server, files, metadata, number) -> None:
     """Send files and metadata to a draft; if that fails, print how to continue."""
     from icha.deposit.upload import ZENODO, ZenodoError, md5_of
 
     draft = None
     try:
-        if number:
-            draft = server.draft(str(number))
-        else:
-            draft = server.new_version(str(new_version_of)) if new_version_of else server.create()
+        draft = server.draft(str(number)) if number else server.create()
         echo(f"draft:     {draft.page}")
         sums = {path.name: md5_of(path) for path in files}
         unchanged = {name for name, (_, md5) in draft.files.items() if md5 == sums.get(name)}
         for name in set(draft.files) - unchanged:
-            if name in sums or new_version_of:
+            if name in sums:
                 server.remove(draft, name)
             else:
                 echo(f"{name}: another file of the draft, not changed")
@@ -311,11 +297,7 @@ def _send(server, files, metadata, number, new_version_of, publish, yes) -> None
             echo(f"{path.name}: sent, {'checksum confirmed' if arrived else 'the server returned no checksum'}")
         if draft.doi:
             echo(f"DOI:       {draft.doi} (reserved)")
-        if publish and (yes or confirm("Publish it? A published record cannot be deleted.")):
-            page, doi = server.publish(draft)
-            echo(f"published: {page}\nDOI:       {doi}")
-        else:
-            echo("It is a draft. Inspect and publish it on its page.")
+        echo("It is a draft. Inspect and publish it on its page.")
     except (ZenodoError, OSError, KeyboardInterrupt) as error:
         with contextlib.suppress(OSError):
             echo(f"Error: {'stopped' if isinstance(error, KeyboardInterrupt) else error}", err=True, fg="red")

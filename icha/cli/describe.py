@@ -10,11 +10,8 @@ from icha.cli.project import (
     Config,
     Cores,
     Folder,
-    Plot,
-    UserError,
     count_cores,
     echo,
-    escape_markup,
     find_configuration,
     find_workflow,
     project,
@@ -24,31 +21,30 @@ from icha.cli.project import (
 )
 from icha.cli.scans import describe_scan
 from icha.support import formatting
-from icha.support.formatting import format_count
+from icha.support.formatting import format_count, printable_lines
 
 
 def describe(
     config: Config = None,
     runs: Annotated[bool, typer.Option("--runs", help="List every file, not only the sums.")] = False,
-    plot: Plot = None,
     cores: Cores = None,
     folder: Folder = None,
 ) -> None:
-    """Show what a campaign computes: its runs, which of them exist, and the expected time, memory and disk of the rest.
+    """List the runs of a campaign, which of them exist, and the expected time, memory and disk space of the rest.
 
-    Nothing is computed. Times are estimates, good to about a factor of two; once some runs are done, their times are
-    used. A run counts as done if its file was made with the present settings; `icha run -n` also detects changes of the
-    program. For measured surfaces it prints the number of summits, whether the spectrum ends in noise, and what to do
-    about it; `--plot` draws them with their spectra.
+    Nothing is computed. Times are estimates, usually right within a factor of two. Once some runs are done, the
+    estimates use their times. A run counts as done if its file was made with the present settings; `icha run -n` also
+    detects changes of the program. For each measured surface, the command prints the number of summits, whether the
+    spectrum ends in noise, and what to do about it.
     """
     path = find_configuration(config)
     campaign = read_configuration(path).campaign
     print_plan(path, campaign, find_workflow(), (folder or project()).resolve(), count_cores(cores), runs=runs)
-    _print_scans(campaign, plot)
+    _print_scans(campaign)
 
 
-def _print_scans(campaign, plot: Path | None) -> None:
-    """Print what is known of the measured surfaces that a study uses, and draw them."""
+def _print_scans(campaign) -> None:
+    """Print what is known of the measured surfaces that a study uses."""
     from icha.configuration.cases import run_cases
     from icha.configuration.surfaces import MeasuredSurface
     from icha.contact.models import MODELS
@@ -58,25 +54,18 @@ def _print_scans(campaign, plot: Path | None) -> None:
         if isinstance(campaign.surfaces[case.surface], MeasuredSurface):
             models.setdefault(case.surface, []).append(MODELS[case.model])
     if not models:
-        if plot is not None:
-            raise UserError("--plot: draws measured surfaces; the studies of this campaign use none")
         return
     from icha.surfaces.measured.resolution import examine_scan
 
-    sections = {name: campaign.surfaces[name] for name in models}
-    scans = {name: examine_scan(section.path, section.preparation) for name, section in sections.items()}
-    echo("")
-    for name, scan in scans.items():
-        for line in describe_scan(name, scan, models=models[name]):
+    echo()
+    for name, used in models.items():
+        section = campaign.surfaces[name]
+        for line in describe_scan(name, examine_scan(section.path, section.preparation), models=used):
             echo(line)
-    if plot is not None:
-        from icha.cli.quick_plot import draw_scans
-
-        draw_scans(scans, plot)
 
 
 def print_plan(path: Path, campaign, workflow: Path, home: Path, cores: int, *, runs=False, profile=None) -> None:
-    """Print what a campaign computes, what exists, what the rest costs, and what prevents it.
+    """Print what a campaign computes, what exists, the cost of the rest, and what prevents it.
 
     Parameters
     ----------
@@ -89,6 +78,7 @@ def print_plan(path: Path, campaign, workflow: Path, home: Path, cores: int, *, 
     profile : folder of the Snakemake profile in use; None is the default profile.
     """
     from rich.console import Console
+    from rich.text import Text
 
     from icha.deposit.metadata import licence_problem
     from icha.planning.ownership import find_conflict
@@ -101,11 +91,11 @@ def print_plan(path: Path, campaign, workflow: Path, home: Path, cores: int, *, 
     items = plan(campaign, results)
     console = Console(width=None if sys.stdout.isatty() else 120, highlight=False)
 
-    def print_line(style: str, name: str, text: str):
-        console.print(f"[{style}]{name}:[/] {escape_markup(text)}", soft_wrap=True)
+    def print_line(style: str, name: str, text: object):
+        console.print(Text.assemble((name, style), ": ", printable_lines(text)), soft_wrap=True)
 
-    console.print(f"[bold]{campaign.name}[/]: {escape_markup(campaign.title)}")
-    console.print(f"configuration: {escape_markup(shorten_path(path))}\n")
+    print_line("bold", campaign.name, campaign.title)
+    print_line("", "configuration", f"{shorten_path(path)}\n")
     if runs:
         _print_files(console, items)
     _print_sums(console, items)

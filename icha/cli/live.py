@@ -1,11 +1,11 @@
-"""Progress of a running campaign, from the events of Snakemake, and the views that print it."""
+"""Progress of a running campaign, from the events of Snakemake, and its view in a terminal or a file."""
 
 import threading
 import time
 from collections import Counter
 from collections.abc import Callable, Mapping
-from contextlib import AbstractContextManager
-from dataclasses import dataclass, field, replace
+from contextlib import nullcontext
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from rich.console import Console, Group
@@ -14,7 +14,6 @@ from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
-from icha.cli.project import echo
 from icha.datasets.results import CHECKS, MODEL_ERROR, REPORT
 from icha.support import formatting
 from icha.support.formatting import printable
@@ -40,9 +39,10 @@ RULES = {
     REPORT: "report_page",
 }
 MOST_JOBS = 8  # running jobs in the live view
+MOST_ERROR_LINES = 3  # of a failed job in the view
 
 
-@dataclass(frozen=True)
+@dataclass
 class JobRecord:
     """A job of Snakemake.
 
@@ -50,9 +50,11 @@ class JobRecord:
     ----------
     rule : its rule.
     title : the message of the rule.
-    outputs, logs : paths of its files.
-    started, ended : times in s; `ended` is None while it runs.
-    threads : cores that it uses.
+    outputs : paths of its results.
+    logs : paths of its logs.
+    started : time in s.
+    ended : time in s; None while the job runs.
+    threads : number of cores that it uses.
     """
 
     rule: str
@@ -65,7 +67,7 @@ class JobRecord:
 
     @property
     def seconds(self) -> float:
-        """Duration."""
+        """Duration in s; 0 while the job runs."""
         return (self.ended or self.started) - self.started
 
 
@@ -80,9 +82,12 @@ class Progress:
     expected : expected core-seconds of the job of an output file, by the path of the file.
     clock : function that returns the time in s.
     total : number of jobs by rule.
-    running, done, failed : the jobs; running ones by their number.
-    cores : cores in use; on a cluster, jobs at a time.
-    started, called : times of the first plan (None before) and of the call.
+    running : running jobs by their number.
+    done : jobs that succeeded.
+    failed : jobs that failed.
+    cores : number of cores in use; on a cluster, number of jobs that run at a time.
+    started : time of the first plan of Snakemake in s; None before.
+    called : time of the call of `icha run` in s.
     """
 
     expected: Mapping[str, float] = field(default_factory=dict)
@@ -120,8 +125,9 @@ class Progress:
                 case "job_finished" | "job_error" as name:
                     jobs, key = (self.done, "job_id") if name == "job_finished" else (self.failed, "jobid")
                     if job := self.running.pop(event[key], None):
-                        jobs.append(replace(job, ended=self.clock()))
-                        return jobs[-1]
+                        job.ended = self.clock()
+                        jobs.append(job)
+                        return job
         return None
 
     @property
@@ -129,31 +135,36 @@ class Progress:
         """Number of all jobs."""
         return sum(self.total.values())
 
+    @property
+    def ended_count(self) -> int:
+        """Number of jobs that succeeded or failed."""
+        return len(self.done) + len(self.failed)
+
     def counts(self) -> list[tuple[str, int, int, int, int]]:
         """Return each rule with its numbers of jobs: done, running, failed, all; in the order of the plan."""
         done, failed = (Counter(job.rule for job in jobs) for jobs in (self.done, self.failed))
         running = Counter(job.rule for job in self.running.values())
         return [(rule, done[rule], running[rule], failed[rule], total) for rule, total in self.total.items()]
 
-    def _expected_work(self, job: JobRecord) -> float:
-        """Return the core-seconds that a job is expected to take."""
-        return max((self.expected.get(output, 0.0) for output in job.outputs), default=0.0) or DEFAULT_SECONDS
-
     def seconds_left(self) -> float | None:
-        """Estimate the time until all jobs are done, from expected and measured times; None if unknown.
+        """Estimate the time until all jobs are done, from expected and measured times; None before the first plan.
 
         Jobs that cannot run because another one failed count as if they were still to run.
         """
         if self.started is None:
             return None
-        now = self.clock()
-        ended = [*self.done, *self.failed]
-        running = list(self.running.values())
+        ended, running = [*self.done, *self.failed], [*self.running.values()]
         measured = sum(job.seconds * job.threads for job in ended)
         # Ratio of measured to expected times on this machine.
         slowness = (measured + PRIOR_SECONDS) / (sum(map(self._expected_work, ended)) + PRIOR_SECONDS)
-        work = sum(max(self._expected_work(job) * slowness - (now - job.started) * job.threads, 0.0) for job in running)
-        return (work + self._waiting_work([*ended, *running]) * slowness) / max(self.cores, 1)
+        work = self._waiting_work([*ended, *running]) * slowness
+        for job in running:
+            work += max(self._expected_work(job) * slowness - (self.clock() - job.started) * job.threads, 0.0)
+        return work / max(self.cores, 1)
+
+    def _expected_work(self, job: JobRecord) -> float:
+        """Return the core-seconds that a job is expected to take."""
+        return max((self.expected.get(output, 0.0) for output in job.outputs), default=0.0) or DEFAULT_SECONDS
 
     def _waiting_work(self, begun: list[JobRecord]) -> float:
         """Return the expected core-seconds of the jobs that have not begun.
@@ -166,11 +177,8 @@ class Progress:
             if output not in outputs:
                 expected.setdefault(find_rule(output), []).append(seconds)
         waiting = Counter(self.total) - Counter(job.rule for job in begun)
-        work = 0.0
-        for rule, count in waiting.items():
-            seconds = expected.get(rule, [DEFAULT_SECONDS])
-            work += count * sum(seconds) / len(seconds)
-        return work
+        means = {rule: sum(seconds) / len(seconds) for rule, seconds in expected.items()}
+        return sum(count * means.get(rule, DEFAULT_SECONDS) for rule, count in waiting.items())
 
     def time_left(self) -> str:
         """Return the estimated time until all jobs are done, as text."""
@@ -184,118 +192,80 @@ def find_rule(output: str) -> str:
     return next((rule for beginning, rule in RULES.items() if path.startswith(beginning)), "")
 
 
+def _complete_lines(job: JobRecord, folder: Path) -> list[str]:
+    """Read the complete lines in the log of a job; none if there is no log."""
+    for log in job.logs:
+        try:
+            text = (folder / log).read_text(encoding="utf-8", errors="replace")
+        except OSError:
+            continue
+        return [printable(line) for line in text.split("\n")[:-1]]
+    return []
+
+
 def read_error(job: JobRecord, folder: Path) -> list[str]:
     """Return why a job failed: the lines of its log from the last one that begins with `Error:`.
 
-    Empty if the log has no such line, for example because the job was killed.
+    The list is empty if the log has no such line, for example because the job was killed.
     """
-    for log in job.logs:
-        try:
-            lines = (folder / log).read_text(encoding="utf-8", errors="replace").splitlines()
-        except OSError:
-            continue
-        starts = [number for number, line in enumerate(lines) if line.startswith("Error:")]
-        if starts:
-            first, *others = map(printable, lines[starts[-1] :])
-            return [first.removeprefix("Error:").strip(), *others]
-    return []
+    lines = _complete_lines(job, folder)
+    starts = [number for number, line in enumerate(lines) if line.startswith("Error:")]
+    if not starts:
+        return []
+    first, *others = lines[starts[-1] :]
+    return [first.removeprefix("Error:").strip(), *others]
 
 
 def read_last_line(job: JobRecord, folder: Path) -> str:
     """Return the last complete line in the log of a running job."""
-    for log in job.logs:
-        try:
-            with open(folder / log, "rb") as file:
-                file.seek(0, 2)
-                file.seek(max(0, file.tell() - 400))
-                lines = file.read().decode("utf-8", errors="replace").split("\n")[:-1]
-        except OSError:
-            continue
-        return next((printable(line.strip()) for line in reversed(lines) if line.strip()), "")
-    return ""
+    return next((line.strip() for line in reversed(_complete_lines(job, folder)) if line.strip()), "")
 
 
-class PlainView(AbstractContextManager):
-    """A line for every job that has ended.
+class View:
+    """View of the jobs: in a terminal a table that is drawn again and again, otherwise a line for each finished job.
 
     Parameters
     ----------
     progress : the jobs.
     campaign : name of the campaign.
     folder : folder from which paths of logs start.
+    console : the terminal or file.
     """
 
-    def __init__(self, progress: Progress, campaign: str, folder: Path):
-        """Take what is printed."""
-        self._progress, self._campaign, self.folder = progress, campaign, folder
-
-    def __exit__(self, *error):
-        """Nothing remains to be done."""
-
-    def print_job(self, job: JobRecord, failed: bool) -> None:
-        """Print how many jobs have ended, the job, and why it failed."""
-        progress = self._progress
-        ended, total = len(progress.done) + len(progress.failed), str(progress.job_count)
-        title = f"failed: {job.title}" if failed else job.title
-        echo(f"[{ended:>{len(total)}}/{total}, {progress.time_left()}] {title} ({formatting.duration(job.seconds)})")
-        for line in read_error(job, self.folder)[:3] if failed else ():
-            echo(f"    {line}")
-
-    def print(self, text: str) -> None:
-        """Print a line."""
-        echo(text)
-
-    def remark(self, text: str) -> None:
-        """Print a remark on the campaign."""
-        echo(f"{self._campaign}: {text}")
-
-
-class LiveView(PlainView):
-    """A table of the jobs in a terminal, drawn again and again; failed jobs are printed above it."""
-
     def __init__(self, progress: Progress, campaign: str, folder: Path, console: Console):
-        """Take what is drawn, and the terminal."""
-        super().__init__(progress, campaign, folder)
-        self._console, self._remark = console, "planning"
-        self._live = Live(get_renderable=self._draw, console=console, refresh_per_second=4, transient=True)
+        """Store what is shown; `live` is the context in which the table is drawn."""
+        self._progress, self._campaign, self.folder, self._console = progress, campaign, folder, console
+        self._is_live = console.is_terminal
+        self.live = nullcontext()
+        if self._is_live:
+            self.live = Live(get_renderable=self._draw, console=console, refresh_per_second=4, transient=True)
 
-    def __enter__(self):
-        """Start drawing."""
-        self._live.start()
-        return self
-
-    def __exit__(self, *error):
-        """Remove the table from the terminal."""
-        self._live.stop()
+    def print(self, text: str, style: str = "") -> None:
+        """Print a line, above the table if there is one."""
+        self._console.print(Text(printable(text), style=style), soft_wrap=True)
 
     def print_job(self, job: JobRecord, failed: bool) -> None:
-        """Print a job if it failed."""
-        if failed:
-            self._console.print(Text(f"failed: {job.title}", style="red"))
-            for line in read_error(job, self.folder)[:3]:
-                self._console.print(Text(f"    {line}", style="red"), overflow="fold")
-
-    def print(self, text: str) -> None:
-        """Print a line above the table."""
-        self._console.print(Text(printable(text), style="yellow"), soft_wrap=True)
-
-    def remark(self, text: str) -> None:
-        """Show a remark beside the name of the campaign."""
-        self._remark = text
+        """Print the number of finished jobs, a finished job, and why it failed; with a table, only failed jobs."""
+        if self._is_live and not failed:
+            return
+        progress, total = self._progress, str(self._progress.job_count)
+        title, style = (f"failed: {job.title}", "red") if failed else (job.title, "")
+        head = f"[{progress.ended_count:>{len(total)}}/{total}, {progress.time_left()}]"
+        self.print(f"{head} {title} ({formatting.duration(job.seconds)})", style)
+        for line in read_error(job, self.folder)[:MOST_ERROR_LINES] if failed else ():
+            self.print(f"    {line}", style)
 
     def _draw(self):
         with self._progress.lock:
-            progress = self._progress
-            if progress.started is None:
-                return Text(f"{self._campaign}: {self._remark} …")
+            if self._progress.started is None:
+                return Text(f"{self._campaign}: planning …")
             return Group(self._heading(), self._table(), *self._running())
 
     def _heading(self) -> Text:
         progress, failed = self._progress, len(self._progress.failed)
-        texts = [f"{self._campaign}: {len(progress.done) + failed} of {progress.job_count} jobs"]
+        texts = [f"{self._campaign}: {progress.ended_count} of {progress.job_count} jobs"]
         texts += [f"{failed} failed"] if failed else []
         texts += [progress.time_left(), f"{formatting.duration(progress.clock() - progress.started)} so far"]
-        texts += [self._remark] if self._remark != "planning" else []
         return Text(", ".join(texts), style="bold")
 
     def _table(self) -> Table:
@@ -304,7 +274,7 @@ class LiveView(PlainView):
             table.add_column(heading, justify="right" if heading else "left")
         for rule, done, running, failed, total in self._progress.counts():
             style = "red" if failed else "green" if done == total else "bold" if running else "dim"
-            cells = [str(number) if number else "" for number in (done, running, failed)]
+            cells = [str(number or "") for number in (done, running, failed)]
             bar = ProgressBar(total=total, completed=done + failed, width=20)
             table.add_row(rule.replace("_", " "), *cells, str(total), bar, style=style)
         return table

@@ -8,17 +8,7 @@ from typing import Annotated
 
 import typer
 
-from icha.cli.project import (
-    CAMPAIGNS,
-    Plot,
-    UserError,
-    echo,
-    find_workflow,
-    list_campaigns,
-    option,
-    project,
-    shorten_path,
-)
+from icha.cli.project import CAMPAIGNS, UserError, echo, find_workflow, list_campaigns, option, project, shorten_path
 from icha.cli.scans import MeasuredSection, describe_scan, read_measured_section
 
 TEMPLATE = Path(__file__).parent / "templates/campaign.yaml"
@@ -35,18 +25,18 @@ def new(
         str | None,
         option("Variable, dataset or channel of the measured file, if it contains several.", metavar="NAME"),
     ] = None,
-    plot: Plot = None,
     pull_off: Annotated[bool, typer.Option("--pull-off", help="Add a study of pull-off and hysteresis.")] = False,
     boundary_elements: Annotated[
         bool, typer.Option("--boundary-elements", help="Add runs with boundary elements.")
     ] = False,
 ) -> None:
-    """Write a commented campaign, config/campaigns/NAME.yaml, and print how to continue.
+    """Write a commented campaign, config/campaigns/NAME.yaml, and print the next commands.
 
-    It runs without changes. With a measured file, first fill in the keys that the command lists. It also prints the
-    number of summits of the scan, whether its spectrum ends in noise, and what to do about it; `--plot` draws the scan
-    with its spectrum.
+    The campaign runs without changes. With a measured file, first fill in the keys that the command lists. The command
+    also prints the number of summits of the scan, whether its spectrum ends in noise, and what to do about it.
     """
+    from jinja2 import Template
+
     from icha.support.values import NAME_PATTERN
 
     file = project() / CAMPAIGNS / f"{name}.yaml"
@@ -56,30 +46,23 @@ def new(
         raise UserError(f"{shorten_path(file)} exists already; choose another name, or remove it")
     if name in list_campaigns():
         raise UserError(f"{name} is the campaign of {shorten_path(list_campaigns()[name])}; choose another name")
-    for names, value in (("--data", data), ("--plot", plot)):
-        if value is not None and measured is None:
-            raise UserError(f"{names} needs a measured file; use it with --measured FILE")
+    if data is not None and measured is None:
+        raise UserError("--data needs a measured file; use it with --measured FILE")
     section = None if measured is None else read_measured_section(measured, data, file.parent)
-    values = {
-        "name": name,
-        "schema": Path(os.path.relpath(_schema(), file.parent)).as_posix(),
-        "readme": README.as_posix(),
-        "scan": section,
-        "pull_off": pull_off,
-        "boundary_elements": boundary_elements,
-    }
+    template = Template(TEMPLATE.read_text(encoding="utf-8"), trim_blocks=True, keep_trailing_newline=True)
+    text = template.render(
+        name=name,
+        schema=Path(os.path.relpath(_schema(), file.parent)).as_posix(),
+        readme=README.as_posix(),
+        scan=section,
+        pull_off=pull_off,
+        boundary_elements=boundary_elements,
+    )
     file.parent.mkdir(parents=True, exist_ok=True)
-    _write(file, values, "without changes" if section is None else "once the keys marked `to fill in` have values")
-    problems = [] if section is None else _problems(file, section)
-    if problems:
-        _write(file, values, f"once `icha describe {name}` reports no more problems")
+    file.write_text(text, encoding="utf-8")
     echo(f"{shorten_path(file)} written")
     if section is not None:
-        _print_section(section, problems)
-        if plot is not None:
-            from icha.cli.quick_plot import draw_scans
-
-            draw_scans({section.name: section.scan}, plot)
+        _print_section(section)
     echo(f"next:  icha describe {name}    print what it computes\n       icha run {name}         compute it")
 
 
@@ -95,38 +78,12 @@ def _schema() -> Path:
     return copies[0]
 
 
-def _write(file: Path, values: dict, condition: str) -> None:
-    """Write the campaign; `condition` is text on when it can be run."""
-    from jinja2 import Template
-
-    template = Template(TEMPLATE.read_text(encoding="utf-8"), trim_blocks=True, keep_trailing_newline=True)
-    file.write_text(template.render(values, runs=condition), encoding="utf-8")
-
-
-def _problems(file: Path, section: MeasuredSection) -> list[str]:
-    """Return the errors of a configuration, apart from the keys to fill in."""
-    from icha.configuration.errors import ConfigurationError
-    from icha.configuration.load import load_configuration
-
-    try:
-        load_configuration(file, {"surfaces": {section.name: section.filled_in}})
-    except ConfigurationError as error:
-        lines = [line.partition(": ")[2] for line in str(error).splitlines()]
-        # Without units, errors on size, slope and stickiness follow from guesses.
-        guessed = [f"surfaces.{section.name}.size:", f"surfaces.{section.name}.height_unit:", "studies.load.models:"]
-        is_guessed = bool(section.to_fill_in.keys() - {"boundary"})
-        return [line for line in lines if not (is_guessed and line.startswith(tuple(guessed)))]
-    return []
-
-
-def _print_section(section: MeasuredSection, problems: list[str]) -> None:
-    """Print what is known of a scan, the keys to fill in, and the other problems."""
-    to_scale = not problems and not section.to_fill_in.keys() - {"boundary"}
+def _print_section(section: MeasuredSection) -> None:
+    """Print what is known of a scan, and the keys to fill in."""
+    to_scale = not section.to_fill_in.keys() - {"boundary"}
     for line in describe_scan(section.name, section.scan, to_scale=to_scale):
         echo(line)
     if not to_scale:
         echo(f"{section.name}: `icha describe` analyses its spectrum once units and size are known")
     for key, reason in section.to_fill_in.items():
         echo(f"to fill in: surfaces.{section.name}.{key} ({reason})", fg="yellow")
-    for line in problems:
-        echo(f"to correct: {line}", fg="yellow")

@@ -18,7 +18,6 @@ CAMPAIGNS = Path("config/campaigns")
 DEFAULT = Path("config/config.yaml")
 # Exit statuses.
 FAILED, WRONG = 1, 2
-PICTURES = (".png", ".pdf", ".svg")
 
 
 def option(help_text: str, *names: str, **settings):
@@ -32,26 +31,12 @@ def _check_cores(value: str | None) -> str | None:
     return value
 
 
-def _check_folder(value: Path | None) -> Path | None:
-    try:
-        return value if value is None else value.resolve()
-    except RuntimeError:  # Python before 3.13
-        raise typer.BadParameter(f"{str(value)!r} is a link to itself; expected a folder") from None
-
-
-def _check_picture(value: Path | None) -> Path | None:
-    if value is not None and value.suffix not in PICTURES:
-        raise typer.BadParameter(f"{str(value)!r}: expected a name that ends in {', '.join(PICTURES)}")
-    return value
-
-
 Config = Annotated[
     str | None,
     typer.Argument(help="Configuration file, or name of a campaign. Default: config/config.yaml.", show_default=False),
 ]
 Anyway = Annotated[bool, typer.Option("--anyway", help="Run even if memory or disk space is probably too small.")]
 Large = Annotated[bool, typer.Option("--large", help="Accept a deposit with very many or very large files.")]
-Plot = Annotated[Path | None, option("Also draw a plot into this file (.png, .pdf or .svg).", callback=_check_picture)]
 Cores = Annotated[str | None, option("Cores to use, or `all`. Default: 2.", "--cores", "-c", callback=_check_cores)]
 Folder = Annotated[
     Path | None,
@@ -59,7 +44,7 @@ Folder = Annotated[
         "Folder that holds results/. Default: the clone, or the working directory.",
         "--directory",
         "-d",
-        callback=_check_folder,
+        resolve_path=True,
     ),
 ]
 
@@ -74,22 +59,6 @@ def count_cores(cores: str | None) -> int:
 def echo(text: object = "", *, err: bool = False, **style) -> None:
     """Print text, to the standard error if `err`; `style` as in `typer.style`: `fg="red"`, `bold=True`."""
     typer.secho(printable_lines(text), err=err, **style)
-
-
-def escape_markup(text: object) -> str:
-    """Escape text for rich, which gives brackets a meaning."""
-    from rich.markup import escape
-
-    return escape(printable_lines(text))
-
-
-def confirm(question: str) -> bool:
-    """Ask a yes-no question; without a terminal, and after Ctrl-C, the answer is no."""
-    try:
-        return sys.stdin.isatty() and typer.confirm(question)
-    except typer.Abort:
-        echo()
-        return False
 
 
 class UserError(Exception):

@@ -62,20 +62,19 @@ def run(
     dry_run: Annotated[
         bool, typer.Option("--dry-run", "-n", help="Only print the plan, and which jobs would run.")
     ] = False,
-    plain: Annotated[
-        bool, typer.Option("--plain", help="Print a line for every job instead of the live view.")
-    ] = False,
     anyway: Anyway = False,
 ) -> None:
     """Run a campaign; results that exist and are up to date are not computed again.
 
-    At the end it lists failures, and prints where figures, dataset and report are. Exit status: 0 if everything was
-    made, 1 if something failed (the other jobs run nevertheless), 2 if the campaign cannot be run.
+    In a terminal, a table shows the progress; otherwise the command prints a line for each finished job. At the end it
+    lists failures, and prints the paths of figures, dataset and report. Ctrl-C stops the campaign; the next call
+    continues.
 
-    If memory or disk space is probably too small, it asks before it starts; without a terminal it does not start.
-
-    Ctrl-C stops it; the next call continues.
+    Exit status: 0 if everything was made, 1 if something failed (the other jobs run nevertheless), 2 if the campaign
+    cannot be run, for example because memory or disk space is probably too small.
     """
+    from icha.planning.ownership import find_conflict
+
     workflow = find_workflow()
     targets = list(targets or [])
     # `icha run figures` and `icha run -- --forceall` name no configuration.
@@ -86,7 +85,10 @@ def run(
     folder = (folder or project()).resolve()
     results = folder / "results" / campaign.name
     profile_folder = _profile_folder(profile, workflow)
-    _refuse_obstacles(folder, results, campaign.name, path, workflow)
+    if reason := find_conflict(shorten_path(results), campaign.name, path, workflow):
+        raise UserError(f"{reason} Nothing was started")
+    if obstacle := find_obstacle(shorten_path(folder / ".snakemake")):
+        raise UserError(f"{obstacle}: Snakemake needs this folder for its records. Remove it or repair it")
     command = [
         # -P: a file in the working directory must not replace a module of the same name.
         *(sys.executable, "-P", "-m", "snakemake", *targets),
@@ -103,26 +105,22 @@ def run(
         return
     from rich.console import Console
 
-    from icha.cli.live import LiveView, PlainView, Progress
+    from icha.cli.live import Progress, View
     from icha.planning.plan import expected_seconds, plan, time_on
     from icha.planning.validity import expected_validity
 
-    console = Console()
     items = plan(campaign, results)
     if not anyway:
-        _confirm_if_too_large(items, targets, count_cores(cores), results, read_profile(profile_folder))
+        _refuse_if_too_large(items, targets, count_cores(cores), results, read_profile(profile_folder))
     if not set(targets) - set(TARGETS):
         _print_validity(expected_validity(campaign))
     progress = Progress(expected_seconds(items, f"results/{campaign.name}"))
-    if plain or not console.is_terminal:
-        view = PlainView(progress, campaign.name, folder)
-    else:
-        view = LiveView(progress, campaign.name, folder, console)
+    view = View(progress, campaign.name, folder, Console(highlight=False))
     log = _log_file(folder, campaign.name)
     status, stopped = _run_snakemake([*command, "--logger", "icha"], workflow, log, progress, view)
     if status and progress.started is None and not stopped:
         try:
-            _refuse_unknown_targets(log.read_text(encoding="utf-8", errors="replace"), targets, campaign)
+            _refuse_unknown_targets(_read(log), targets, campaign)
         except UserError:
             log.unlink(missing_ok=True)
             raise
@@ -138,15 +136,6 @@ def run(
         echo(f"deposit: {shorten_path(results / 'publish' / f'{campaign.name}-{version}.zip')}")
 
 
-def _refuse_obstacles(folder: Path, results: Path, name: str, path: Path, workflow: Path) -> None:
-    from icha.planning.ownership import find_conflict
-
-    if reason := find_conflict(shorten_path(results), name, path, workflow):
-        raise UserError(f"{reason} Nothing was started")
-    if obstacle := find_obstacle(shorten_path(folder / ".snakemake")):
-        raise UserError(f"{obstacle}: Snakemake needs this folder for its records. Remove it or repair it")
-
-
 def _profile_folder(profile: str | None, workflow: Path) -> Path:
     """Find the folder of a profile by its path or its name."""
     for path in (Path(profile or "default"), workflow / "profiles" / (profile or "default")):
@@ -156,8 +145,8 @@ def _profile_folder(profile: str | None, workflow: Path) -> Path:
     raise UserError(f"--profile {profile}: no folder with a config.yaml; expected a folder, or {', '.join(names)}")
 
 
-def _confirm_if_too_large(items, targets: list[str], cores: int, results: Path, profile: dict) -> None:
-    """Ask whether to start if memory or disk space is probably too small; without a terminal, refuse."""
+def _refuse_if_too_large(items, targets: list[str], cores: int, results: Path, profile: dict) -> None:
+    """Raise `UserError` if memory or disk space is probably too small."""
     from icha.planning.requirements import find_shortages
 
     if "surfaces" in targets:
@@ -166,19 +155,9 @@ def _confirm_if_too_large(items, targets: list[str], cores: int, results: Path, 
         return  # the cost of single files is unknown
     # Resources of the command line precede those of the profile.
     resources = [each for each in targets if "=" in each] + profile.get("resources", [])
-    shortages = find_shortages(items, cores, results, profile | {"resources": resources})
-    if not shortages:
-        return
-    message = "\n".join(["this machine is probably too small:", *(f"  {shortage}" for shortage in shortages)])
-    if not _at_a_terminal():
-        raise UserError(f"{message}\nNothing was started; use --anyway to start nevertheless")
-    echo(message, fg="red")
-    if not typer.confirm("Start nevertheless?"):
-        raise UserError("nothing was started")
-
-
-def _at_a_terminal() -> bool:
-    return sys.stdin.isatty() and sys.stdout.isatty()
+    if shortages := find_shortages(items, cores, results, profile | {"resources": resources}):
+        lines = "\n  ".join(["this machine is probably too small:", *shortages])
+        raise UserError(f"{lines}\nNothing was started; use --anyway to start nevertheless")
 
 
 def _dry_run(command: list[str], workflow: Path, campaign, targets: list[str]) -> str:
@@ -253,7 +232,7 @@ def _run_snakemake(command: list[str], workflow: Path, log: Path, progress, view
     environment = os.environ | {"ICHA_EVENTS": str(writing), "PYTHONPATH": os.pathsep.join(modules)}
     if sys.platform == "linux":
         environment["ICHA_CALLER"] = str(os.getpid())
-    with view, log.open("w", encoding="utf-8") as output:
+    with view.live, log.open("w", encoding="utf-8") as output:
         # In its own process group, Ctrl-C reaches Snakemake and its jobs once, from `stop`.
         process = subprocess.Popen(
             command,
@@ -269,7 +248,7 @@ def _run_snakemake(command: list[str], workflow: Path, log: Path, progress, view
 
         def stop(number, frame):
             stopped.append(number)
-            view.remark("stopping")
+            view.print("stopping …")
             with contextlib.suppress(ProcessLookupError):
                 os.killpg(process.pid, number)
 
@@ -288,6 +267,10 @@ def _run_snakemake(command: list[str], workflow: Path, log: Path, progress, view
     return status, bool(stopped)
 
 
+def _read(log: Path) -> str:
+    return log.read_text(encoding="utf-8", errors="replace")
+
+
 def _listen(reading: int, progress, view, stopped: list) -> None:
     """Read the events of Snakemake, one JSON object per line, until it ends."""
     from icha.cli.live import read_error
@@ -296,7 +279,7 @@ def _listen(reading: int, progress, view, stopped: list) -> None:
         for line in events:
             event = json.loads(line)
             if event["event"] == "remark":
-                view.print(event["text"])
+                view.print(event["text"], "yellow")
                 continue
             job = progress.update(event)
             failed = event["event"] == "job_error"
@@ -310,7 +293,7 @@ def _print_outcome(status: int, stopped: bool, progress, campaign, folder: Path,
     from icha.support.atomic_files import probe_folder
 
     results = folder / "results" / campaign.name
-    ended = len(progress.done) + len(progress.failed)
+    ended = progress.ended_count
     if status == 0:
         log.unlink(missing_ok=True)  # Snakemake has its own copy
     if status == 0 and progress.started is None:
@@ -325,14 +308,13 @@ def _print_outcome(status: int, stopped: bool, progress, campaign, folder: Path,
     if status and results.is_dir() and (reason := probe_folder(results)):
         # Logs are in this folder, so jobs may have been unable to report it.
         echo(
-            f"cannot write to {shorten_path(results)}: {reason.strerror}. Repair this and repeat the command.",
-            fg="red",
+            f"cannot write to {shorten_path(results)}: {reason.strerror}. Repair this and repeat the command", fg="red"
         )
     if stopped or status < 0:
         echo("Stopped before the end. Repeat the command to continue.", fg="red")
     elif status and not progress.failed:
         heading = "Snakemake could not continue:" if ended else "Snakemake could not start:"
-        _print_failure(heading, None, _reason_in(log.read_text(encoding="utf-8", errors="replace")))
+        _print_failure(heading, None, _reason_in(_read(log)))
     elif status and progress.job_count > ended:
         echo(f"{format_count(progress.job_count - ended, 'job')} not run, since they need results of failed jobs")
     if ended or not status:  # otherwise the existing files are those of an earlier call

@@ -1,4 +1,4 @@
-"""Scans: what ICHA prints about them before anything is computed, and their section in a new campaign."""
+"""Description of a scan before anything is computed, and its section in a new campaign."""
 
 from __future__ import annotations
 
@@ -20,11 +20,9 @@ if TYPE_CHECKING:
 
 # Largest share of filled points without a warning; the documentation recommends another measurement above.
 MOST_FILLED = 0.05
-# Values that replace missing keys while the rest is checked: in SI units, and as written in a configuration.
+# Guesses, in m, for keys that the file lacks, with which it can be read; and examples of values to fill in.
 GUESSES = {"height_unit": 1e-9, "size": (1e-4, 1e-4)}
-GUESSED_TEXT = {"height_unit": "nm", "lateral_unit": "um", "boundary": "window"}
 EXAMPLES = {"height_unit": "nm", "lateral_unit": "um", "size": "[90 um, 90 um]"}
-FIRST_BYTES = 2**16  # read to see whether a file is empty
 
 
 def describe_scan(name: str, scan, *, to_scale: bool = True, models: Iterable[Model] = ()) -> Iterator[str]:
@@ -42,7 +40,7 @@ def describe_scan(name: str, scan, *, to_scale: bool = True, models: Iterable[Mo
 
 
 def _reading(scan) -> Iterator[str]:
-    """Return how the file was read, its missing points, and whether opposite edges fit."""
+    """Yield lines on the format of the file, missing points, and opposite edges that do not fit."""
     filled = f"{format_count(scan.filled, 'point')} without height {'was' if scan.filled == 1 else 'were'} filled"
     array = f", `data: {printable(scan.data)}` of several" if scan.data else ""
     yield f"read as {scan.format}{array}, {filled if scan.filled else 'no point is missing'}"
@@ -62,7 +60,7 @@ def _reading(scan) -> Iterator[str]:
 
 
 def _resolution(scan, to_scale: bool, models: list[Model]) -> Iterator[str]:
-    """Return how well the nodes resolve summits and waves, and which models are not applicable."""
+    """Yield lines on the resolution of summits and waves, and on models that are not applicable."""
     from icha.surfaces.measured.resolution import LEAST_CELLS_OF_SUMMIT, RESOLVED_CELLS
     from icha.surfaces.moments import LEAST_CELLS_PER_WAVE, error_of_cells
 
@@ -93,7 +91,7 @@ def _resolution(scan, to_scale: bool, models: list[Model]) -> Iterator[str]:
 
 
 def _noise(scan) -> Iterator[str]:
-    """Return where the spectrum ends in noise, and the recommended keys."""
+    """Yield lines on the noise floor of the spectrum, and on recommended keys."""
     from icha.surfaces.measured.resolution import filtered_slope_share
 
     if (noise := scan.noise) is None:
@@ -118,7 +116,7 @@ def format_advice(advice: Mapping[str, float | int]) -> dict[str, str]:
 
 @dataclass(frozen=True)
 class MeasuredSection:
-    """The section of a scan in a new campaign.
+    """Section of a scan in a new campaign.
 
     Attributes
     ----------
@@ -126,7 +124,6 @@ class MeasuredSection:
     path : its file, relative to the configuration.
     lines : keys that the file determines, and keys to fill in.
     to_fill_in : reason for each key to fill in.
-    filled_in : guessed values of these keys, with which the other keys can be checked.
     advice : recommended keys, as written in a configuration.
     scan : its `icha.surfaces.measured.resolution.ScanResolution`.
     """
@@ -135,7 +132,6 @@ class MeasuredSection:
     path: str
     lines: list[str]
     to_fill_in: dict[str, str]
-    filled_in: dict[str, str]
     advice: dict[str, str]
     scan: Any
 
@@ -153,13 +149,12 @@ def read_measured_section(path: Path, data: str | None, folder: Path) -> Measure
     from icha.surfaces.measured.resolution import examine_scan
     from icha.surfaces.measured.settings import UnfitTopography
 
-    _check_file(path)
-    scan, assumed, missing, sides = _load(path, data)
+    if problem := problem_with_path(path):
+        raise UserError(f"--measured {path}: {problem}; expected a file with a topography")
+    scan, guessed, missing = _load(path, data)
     rows, columns = scan.heights.shape
     gaps = int(np.count_nonzero(~np.isfinite(scan.heights)))
-    periodic = scan.format == "fourier"
-    boundary, detrend = ("periodic", "none") if periodic else ("free", "tilt")
-    settings = {"format": "auto", "boundary": boundary, "data": data, "detrend": detrend, "missing": "fill"} | assumed
+    settings = {"format": "auto", "boundary": "free", "data": data, "detrend": "tilt", "missing": "fill"} | guessed
     try:
         resolution = examine_scan(path, settings)
     except UnfitTopography as error:
@@ -167,70 +162,43 @@ def read_measured_section(path: Path, data: str | None, folder: Path) -> Measure
 
     array = data if data is not None else scan.data
     lines = [f"data: {json.dumps(array)}"] if array else []
-    lines.append(f"# {columns} x {rows} points{_size_and_heights(scan, missing, sides)}")
-    for key in missing:
-        default = " (default: that of the heights)" if key == "lateral_unit" else ""
-        lines.append(f"{key}:        # to fill in, since the file lacks it{default}: such as {EXAMPLES[key]}")
+    points = f"# {columns} x {rows} points"
+    if "size" not in missing and "lateral_unit" not in missing:
+        points += f" over {scan.size[0] * 1e6:.4g} um x {scan.size[1] * 1e6:.4g} um"
+    if "height_unit" not in missing:
+        points += f", heights from {np.nanmin(scan.heights) * 1e6:.4g} um to {np.nanmax(scan.heights) * 1e6:.4g} um"
+    lines.append(points)
+    lines += [f"{key}:        # to fill in, since the file lacks it: such as {EXAMPLES[key]}" for key in missing]
     if gaps:
         lines.append(f"missing: fill                # {gaps} points have no height; `refuse` makes that an error")
     advice = {} if missing else format_advice(resolution.advice)
     name = re.sub("[^a-z0-9_-]+", "_", path.stem.lower()).strip("_") or "measured"
-    if not periodic:
-        missing = missing | {"boundary": "what surrounds the scan: free, window, mirror or periodic"}
-    guessed = GUESSED_TEXT | {"size": [f"{columns} um", f"{rows} um"]}
-    filled_in = {key: guessed[key] for key in missing}
+    missing["boundary"] = "what surrounds the scan: free, window, mirror or periodic"
     path = Path(os.path.relpath(path.resolve(), folder.resolve())).as_posix()
-    return MeasuredSection(name, path, lines, missing, filled_in, advice, resolution)
-
-
-def _check_file(path: Path) -> None:
-    if problem := problem_with_path(path):
-        raise UserError(f"--measured {path}: {problem}; expected a file with a topography")
-    with path.open("rb") as file:
-        if not file.read(FIRST_BYTES).strip():
-            raise UserError(f"--measured {path}: the file is empty; expected a file with a topography")
+    return MeasuredSection(name, path, lines, missing, advice, resolution)
 
 
 def _load(path: Path, data: str | None):
-    """Load a scan, with guesses for keys that the file lacks.
-
-    Returns the scan, the guesses in SI units, the reason for each missing key, and the sides in the coordinates of the
-    file if their unit is missing.
-    """
+    """Load a scan; return it with guesses for the keys that the file lacks, and the reason for each missing key."""
     from icha.surfaces.measured.scan import load_scan
     from icha.surfaces.measured.settings import Preparation, UnfitTopography
 
-    assumed, missing = {}, {}
+    guessed, missing = {}, {}
     while True:
         try:
-            scan = load_scan(path, Preparation("auto", "free", data, **assumed))
+            scan = load_scan(path, Preparation("auto", "free", data, **guessed))
             break
         except UnfitTopography as error:
-            if error.key not in GUESSES or error.key in assumed:
+            if error.key not in GUESSES or error.key in guessed:
                 hint = "; choose one with --data NAME" if error.key == "data" else ""
                 raise UserError(f"--measured {path}: {error.key} {error}{hint}") from None
-            assumed[error.key] = GUESSES[error.key]
+            guessed[error.key] = GUESSES[error.key]
             missing[error.key] = str(error)
     if "size" in missing:
         rows, columns = scan.heights.shape  # most scans have square pixels
-        assumed["size"] = columns * 1e-6, rows * 1e-6
+        guessed["size"] = columns * 1e-6, rows * 1e-6
     elif "height_unit" in missing:
         # Coordinates without a unit have the unit of the heights, which is unknown too.
-        unscaled = load_scan(path, Preparation("auto", "free", data, **assumed, lateral_unit=1.0))
-        if unscaled.size != scan.size:
+        if load_scan(path, Preparation("auto", "free", data, **guessed, lateral_unit=1.0)).size != scan.size:
             missing["lateral_unit"] = "is missing, and the file does not contain it; default: that of the heights"
-            return scan, assumed, missing, unscaled.size
-    return scan, assumed, missing, None
-
-
-def _size_and_heights(scan, missing: Mapping, sides: tuple[float, float] | None) -> str:
-    import numpy as np
-
-    text = ""
-    if sides is not None:
-        text += f" over {sides[0]:.4g} x {sides[1]:.4g} in its coordinates"
-    elif "size" not in missing:
-        text += f" over {scan.size[0] * 1e6:.4g} um x {scan.size[1] * 1e6:.4g} um"
-    if "height_unit" not in missing:
-        text += f", heights from {np.nanmin(scan.heights) * 1e6:.4g} um to {np.nanmax(scan.heights) * 1e6:.4g} um"
-    return text
+    return scan, guessed, missing

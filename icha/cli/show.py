@@ -1,26 +1,23 @@
-"""The command `icha show`: print what a file contains, and plot it."""
+"""The command `icha show`: print the content of a file with its main numbers."""
 
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from icha.cli.project import Plot, UserError, echo, option
+from icha.cli.project import UserError, echo
 from icha.datasets.attributes import reasons_not_applicable, why_no_result
-from icha.support.formatting import format_count, printable
+from icha.support.formatting import format_count, format_quantity, printable
 
 BARS = " ▁▂▃▄▅▆▇█"
-MOST_BARS = 60
-MOST_ROWS = 12
+MOST_BARS = 60  # of a sparkline
+MOST_ROWS = 12  # of the table of steps
 CURVES = {"contact_area_fraction": "A/A0", "reduced_pressure": "p*", "reduced_separation": "u/h_rms"}
+COLUMNS = ("reduced_pressure", "contact_area_fraction", "reduced_separation", "spot_count")
 
 
-def show(
-    file: Annotated[Path, typer.Argument(help="A run, surface or campaign dataset (.nc).")],
-    plot: Plot = None,
-    study: Annotated[str | None, option("Study of a campaign dataset. Default: all of them.")] = None,
-) -> None:
-    """Show what a file contains: a run, a surface or a campaign dataset. --plot draws it."""
+def show(file: Annotated[Path, typer.Argument(help="A run, surface or campaign dataset (.nc).")]) -> None:
+    """Print the content of a file with its main numbers: a run, a surface or a campaign dataset."""
     from icha.datasets.format import CAMPAIGN, RUN, SURFACE, UnknownFile, identify_file
 
     try:
@@ -30,27 +27,18 @@ def show(
     printers = {RUN: print_run, SURFACE: _print_surface, CAMPAIGN: _print_campaign}
     if kind not in printers:
         raise UserError(f"{file}: {kind}; expected a run, a surface or a campaign dataset. Try `ncdump -h`")
-    if kind == CAMPAIGN and study is not None:
-        if study not in data.children:
-            raise UserError(f"--study {study}: not in {file}; expected one of {printable(', '.join(data.children))}")
-        data = data.filter(lambda node: node.name in (None, data.name, study))
     try:
         printers[kind](data, file)
-        if plot is not None:
-            from icha.cli.quick_plot import draw
-
-            draw(kind, data, plot)
     except (AttributeError, LookupError, TypeError, ValueError) as error:  # a file that another program wrote
         raise UserError(f"{file}: {kind} of another format ({error!r}); `icha check` lists the problems") from None
 
 
 def print_run(run, file: Path) -> None:
     """Print the model, material and surface of a run, and its results."""
-    from icha.support.formatting import format_quantity
+    import numpy as np
 
-    def value(variable, unit=None):
-        number = float(run[variable])
-        return number if unit is None else format_quantity(number, unit)
+    def quantity(name, unit):
+        return format_quantity(float(run[name]), unit)
 
     echo(f"{file}: {printable(run.attrs.get('title', 'run'))}")
     labels = [f"{key} {printable(run.attrs[key])}" for key in ("campaign", "study") if run.attrs.get(key)]
@@ -58,12 +46,12 @@ def print_run(run, file: Path) -> None:
         echo(" and ".join(labels))
     echo(f"model:    {printable(run.attrs.get('contact_model', 'unknown')).replace('_', ' ')}")
     echo(
-        f"material: E* {value('contact_modulus', 'Pa')}, surface energy {value('surface_energy', 'J/m²')}, "
-        f"range {value('interaction_range', 'm')}, Tabor parameter {value('tabor_parameter'):.3g}"
+        f"material: E* {quantity('contact_modulus', 'Pa')}, surface energy {quantity('surface_energy', 'J/m²')}, "
+        f"range {quantity('interaction_range', 'm')}, Tabor parameter {float(run['tabor_parameter']):.3g}"
     )
     echo(
-        f"surface:  period {value('period', 'm')}, rms slope {value('rms_slope'):.4g}, rms height "
-        f"{value('rms_height', 'm')}, seed {int(run['seed'])}, {int(run['asperity_count'])} asperities"
+        f"surface:  period {quantity('period', 'm')}, rms slope {float(run['rms_slope']):.4g}, rms height "
+        f"{quantity('rms_height', 'm')}, seed {int(run['seed'])}, {int(run['asperity_count'])} asperities"
     )
     if reason := why_no_result(run.attrs):
         echo(f"failed:   {printable(reason)}", fg="red")
@@ -83,22 +71,17 @@ def print_run(run, file: Path) -> None:
     if "gap/h_rms" in curves:
         echo("          u: mean separation from the half-space far away; gap: mean gap between the surfaces")
     if "hysteresis_loss" in run:
-        tension = format_quantity(-value("pull_off_pressure"), "Pa")
-        echo(f"pull-off: {tension} of tension; loss {value('hysteresis_loss'):.3g} J/m²")
+        tension = format_quantity(-float(run["pull_off_pressure"]), "Pa")
+        echo(f"pull-off: {tension} of tension; loss {float(run['hysteresis_loss']):.3g} J/m²")
     echo("\n  step      p/(E* h'rms)   A/A0         u/h_rms    spots")
-    rows = min(steps, MOST_ROWS)
-    for k in sorted({round(row * (steps - 1) / max(rows - 1, 1)) for row in range(rows)}):
-        row = run.isel(step=k)
-        echo(
-            f"{k:>6}  {float(row['reduced_pressure']):>16.4e}   {float(row['contact_area_fraction']):.4e}   "
-            f"{float(row['reduced_separation']):>8.4f}   {int(row['spot_count']):>6}"
-        )
+    for k in np.unique(np.linspace(0, steps - 1, min(steps, MOST_ROWS)).round().astype(int)):
+        pressure, area, separation, spots = (float(run[name][k]) for name in COLUMNS)
+        echo(f"{k:>6}  {pressure:>16.4e}   {area:.4e}   {separation:>8.4f}   {spots:>6.0f}")
 
 
 def _print_surface(surface, file: Path) -> None:
-    """Print attributes and statistics of a surface; those of a scan as measured, too."""
+    """Print attributes and statistics of a surface; for a scan, also the rms height and slope as measured."""
     from icha.datasets.surface_file import measured_scale
-    from icha.support.formatting import format_quantity
 
     echo(f"{file}: {printable(surface.attrs.get('title', 'surface'))}")
     for key in ("summary", "boundary", "source_file", "preparation"):
@@ -110,13 +93,11 @@ def _print_surface(surface, file: Path) -> None:
         height, slope = (float(surface[name]) * scale for name in ("rms_height", "rms_slope"))
         echo(f"as measured: rms height {format_quantity(height, 'm')}, rms slope {slope:.4g}")
         echo("as stored, at the rms slope to which the heights are scaled:")
-    for name in surface.data_vars:
-        variable = surface[name]
+    for name, variable in surface.data_vars.items():
         if variable.ndim == 0 and variable.dtype.kind in "fiu":
-            unit = variable.attrs.get("units", "1")
-            text = format_quantity(float(variable), "m") if unit == "m" else f"{float(variable):.5g}"
-            unit = "" if unit in ("1", "m") else f" {unit}"
-            echo(printable(f"{variable.attrs.get('long_name', name)}: {text}{unit}"))
+            unit = variable.attrs.get("units", "1").removeprefix("1")
+            text = format_quantity(float(variable), "m") if unit == "m" else f"{float(variable):.5g} {unit}".rstrip()
+            echo(printable(f"{variable.attrs.get('long_name', name)}: {text}"))
     heights = surface["height"].values
     low, high = (format_quantity(float(height) * scale, "m") for height in (heights.min(), heights.max()))
     echo(f"heights from {low} to {high}, as {'stored' if scale == 1 else 'measured'}; profile through the centre:")

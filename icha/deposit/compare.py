@@ -1,12 +1,14 @@
 """Compare the results of a deposit with those of a rerun, variable by variable.
 
 With the same program, environment and kind of processor, the files of a rerun are identical byte for byte. On another
-processor the last digits of sums and transforms differ, and the differences grow in later computations. Therefore two
-numbers are the same within tolerance if they differ by at most `TOLERANCE` of the larger one. A value near zero is
-often the difference of two large values, and has their absolute error. Therefore values below `FLOOR` of the variable's
-largest value are compared as if they were that large. All digits of a solver's residual are rounding errors. Therefore
-two residuals are the same within tolerance if they differ by at most the largest residual that the solver accepts
-(`NOISE`).
+processor the last digits of sums and transforms differ, and these differences grow in later computations. So numbers
+have a tolerance:
+
+- Two numbers are the same if they differ by at most `TOLERANCE` of the larger one.
+- Values below `FLOOR` of the variable's largest value are compared as if they were that large: a value near zero is
+  often the difference of two large values, and has their absolute error.
+- Two residuals of a solver are the same if they differ by at most the largest residual that the solver accepts
+  (`NOISE`): all digits of a residual are rounding errors.
 
 Everything else has to be equal: integers, text, places of missing values, dimensions, types, attributes. Storage
 (chunks, compression, order in the file) is not compared. Figures and the report are drawn from the compared values, by
@@ -14,7 +16,6 @@ libraries and fonts that may differ. If only figures or the report differ, the c
 difference.
 """
 
-import json
 import os
 import textwrap
 from collections import Counter, defaultdict
@@ -27,18 +28,12 @@ import numpy as np
 
 from icha.checks.run import FRONT_LIMIT, RESIDUAL_LIMIT
 from icha.deposit.verify import COMPUTED, files_of
-from icha.support.atomic_files import whole_file
 from icha.support.checksums import sha256_of
 from icha.support.formatting import printable
 from icha.support.input_files import refuse_traps
 
-IDENTICAL, WITHIN, DIFFERENT, MISSING, EXTRA = VERDICTS = (
-    "identical",
-    "within tolerance",
-    "different",
-    "missing",
-    "extra",
-)
+VERDICTS = ("identical", "within tolerance", "different", "missing", "extra")
+IDENTICAL, WITHIN, DIFFERENT, MISSING, EXTRA = VERDICTS
 TOLERANCE = 1e-6
 FLOOR = 1e-6
 # Allowed differences of the variables with these names.
@@ -144,7 +139,7 @@ def _differences(deposit: Path, rerun: Path) -> Iterator[Difference]:
         with netCDF4.Dataset(deposit) as a, netCDF4.Dataset(rerun) as b:
             yield from _compare_groups(a, b, "")
     else:
-        yield Difference("", DIFFERENT, "other bytes")
+        yield Difference("", DIFFERENT, "the bytes differ")
 
 
 def _compare_groups(a: netCDF4.Dataset, b: netCDF4.Dataset, path: str) -> Iterator[Difference]:
@@ -154,27 +149,19 @@ def _compare_groups(a: netCDF4.Dataset, b: netCDF4.Dataset, path: str) -> Iterat
     for name, size, other in _paired(sizes_a, sizes_b):
         if size != other:
             yield Difference(f"{path}/{name} (dimension)", DIFFERENT, f"size: {size} and {other}")
-    for name, variable, other in _paired(a.variables, b.variables):
-        if variable is None or other is None:
-            yield _only_in_one(f"{path}/{name}", variable)
-        else:
-            yield from _compare_variables(variable, other, f"{path}/{name}")
-    for name, group, other in _paired(a.groups, b.groups):
-        if group is None or other is None:
-            yield _only_in_one(f"{path}/{name} (group)", group)
-        else:
-            yield from _compare_groups(group, other, f"{path}/{name}")
+    for compare, members, kind in ((_compare_variables, "variables", ""), (_compare_groups, "groups", " (group)")):
+        for name, one, other in _paired(getattr(a, members), getattr(b, members)):
+            if one is None:
+                yield Difference(f"{path}/{name}{kind}", EXTRA, "only in the rerun")
+            elif other is None:
+                yield Difference(f"{path}/{name}{kind}", MISSING, "only in the deposit")
+            else:
+                yield from compare(one, other, f"{path}/{name}")
 
 
 def _paired(a: Mapping, b: Mapping) -> Iterator[tuple]:
     """Pair the values of two mappings by their keys, with None for a missing value."""
     return ((key, a.get(key), b.get(key)) for key in dict.fromkeys([*a, *b]))
-
-
-def _only_in_one(name: str, of_deposit: object) -> Difference:
-    if of_deposit is None:
-        return Difference(name, EXTRA, "the deposit has none")
-    return Difference(name, MISSING, "the rerun has none")
 
 
 def _compare_variables(a: netCDF4.Variable, b: netCDF4.Variable, name: str) -> Iterator[Difference]:
@@ -192,16 +179,9 @@ def _compare_variables(a: netCDF4.Variable, b: netCDF4.Variable, name: str) -> I
 
 
 def _compare_attributes(a, b, name: str) -> Iterator[Difference]:
-    """Compare the attributes of two variables or groups; numbers are compared with the tolerance of variables."""
     for key, one, other in _paired(*({key: each.getncattr(key) for key in each.ncattrs()} for each in (a, b))):
-        if one is None or other is None:
-            yield Difference(name, DIFFERENT, f"attribute {key}: {'extra' if one is None else 'missing'}")
-            continue
-        one, other = np.asarray(one), np.asarray(other)
-        if (one.shape, one.dtype.kind) != (other.shape, other.dtype.kind):
+        if type(one) is not type(other) or not np.array_equal(one, other):
             yield Difference(name, DIFFERENT, f"attribute {key}: {_shown(one)} and {_shown(other)}")
-        elif found := compare_values(one, other):
-            yield found._replace(name=name, detail=f"attribute {key}: {found.detail}")
 
 
 def compare_values(a: np.ndarray, b: np.ndarray, *, noise: float = 0.0) -> Difference | None:
@@ -247,8 +227,7 @@ def _place(a: np.ndarray, b: np.ndarray, position: int) -> str:
 
 def _shown(value: object) -> str:
     value = value.item() if isinstance(value, np.ndarray | np.generic) and value.size == 1 else value
-    text = repr(value) if isinstance(value, str | float) else str(value)
-    return text if len(text) <= _LONGEST_VALUE else f"{text[: _LONGEST_VALUE - 3]}..."
+    return textwrap.shorten(repr(value), _LONGEST_VALUE, placeholder=" …")
 
 
 def format_comparison(comparison: Comparison) -> str:
@@ -280,30 +259,11 @@ def _lines(comparison: Comparison, within: bool) -> list[str]:
     for file in comparison.files:
         for each in file.differences:
             if (each.verdict == WITHIN) == within:
-                grouped[file.kind if each.name else file.path, each.name, each.verdict].append((each, file.path))
+                place = f"{file.kind}: {each.name.lstrip('/')}" if each.name else file.path
+                grouped[place, each.verdict].append((each.deviation, each.detail, file.path))
     lines = []
-    for (kind, name, verdict), found in grouped.items():
-        worst, path = max(found, key=lambda entry: entry[0].deviation)
+    for (place, verdict), found in grouped.items():
+        deviation, detail, path = max(found)
         files = path if len(found) == 1 else f"{len(found)} files, most in {path}"
-        detail = f"{worst.deviation:.2g} at most" if within else worst.detail
-        about = f"{kind}: {name.lstrip('/')}: {verdict}, {detail} ({files})" if name else f"{path}: {verdict}, {detail}"
-        lines.append((-worst.deviation, about))
+        lines.append((-deviation, f"{place}: {verdict}, {detail}" + (f" ({files})" if place != path else "")))
     return [line for _, line in sorted(lines)]
-
-
-def write_json(comparison: Comparison, path: str | os.PathLike) -> None:
-    """Write all differences to a JSON file; infinite deviations are null."""
-    files = [
-        {
-            "path": file.path,
-            "verdict": file.verdict,
-            "variables": [
-                each._asdict() | {"deviation": each.deviation if np.isfinite(each.deviation) else None}
-                for each in file.differences
-            ],
-        }
-        for file in comparison.files
-    ]
-    content = {"verdict": comparison.verdict, "tolerance": TOLERANCE, "files": files}
-    with whole_file(path) as temporary:
-        temporary.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")

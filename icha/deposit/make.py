@@ -1,7 +1,7 @@
-"""Making a deposit, as a folder and a zip: results with all that others need to understand, verify and reproduce them.
+"""Make a deposit, as a folder and a zip: results, and what others need to understand, verify and reproduce them.
 
-The same results and the same revision always give exactly the same files. A deposit adds no times and no names of
-people, machines or folders to those in the results, the configuration and the source.
+The same results and the same revision of the program always give exactly the same files. A deposit contains no times
+and no names of people, machines or folders, except those that the results, the configuration and the source contain.
 """
 
 import json
@@ -31,7 +31,7 @@ from icha.support.checksums import is_whole, recorded_hash, sha256_of, stale
 _BLOCK = 2**20
 # The time of every file in a zip, the earliest possible one.
 _NO_TIME = (1980, 1, 1, 0, 0, 0)
-# Number of the system in a zip that has modes of files.
+# Number by which a zip states that its modes of files are those of Unix.
 _UNIX = 3
 
 
@@ -68,7 +68,12 @@ def make_deposit(
     folder, archive, results = Path(folder), Path(archive), Path(results)
     files, publication = sorted(files), campaign.deposit_metadata()
     refuse_unknown_failures(read_checks(results / "checks.json"), [each.run for each in publication.known_failures])
-    _refuse_changed(results, files)
+    if changed := [f"  {results / file}" for file in files if not is_whole(results, file, thorough=True)]:
+        listed = "\n".join(changed)
+        raise ValueError(
+            "not published, because these files are not what their jobs wrote. Remove them, and run the campaign "
+            f"again:\n{listed}"
+        )
     staging = folder.with_name(f".{folder.name}.part")
     shutil.rmtree(staging, ignore_errors=True)
     try:
@@ -77,7 +82,9 @@ def make_deposit(
             shutil.copyfile(results / file, staging / file)
             (staging / file).chmod(0o644)
         source.export(staging / SOURCE)
-        _refuse_names(files_of(staging))
+        if wrong := [f"  {file!r} {why}" for file in files_of(staging) if (why := problem_with_name(file))]:
+            listed = "\n".join(wrong)
+            raise ValueError(f"not published, because of names of files. Rename these:\n{listed}")
         _describe(staging, files, campaign, source.revision, cost)
         checksums = {path: sha256_of(staging / path) for path in files_of(staging)}
         write_crate(staging, publication, jobs, campaign=campaign.name, revision=source.revision, checksums=checksums)
@@ -93,21 +100,6 @@ def make_deposit(
                 staging.rename(folder)
     finally:
         shutil.rmtree(staging, ignore_errors=True)
-
-
-def _refuse_names(files: Iterable[str]) -> None:
-    """Refuse names that `verify` would refuse."""
-    if wrong := [f"  {file!r} {problem}" for file in files if (problem := problem_with_name(file))]:
-        raise ValueError("not published, because of names of files. Rename these:\n" + "\n".join(wrong))
-
-
-def _refuse_changed(results: Path, files: Iterable[str]) -> None:
-    """Refuse results that are not what their jobs wrote, as far as that is recorded; every byte is read."""
-    if changed := [f"  {results / file}" for file in files if not is_whole(results, file, thorough=True)]:
-        raise ValueError(
-            "not published, because these files are not what their jobs wrote. Remove them, and run the campaign "
-            "again:\n" + "\n".join(changed)
-        )
 
 
 def refuse_mixed(results: Path, campaign: Campaign, recorded: Mapping[str, str]) -> None:
@@ -144,12 +136,12 @@ def refuse_mixed(results: Path, campaign: Campaign, recorded: Mapping[str, str])
 
 def _describe(staging: Path, files: Sequence[str], campaign: Campaign, revision: str, cost: Cost) -> None:
     """Write licence, citation, metadata, data dictionary and page of the deposit."""
-    publication, dictionary = campaign.deposit_metadata(), data_dictionary(staging, files)
+    publication = campaign.deposit_metadata()
     _write(staging / "LICENSE.txt", find_licence(publication.license).page())
     _write(staging / "CITATION.cff", citation_cff(publication, revision))
     for name, metadata in ((ZENODO, zenodo_metadata(publication)), ("datacite.json", datacite_metadata(publication))):
         _write(staging / name, json.dumps(metadata, indent=1, ensure_ascii=False, allow_nan=False) + "\n")
-    _write(staging / "data_dictionary.csv", dictionary_csv(dictionary))
+    _write(staging / "data_dictionary.csv", dictionary_csv(data_dictionary(staging, files)))
     error = staging / "aggregated/model_error.nc"
     # Opened and not loaded, because the dataset may be large and the page shows little of it.
     with xr.open_datatree(staging / f"dataset/{campaign.name}.nc", engine="netcdf4") as dataset:
@@ -159,7 +151,6 @@ def _describe(staging: Path, files: Sequence[str], campaign: Campaign, revision:
             dataset=dataset,
             checks=read_checks(staging / "checks.json"),
             model_error=read_campaign(error) if error.is_file() else None,
-            dictionary=dictionary,
             sizes={path: (staging / path).stat().st_size for path in files_of(staging)},
             cost=cost,
         )
@@ -172,7 +163,7 @@ def _write(path: Path, text: str) -> None:
 
 
 def _remove(folder: Path) -> None:
-    """Remove a folder; at no moment does an incomplete one have its name."""
+    """Remove a folder. It is renamed first, so that no incomplete folder has its name at any time."""
     if folder.is_dir():
         old = folder.with_name(f".{folder.name}.old")
         shutil.rmtree(old, ignore_errors=True)
@@ -181,7 +172,7 @@ def _remove(folder: Path) -> None:
 
 
 def _write_zip(path: Path, folder: Path, name: str) -> None:
-    """Write a folder to a zip, under the given name; without compression, since versions of zlib differ."""
+    """Write a folder to a zip, under the given name; without compression, because versions of zlib differ."""
     with zipfile.ZipFile(path, "w", zipfile.ZIP_STORED) as archive:
         for file in files_of(folder):
             status = (folder / file).stat()

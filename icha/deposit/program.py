@@ -3,7 +3,6 @@
 `python -m icha.deposit.program` prints the locked versions for `pip install --constraint`.
 """
 
-import contextlib
 import hashlib
 import importlib.metadata
 import importlib.util
@@ -13,7 +12,7 @@ import subprocess
 import tarfile
 import tomllib
 from base64 import urlsafe_b64decode
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 
@@ -172,12 +171,9 @@ def _listed(names: list[str]) -> str:
 
 def note_versions(results: Path) -> None:
     """Add the installed versions of the packages that ICHA requires to those noted before."""
-    noted, now = _noted(results), set()
-    for line in importlib.metadata.requires("icha") or ():
-        name = canonicalize_name(Requirement(line).name)
-        with contextlib.suppress(importlib.metadata.PackageNotFoundError):
-            if name != "icha":
-                now.add(f"{name}=={importlib.metadata.version(name)}")
+    noted, installed = _noted(results), installed_versions()
+    required = {canonicalize_name(Requirement(line).name) for line in importlib.metadata.requires("icha") or ()}
+    now = {f"{name}=={installed[name]}" for name in required - {"icha"} if name in installed}
     if not now <= noted:
         with whole_file(results / MADE_WITH) as temporary:
             temporary.write_text("".join(f"{line}\n" for line in sorted(noted | now)), encoding="utf-8")
@@ -220,9 +216,9 @@ def refuse_other_environment(project: Path, results: Path) -> None:
         raise ValueError(
             f"the environment is not that of uv.lock, which the deposit promises. Use {command}:\n{problems}"
         )
-    locked = _locked(lock)
+    locked = locked_versions(lock)
     made_with = (line.partition("==")[::2] for line in sorted(_noted(results)))
-    if other := [f"{name} {version}" for name, version in made_with if version not in locked.get(name, {version})]:
+    if other := [f"{name} {version}" for name, version in made_with if locked.get(name, version) != version]:
         raise ValueError(
             f"{results}: some results may have been made with other versions than those of uv.lock, which the deposit "
             f"promises. Remove {results}, and run the campaign again:\n{_listed(other)}"
@@ -234,37 +230,33 @@ def version_differences(lock: str) -> list[str]:
 
     Packages that are locked but not installed are left out, since no environment has all optional packages.
     """
-    locked = _locked(lock)
-    installed = {canonicalize_name(each.name): each.version for each in importlib.metadata.distributions() if each.name}
+    locked = locked_versions(lock)
     return [
-        f"  {name}: {version} is installed, {' or '.join(sorted(locked[name]))} is locked"
-        for name, version in sorted(installed.items())
-        if name in locked and version not in locked[name]
+        f"  {name}: {version} is installed, {locked[name]} is locked"
+        for name, version in sorted(installed_versions().items())
+        if locked.get(name, version) != version
     ]
 
 
-def _locked(lock: str) -> dict[str, set[str]]:
-    """Return the versions of every locked package; a name may have several, for several Pythons and systems."""
-    locked: dict[str, set[str]] = {}
-    for package in _packages(lock):
-        locked.setdefault(canonicalize_name(package["name"]), set()).add(package["version"])
-    return locked
+def installed_versions() -> dict[str, str]:
+    """Return the version of every installed package."""
+    return {canonicalize_name(each.name): each.version for each in importlib.metadata.distributions() if each.name}
 
 
-def _packages(lock: str) -> Iterator[dict]:
-    """Return packages of a lock, except the project itself, which has no version there."""
-    return (package for package in tomllib.loads(lock)["package"] if "editable" not in package["source"])
+def locked_versions(lock: str) -> dict[str, str]:
+    """Return the version of every package in the text of a lock file, for this Python and system.
 
-
-def constraints(lock: str) -> list[str]:
-    """Return the versions of a lock for this Python and system, as pip takes them."""
-    found = []
-    for package in _packages(lock):
+    The project itself is left out, because it has no version there.
+    """
+    found = {}
+    for package in tomllib.loads(lock)["package"]:
         markers = package.get("resolution-markers")
-        if markers is None or any(Marker(marker).evaluate() for marker in markers):
-            found.append(f"{package['name']}=={package['version']}")
+        applies = markers is None or any(Marker(marker).evaluate() for marker in markers)
+        if applies and "editable" not in package["source"]:
+            found[canonicalize_name(package["name"])] = package["version"]
     return found
 
 
 if __name__ == "__main__":
-    print("\n".join(constraints((own_workflow() / "uv.lock").read_text(encoding="utf-8"))))
+    for name, version in locked_versions((own_workflow() / "uv.lock").read_text(encoding="utf-8")).items():
+        print(f"{name}=={version}")

@@ -2,10 +2,9 @@
 
 import csv
 import io
-import math
 import re
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
@@ -23,7 +22,7 @@ from icha.configuration.publication import Publication
 from icha.configuration.surfaces import SelfAffineSurface
 from icha.contact.models import MODEL_PAPER
 from icha.datasets.campaign import run_place, runs_of_status
-from icha.datasets.labels import LABELS, RunLabels, slopes_of
+from icha.datasets.labels import LABELS, slopes_of
 from icha.datasets.results import LOOP, RUN, SOLUTION, SURFACE, THEORIES
 from icha.datasets.variables.campaign import COMPLETE, FAILED_CHECKS, INCOMPLETE, NOT_IN_DESIGN, STATUS_MEANINGS
 from icha.deposit.metadata import TABLES, acknowledgement, find_licence, paragraphs, web_address
@@ -41,8 +40,6 @@ _KINDS = [
     for pattern in (SURFACE, RUN, SOLUTION, LOOP, THEORIES)
     for folder in ("", "<model>/")
 ]
-# Number of values of a variable that are read at once.
-_BLOCK = 2**22
 # Number of entries after which a list is cut.
 _MOST_NAMES = 12
 _METADATA = "citation, licence and provenance for people and machines"
@@ -61,7 +58,6 @@ class Entry(NamedTuple):
     file : path of the files, with placeholders for what differs.
     group, variable, dimensions, type, units, long_name, flags, missing, comment : as in the files.
     files : number of files with the variable.
-    smallest, largest : over all values that are not missing; None for text.
     """
 
     file: str
@@ -75,8 +71,6 @@ class Entry(NamedTuple):
     missing: str
     comment: str
     files: int
-    smallest: float | int | None
-    largest: float | int | None
 
 
 def data_dictionary(folder: Path, files: Iterable[str]) -> list[Entry]:
@@ -87,22 +81,14 @@ def data_dictionary(folder: Path, files: Iterable[str]) -> list[Entry]:
     folder : the folder of the files.
     files : their paths from there; files that are not netCDF are skipped.
     """
-    found: dict[tuple, list] = {}
+    found: Counter[tuple[str, ...]] = Counter()
     for name in sorted(files):
-        if not name.endswith(".nc"):
-            continue
-        with netCDF4.Dataset(folder / name) as file:
-            file.set_auto_scale(False)
-            for group in _groups(file):
-                for variable in group.variables.values():
-                    found.setdefault((file_pattern(name), group.path, *_described(variable)), []).append(
-                        _range(variable)
-                    )
-    entries = []
-    for key, ranges in found.items():
-        smallest, largest = ([value for value in values if value is not None] for values in zip(*ranges, strict=True))
-        entries.append(Entry(*key, len(ranges), min(smallest, default=None), max(largest, default=None)))
-    return entries
+        if name.endswith(".nc"):
+            with netCDF4.Dataset(folder / name) as file:
+                for group in (file, *file.groups.values()):
+                    for variable in group.variables.values():
+                        found[file_pattern(name), group.path, *_described(variable)] += 1
+    return [Entry(*key, count) for key, count in found.items()]
 
 
 def dictionary_csv(entries: Iterable[Entry]) -> str:
@@ -115,12 +101,6 @@ def dictionary_csv(entries: Iterable[Entry]) -> str:
 def file_pattern(path: str) -> str:
     """Return the path pattern of a kind of file, such as `surfaces/<surface>/<seed>.nc`."""
     return next((kind for kind in _KINDS if re.fullmatch(re.sub("<.*?>", "[^/]+", kind), path)), path)
-
-
-def _groups(group) -> Iterator[netCDF4.Dataset]:
-    yield group
-    for inner in group.groups.values():
-        yield from _groups(inner)
 
 
 def _described(variable) -> tuple[str, ...]:
@@ -146,20 +126,6 @@ def _described(variable) -> tuple[str, ...]:
     )
 
 
-def _range(variable) -> tuple[float | int | None, float | int | None]:
-    """Return the smallest and the largest value of a variable of numbers, read block by block."""
-    if np.dtype(variable.dtype).kind not in "fiu":
-        return None, None
-    rows = max(1, _BLOCK // max(1, math.prod(variable.shape[1:])))
-    smallest, largest = [], []
-    for begin in range(0, variable.shape[0] if variable.shape else 1, rows):
-        block = np.ma.masked_invalid(variable[begin : begin + rows] if variable.shape else variable[...])
-        if block.count():
-            smallest.append(block.min().item())
-            largest.append(block.max().item())
-    return min(smallest, default=None), max(largest, default=None)
-
-
 def readme(
     campaign: Campaign,
     *,
@@ -167,7 +133,6 @@ def readme(
     dataset: xr.DataTree,
     checks: Sequence[Check],
     model_error: xr.DataTree | None,
-    dictionary: Sequence[Entry],
     sizes: Mapping[str, int],
     cost: Cost,
 ) -> str:
@@ -178,7 +143,6 @@ def readme(
     campaign : the configuration, with complete metadata.
     revision : that of the source.
     dataset, checks, model_error : the results of the campaign.
-    dictionary : the variables of all files.
     sizes : bytes of every file, by its path in the deposit.
     cost : expected cost of computing the whole campaign.
     """
@@ -191,7 +155,6 @@ def readme(
         summary=paragraphs(publication.summary),
         licence=find_licence(publication.license),
         revision=revision,
-        variables=_short_dictionary(dictionary, campaign.name),
         cost=cost,
         addresses={each.identifier: web_address(each.identifier) for each in publication.related_identifiers},
         parts=_parts(sizes),
@@ -222,7 +185,6 @@ def _template() -> jinja2.Template:
         "size": formatting.size,
         "duration": formatting.duration,
         "span": _span,
-        "seeds": _seeds,
         "few": _few,
     }
     return environment.get_template(_TEMPLATE)
@@ -239,8 +201,6 @@ def _settings(campaign: Campaign) -> dict:
         "surfaces": surfaces,
         "materials": materials,
         "self_affine": any(isinstance(each, SelfAffineSurface) for each in surfaces.values()),
-        "sides": {name: _known(campaign.period, name, "{:.4g}") for name in surfaces},
-        "grids": {name: _known(campaign.grid, name, "{}") for name in surfaces},
         "adhesive": any(material.surface_energy > 0 for material in campaign.materials.values()),
         "both_ways": any(study.unload or study.turning_points for study in campaign.studies.values()),
         "installed": (*further_software(campaign), "environment")[0],
@@ -248,30 +208,28 @@ def _settings(campaign: Campaign) -> dict:
     }
 
 
-def _known(quantity: Callable[[str], float], surface: str, form: str) -> str:
-    """Write a property of a surface; empty for files that have not been read."""
-    try:
-        return form.format(quantity(surface))
-    except AttributeError:
-        return ""
-
-
 def _outcome(publication: Publication, dataset: xr.DataTree, checks: Sequence[Check]) -> dict:
     """Return complete and incomplete runs, and their checks."""
-    designs = _study_designs(dataset)
     known = {failure.run: failure.reason for failure in publication.known_failures}
-    complete = _runs_of_status(dataset, COMPLETE)
-    incomplete = _runs_of_status(dataset, INCOMPLETE) | _runs_of_status(dataset, FAILED_CHECKS)
-    example = next(iter(complete or incomplete))
+    designs, incomplete, complete = [], [], []
+    for name, node in dataset.children.items():
+        study = node.to_dataset()
+        counts = Counter(study["status"].values.ravel().tolist())
+        axes = {each: slopes_of(study) if each == "rms_slope" else study[each].values.tolist() for each in LABELS}
+        status = {text: counts[k] for k, text in enumerate(STATUS_MEANINGS)}
+        designs.append({"name": name, "status": status, "runs": counts.total() - counts[NOT_IN_DESIGN], **axes})
+        complete += runs_of_status(study, name, (COMPLETE,))
+        for labels in runs_of_status(study, name, (INCOMPLETE, FAILED_CHECKS)):
+            run = study[["step_count", "failure"]].isel(run_place(study, labels))
+            facts = {"steps": int(run["step_count"]), "failure": run["failure"].item()}
+            incomplete.append({"labels": labels, "reason": known.get(str(labels), ""), **facts})
+    example = complete[0] if complete else incomplete[0]["labels"]
     study = dataset[example.study].to_dataset()
     meaning = "0 if the run reached the end of its path, else 1"
     return {
         "designs": designs,
         "partial": [study["name"] for study in designs if study["status"][STATUS_MEANINGS[NOT_IN_DESIGN]]],
-        "incomplete": [
-            {"labels": labels, "steps": steps, "failure": failure, "reason": known.get(str(labels), "")}
-            for labels, (steps, failure) in incomplete.items()
-        ],
+        "incomplete": incomplete,
         "example": example,
         # Slopes that differ between surfaces have no index by which to select.
         "slope_place": run_place(study, example)["rms_slope"] if study["rms_slope"].ndim == 2 else None,
@@ -282,29 +240,6 @@ def _outcome(publication: Publication, dataset: xr.DataTree, checks: Sequence[Ch
         "passed": sum(check.passed for check in checks),
         "total": len(checks),
     }
-
-
-def _study_designs(dataset: xr.DataTree) -> list[dict]:
-    """Return the labels of every study, and the number of its runs with each status."""
-    designs = []
-    for name, study in dataset.children.items():
-        counts = Counter(study["status"].values.ravel().tolist())
-        status = {text: counts[k] for k, text in enumerate(STATUS_MEANINGS)}
-        runs = sum(counts.values()) - counts[NOT_IN_DESIGN]
-        labels = {each: slopes_of(study) if each == "rms_slope" else study[each].values.tolist() for each in LABELS}
-        designs.append({"name": name, "status": status, "runs": runs, **labels})
-    return designs
-
-
-def _runs_of_status(dataset: xr.DataTree, status: int) -> dict[RunLabels, tuple[int, str]]:
-    """Return number of steps, and reason for a failure, of the runs of a status in a campaign dataset."""
-    found = {}
-    for name, node in dataset.children.items():
-        study = node.to_dataset()
-        for labels in runs_of_status(study, name, (status,)):
-            run = study.isel(run_place(study, labels))
-            found[labels] = int(run["step_count"]), str(run["failure"].values)
-    return found
 
 
 def _model_errors(tree: xr.DataTree) -> list[dict]:
@@ -326,15 +261,6 @@ def _model_errors(tree: xr.DataTree) -> list[dict]:
             ranges = {name: (float(each.min()), float(each.max())) for name, each in values.items()}
             found.append({"entry": entry, "study": data.attrs["study"], "material": material, **ranges})
     return found
-
-
-def _short_dictionary(dictionary: Sequence[Entry], campaign: str) -> list[Entry]:
-    """Return the variables of the campaign dataset, except those of single spots and events, each once."""
-    found = {}
-    for entry in dictionary:
-        if entry.file == f"dataset/{campaign}.nc" and not {"spot", "event"} & set(entry.dimensions.split()):
-            found.setdefault(entry.variable, entry)
-    return list(found.values())
 
 
 def _parts(sizes: Mapping[str, int]) -> list[dict]:
@@ -379,11 +305,3 @@ def _span(values, form="{:z.3g}") -> str:
     """Write the smallest and largest value, or the only one."""
     least, most = form.format(min(values)), form.format(max(values))
     return least if least == most else f"{least} to {most}"
-
-
-def _seeds(values: Sequence[int]) -> str:
-    """Write seeds as a range, `1..50`, or a list."""
-    values = sorted(values)
-    if len(values) > 2 and values == list(range(values[0], values[-1] + 1)):
-        return f"{values[0]}..{values[-1]}"
-    return ", ".join(map(str, values))

@@ -1,10 +1,11 @@
 """A client for Zenodo's deposit API (https://developers.zenodo.org), and for other servers with the same API."""
 
+import contextlib
 import hashlib
 import os
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 from urllib.parse import quote, urlsplit
 
 import requests
@@ -53,7 +54,8 @@ class Draft(NamedTuple):
     files: dict[str, tuple[str, str]]
 
 
-# Requests that can be repeated are, after 0, 2, 4, 8, 16 s, or after the time that the server asks for, at most 300 s.
+# Requests that can be repeated are repeated after 0, 2, 4, 8 and 16 s, or after the time that the server states, at
+# most 300 s.
 _PATIENCE = Retry(
     total=5, backoff_factor=1, status_forcelist=_FAILING, redirect=0, raise_on_status=False, retry_after_max=300
 )
@@ -107,19 +109,10 @@ class Zenodo:
         """Return an existing draft."""
         content = self._call("GET", f"/api/deposit/depositions/{quote(number, safe='')}")
         if content.get("submitted") is True or content.get("state") == "done":
-            raise ZenodoError(f"{number} is published already. Use --new-version-of {number} for a new version of it")
-        return self._draft(content)
-
-    def new_version(self, number: str) -> Draft:
-        """Make a draft of a new version of a published record; it begins with the files of the previous version."""
-        content = self._call("POST", f"/api/deposit/depositions/{quote(number, safe='')}/actions/newversion")
-        found = _text(content, "links", "latest_draft").rstrip("/").rpartition("/")[2]
-        if found in ("", number):
             raise ZenodoError(
-                f"{self.address} returns no draft of a new version of {number}. If a draft exists already, continue it "
-                "with --draft"
+                f"{number} is published already. Make a draft of a new version on its page, and upload with --draft"
             )
-        return self.draft(found)
+        return self._draft(content)
 
     def describe(self, draft: Draft, metadata: Mapping) -> None:
         """Set the metadata of a draft, as https://developers.zenodo.org/#representation lists them."""
@@ -129,7 +122,7 @@ class Zenodo:
         """Send a file, read in pieces; return whether the server has confirmed its checksum `md5`."""
         name = Path(path).name
         with open(path, "rb") as file:
-            received = _md5(self._call("PUT", f"{draft.bucket}/{quote(name)}", data=file))
+            received = _md5(self._call("PUT", f"/{draft.bucket}/{quote(name)}", data=file))
         if received and received != md5:
             raise ZenodoError(
                 f"{name} did not arrive as it was sent: its MD5 is {md5}, that on the server is {received}"
@@ -141,28 +134,22 @@ class Zenodo:
         identifier, _ = draft.files[name]
         self._call("DELETE", f"/api/deposit/depositions/{draft.number}/files/{quote(identifier, safe='')}")
 
-    def publish(self, draft: Draft) -> tuple[str, str]:
-        """Publish a draft, which cannot be undone; return its page and DOI."""
-        content = self._call("POST", f"/api/deposit/depositions/{draft.number}/actions/publish")
-        page = _text(content, "links", "record_html") or f"{self.address}/records/{draft.number}"
-        return page, _text(content, "doi") or draft.doi
-
-    def _draft(self, content: Mapping) -> Draft:
-        number, bucket = _text(content, "id"), _text(content, "links", "bucket")
-        if not number or not bucket:
-            raise ZenodoError(f"{self.address} does not answer as Zenodo does: its draft has no number or no bucket")
-        if not bucket.startswith(f"{self.address}/"):
+    def _draft(self, content: dict) -> Draft:
+        try:
+            links, metadata, number = content["links"], content.get("metadata", {}), str(content["id"])
+            draft = Draft(
+                number,
+                page=links.get("html", f"{self.address}/uploads/{number}"),
+                bucket=links["bucket"].removeprefix(f"{self.address}/"),
+                doi=metadata.get("prereserve_doi", metadata).get("doi", ""),
+                files={file["filename"]: (file["id"], _md5(file)) for file in content.get("files", [])},
+            )
+        except (KeyError, TypeError, AttributeError):
+            raise ZenodoError(f"{self.address} does not answer as Zenodo does: its draft is incomplete") from None
+        if draft.bucket == links["bucket"]:
             # The token must not reach another server.
-            raise ZenodoError(f"{self.address} asks to send the files to another server: {self._plain(bucket)}")
-        listed = content.get("files")
-        files = {
-            _text(file, "filename") or _text(file, "key"): (_text(file, "id"), _md5(file))
-            for file in (listed if isinstance(listed, list) else ())
-            if isinstance(file, dict)
-        }
-        doi = _text(content, "metadata", "prereserve_doi", "doi") or _text(content, "metadata", "doi")
-        page = _text(content, "links", "html") or f"{self.address}/uploads/{number}"
-        return Draft(number, page, bucket.removeprefix(self.address).rstrip("/"), doi, files)
+            raise ZenodoError(f"{self.address} asks to send the files to another server: {self._plain(draft.bucket)}")
+        return draft
 
     def _call(self, method: str, path: str, **content) -> dict:
         """Send a request; return its JSON, or {} if the answer is empty."""
@@ -180,21 +167,16 @@ class Zenodo:
             )
         if not answer.ok:
             raise ZenodoError(self._refusal(path, answer))
-        try:
-            found = answer.json() if answer.content else {}
-        except (ValueError, RecursionError):
-            found = None
-        if not isinstance(found, dict):
-            raise ZenodoError(f"{self.address} does not answer as Zenodo does: {path} is not a mapping")
-        return found
+        with contextlib.suppress(ValueError, RecursionError):
+            if isinstance(found := answer.json() if answer.content else {}, dict):
+                return found
+        raise ZenodoError(f"{self.address} does not answer as Zenodo does: {path} is not a mapping")
 
     def _refusal(self, path: str, answer: requests.Response) -> str:
         """Describe why the server refused a request: its message, and advice."""
         advice = _ADVICE.get(answer.status_code, "").format(self.address)
         if answer.status_code in _FAILING:
             advice = "it is busy or has failed; try again in a while"
-        elif answer.status_code == 400 and path.endswith("/newversion"):
-            advice = "if a draft of a new version exists already, continue it with --draft"
         reason = self._plain(answer.text or answer.reason)
         return f"{self.address} refuses {path} ({answer.status_code}): {'; '.join(filter(None, (reason, advice)))}"
 
@@ -204,14 +186,6 @@ class Zenodo:
         return plain if len(plain) <= _LONGEST else f"{plain[: _LONGEST - 1]}…"
 
 
-def _text(content: Any, *keys: str) -> str:
-    """Return a text or number in nested mappings of an answer, as text; empty if it is missing."""
-    for key in keys:
-        content = content.get(key) if isinstance(content, dict) else None
-    return str(content) if isinstance(content, str | int) else ""
-
-
-def _md5(content: Mapping) -> str:
+def _md5(content: dict) -> str:
     """Return the checksum that the server reports for a file, with or without the prefix `md5:`."""
-    algorithm, _, digits = _text(content, "checksum").rpartition(":")
-    return digits.lower() if algorithm in ("", "md5") else ""
+    return str(content.get("checksum", "")).removeprefix("md5:").lower()

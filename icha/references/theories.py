@@ -14,14 +14,15 @@ from icha.references import persson, summit_theories
 from icha.surfaces.moments import SpectralMoments
 from icha.surfaces.spectrum import SelfAffineSpectrum
 
-REDUCED_PRESSURES = np.geomspace(1e-5, 1.0, 101)
+REDUCED_PRESSURES = np.geomspace(1e-5, 3.0, 111)
 SUMMIT_AREAS = np.geomspace(1e-5, summit_theories.SEPARATE_SUMMITS_AREA_LIMIT, 81)
 
 
 def literature(name: str) -> dict:
     """Return published numbers: one entry of `literature.json`, with title, description, citation, DOIs and units.
 
-    Entries are `gfmd_area`, `area_slope` and `contact_mechanics_challenge`. The lists of an entry have the same points.
+    Entries are `gfmd_area`, `gfmd_gap`, `area_slope` and `contact_mechanics_challenge`. The lists of an entry have the
+    same points.
     """
     return json.loads(files("icha.references").joinpath("literature.json").read_text(encoding="utf-8"))[name]
 
@@ -70,6 +71,7 @@ _PRESSURE, _AREA, _SEPARATION, _NAYAK = (
 )
 
 _PERSSON = "B. N. J. Persson, J. Chem. Phys. 115 (2001) 3840, doi:10.1063/1.1388626"
+_XU = "Y. Xu, L. Zhu, F. Xiao and Y. Zhou, Tribol. Lett. 72 (2024), doi:10.1007/s11249-024-01838-4, gamma = 0.45"
 _YANG = "C. Yang and B. N. J. Persson, J. Phys.: Condens. Matter 20 (2008) 215214, gamma = 0.45"
 _BUSH = "A. W. Bush, R. D. Gibson and T. R. Thomas, Wear 35 (1975) 87, doi:10.1016/0043-1648(75)90145-3"
 _GREENWOOD = (
@@ -92,6 +94,9 @@ def _mean_field_theories(pressure, spectrum):
     variables = {
         dim: _variable(dim, pressure, _PRESSURE),
         "persson_area_fraction": _variable(dim, persson.persson_area(pressure), f"{_AREA}, Persson", _PERSSON),
+        "xu_area_fraction": _variable(
+            dim, persson.corrected_persson_area(pressure), f"{_AREA}, Persson corrected by Xu and others", _XU
+        ),
     }
     if spectrum is not None:
         separation = persson.persson_mean_separation(pressure, spectrum)
@@ -148,5 +153,9 @@ def _published_points(spectrum):
     points = gfmd["citation"] + " " + gfmd["description"]
     return {
         f"gfmd_{name}": _variable("gfmd_point", np.array(gfmd[name]), f"{long_name}, GFMD", points)
-        for name, long_name in (("reduced_pressure", _PRESSURE), ("area_fraction", _AREA))
+        for name, long_name in (
+            ("reduced_pressure", _PRESSURE),
+            ("area_fraction", _AREA),
+            ("area_scatter", f"standard deviation over realisations of the {_AREA}"),
+        )
     }

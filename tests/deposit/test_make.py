@@ -16,7 +16,6 @@ import netCDF4
 import numpy as np
 import pytest
 import small_campaign as small
-import xarray as xr
 import yaml
 from conftest import REPOSITORY, copy_project, snakemake_command
 from outside_validators import problems_with
@@ -31,11 +30,11 @@ from icha.configuration.load import collect_inputs, load_configuration
 from icha.configuration.publication import KnownFailure
 from icha.datasets.campaign_file import write_campaign
 from icha.datasets.files import write_dataset
-from icha.deposit import make, readme
+from icha.deposit import make
 from icha.deposit.crate import Job
 from icha.deposit.make import make_deposit, refuse_mixed
 from icha.deposit.program import Source
-from icha.deposit.readme import data_dictionary, file_pattern
+from icha.deposit.readme import file_pattern
 from icha.deposit.verify import COMPUTED
 from icha.planning.costs import Cost
 from icha.planning.results import campaign_files
@@ -173,12 +172,10 @@ def test_the_dictionary_has_every_variable_and_no_other(published):
     assert all(row["units"] and row["long_name"] for row in rows.values())
     run = file_pattern(f"runs/{RUN}.nc"), "/"
     row = rows[*run, "contact_area_fraction"]
-    area = xr.load_dataset(published / f"runs/{RUN}.nc").contact_area_fraction
-    assert (float(row["smallest"]), float(row["largest"])) == (float(area.min()), float(area.max()))
     assert (row["dimensions"], row["type"]) == ("step", "float64")
     assert rows["dataset/tiny.nc", "/load", "status"]["flags"].startswith("0: complete, 1: incomplete")
     row = rows[*run, "step_kind"]
-    assert (row["type"], row["dimensions"], row["smallest"]) == ("text", "step", "")
+    assert (row["type"], row["dimensions"]) == ("text", "step")
 
 
 @pytest.mark.slow
@@ -231,13 +228,10 @@ def test_it_has_no_places_times_or_persons(project, published):
 
 @pytest.mark.slow
 def test_computed_again_it_has_the_same_bytes(published, tmp_path):
-    asked = ["--folder", str(tmp_path / "again"), "--json", str(tmp_path / "out.json")]
-    done = CliRunner().invoke(app, ["reproduce", f"{published}.zip", *asked])
+    done = CliRunner().invoke(app, ["reproduce", f"{published}.zip", "--folder", str(tmp_path / "again")])
     assert done.exit_code == 0, done.output
-    files = json.loads((tmp_path / "out.json").read_text())["files"]
-    there = {path for path in files_of(published) if path.endswith((".nc", ".png", ".pdf"))}
-    assert {file["path"] for file in files} == {*there, "report.html", "checks.json", "verdict.txt"}
-    assert {file["verdict"] for file in files} == {"identical"}
+    computed = [path for path in files_of(published) if path.endswith((".nc", ".png", ".pdf"))]
+    assert f"identical: {len(computed) + 3} files, every value" in done.output  # report, checks, verdict
 
 
 # Made in this process.
@@ -409,18 +403,3 @@ def test_files_are_stored_with_the_configuration(tmp_path):
     again = load_configuration(kept / "config.used.yaml")
     assert campaign_sha256(again.campaign) == campaign_sha256(asked.campaign)
     assert collect_inputs(again) == (text, {place: str(kept / place) for place in files})
-
-
-def test_ranges_leave_out_what_is_missing_and_do_not_hang_on_the_size_of_blocks(tmp_path, monkeypatch):
-    values = np.random.default_rng(1).normal(size=(7, 5))
-    values[2, 3], values[0, 0], values[6, 4] = np.nan, 1e30, -1e30
-    with netCDF4.Dataset(tmp_path / "a.nc", "w") as file:
-        for dim, size in zip("xy", values.shape, strict=True):
-            file.createDimension(dim, size)
-        file.createVariable("v", "f8", ("x", "y"), fill_value=-1e30)[:] = values
-        file.createVariable("none", "i4", ("y",), fill_value=-9)[:] = -9
-    for block in (1, 8, 10**6):
-        monkeypatch.setattr(readme, "_BLOCK", block)
-        first, second = data_dictionary(tmp_path, ["a.nc", "b.txt"])
-        assert (first.smallest, first.largest) == (np.nanmin(np.where(values == -1e30, np.nan, values)), 1e30)
-        assert (second.smallest, second.largest) == (None, None) and second.missing.startswith("-9")

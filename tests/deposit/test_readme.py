@@ -69,7 +69,6 @@ def page_of(tree, checks, campaign):
         dataset=tree,
         checks=checks,
         model_error=None,
-        dictionary=[],
         sizes={"dataset/smoke.nc": 2_000_000, "report.html": 340_000, "source/icha/asperity/jkr.py": 10**9},
         cost=Cost(60.0, 2e8, 7e6),
     )

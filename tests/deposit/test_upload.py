@@ -113,10 +113,6 @@ class Handler(BaseHTTPRequestHandler):
         if self.command == "DELETE":
             del server.files[parts[5].removeprefix("id-")]
             return self.answer(204)
-        if parts[-1] == "publish":
-            server.published = True
-            links = {"record_html": f"{server.address}/records/77"}
-            return self.answer(202, {"doi": "10.5072/zenodo.77", "links": links})
         if self.command == "PUT":
             server.metadata = json.loads(body)["metadata"]
         return self.answer(201 if self.command == "POST" else 200, server.deposition())
@@ -162,28 +158,26 @@ def break_off(handler):
 
 def test_a_deposit_goes_to_zenodo_and_comes_back(tmp_path, deposit):
     with spawn(tmp_path / "zenodo") as address:
-        status, output = upload(deposit, "--url", address, "--publish", "--yes")
+        status, output = upload(deposit, "--url", address, "--yes")
         assert status == 0, output
-        number = re.search(r"published: \S+/records/(\d+)", output)[1]
-        assert f"DOI:       10.5072/zenodo.{number}" in output
+        number, page = re.search(r"DOI: +10.5072/zenodo.(\d+) ", output)[1], f"{address}/api/deposit/depositions"
+        token = {"Authorization": f"Bearer {TOKEN}"}
+        requests.post(f"{page}/{number}/actions/publish", headers=token).raise_for_status()
         record = requests.get(f"{address}/api/records/{number}").json()
         assert {key: record["metadata"][key] for key in METADATA} == METADATA
-        assert {file["key"] for file in record["files"]} == SENT
         got = {file["key"]: requests.get(file["links"]["download"]).content for file in record["files"]}
-        assert got[f"{NAME}.zip"] == deposit.read_bytes()
+        assert set(got) == SENT and got[f"{NAME}.zip"] == deposit.read_bytes()
         assert got["README.md"] == FILES["README.md"]
-        # A new version begins with the files of the one before, of which none is left.
+        # A draft of a new version, made on the page, is continued like any other.
+        answer = requests.post(f"{page}/{number}/actions/newversion", headers=token).json()
+        after = answer["links"]["latest_draft"].rpartition("/")[2]
         (tmp_path / "next").mkdir()
         other = make_deposit(tmp_path / "next", version="1.1.0").rename(tmp_path / "next/mine-1.1.0.zip")
-        status, output = upload(other, "--url", address, "--new-version-of", number, "--publish", "--yes")
-        assert status == 0, output
-        after = re.search(r"published: \S+/records/(\d+)", output)[1]
-        record = requests.get(f"{address}/api/records/{after}").json()
-        assert after != number and record["metadata"]["version"] == "1.1.0"
-        assert {file["key"] for file in record["files"]} == SENT - {deposit.name} | {other.name}
+        status, output = upload(other, "--url", address, "--draft", after, "--yes")
+        assert status == 0 and f"{deposit.name}: another file of the draft, not changed" in output, output
 
 
-def test_it_stays_a_draft_that_another_call_publishes_without_sending_it_twice(server, deposit):
+def test_another_call_continues_a_draft_and_sends_nothing_twice(server, deposit):
     status, output = upload(deposit.parent / NAME, "--url", server.address, "--yes")  # the folder
     assert status == 0 and f"{server.address}/deposit/77" in output and "10.5072/zenodo.77 (reserved)" in output
     assert "checksum confirmed" in output and not server.published
@@ -193,35 +187,26 @@ def test_it_stays_a_draft_that_another_call_publishes_without_sending_it_twice(s
     del server.requests[:]
     server.files["README.md"] = b"of another version"
     server.files["photo.jpg"] = b"of the author's"
-    status, output = upload(deposit, "--url", server.address, "--draft", "77", "--publish", "--yes")
-    assert status == 0 and server.published and f"{deposit.name}: already sent" in output
+    status, output = upload(deposit, "--url", server.address, "--draft", "77", "--yes")
+    assert status == 0 and f"{deposit.name}: already sent" in output
     assert "photo.jpg: another file of the draft, not changed" in output
     sent = [path for method, path, _ in server.requests if method == "PUT" and "/files/" in path]
     assert sent == ["/api/files/b-77/README.md"] and server.files["README.md"] == FILES["README.md"]
     assert set(server.files) == SENT | {"photo.jpg"}
+    server.published = True
     status, output = upload(deposit, "--url", server.address, "--draft", "77", "--yes")
-    assert status == 1 and "77 is published already" in output and "--new-version-of 77" in output
+    assert status == 1 and "77 is published already" in output
 
 
-def test_nothing_is_sent_without_consent(server, deposit):
-    status, output = upload(deposit, "--url", server.address, "--publish")
+def test_nothing_is_sent_without_consent(server, deposit, monkeypatch):
+    status, output = upload(deposit, "--url", server.address)
     assert status == 2 and "nothing was sent. Use --yes" in output
     for text in ("A campaign", "1.0.0", "Carberry, Josiah; The team", "cc-by-4.0", "contact", server.address, *SENT):
         assert text in output
-    assert f"({deposit.stat().st_size:,} bytes)" in output and server.requests == []
-
-
-@pytest.mark.parametrize(("answers", "status", "requests_made"), [([False], 1, 0), ([True, False], 0, 5)])
-def test_a_declined_question(answers, status, requests_made, server, deposit, monkeypatch):
-    """At a terminal, the first question is about sending, the second about publishing."""
-    asked = []
-    monkeypatch.setattr(deposits, "confirm", lambda question: asked.append(question) or answers[len(asked) - 1])
-    terminal = SimpleNamespace(isatty=lambda: True)
-    monkeypatch.setattr(deposits, "sys", SimpleNamespace(stdin=terminal))
-    assert upload(deposit, "--url", server.address, "--publish")[0] == status
-    assert len(asked) == len(answers) and "Send it?" in asked[0]
-    assert all("cannot be deleted" in question for question in asked[1:])
-    assert len(server.requests) == requests_made and not server.published
+    assert f"({deposit.stat().st_size:,} bytes)" in output
+    monkeypatch.setattr(deposits, "confirm", lambda question: False)
+    monkeypatch.setattr(deposits, "sys", SimpleNamespace(stdin=SimpleNamespace(isatty=lambda: True)))
+    assert upload(deposit, "--url", server.address)[0] == 1 and server.requests == []
 
 
 def test_what_cannot_be_sent_is_refused_before_anything_is_asked(server, deposit, tmp_path):
@@ -235,7 +220,6 @@ def test_what_cannot_be_sent_is_refused_before_anything_is_asked(server, deposit
     assert "is not a token" in refused(deposit, *url, token="two words")
     assert "no such file" in refused(tmp_path / "none.zip", *url)
     assert "exclude each other" in refused(deposit, "--sandbox", *url)
-    assert "exclude each other" in refused(deposit, "--draft", "1", "--new-version-of", "2", *url)
     refused(deposit, "--draft", "mine", *url)
     assert "over http" in refused(deposit, "--url", "http://zenodo.org")
     (tmp_path / "reserved").mkdir()
@@ -278,7 +262,7 @@ POST, PUT, ZIP = ("POST", "depositions"), ("PUT", "depositions"), ("PUT", ".zip"
         (POST, refuse(200, {"id": 1, "links": {"bucket": ELSEWHERE}}), "another server"),
         (POST, refuse(200, [1]), "does not answer as Zenodo does"),
         (POST, refuse(200, {"id": 1, "links": None}), "does not answer as Zenodo does"),
-        (POST, refuse(200, {"id": 1, "links": {"bucket": 3}}), "to send the files to another server"),
+        (POST, refuse(200, {"id": 1, "links": {"bucket": 3}}), "does not answer as Zenodo does"),
         (POST, refuse(400, {"errors": 1}), "(400)"),
         (POST, refuse(503, {"message": "busy"}), "try again in a while"),
         (POST, break_off, "ended the connection"),
@@ -290,9 +274,8 @@ POST, PUT, ZIP = ("POST", "depositions"), ("PUT", "depositions"), ("PUT", ".zip"
 )
 def test_refusals_of_a_server_are_shown_with_advice(server, deposit, request_, action, message):
     server.failures.append((*request_, action))
-    status, output = upload(deposit, "--url", server.address, "--publish", "--yes")
+    status, output = upload(deposit, "--url", server.address, "--yes")
     assert status == 1 and message in output, output
-    assert not server.published
     # Nothing that makes something is tried twice, and a draft that is left behind can be continued.
     assert [method for method, _, _ in server.requests].count("POST") == 1
     if request_[0] == "PUT":
@@ -304,13 +287,6 @@ def test_refusals_of_a_server_are_shown_with_advice(server, deposit, request_, a
         assert "--draft" not in output
 
 
-@pytest.mark.parametrize("links", [None, [], {"latest_draft": 7}, {"latest_draft": "http://["}])
-def test_a_draft_of_a_new_version_that_is_nowhere(links, server, deposit):
-    server.failures += [("POST", "newversion", refuse(201, {"links": links})), ("GET", "depositions", refuse(404))]
-    status, output = upload(deposit, "--url", server.address, "--new-version-of", "7", "--yes")
-    assert status == 1 and "Error: " in output, output
-
-
 def test_what_fails_for_the_moment_is_tried_again(server, deposit, monkeypatch):
     monkeypatch.setattr(client, "_PATIENCE", client._PATIENCE.new(backoff_factor=0))
     server.failures += [
@@ -318,10 +294,8 @@ def test_what_fails_for_the_moment_is_tried_again(server, deposit, monkeypatch):
         ("PUT", ".zip", break_off),
         ("PUT", ".zip", refuse(503, Retry_After="0")),
         ("PUT", "README", refuse(502)),
-        ("POST", "publish", refuse(202, {"links": None, "doi": ["x"]})),
     ]
-    status, output = upload(deposit, "--url", server.address, "--publish", "--yes")
-    assert status == 0 and f"published: {server.address}/records/77" in output and "10.5072/zenodo.77" in output
+    assert upload(deposit, "--url", server.address, "--yes")[0] == 0
     # Every time from its beginning.
     assert server.failures == [] and server.files[deposit.name] == deposit.read_bytes()
 

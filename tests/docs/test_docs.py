@@ -161,7 +161,7 @@ def write_results(folder, campaign):
     runs = []
     for case in run_cases(campaign):
         path = campaign.studies[case.study].path_settings(campaign.snapshots_of(case.study))
-        material = campaign.materials[case.material].model_dump()
+        material = campaign.materials[case.material].model_dump(exclude_none=True)
         runs.append((case, small_run(case, (frozen(path), frozen(material)))))
     attributes = {"title": campaign.title, "campaign": campaign.name}
     write_dataset(campaign_tree(runs, attrs=attributes), folder / f"results/{campaign.name}/dataset/{campaign.name}.nc")

@@ -28,6 +28,17 @@ def test_persson_pressures_carry_the_area_and_the_load(p):
     assert persson.persson_pressure_density(-0.1, p) == 0
 
 
+def test_the_correction_of_xu_brings_persson_close_to_gfmd():
+    """At small loads the area is larger by 1/sqrt(gamma); in full contact there is nothing to correct."""
+    small = persson.corrected_persson_area(1e-8) / persson.persson_area(1e-8)
+    assert small == pytest.approx(persson.XU_GAMMA**-0.5) and persson.corrected_persson_area(5.0) == 1
+    points = literature("gfmd_area")
+    pressure, area = np.array(points["reduced_pressure"]), np.array(points["area_fraction"])
+    corrected = abs(persson.corrected_persson_area(pressure) / area - 1)
+    assert corrected.max() < 0.055
+    assert (corrected <= abs(persson.persson_area(pressure) / area - 1)).all()
+
+
 @pytest.mark.parametrize(("hurst", "p"), [(0.8, 1e-2), (0.5, 5e-2)])
 def test_mean_separation_is_the_published_double_integral(hurst, p):
     q0, q1, gamma = 5.0, 40.0, persson.YANG_PERSSON_GAMMA

@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 
 from icha.cli import app
 from icha.cli.live import JobRecord, read_error, read_last_line
-from icha.cli.project import UserError, echo, escape_markup, reports_errors
+from icha.cli.project import UserError, echo, reports_errors
 from icha.datasets.files import write_dataset
 from icha.datasets.surface_file import write_surface
 from icha.report.explorer import _filled
@@ -46,7 +46,6 @@ def test_commands_say_nothing_else(capsys):
     out, err = capsys.readouterr()
     assert r"\x1b[2J" in out and r"\x1b[2J" in err and err.startswith("two\n")
     assert not set("\x1b\x9b\r\b\x07\x7f\u202e") & set(out + err)
-    assert escape_markup("[red]x[/] \x1b") == r"\[red]x\[/] \x1b"
 
 
 def test_messages_of_jobs_are_printable(tmp_path):
