@@ -42,7 +42,10 @@ settings.load_profile("fast")
 
 # Files with the longest tests, the longest first. If such a file came last, one core would wait for it. With
 # `--dist worksteal` one worker begins with these files and the campaign, the other in the middle of the list.
-LONG = ("every_case_ends", "slurm", "reruns", "faults", "workflow", "finite_range", "make", "energy_balance")
+LONG = ("every_case_ends", "slurm", "wheel", "faults", "cli_run", "full_contact", "make", "in_browser", "reruns")
+LONG += ("workflow", "finite_range", "energy_balance")
+# Folders of tests whose coverage is measured (`--cov`). Measuring it nearly doubles the time of a test.
+PHYSICS = {"asperity", "boundary_elements", "contact", "equilibrium", "half_space", "path", "surfaces"}
 
 
 def _numbers(text):
@@ -57,10 +60,13 @@ def pytest_addoption(parser):
 
 
 def pytest_collection_modifyitems(items):
-    """Sort the files that take longest to the beginning; exclude all imported modules from garbage collection."""
+    """Sort the longest files to the beginning; exclude imported modules from garbage collection."""
     gc.freeze()
     rank = {f"test_{name}.py": number for number, name in enumerate(LONG)}
     items.sort(key=lambda item: rank.get(item.path.name, len(LONG)))
+    for item in items:
+        if item.path.parent.name not in PHYSICS:
+            item.add_marker("no_cover")
 
 
 def modules_of(project):
