@@ -15,6 +15,7 @@ from icha.asperity.material import Material
 from icha.asperity.stickiness import stickiness
 from icha.checks.run import check_run, reasons_of_failure
 from icha.contact.model import (
+    EVENT_KINDS,
     GAP_BINS,
     JUMP_IN,
     PRESSURE_BINS,
@@ -22,7 +23,7 @@ from icha.contact.model import (
     Events,
     NotConverged,
     State,
-    count_summits,
+    events_between,
     gap_bins,
 )
 from icha.contact.models import DEFAULT_MODEL, MODELS
@@ -147,14 +148,16 @@ def _compute(solver, surface, material, path, model, seed, progress, kept):
         record = _record_path(contact, observables, path, progress)
         loading = [step["mean_separation"] for step in record.steps if step["leg"] == 0]
         reasons = observables.reasons_against(loading, record.pressed)
-        dataset = _dataset(surface, material, path, model, seed, record, observables.of_contact(), reasons)
+        values = observables.of_contact()
+        dataset = _dataset(surface, material, path, model, seed, record, contact.asperities, reasons, values)
     if record.failure:
         raise ConvergenceError(record.failure, dataset) from None
     if path.unload:
         pull_off = record.snapshots[-1]["snapshot_step"]
-        loop = summarise_loop(
-            record.steps, pull_off, material, observables.summit_pull_off_pressure, record.unattributed
-        )
+        # Tension if all summits pulled with their pull-off force at once, Pa.
+        radii = float(np.sum(contact.asperities.radius_of_curvature))
+        summits_pull = 1.5 * np.pi * material.surface_energy * radii / contact.area
+        loop = summarise_loop(record.steps, pull_off, material, summits_pull, record.unattributed)
         loop["uphill_jump_in_count"] = _count_uphill_jumps_in(record)
         dataset = dataset.assign(describe_variables(LOOP, loop))
     return dataset
@@ -170,16 +173,18 @@ def empty_run(
     record, summits = _PathRecord(reason), locate_summits(surface)
     coverage = SummitCoverage.of(surface, summits)
     reasons = coverage.reasons_against([surface.rms_height]) if MODELS[model].by_summits else []
-    return _dataset(surface, material, path, model, seed, record, count_summits(summits), reasons)
+    return _dataset(surface, material, path, model, seed, record, summits, reasons, {})
 
 
-def _dataset(surface, material, path, name, seed, record, of_contact, reasons):
+def _dataset(surface, material, path, name, seed, record, summits, reasons, of_contact):
     """Build the dataset of a run without the summary of its loop."""
     table = RUN | FURTHER[name]
     values = {
         **_path_values(table, path, record, surface.grid),
         **_surface_values(surface, material, seed),
         **of_contact,
+        "asperity_count": len(summits),
+        "unsupported_summit_count": len(summits.unsupported_height),
         **bin_values("gap", gap_bins(surface)),
         **bin_values("pressure", PRESSURE_BINS * (material.contact_modulus * surface.rms_slope)),
     }
@@ -282,7 +287,8 @@ def _count_uphill_jumps_in(record: _PathRecord) -> int:
 
 def _record_path(contact, observables, path, progress) -> _PathRecord:
     """Follow a path and record its steps, snapshots and events."""
-    record, before, weakest, largest = _PathRecord(), None, None, 0.0
+    record, before, weakest, largest = _PathRecord(), contact.untouched(), None, 0.0
+    counts = np.zeros(len(EVENT_KINDS), int)
 
     def record_snapshot(target, state, step):
         row = {"snapshot_step": step, "snapshot_kind": target.kind, "snapshot_target": target.value}
@@ -291,9 +297,12 @@ def _record_path(contact, observables, path, progress) -> _PathRecord:
     try:
         for waypoint in follow(contact, path, progress):
             state, index = waypoint.state, len(record.steps)
-            step = _require_finite(_step_values(contact, waypoint) | observables.of_step(state))
+            events = events_between(before, state)
+            counts = counts + events.counts()
+            numbers = {f"{kind}_count": count for kind, count in zip(EVENT_KINDS, counts, strict=True)}
+            step = _require_finite(_step_values(contact, waypoint) | numbers | observables.of_step(state))
             record.steps.append(step)
-            record.events.append(Events.concatenate(()) if before is None else contact.events_between(before, state))
+            record.events.append(events)
             record.unattributed = waypoint.balance.unattributed if waypoint.balance else 0.0
             before = state
             if waypoint.leg == 0 and step["contact_area_fraction"] >= largest:

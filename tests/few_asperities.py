@@ -70,6 +70,11 @@ def history(waypoints):
     return Events.concatenate(waypoints[-1].state.history)
 
 
+def counts(state):
+    """Numbers of jumps in, jumps off, unions and splits on the path to a state."""
+    return Events.concatenate(state.history).counts().tolist()
+
+
 def closed_again(waypoints):
     """The last waypoint: nothing touches any more."""
     assert not len(waypoints[-1].state.spots)

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from icha.figures.curves import PRESSURE_LABEL
 from icha.figures.ensembles import draw_points, points_handles
-from icha.figures.legends import legend_below, named_handles
+from icha.figures.looks import legend_below, named_handles
 from icha.figures.style import (
     BLACK,
     BLUE,

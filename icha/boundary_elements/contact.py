@@ -29,7 +29,7 @@ from icha.boundary_elements.patches import (
     unpack,
 )
 from icha.contact.checkpoints import CheckpointedContact
-from icha.contact.model import AREA_FRACTION, PRESSURE, Control, Events, NotConverged
+from icha.contact.model import AREA_FRACTION, PRESSURE, Control, NotConverged
 from icha.contact.models import MODELS, REFERENCE_MODEL, PathAccuracy
 from icha.surfaces.summits import locate_summits
 from icha.surfaces.surface import Surface
@@ -164,10 +164,6 @@ class BoundaryElements(FullContactProblem):
     def is_unstable(self, state: CellState) -> bool:
         """Return False: every equilibrium is a minimum of energy."""
         return False
-
-    def events_between(self, before: CellState, after: CellState) -> Events:
-        """Events on the path from one state to a later one."""
-        return Events.concatenate(after.history[len(before.history) :])
 
     def _predict(self, state, separation):
         """Contact of a state, moved along its rates to a separation (m) if that is close."""

@@ -9,17 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from icha.boundary_elements.patches import CellState, free_edges, label_patches, labels_at, patch_centres
-from icha.contact.model import (
-    COALESCENCE,
-    JUMP_IN,
-    JUMP_OFF,
-    PRESSURE_BINS,
-    SPLIT,
-    Events,
-    count_summits,
-    gap_bins,
-    summit_pull_off_pressure,
-)
+from icha.contact.model import PRESSURE_BINS, gap_bins
 from icha.surfaces.moments import LEAST_CELLS_PER_WAVE, cells_per_short_wave
 from icha.surfaces.surface import Surface
 
@@ -35,29 +25,16 @@ class PatchObservables:
     surface: Surface
 
     def of_contact(self) -> dict:
-        """Numbers of summits, and the largest tension that the grid resolves at a straight edge of contact."""
-        contact = self.contact
-        return count_summits(contact.asperities) | {
-            "resolved_tension": contact.front.strength * contact.contact_modulus
-        }
+        """Return the largest tension that the grid resolves at a straight edge of contact."""
+        return {"resolved_tension": self.contact.front.strength * self.contact.contact_modulus}
 
     def of_step(self, state: CellState) -> dict:
-        """Residuals of the equilibrium, events so far, and the share of summits outside the range of Wu's formula."""
+        """Residuals of the equilibrium, and the share of summits outside the range of Wu's formula."""
         contact = self.contact
         touched = np.isin(contact.summits.cell, state.cells)
         verified = contact.law.is_jump_in_verified(contact.asperities.radius_of_curvature[touched])
         outside = np.count_nonzero(~verified) / max(len(verified), 1)
-        events = Events.concatenate(state.history)
-        counts = {
-            name: events.count(kind)
-            for name, kind in (
-                ("jump_in_count", JUMP_IN),
-                ("jump_off_count", JUMP_OFF),
-                ("coalescence_count", COALESCENCE),
-                ("split_count", SPLIT),
-            )
-        }
-        return counts | {
+        return {
             "residual": state.gap_residual / contact.rms_height,
             "front_residual": state.front_residual,
             "gap_residual": state.gap_residual / contact.rms_height,
@@ -89,12 +66,6 @@ class PatchObservables:
         if cells >= LEAST_CELLS_PER_WAVE:
             return []
         return [f"about {cells:.2g} grid cells for the shortest waves (at least {LEAST_CELLS_PER_WAVE:g} expected)"]
-
-    @property
-    def summit_pull_off_pressure(self) -> float:
-        """Tension of all summits at their pull-off at once, Pa."""
-        contact = self.contact
-        return summit_pull_off_pressure(contact.asperities, contact.law.material.surface_energy, contact.area)
 
     def _gap_density(self, state, areas):
         """Density of the gap over the nominal area outside contact; with the contact area it sums up to one."""

@@ -93,7 +93,6 @@ def reproduce(
     ] = None,
     cores: Cores = None,
     anyway: Anyway = False,
-    json: Annotated[Path | None, option("Write the comparison to this file.", metavar="FILE")] = None,
     large: Large = False,
 ) -> None:
     """Compute a deposit again and compare every number with the published one.
@@ -105,7 +104,7 @@ def reproduce(
     Exit status: 0 if all is identical or within tolerance, 1 if not, or if the computation fails or is stopped, 2 if
     the deposit is damaged or missing, or cannot be computed again.
     """
-    from icha.deposit.compare import compare_folders, write_json
+    from icha.deposit.compare import compare_folders
     from icha.deposit.reproduce import RerunError, add_surfaces, campaign_name, find_runs, prepare_rerun
 
     target = None if folder is None else folder.resolve()
@@ -134,8 +133,6 @@ def reproduce(
         echo(f"Some jobs did not run; to continue, add --folder {shorten_path(target)} to the command.", fg="yellow")
     if keep:
         echo(f"new results: {shorten_path(results)}")
-    if json:
-        write_json(comparison, json)
     if not reproduced:
         raise typer.Exit(FAILED)
 

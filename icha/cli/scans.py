@@ -154,9 +154,7 @@ def read_measured_section(path: Path, data: str | None, folder: Path) -> Measure
     scan, guessed, missing = _load(path, data)
     rows, columns = scan.heights.shape
     gaps = int(np.count_nonzero(~np.isfinite(scan.heights)))
-    periodic = scan.format == "fourier"
-    boundary, detrend = ("periodic", "none") if periodic else ("free", "tilt")
-    settings = {"format": "auto", "boundary": boundary, "data": data, "detrend": detrend, "missing": "fill"} | guessed
+    settings = {"format": "auto", "boundary": "free", "data": data, "detrend": "tilt", "missing": "fill"} | guessed
     try:
         resolution = examine_scan(path, settings)
     except UnfitTopography as error:
@@ -175,8 +173,7 @@ def read_measured_section(path: Path, data: str | None, folder: Path) -> Measure
         lines.append(f"missing: fill                # {gaps} points have no height; `refuse` makes that an error")
     advice = {} if missing else format_advice(resolution.advice)
     name = re.sub("[^a-z0-9_-]+", "_", path.stem.lower()).strip("_") or "measured"
-    if not periodic:
-        missing["boundary"] = "what surrounds the scan: free, window, mirror or periodic"
+    missing["boundary"] = "what surrounds the scan: free, window, mirror or periodic"
     path = Path(os.path.relpath(path.resolve(), folder.resolve())).as_posix()
     return MeasuredSection(name, path, lines, missing, advice, resolution)
 

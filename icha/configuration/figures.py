@@ -113,8 +113,7 @@ class _Drawn(Section):
 
     def arguments(self, name: str, campaign: Campaign) -> dict[str, Any]:
         """Return the other arguments of the function that draws a figure."""
-        options = getattr(self, name)
-        return options.arguments() | DECLARATIONS[name].arguments(campaign, options)
+        return getattr(self, name).arguments(campaign)
 
     def studies_of(self, name: str, campaign: Campaign) -> tuple[str, ...]:
         """Return the studies whose runs a figure shows."""

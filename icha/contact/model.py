@@ -13,18 +13,18 @@ if TYPE_CHECKING:
     from icha.surfaces.summits import Asperities
     from icha.surfaces.surface import Surface
 
-# Quantities that the solver can hold.
+# Quantities that the solver can keep constant.
 PRESSURE, AREA_FRACTION = "pressure", "area_fraction"
 
 
 @dataclass(frozen=True)
 class Control:
-    """Quantity that the solver holds instead of the mean separation.
+    """Quantity that is prescribed instead of the mean separation.
 
     Attributes
     ----------
     quantity : PRESSURE (nominal, Pa) or AREA_FRACTION.
-    target : its value.
+    target : value of the quantity.
     """
 
     quantity: str
@@ -50,8 +50,8 @@ class Events:
 
     Attributes
     ----------
-    kind : (k,) int8: JUMP_IN; JUMP_OFF, a spot or a union breaks contact; COALESCENCE, two spots unite; or SPLIT, a
-        union comes apart and its two spots stay in contact.
+    kind : (k,) int8, JUMP_IN: a spot forms. JUMP_OFF: a spot or a union breaks contact. COALESCENCE: two spots unite.
+        SPLIT: a union becomes two spots again.
     position : (k, 2) float, m.
     members : (k,) int, number of first contacts that are united in the spot.
     energy : (k,) float, energy that a jump would release if the spot were alone, J; zero for unions and splits.
@@ -70,6 +70,10 @@ class Events:
         """Return the number of events of a kind."""
         return int(np.count_nonzero(self.kind == kind))
 
+    def counts(self) -> np.ndarray:
+        """Return the numbers of events of all kinds, in the order of EVENT_KINDS."""
+        return np.bincount(self.kind, minlength=len(EVENT_KINDS))
+
     @classmethod
     def concatenate(cls, parts) -> Events:
         """Concatenate several records of events."""
@@ -78,11 +82,20 @@ class Events:
 
 
 class State(Protocol):
-    """Equilibrium, immutable; all other attributes belong to its model."""
+    """Equilibrium, immutable; each model adds attributes of its own."""
 
     @property
     def separation(self) -> float:
         """Mean separation u, m."""
+
+    @property
+    def history(self) -> tuple[Events, ...]:
+        """Events of the path up to this state, one entry for each equilibrium with events."""
+
+
+def events_between(before: State, after: State) -> Events:
+    """Return the events on the path from one state to a later one."""
+    return Events.concatenate(after.history[len(before.history) :])
 
 
 S = TypeVar("S", bound=State)
@@ -90,7 +103,7 @@ S_in = TypeVar("S_in", bound=State, contravariant=True)
 
 
 class ContactModel(Protocol[S]):
-    """Contact, immutable, whose equilibria follow from each other along a path; its nominal area is A0."""
+    """Contact of one surface and one material; a path computes each equilibrium from the one before. Immutable."""
 
     @property
     def adhesive(self) -> bool:
@@ -109,6 +122,10 @@ class ContactModel(Protocol[S]):
         """Rms height h_rms of the surface, the unit of separations, m."""
 
     @property
+    def asperities(self) -> Asperities:
+        """Summits of the surface; there may be none if the model does not need them."""
+
+    @property
     def area(self) -> float:
         """Nominal contact area A0, m^2."""
 
@@ -121,7 +138,7 @@ class ContactModel(Protocol[S]):
         """Accuracy to which a path resolves its events."""
 
     def untouched(self) -> S:
-        """State in which contact is about to form first."""
+        """Return the state without contact at the separation of first contact."""
 
     def equilibrium(self, state: S, separation: float, control: Control | None = None, *, let_go: int = 0) -> S:
         """Find the equilibrium at another mean separation, load or area, starting from a state.
@@ -129,8 +146,8 @@ class ContactModel(Protocol[S]):
         Parameters
         ----------
         separation : mean separation, or its first guess if there is a `control`, m.
-        control : load or area to hold instead of the separation.
-        let_go : number of spots that break contact first, those closest to jump-off.
+        control : load or area that is prescribed instead of the separation.
+        let_go : number of spots, those closest to jump-off, whose contact is broken before the search.
 
         Raises
         ------
@@ -141,75 +158,59 @@ class ContactModel(Protocol[S]):
         """
 
     def pressure(self, state: S) -> float:
-        """Force over nominal area, Pa; negative in tension."""
+        """Return the force over the nominal area, Pa; negative in tension."""
 
     def area_fraction(self, state: S) -> float:
-        """Contact area over nominal area."""
+        """Return the contact area over the nominal area."""
 
     def mean_gap(self, state: S) -> float:
-        """Mean gap over the nominal area, m; on a periodic surface the mean separation."""
+        """Return the mean gap over the nominal area, m; on a periodic surface the mean separation."""
 
     def spot_count(self, state: S) -> int:
-        """Return number of contact spots."""
+        """Return the number of contact spots."""
 
     def stiffness(self, state: S) -> float:
-        """Contact stiffness -dp/du of the present spots, Pa/m."""
+        """Return the contact stiffness -dp/du of the present spots, Pa/m."""
 
     def slope(self, quantity: str, state: S) -> float:
-        """Return the derivative of PRESSURE or AREA_FRACTION by the mean separation, for unchanged contacts."""
+        """Return the derivative of PRESSURE or AREA_FRACTION with respect to the mean separation, without events."""
 
     def stored_energy(self, state: S) -> float:
-        """Elastic energy less that of adhesion over nominal area, J/m^2; zero out of contact."""
+        """Return elastic energy minus energy of adhesion, over the nominal area, J/m^2; zero without contact."""
 
     def is_unstable(self, state: S) -> bool:
-        """Return true if a spot would approach as the surfaces move apart, as on an unstable branch only."""
-
-    def events_between(self, before: S, after: S) -> Events:
-        """Return the events on the path from one state to a later one."""
+        """Return whether a spot approaches as the surfaces move apart, which happens only on an unstable branch."""
 
     def observables(self, surface: Surface) -> Observables[S]:
-        """Observables of the states on a surface."""
+        """Return the observables of the states on a surface."""
 
 
 class Observables(Protocol[S_in]):
     """Observables of a contact, by the names of the variables of a run (`icha.datasets.variables.run`)."""
 
     def of_contact(self) -> dict[str, Any]:
-        """Values that are the same in all states."""
+        """Return the values that are the same in all states."""
 
     def of_step(self, state: S_in) -> dict[str, Any]:
-        """Values that a run records of every state."""
+        """Return the values that a run records of every state."""
 
     def of_snapshot(self, state: S_in) -> dict[str, Any]:
-        """Distributions of gap and pressure, and the spots."""
+        """Return the distributions of gap and pressure, and the spots."""
 
     def reasons_against(self, separations: Iterable[float], pressed: S_in | None) -> list[str]:
-        """Reasons why the model does not represent the surface in the first loading.
+        """Return the reasons why the model does not represent the surface in the first loading.
 
         Parameters
         ----------
         separations : mean separations that the loading has reached, m.
-        pressed : state with the largest contact area; None without any state.
+        pressed : state with the largest contact area; None if there is no state.
         """
 
-    @property
-    def summit_pull_off_pressure(self) -> float:
-        """Tension of all summits pulling their most at once, 3/2 pi dgamma sum(R)/A0, Pa."""
 
-
-def count_summits(asperities: Asperities) -> dict[str, int]:
-    """Return the numbers of summits of a surface, by the names of their variables."""
-    return {"asperity_count": len(asperities), "unsupported_summit_count": len(asperities.unsupported_height)}
-
-
-def summit_pull_off_pressure(asperities: Asperities, surface_energy: float, area: float) -> float:
-    """Return the tension if all summits pulled with their pull-off force at once, 3/2 pi dgamma sum(R)/A0, Pa."""
-    return 1.5 * np.pi * surface_energy * float(np.sum(asperities.radius_of_curvature)) / area
-
-
-# Edges of the bins of gap and pressure, the same for every model; the last bin includes all larger values. Gaps in
-# h_rms: one bin from zero, then 20 per decade. Pressures in E* h'_rms: linear in the bulk, 20 per decade in the tails.
-# The tail of tension is long because the distribution of JKR pressures falls as |p|^-3.
+# Edges of the bins of gap and pressure, the same for every model. The last bin includes all larger values. Gaps are in
+# h_rms: the first bin starts at zero, and there are 20 bins per decade after it. Pressures are in E* h'_rms: the bins
+# have equal width from -1 to 5, and there are 20 bins per decade in the tails. The tail of tension is long because the
+# distribution of JKR pressures falls as |p|^-3.
 GAPS_PER_DECADE = 20
 GAP_BINS = np.concatenate([[0.0], np.logspace(-4, 1.5, 111)])
 PRESSURE_BINS = np.concatenate([-np.logspace(8, 0, 161)[:-1], np.linspace(-1, 5, 301), 5 * np.logspace(0, 2, 41)[1:]])
@@ -218,9 +219,9 @@ PRESSURE_BINS = np.concatenate([-np.logspace(8, 0, 161)[:-1], np.linspace(-1, 5,
 def gap_bins(surface: Surface) -> np.ndarray:
     """Return the edges of the bins of the gap on a surface, m.
 
-    The last bin reaches to the height from the deepest pit to the highest peak, if it is more than 31.6 h_rms. This is
-    the largest gap when the surface just touches. By Chebyshev's inequality less than 0.2 % of a surface lies so deep,
-    so that one bin suffices for it.
+    The largest gap, when the surface just touches, is the height from the deepest pit to the highest peak. If it is
+    more than 31.6 h_rms, the last bin ends there. By Chebyshev's inequality less than 0.2 % of a surface lies so deep,
+    so that one bin is enough for it.
     """
     edges = GAP_BINS * surface.rms_height
     edges[-1] = max(edges[-1], np.ptp(surface.heights))

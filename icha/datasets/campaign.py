@@ -1,6 +1,5 @@
 """The campaign dataset: the runs of every study as full arrays along model, surface, seed, rms slope and material."""
 
-import os
 import tempfile
 from collections.abc import Collection, Iterable, Mapping
 from pathlib import Path
@@ -9,6 +8,7 @@ import numpy as np
 import xarray as xr
 
 from icha.datasets.campaign_file import write_campaign
+from icha.datasets.campaign_runs import LabelledRun
 from icha.datasets.files import read_campaign
 from icha.datasets.labels import LABELS, RunLabels, labels_at, place_of, slopes_at
 from icha.datasets.variables.campaign import COMPUTED_RUNS, FAILED_CHECKS, INCOMPLETE, MISSING, NOT_IN_DESIGN, RAGGED
@@ -20,7 +20,7 @@ _OF_EVERY_CAMPAIGN = ("status", "step_count", "failure")
 
 
 def campaign_tree(
-    runs: Iterable[tuple[RunLabels | tuple, xr.Dataset | str | os.PathLike]],
+    runs: Iterable[LabelledRun],
     *,
     design: Iterable[RunLabels | tuple] | None = None,
     attrs: Mapping[str, str] = {},

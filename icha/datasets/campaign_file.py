@@ -15,10 +15,9 @@ from typing import BinaryIO, NamedTuple
 
 import netCDF4
 import numpy as np
-import xarray as xr
 
 from icha.datasets.attributes import COLLECTED, combine_attributes
-from icha.datasets.campaign_runs import Arrangement, Entry, arrange_runs, load_values, spool_runs
+from icha.datasets.campaign_runs import Arrangement, LabelledRun, arrange_runs, load_values, spool_runs
 from icha.datasets.files import (
     FLOAT_FILL,
     INTEGER_FILL,
@@ -52,8 +51,6 @@ _ACCESS = (
     "The data are in the groups, one for each study: {0}. With Python's xarray: "
     "xarray.open_datatree(FILE)['{1}'].to_dataset(), or xarray.open_dataset(FILE, group='{1}')"
 )
-# Variables of reasons, one for each run.
-_REASONS = ("failure", "applicability")
 
 
 class Column(NamedTuple):
@@ -95,8 +92,7 @@ class Group(NamedTuple):
     block : how many neighbouring runs are written at once, along every label.
     columns : the variables of the runs, by name.
     ragged : the variables along ragged dimensions, by dimension and name.
-    known : variables whose values need no run, with these.
-    texts : reasons, with that of each of the study's runs.
+    known : the variables whose values need no run, and these values.
     """
 
     study: Arrangement
@@ -104,85 +100,89 @@ class Group(NamedTuple):
     columns: dict[str, Column]
     ragged: dict[str, dict[str, netCDF4.Variable]]
     known: list[tuple[netCDF4.Variable, np.ndarray]]
-    texts: list[tuple[netCDF4.Variable, list[str]]]
 
 
 def define_group(group: netCDF4.Dataset, study: Arrangement, attrs: Mapping[str, str]) -> Group:
     """Define dimensions, variables and attributes of a study's group; `attrs` are those of the file."""
-    sample = study.sample
-    counts = {dim: int(study.sizes_of(dim).sum()) for dim in RAGGED if dim in sample.dims}
-    sizes = dict(zip(LABELS, study.status.shape, strict=True)) | study.sizes | counts
+    counts = {
+        dim: sum(entry.sizes.get(dim, 0) for entry in study.entries)
+        for dim in RAGGED
+        if any(dim in variable.dims for variable in study.variables.values())
+    }
+    sizes = dict(zip(LABELS, study.known["status"].shape, strict=True)) | study.sizes | counts
     define_dimensions(group, sizes)
     # The checksum is that of the campaign, and not that of one of the runs.
-    shared = {"license": sample.attrs.get("license"), "config_sha256": attrs.get("config_sha256")}
+    shared = {"license": study.origins[0].get("license"), "config_sha256": attrs.get("config_sha256")}
     group.setncatts(
         combine_attributes(f"Study {study.name}", _LAYOUT, COLLECTED, study.origins)
         | {"study": study.name}
         | {name: value for name, value in shared.items() if value is not None}
     )
-    names = [name for name in sample.variables if name not in LABELS]
-    dims = {name: sum(study.dims_of(name), ()) for name in names} | {label: (label,) for label in LABELS}
-    dims |= {name: CAMPAIGN[name].dims for name in ("status", "step_count", *_REASONS)}
-    dims |= {"rms_slope": study.slope_dims}
-    coordinates = coordinates_of(sample.variables, {*sample.coords, *LABELS}, dims)
+    dims_in_file = {name: sum(study.dims_of(name), ()) for name in study.variables}
+    dims_in_file |= {name: described.dims for name, described in CAMPAIGN.items()} | {"rms_slope": study.slope_dims}
+    coordinates = coordinates_of(study.variables, study.coordinates, dims_in_file)
+    varying = [dims for along, dims in map(study.dims_of, study.variables) if along == LABELS]
+    block = _block(sizes, LABELS, max(math.prod(sizes[dim] for dim in dims) for dims in varying))
 
-    def attributes_of(name: str, attributes: Mapping) -> dict:
-        return {**attributes, **({"coordinates": coordinates[name]} if name in coordinates else {})}
+    def define(name, attributes, along, dims, dtype, width=0, fill=None):
+        """Define a variable along labels and its own dimensions; one of texts has a width, in bytes."""
+        options = _storage(sizes, block, along, dims, width or 1)
+        attributes = {**attributes, **({"coordinates": coordinates[name]} if name in coordinates else {})}
+        if width:
+            return define_text(group, name, along + dims, width, attributes, **options)
+        options |= {} if fill is None else {"fill_value": fill}
+        return define_numbers(group, name, along + dims, dtype, attributes, **options)
 
-    storage = _Storage.of(study, sizes, names)
-    columns = {
-        name: _define_column(
-            group, study, storage, name, attributes_of(name, sample[name].attrs | _why_lacking(study, name))
-        )
-        for name in names
-        if name not in sizes
-    }
-    described = {name: attributes_of(name, CAMPAIGN[name].attributes) for name in CAMPAIGN}
-    known = [*_define_positions(group, study), *_define_of_campaign(group, study, storage, described)]
-    texts = [
-        (_define_reasons(group, storage, name, reasons, described[name]), reasons)
-        for name, reasons in zip(
-            _REASONS, (study.failures, [each.applicability for each in study.entries]), strict=True
-        )
-    ]
+    columns, known = {}, []
+    for name in (name for name in study.variables if name not in sizes):
+        along, dims = study.dims_of(name)
+        attributes, dtype = study.variables[name].attrs | _why_lacking(study, name), study.variables[name].dtype
+        lacks, width = study.lacks(name), 0
+        fill: float | int | bytes = FLOAT_FILL if dtype.kind == "f" else INTEGER_FILL if lacks else 0
+        if is_text(dtype):
+            width, fill = study.widths[name], b""
+        elif dtype.kind != "f":
+            # 32 bits, which every netCDF tool reads, or flags.
+            dtype = np.dtype(np.int8 if dtype == np.int8 and not lacks else np.int32)
+        variable = define(name, attributes, along, dims, dtype, width, fill if lacks and not width else None)
+        columns[name] = Column(variable, along, dims, fill)
+    for dim, size in study.sizes.items():
+        if dim in study.variables:
+            known.append((define(dim, study.variables[dim].attrs, (), (dim,), np.int32), np.arange(size)))
+    for name, described in CAMPAIGN.items():
+        along, dims, attributes, fill = (), described.dims, described.attributes, None
+        if dims == LABELS:
+            along, dims = dims, ()
+        is_texts = described.dtype is str
+        values = characters(study.known[name]) if is_texts else np.asarray(study.known[name], described.dtype)
+        if name == "rms_slope" and values.ndim > 1:
+            dims, attributes = study.slope_dims, attributes | _OWN_SLOPES
+            fill = FLOAT_FILL if np.isnan(values).any() else None
+            values = np.nan_to_num(values, nan=FLOAT_FILL)
+        width = values.shape[-1] if is_texts else 0
+        known.append((define(name, attributes, along, dims, values.dtype, width, fill), values))
     ragged = {dim: {name: each.variable for name, each in columns.items() if each.dims == (dim,)} for dim in counts}
     for dim, variables in ragged.items():
         for label in LABELS:
-            name, options = f"{dim}_{label}", storage.options((), (dim,))
-            variables[name] = define_numbers(
-                group, name, (dim,), np.int32, index_variable(dim, label).attributes, **options
-            )
-    return Group(study, storage.block, columns, ragged, known, texts)
+            name = f"{dim}_{label}"
+            variables[name] = define(name, index_variable(dim, label).attributes, (), (dim,), np.int32)
+    return Group(study, block, columns, ragged, known)
 
 
-class _Storage(NamedTuple):
-    """How the variables of a group are stored.
-
-    `sizes` are those of its dimensions, `block` is how many neighbouring runs make a block along every label.
-    """
-
-    sizes: dict[str, int]
-    block: tuple[int, ...]
-
-    @classmethod
-    def of(cls, study, sizes, names):
-        varying = [dims for along, dims in map(study.dims_of, names) if along == LABELS]
-        largest = max(math.prod(sizes[dim] for dim in dims) for dims in varying)
-        return cls(sizes, _block(sizes, LABELS, largest))
-
-    def options(self, along, dims, width=None):
-        """Return the options of a variable: none if it is small, else it is compressed, block by block."""
-        shape = tuple(self.sizes[dim] for dim in dims) + (() if width is None else (width,))
-        if math.prod(self.sizes[dim] for dim in along) * math.prod(shape) < LEAST_COMPRESSED:
-            return {}
-        block = self.block if along == LABELS else _block(self.sizes, along, math.prod(shape))
-        chunk = (*block, *shape) if along else tuple(min(size, _VALUES_IN_CHUNK) for size in shape)
-        # A block is written at once: nothing is gained from keeping more than one.
-        return COMPRESSION | {"chunksizes": chunk, "chunk_cache": 8 * math.prod(chunk)}
+def _storage(sizes, block, along, dims, width):
+    """Return the options of a variable: none if it is small, else it is compressed, block by block."""
+    shape = (*(sizes[dim] for dim in dims), *([width] if width > 1 else []))
+    if math.prod(sizes[dim] for dim in along) * math.prod(shape) < LEAST_COMPRESSED:
+        return {}
+    if along != LABELS:
+        block = _block(sizes, along, math.prod(shape))
+    chunk = (*block, *shape) if along else tuple(min(size, _VALUES_IN_CHUNK) for size in shape)
+    # Each block is written at once, so that keeping more than one gains nothing.
+    return COMPRESSION | {"chunksizes": chunk, "chunk_cache": 8 * math.prod(chunk)}
 
 
 def _block(sizes, along, values):
-    """Count the neighbouring runs that make a block, along every label; each has so many values."""
+    """Count the neighbouring runs that make a block, along every label; `values` is the number of values of each."""
     left = max(1, min(_RUNS_IN_BLOCK, VALUES_IN_BLOCK // max(1, values)))
     block = []
     for size in reversed([sizes[label] for label in along]):
@@ -194,67 +194,12 @@ def _block(sizes, along, values):
 def _why_lacking(study, name):
     """Return the attribute of a variable that some of the study's models do not have."""
     owners = [model for model, names in FURTHER.items() if name in names]
-    lacking = [model for model in study.axes["model"] if owners and model not in owners]
+    lacking = [model for model in study.known["model"] if owners and model not in owners]
     return {"missing": f"of runs by {' and '.join(lacking)}"} if lacking else {}
 
 
-def _define_column(group, study, storage, name, attributes):
-    """Define a variable of the runs."""
-    along, dims = study.dims_of(name)
-    dtype = study.sample[name].dtype
-    if is_text(dtype):
-        width = study.widths[name]
-        options = storage.options(along, dims, width)
-        return Column(define_text(group, name, along + dims, width, attributes, **options), along, dims, b"")
-    options, lacks = storage.options(along, dims), study.lacks(name)
-    fill = FLOAT_FILL
-    if dtype.kind != "f":
-        # 32 bits, which every netCDF tool reads, or flags.
-        dtype = np.dtype(np.int8 if dtype == np.int8 and not lacks else np.int32)
-        fill = INTEGER_FILL if lacks else 0
-    options |= {"fill_value": fill} if lacks else {}
-    return Column(define_numbers(group, name, along + dims, dtype, attributes, **options), along, dims, fill)
-
-
-def _define_reasons(group, storage, name, reasons, attributes):
-    """Define a variable of texts, one for each run, as wide as the longest of them."""
-    width = max(1, *(len(text.encode()) for text in reasons))
-    return define_text(group, name, LABELS, width, attributes, **storage.options(LABELS, (), width))
-
-
-def _define_positions(group, study):
-    """Define the variables that number the positions along the dimensions of runs; return them with their values."""
-    return [
-        (define_numbers(group, dim, (dim,), np.int32, study.sample[dim].attrs), np.arange(size, dtype=np.int32))
-        for dim, size in study.sizes.items()
-        if dim in study.sample.variables
-    ]
-
-
-def _define_of_campaign(group, study, storage, described):
-    """Define the variables that list the runs of the study; yield them with their values."""
-    values = {"status": study.status, "step_count": study.step_count, **study.axes}
-    for name, (dims, _, _, dtype, *_) in CAMPAIGN.items():
-        if name in _REASONS:
-            continue
-        attributes = described[name]
-        if dtype is str:
-            texts = characters(np.array(values[name]))
-            yield define_text(group, name, dims, texts.shape[-1], attributes), texts
-            continue
-        numbers = np.asarray(values[name], dtype)
-        options = storage.options(dims, ()) if dims == LABELS else {}
-        if name == "rms_slope":
-            dims = study.slope_dims
-            attributes = attributes | (_OWN_SLOPES if len(dims) > 1 else {})
-            if np.isnan(numbers).any():
-                options |= {"fill_value": FLOAT_FILL}
-                numbers = np.nan_to_num(numbers, nan=FLOAT_FILL)
-        yield define_numbers(group, name, dims, numbers.dtype, attributes, **options), numbers
-
-
 def write_campaign(
-    runs: Iterable[tuple[RunLabels | tuple, xr.Dataset | str | os.PathLike]],
+    runs: Iterable[LabelledRun],
     path: str | os.PathLike,
     *,
     design: Iterable[RunLabels | tuple] | None = None,
@@ -308,65 +253,44 @@ def _write(group: Group, spool: BinaryIO) -> None:
     """Write all values of a group; the values of the runs are read from the temporary file, block by block."""
     for variable, values in group.known:
         variable[...] = values
-    for variable, reasons in group.texts:
-        for position, reason in zip(group.study.positions, reasons, strict=True):
-            if reason:
-                text = characters(np.array(reason))
-                variable[(*position, slice(0, len(text)))] = text
+    ragged = [_RaggedVariables(dim, variables) for dim, variables in group.ragged.items()]
+    along_ragged = {name for variables in group.ragged.values() for name in variables}
     shared = {
         name: _SharedVariable(name, column)
         for name, column in group.columns.items()
-        if column.along != LABELS and not set(column.dims) & set(RAGGED)
+        if column.along != LABELS and name not in along_ragged
     }
-    ragged = [_RaggedVariables(dim, variables) for dim, variables in group.ragged.items()]
-    placed = zip(group.study.entries, map(tuple, group.study.positions.tolist()), strict=True)
-    for start, members in itertools.groupby(
-        placed, key=lambda each: tuple(k // n * n for k, n in zip(each[1], group.block, strict=True))
-    ):
-        _write_block(group, start, members, spool, shared, ragged)
+    shape, lengths = group.study.known["status"].shape, np.array(group.block)
+    placed = zip(group.study.entries, group.study.positions, strict=True)
+    for start, members in itertools.groupby(placed, key=lambda each: tuple(each[1] // lengths * lengths)):
+        box = tuple(slice(k, min(k + n, size)) for k, n, size in zip(start, lengths, shape, strict=True))
+        sides = [side.stop - side.start for side in box]
+        block = {
+            name: np.full((*sides, *column.variable.shape[len(LABELS) :]), column.fill, column.variable.dtype)
+            for name, column in group.columns.items()
+            if column.along == LABELS
+        }
+        for entry, position in members:
+            snapshots = [group.study.snapshots[each] for each in entry.snapshots]
+            values = {
+                name: group.columns[name].pad(v)
+                for name, (_, v) in load_values(entry, spool).items()
+                if name in group.columns
+            }
+            for name, v in values.items():
+                slots = group.columns[name].slots(snapshots, v)
+                if name in block:
+                    block[name][*(position - start), ...][slots] = v
+                elif name in shared:
+                    shared[name].put(entry.labels, position, slots, v)
+            for each in ragged:
+                each.add(position, values, snapshots)
+        for name, values in block.items():
+            group.columns[name].variable[box] = values
     for each in ragged:
         each.flush()
     for each in shared.values():
-        if not each.is_large:
-            each.column.variable[...] = each.values
-
-
-def _write_block(
-    group: Group,
-    start: tuple[int, ...],
-    members: Iterable[tuple[Entry, tuple[int, ...]]],
-    spool: BinaryIO,
-    shared: Mapping[str, "_SharedVariable"],
-    ragged: Iterable["_RaggedVariables"],
-) -> None:
-    """Write a block of neighbouring runs, except shared and ragged variables, which are kept for later."""
-    corner = zip(start, group.block, group.study.status.shape, strict=True)
-    box = tuple(slice(k, min(k + n, size)) for k, n, size in corner)
-    lengths = tuple(side.stop - side.start for side in box)
-    block = {
-        name: np.full(lengths + column.variable.shape[len(LABELS) :], column.fill, column.variable.dtype)
-        for name, column in group.columns.items()
-        if column.along == LABELS
-    }
-    for entry, position in members:
-        snapshots = [group.study.snapshots[each] for each in entry.snapshots]
-        place = dict(zip(LABELS, position, strict=True))
-        values = {
-            name: group.columns[name].pad(v)
-            for name, (_, v) in load_values(entry, spool).items()
-            if name in group.columns
-        }
-        for name, v in values.items():
-            column = group.columns[name]
-            slots = column.slots(snapshots, v)
-            if name in block:
-                block[name][(*np.subtract(position, start), ...)][slots] = v
-            elif name in shared:
-                shared[name].put(entry.labels, tuple(place[label] for label in column.along), slots, v)
-        for each in ragged:
-            each.add(position, values, snapshots)
-    for name, values in block.items():
-        group.columns[name].variable[box] = values
+        each.column.variable[...] = each.values
 
 
 class _SharedVariable:
@@ -375,22 +299,20 @@ class _SharedVariable:
     Attributes
     ----------
     name, column : the variable.
-    values : of all places; few enough to stay in memory.
-    known : which places, and snapshots, have values.
-    is_large : True for arrays along labels, which are written one by one; others are written at the end.
+    values : its values for all runs; few enough to stay in memory.
+    known : True where labels, and snapshots, have values.
     """
 
     def __init__(self, name: str, column: Column):
         """Begin without values."""
         self.name, self.column = name, column
-        shape, snapshot = column.variable.shape, column.dims.index("snapshot") + 1 if "snapshot" in column.dims else 0
-        self.is_large = bool(column.dims and column.along)
+        shape, snapshot = column.variable.shape, column.dims[:1] == ("snapshot",)
         self.values = np.full(shape, column.fill, column.variable.dtype)
         self.known = np.zeros(shape[: len(column.along) + snapshot], bool)
 
-    def put(self, labels: RunLabels, place: tuple[int, ...], slots: tuple, values: np.ndarray) -> None:
-        """Store the values of a run; if these labels have values already, check that both are equal."""
-        index = (*place, *slots)
+    def put(self, labels: RunLabels, position: np.ndarray, slots: tuple, values: np.ndarray) -> None:
+        """Store the values of a run; if other runs gave these values already, check that both are equal."""
+        index = (*(position[LABELS.index(label)] for label in self.column.along), *slots)
         known, present = self.known[index[: self.known.ndim]], self.values[index]
         if np.all(known) and np.array_equal(present, values):
             return
@@ -401,8 +323,6 @@ class _SharedVariable:
         if not np.all(known):
             self.values[index] = values
             self.known[index[: self.known.ndim]] = True
-            if self.is_large:
-                self.column.variable[index] = values
 
 
 class _RaggedVariables:
@@ -420,13 +340,11 @@ class _RaggedVariables:
         self.dim, self.variables = dim, variables
         self.runs, self.pending, self.written = [], 0, 0
 
-    def add(self, position: tuple[int, ...], values: Mapping[str, np.ndarray], snapshots: list[int]) -> None:
+    def add(self, position: np.ndarray, values: Mapping[str, np.ndarray], snapshots: list[int]) -> None:
         """Store the values of a run at a position; its spots are sorted by the positions of their snapshots."""
         found = {name: values[name] for name in self.variables if name in values}
         count = len(next(iter(found.values()), ()))
-        if not count:
-            return
-        if "spot_snapshot" in found:
+        if "spot_snapshot" in found and count:
             found["spot_snapshot"] = np.asarray(snapshots, np.int32)[found["spot_snapshot"]]
             order = np.argsort(found["spot_snapshot"], kind="stable")
             found = {name: v[order] for name, v in found.items()}
@@ -437,11 +355,10 @@ class _RaggedVariables:
             self.flush()
 
     def flush(self) -> None:
-        """Write what has been added since the last time."""
-        if not self.runs:
-            return
+        """Write the values that were added since the last call."""
+        begin = self.written
         for name, variable in self.variables.items():
-            values = np.concatenate([run[name] for run in self.runs])
-            variable[self.written : self.written + len(values)] = values
-        self.written += len(values)
+            values = np.concatenate([np.empty(0, variable.dtype), *(run[name] for run in self.runs if name in run)])
+            variable[begin : begin + len(values)] = values
+            self.written = begin + len(values)
         self.runs, self.pending = [], 0

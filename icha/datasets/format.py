@@ -33,14 +33,6 @@ _OTHERS = {
 _ROUNDING = 1e-9
 # The unit of a target is that of its quantity, if all targets have the same one.
 _UNITS_OF_TARGETS = dict.fromkeys(("step_target", "snapshot_target"), ("1", "m"))
-# Global attributes. Those of a campaign are written by the workflow, not by `icha.simulate`.
-_EVERYWHERE = ("title", "summary", "keywords", "Conventions", "source", "history", "processing_level")
-ATTRIBUTES = {
-    RUN: (*_EVERYWHERE, "references", "contact_model"),
-    SURFACE: _EVERYWHERE,
-    CAMPAIGN: (*_EVERYWHERE, "references", "campaign", "config_sha256", "license"),
-}
-IN_CAMPAIGN = ("campaign", "study", "config_sha256", "license")
 
 
 class UnknownFile(ValueError):
@@ -119,27 +111,25 @@ def identify_file(path: str | os.PathLike) -> tuple[str, xr.Dataset | xr.DataTre
 
 
 def problems_with_file(kind: str, data: xr.Dataset | xr.DataTree) -> list[str]:
-    """List the differences between a file and its documented format, one line each; empty if it keeps to it.
+    """List the differences between a file and its documented format, one line each; empty if there are none.
 
     Parameters
     ----------
     kind, data : as `identify_file` returns them.
     """
-    if kind == RUN:
-        return list(_problems_with_run(data))
-    if kind == SURFACE:
-        return list(_problems_with_surface(data))
-    found = list(_problems_with_attributes(data.attrs, ATTRIBUTES[CAMPAIGN]))
-    for name, node in data.children.items():
-        found += [f"{name}: {problem}" for problem in _problems_with_study(node.to_dataset())]
-    return found
+    if kind == CAMPAIGN:
+        studies = {name: node.to_dataset() for name, node in data.children.items()}
+        return [
+            f"{name}: {each}"
+            for name, study in studies.items()
+            for each in _problems_with_variables(study, _OF_STUDY, {})
+        ]
+    return list(_problems_with_run(data) if kind == RUN else _problems_with_surface(data))
 
 
 def _problems_with_run(run: xr.Dataset) -> Iterator[str]:
-    required = (*ATTRIBUTES[RUN], *(IN_CAMPAIGN if run.attrs.get("campaign") else ()))
-    yield from _problems_with_attributes(run.attrs, required)
     model, snapshots = run.attrs.get("contact_model", ""), run.sizes.get("snapshot", 0)
-    if model and model not in MODELS:
+    if model not in MODELS:
         yield f"attribute contact_model: {model!r}; expected {' or '.join(MODELS)}"
     by_cells = model in MODELS and MODELS[model].by_cells
     conditions = {
@@ -148,20 +138,15 @@ def _problems_with_run(run: xr.Dataset) -> Iterator[str]:
         "boundary elements": by_cells,
         "snapshots of boundary elements": by_cells and snapshots > 0,
     }
-    missing = list(_problems_with_variables(run, PROMISED[RUN], conditions))
-    yield from missing
+    problems = list(_problems_with_variables(run, PROMISED[RUN], conditions))
+    yield from problems
     yield from _problems_with_numbers(run)
-    if missing:
+    if problems:
         return
-    yield from _problems_with_steps(run)
+    yield from _outside("contact_area_fraction", run["contact_area_fraction"].values, 0, 1)
     if snapshots:
         yield from _outside("snapshot_step", run["snapshot_step"].values, 0, run.sizes["step"] - 1)
         yield from _outside("spot_snapshot", run["spot_snapshot"].values, 0, snapshots - 1)
-
-
-def _problems_with_steps(run: xr.Dataset) -> Iterator[str]:
-    """Check bounds and identities of variables along `step`."""
-    yield from _outside("contact_area_fraction", run["contact_area_fraction"].values, 0, 1)
     unit = run["contact_modulus"] * run["rms_slope"]
     for name, expected, formula in (
         ("reduced_pressure", run["nominal_pressure"] / unit, "nominal_pressure over contact_modulus and rms_slope"),
@@ -173,27 +158,12 @@ def _problems_with_steps(run: xr.Dataset) -> Iterator[str]:
 
 
 def _problems_with_surface(surface: xr.Dataset) -> Iterator[str]:
-    yield from _problems_with_attributes(surface.attrs, ATTRIBUTES[SURFACE])
     conditions = {"a spectrum": "hurst" in surface, "a measurement": "source_sha256" in surface.attrs}
-    missing = list(_problems_with_variables(surface, PROMISED[SURFACE], conditions))
-    yield from missing
+    problems = list(_problems_with_variables(surface, PROMISED[SURFACE], conditions))
+    yield from problems
     yield from _problems_with_numbers(surface)
-    if missing:
-        return
-    grid = int(surface["grid"])
-    if surface["height"].shape != (grid, grid):
+    if not problems and surface["height"].shape != (grid := int(surface["grid"]), grid):
         yield f"height: has the shape {surface['height'].shape}; expected ({grid}, {grid}), as `grid` is {grid}"
-
-
-def _problems_with_study(study: xr.Dataset) -> Iterator[str]:
-    yield from _problems_with_attributes(study.attrs, ("title", "study", "config_sha256", "license"))
-    yield from _problems_with_variables(study, _OF_STUDY, {})
-
-
-def _problems_with_attributes(attributes: Mapping, required: Iterable[str]) -> Iterator[str]:
-    for name in required:
-        if not str(attributes.get(name, "")).strip():
-            yield f"attribute {name} is missing"
 
 
 def _problems_with_variables(

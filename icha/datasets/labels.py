@@ -8,7 +8,6 @@ last slope.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -138,12 +137,6 @@ def arrange_slopes(pairs: Iterable[tuple[str, float]]) -> np.ndarray:
     if most == len(common):
         return np.array(common, float)
     return np.array([sorted(slopes) + [np.nan] * (most - len(slopes)) for slopes in found.values()], float)
-
-
-def count_cells(runs: Sequence[RunLabels]) -> int:
-    """Count the combinations of labels that the dataset of a study with these runs has."""
-    others = (len({getattr(run, label) for run in runs}) for label in LABELS if label != "rms_slope")
-    return math.prod(others) * arrange_slopes((run.surface, run.rms_slope) for run in runs).shape[-1]
 
 
 def slope_dims(slopes: np.ndarray) -> tuple[str, ...]:

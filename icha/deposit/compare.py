@@ -16,7 +16,6 @@ libraries and fonts that may differ. If only figures or the report differ, the c
 difference.
 """
 
-import json
 import os
 import textwrap
 from collections import Counter, defaultdict
@@ -29,7 +28,6 @@ import numpy as np
 
 from icha.checks.run import FRONT_LIMIT, RESIDUAL_LIMIT
 from icha.deposit.verify import COMPUTED, files_of
-from icha.support.atomic_files import whole_file
 from icha.support.checksums import sha256_of
 from icha.support.formatting import printable
 from icha.support.input_files import refuse_traps
@@ -269,18 +267,3 @@ def _lines(comparison: Comparison, within: bool) -> list[str]:
         files = path if len(found) == 1 else f"{len(found)} files, most in {path}"
         lines.append((-deviation, f"{place}: {verdict}, {detail}" + (f" ({files})" if place != path else "")))
     return [line for _, line in sorted(lines)]
-
-
-def write_json(comparison: Comparison, path: str | os.PathLike) -> None:
-    """Write all differences to a JSON file; infinite deviations are null."""
-
-    def entry(each: Difference) -> dict:
-        return each._asdict() | {"deviation": each.deviation if np.isfinite(each.deviation) else None}
-
-    files = [
-        {"path": file.path, "verdict": file.verdict, "variables": list(map(entry, file.differences))}
-        for file in comparison.files
-    ]
-    content = {"verdict": comparison.verdict, "tolerance": TOLERANCE, "files": files}
-    with whole_file(path) as temporary:
-        temporary.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")

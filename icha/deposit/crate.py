@@ -23,7 +23,6 @@ from icha.contact.models import MODEL_PAPER
 from icha.datasets.results import CONFIGURATION
 from icha.deposit.metadata import TABLES, find_licence, web_address
 from icha.deposit.verify import CRATE, README, SOURCE
-from icha.support.atomic_files import whole_file
 
 _PROGRAM = f"{SOURCE}/"
 _WORKFLOW = f"{_PROGRAM}Snakefile"
@@ -93,26 +92,24 @@ def write_crate(
     _describe(crate, publication, campaign)
     shown = {path for path in checksums if not path.startswith(_PROGRAM)}
     shown |= {*_SHOWN, *(job.script for job in jobs)}
-    files = {path: _add_file(crate, path, Path(folder, path), checksums[path]) for path in sorted(shown)}
-    source = crate.add(Dataset(crate, dest_path=_PROGRAM))
-    _set(
-        source,
-        name="Source of the workflow and of its program",
-        version=revision,
-        identifier=revision,
-        hasPart=[file for path, file in files.items() if path.startswith(_PROGRAM)],
-    )
+    files = {}
+    for path in sorted(shown):
+        file = folder / path
+        kind = TABLES["formats"].get(file.suffix, "application/octet-stream")
+        facts = {"contentSize": str(file.stat().st_size), "sha256": checksums[path], "encodingFormat": kind}
+        files[path] = crate.add(File(crate, dest_path=path, properties={"name": path, **facts}))
+    parts = [file for path, file in files.items() if path.startswith(_PROGRAM)]
+    facts = {"version": revision, "identifier": revision, "hasPart": parts}
+    _set(crate.add(Dataset(crate, dest_path=_PROGRAM)), name="Source of the workflow and of its program", **facts)
     number = version("snakemake")
     _set(crate.dereference("#snakemake"), name=f"Snakemake {number}", version=number)
     _describe_workflow(crate, files, revision, _steps(jobs))
     _add_jobs(crate, jobs, files, f"Campaign {campaign}", publication.title)
     _set(crate.root_dataset, mainEntity=files[_WORKFLOW])
     _set(files[README], about=crate.root_dataset)
-    with whole_file(Path(folder) / CRATE) as temporary:
-        temporary.write_text(
-            json.dumps(crate.metadata.generate(), indent=1, ensure_ascii=False) + "\n", encoding="utf-8"
-        )
-    Path(folder, CRATE).chmod(0o644)
+    content = json.dumps(crate.metadata.generate(), indent=1, ensure_ascii=False)
+    (folder / CRATE).write_text(f"{content}\n", encoding="utf-8")
+    (folder / CRATE).chmod(0o644)
 
 
 def _steps(jobs: Sequence[Job]) -> list[Job]:
@@ -147,27 +144,22 @@ def _describe(crate: ROCrate, publication: Publication, campaign: str) -> None:
 def _add_author(crate: ROCrate, author: Author) -> Entity:
     if not author.is_person:
         return _add_organisation(crate, author.name, author.ror)
-    person = _add(
-        crate,
-        author.orcid_address or f"#person/{quote(author.full_name)}",
-        "Person",
-        name=author.full_name,
-        givenName=author.given_names,
-        familyName=author.family_names,
-    )
+    person = _add_person(crate, author.given_names, author.family_names, author.orcid_address)
     if author.affiliation:
         _set(person, affiliation=_add_organisation(crate, author.affiliation, author.ror))
     return person
 
 
+def _add_person(crate: ROCrate, given: str, family: str, address: str | None = None) -> Entity:
+    """Return a person, who may be an author of the data and of the paper."""
+    name = f"{given} {family}"
+    key = address or f"#person/{quote(name)}"
+    return crate.dereference(key) or _add(crate, key, "Person", name=name, givenName=given, familyName=family)
+
+
 def _add_paper(crate: ROCrate) -> Entity:
     """Add the paper of the model."""
-    people = []
-    for given, family in MODEL_PAPER.authors:
-        # An author of the paper may also be an author of the data.
-        key = f"#person/{quote(f'{given} {family}')}"
-        names = {"name": f"{given} {family}", "givenName": given, "familyName": family}
-        people.append(crate.dereference(key) or _add(crate, key, "Person", **names))
+    people = [_add_person(crate, *names) for names in MODEL_PAPER.authors]
     described = {"name": MODEL_PAPER.title, "author": people, "datePublished": str(MODEL_PAPER.year)}
     return _add(crate, MODEL_PAPER.address, "ScholarlyArticle", **described)
 
@@ -176,38 +168,21 @@ def _add_organisation(crate: ROCrate, name: str, address: str | None) -> Entity:
     return _add(crate, address or f"#organisation/{quote(name)}", "Organization", name=name, url=address)
 
 
-def _add_file(crate: ROCrate, path: str, file: Path, sha256: str) -> File:
-    known = TABLES["formats"].get(file.suffix, "application/octet-stream")
-    size = str(file.stat().st_size)
-    properties = {"name": path, "contentSize": size, "sha256": sha256, "encodingFormat": known}
-    return crate.add(File(crate, dest_path=path, properties=properties))
-
-
 def _describe_workflow(crate: ROCrate, files: Mapping[str, File], revision: str, steps: Sequence[Job]) -> None:
     """Describe scripts and workflow, which are programs as well as files, and the steps of the workflow."""
     configuration = crate.dereference("#configuration")
     _set(files[CONFIGURATION], exampleOfWork=configuration)
     tools = {job.script: files[job.script] for job in steps}
-    for job in steps:
-        _set(
-            tools[job.script],
-            ["File", "SoftwareSourceCode"],
-            name=job.rule,
-            description=job.description,
-            version=revision,
-            programmingLanguage=crate.dereference("#python"),
-        )
-    how_to = [
-        _add(
-            crate,
-            f"{_WORKFLOW}#{job.rule}",
-            "HowToStep",
-            name=job.rule,
-            position=str(position),
-            workExample=tools[job.script],
-        )
-        for position, job in enumerate(steps, 1)
-    ]
+    how_to = []
+    for position, job in enumerate(steps, 1):
+        facts = {
+            "description": job.description,
+            "version": revision,
+            "programmingLanguage": crate.dereference("#python"),
+        }
+        _set(tools[job.script], ["File", "SoftwareSourceCode"], name=job.rule, **facts)
+        facts = {"position": str(position), "workExample": tools[job.script]}
+        how_to.append(_add(crate, f"{_WORKFLOW}#{job.rule}", "HowToStep", name=job.rule, **facts))
     _set(
         files[_WORKFLOW],
         ["File", "SoftwareSourceCode", "ComputationalWorkflow", "HowTo"],
@@ -222,7 +197,7 @@ def _describe_workflow(crate: ROCrate, files: Mapping[str, File], revision: str,
     )
 
 
-def _add_jobs(crate: ROCrate, jobs: Sequence[Job], files: Mapping[str, File], campaign: str, title: str) -> None:
+def _add_jobs(crate: ROCrate, jobs: Sequence[Job], files: Mapping[str, File], campaign: str, description: str) -> None:
     """Add the run of the workflow, every job in it, and the step of the workflow that started each job."""
     engine = crate.dereference("#snakemake")
     made = {path for job in jobs for path in job.outputs}
@@ -231,7 +206,7 @@ def _add_jobs(crate: ROCrate, jobs: Sequence[Job], files: Mapping[str, File], ca
         crate,
         "#campaign",
         name=campaign,
-        description=title,
+        description=description,
         instrument=files[_WORKFLOW],
         object=[files[path] for path in sorted(given)],
         result=[files[path] for path in sorted(made)],
@@ -250,15 +225,9 @@ def _add_jobs(crate: ROCrate, jobs: Sequence[Job], files: Mapping[str, File], ca
             result=[files[path] for path in job.outputs],
         )
         actions.append(action)
-        control = _add_action(
-            crate,
-            f"#control/{name}",
-            "ControlAction",
-            name=f"step {job.rule}: {job.outputs[0]}",
-            instrument={"@id": f"{_WORKFLOW}#{job.rule}"},
-            object=action,
-        )
-        controls.append(control)
+        facts = {"instrument": {"@id": f"{_WORKFLOW}#{job.rule}"}, "object": action}
+        title = f"step {job.rule}: {job.outputs[0]}"
+        controls.append(_add_action(crate, f"#control/{name}", "ControlAction", name=title, **facts))
     name = f"{campaign}, organised by {engine['name']}"
     _add_action(crate, "#organised", "OrganizeAction", name=name, instrument=engine, object=controls, result=run)
     crate.root_dataset.append_to("mentions", [run, *actions])

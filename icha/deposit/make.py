@@ -68,7 +68,12 @@ def make_deposit(
     folder, archive, results = Path(folder), Path(archive), Path(results)
     files, publication = sorted(files), campaign.deposit_metadata()
     refuse_unknown_failures(read_checks(results / "checks.json"), [each.run for each in publication.known_failures])
-    _refuse_changed(results, files)
+    if changed := [f"  {results / file}" for file in files if not is_whole(results, file, thorough=True)]:
+        listed = "\n".join(changed)
+        raise ValueError(
+            "not published, because these files are not what their jobs wrote. Remove them, and run the campaign "
+            f"again:\n{listed}"
+        )
     staging = folder.with_name(f".{folder.name}.part")
     shutil.rmtree(staging, ignore_errors=True)
     try:
@@ -77,7 +82,9 @@ def make_deposit(
             shutil.copyfile(results / file, staging / file)
             (staging / file).chmod(0o644)
         source.export(staging / SOURCE)
-        _refuse_names(files_of(staging))
+        if wrong := [f"  {file!r} {why}" for file in files_of(staging) if (why := problem_with_name(file))]:
+            listed = "\n".join(wrong)
+            raise ValueError(f"not published, because of names of files. Rename these:\n{listed}")
         _describe(staging, files, campaign, source.revision, cost)
         checksums = {path: sha256_of(staging / path) for path in files_of(staging)}
         write_crate(staging, publication, jobs, campaign=campaign.name, revision=source.revision, checksums=checksums)
@@ -93,21 +100,6 @@ def make_deposit(
                 staging.rename(folder)
     finally:
         shutil.rmtree(staging, ignore_errors=True)
-
-
-def _refuse_names(files: Iterable[str]) -> None:
-    """Refuse names that `verify` would refuse."""
-    if wrong := [f"  {file!r} {problem}" for file in files if (problem := problem_with_name(file))]:
-        raise ValueError("not published, because of names of files. Rename these:\n" + "\n".join(wrong))
-
-
-def _refuse_changed(results: Path, files: Iterable[str]) -> None:
-    """Refuse results that are not what their jobs wrote, as far as that is recorded; every byte is read."""
-    if changed := [f"  {results / file}" for file in files if not is_whole(results, file, thorough=True)]:
-        raise ValueError(
-            "not published, because these files are not what their jobs wrote. Remove them, and run the campaign "
-            "again:\n" + "\n".join(changed)
-        )
 
 
 def refuse_mixed(results: Path, campaign: Campaign, recorded: Mapping[str, str]) -> None:

@@ -3,7 +3,6 @@
 `python -m icha.deposit.program` prints the locked versions for `pip install --constraint`.
 """
 
-import contextlib
 import hashlib
 import importlib.metadata
 import importlib.util
@@ -172,12 +171,9 @@ def _listed(names: list[str]) -> str:
 
 def note_versions(results: Path) -> None:
     """Add the installed versions of the packages that ICHA requires to those noted before."""
-    noted, now = _noted(results), set()
-    for line in importlib.metadata.requires("icha") or ():
-        name = canonicalize_name(Requirement(line).name)
-        with contextlib.suppress(importlib.metadata.PackageNotFoundError):
-            if name != "icha":
-                now.add(f"{name}=={importlib.metadata.version(name)}")
+    noted, installed = _noted(results), installed_versions()
+    required = {canonicalize_name(Requirement(line).name) for line in importlib.metadata.requires("icha") or ()}
+    now = {f"{name}=={installed[name]}" for name in required - {"icha"} if name in installed}
     if not now <= noted:
         with whole_file(results / MADE_WITH) as temporary:
             temporary.write_text("".join(f"{line}\n" for line in sorted(noted | now)), encoding="utf-8")
@@ -235,12 +231,16 @@ def version_differences(lock: str) -> list[str]:
     Packages that are locked but not installed are left out, since no environment has all optional packages.
     """
     locked = locked_versions(lock)
-    installed = {canonicalize_name(each.name): each.version for each in importlib.metadata.distributions() if each.name}
     return [
         f"  {name}: {version} is installed, {locked[name]} is locked"
-        for name, version in sorted(installed.items())
+        for name, version in sorted(installed_versions().items())
         if locked.get(name, version) != version
     ]
+
+
+def installed_versions() -> dict[str, str]:
+    """Return the version of every installed package."""
+    return {canonicalize_name(each.name): each.version for each in importlib.metadata.distributions() if each.name}
 
 
 def locked_versions(lock: str) -> dict[str, str]:

@@ -1,10 +1,11 @@
 """A client for Zenodo's deposit API (https://developers.zenodo.org), and for other servers with the same API."""
 
+import contextlib
 import hashlib
 import os
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 from urllib.parse import quote, urlsplit
 
 import requests
@@ -119,7 +120,7 @@ class Zenodo:
         """Send a file, read in pieces; return whether the server has confirmed its checksum `md5`."""
         name = Path(path).name
         with open(path, "rb") as file:
-            received = _md5(self._call("PUT", f"{draft.bucket}/{quote(name)}", data=file))
+            received = _md5(self._call("PUT", f"/{draft.bucket}/{quote(name)}", data=file))
         if received and received != md5:
             raise ZenodoError(
                 f"{name} did not arrive as it was sent: its MD5 is {md5}, that on the server is {received}"
@@ -131,22 +132,22 @@ class Zenodo:
         identifier, _ = draft.files[name]
         self._call("DELETE", f"/api/deposit/depositions/{draft.number}/files/{quote(identifier, safe='')}")
 
-    def _draft(self, content: Mapping) -> Draft:
-        number, bucket = _text(content, "id"), _text(content, "links", "bucket")
-        if not number or not bucket:
-            raise ZenodoError(f"{self.address} does not answer as Zenodo does: its draft has no number or no bucket")
-        if not bucket.startswith(f"{self.address}/"):
+    def _draft(self, content: dict) -> Draft:
+        try:
+            links, metadata, number = content["links"], content.get("metadata", {}), str(content["id"])
+            draft = Draft(
+                number,
+                page=links.get("html", f"{self.address}/uploads/{number}"),
+                bucket=links["bucket"].removeprefix(f"{self.address}/"),
+                doi=metadata.get("prereserve_doi", metadata).get("doi", ""),
+                files={file["filename"]: (file["id"], _md5(file)) for file in content.get("files", [])},
+            )
+        except (KeyError, TypeError, AttributeError):
+            raise ZenodoError(f"{self.address} does not answer as Zenodo does: its draft is incomplete") from None
+        if draft.bucket == links["bucket"]:
             # The token must not reach another server.
-            raise ZenodoError(f"{self.address} asks to send the files to another server: {self._plain(bucket)}")
-        listed = content.get("files")
-        files = {
-            _text(file, "filename") or _text(file, "key"): (_text(file, "id"), _md5(file))
-            for file in (listed if isinstance(listed, list) else ())
-            if isinstance(file, dict)
-        }
-        doi = _text(content, "metadata", "prereserve_doi", "doi") or _text(content, "metadata", "doi")
-        page = _text(content, "links", "html") or f"{self.address}/uploads/{number}"
-        return Draft(number, page, bucket.removeprefix(self.address).rstrip("/"), doi, files)
+            raise ZenodoError(f"{self.address} asks to send the files to another server: {self._plain(draft.bucket)}")
+        return draft
 
     def _call(self, method: str, path: str, **content) -> dict:
         """Send a request; return its JSON, or {} if the answer is empty."""
@@ -164,13 +165,10 @@ class Zenodo:
             )
         if not answer.ok:
             raise ZenodoError(self._refusal(path, answer))
-        try:
-            found = answer.json() if answer.content else {}
-        except (ValueError, RecursionError):
-            found = None
-        if not isinstance(found, dict):
-            raise ZenodoError(f"{self.address} does not answer as Zenodo does: {path} is not a mapping")
-        return found
+        with contextlib.suppress(ValueError, RecursionError):
+            if isinstance(found := answer.json() if answer.content else {}, dict):
+                return found
+        raise ZenodoError(f"{self.address} does not answer as Zenodo does: {path} is not a mapping")
 
     def _refusal(self, path: str, answer: requests.Response) -> str:
         """Describe why the server refused a request: its message, and advice."""
@@ -186,14 +184,6 @@ class Zenodo:
         return plain if len(plain) <= _LONGEST else f"{plain[: _LONGEST - 1]}…"
 
 
-def _text(content: Any, *keys: str) -> str:
-    """Return a text or number in nested mappings of an answer, as text; empty if it is missing."""
-    for key in keys:
-        content = content.get(key) if isinstance(content, dict) else None
-    return str(content) if isinstance(content, str | int) else ""
-
-
-def _md5(content: Mapping) -> str:
+def _md5(content: dict) -> str:
     """Return the checksum that the server reports for a file, with or without the prefix `md5:`."""
-    algorithm, _, digits = _text(content, "checksum").rpartition(":")
-    return digits.lower() if algorithm in ("", "md5") else ""
+    return str(content.get("checksum", "")).removeprefix("md5:").lower()

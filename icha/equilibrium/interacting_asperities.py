@@ -9,8 +9,8 @@ import numpy as np
 
 from icha.asperity.jkr import JKR
 from icha.asperity.material import Material
-from icha.contact.model import AREA_FRACTION, PRESSURE, Control, Events, count_summits, summit_pull_off_pressure
-from icha.contact.models import DEFAULT_MODEL, MODELS, PathAccuracy
+from icha.contact.model import AREA_FRACTION, PRESSURE, Control
+from icha.contact.models import DEFAULT_MODEL, MODELS
 from icha.equilibrium.distributions import gap_distribution, pressure_distribution
 from icha.equilibrium.equations import nominal_derivative, nominal_value, radius_slope
 from icha.equilibrium.sites import AsperityContact, ContactState, Sites
@@ -19,28 +19,17 @@ from icha.half_space.free_square import mean_displacement
 from icha.surfaces.summits import LARGEST_DEPARTURE, SummitCoverage, find_summits, paraboloid_departure
 from icha.surfaces.surface import Surface
 
-# Largest contact area fraction of a state. Targets are allowed up to 0.25; the search for them goes somewhat beyond.
-_LARGEST_AREA = 1.5 * 0.25
 # Derivative of the approach with respect to the mean separation, above which a spot is on an unstable branch.
 _UNSTABLE_RESPONSE = 10.0
 
 
 @dataclass(frozen=True, eq=False)
 class InteractingAsperities(AsperityContact):
-    """Asperities that interact through the half-space and unite where they overlap: a `ContactModel`.
+    """Asperities that interact through the half-space and unite where they overlap: a `ContactModel`."""
 
-    The quantities of a state are those of its spots (`ContactState.spots`).
-    """
-
-    @property
-    def largest_area_fraction(self) -> float:
-        """Contact area fraction above which spots have lost their identity."""
-        return _LARGEST_AREA
-
-    @property
-    def path_accuracy(self) -> PathAccuracy:
-        """Accuracy to which a path resolves events."""
-        return MODELS[DEFAULT_MODEL].accuracy
+    # Largest contact area fraction of a state. Targets are allowed up to 0.25; the search for them goes beyond 0.25.
+    largest_area_fraction = 1.5 * 0.25
+    path_accuracy = MODELS[DEFAULT_MODEL].accuracy
 
     def untouched(self) -> ContactState:
         """Return the state at first contact: the first asperity is about to jump in, and none touches yet."""
@@ -70,9 +59,9 @@ class InteractingAsperities(AsperityContact):
         return nominal_value(self, AREA_FRACTION, state.spots.contact_radius, state.spots.radius_of_curvature)
 
     def mean_gap(self, state: ContactState) -> float:
-        """Return the mean gap, m: the mean separation of a periodic surface.
+        """Return the mean gap, m; on a periodic surface the mean separation.
 
-        On a free square the mean displacement is added, with the spots as forces at their centres.
+        On a free square the mean displacement is added. It is computed with the spots as forces at their centres.
         """
         if not self.asperities.free:
             return state.separation
@@ -89,22 +78,19 @@ class InteractingAsperities(AsperityContact):
         return 0.0 - self.slope(PRESSURE, state)
 
     def slope(self, quantity: str, state: ContactState) -> float:
-        """Return the derivative of the pressure or area fraction with respect to the mean separation.
-
-        It follows from the responses of the approaches, for unchanged contacts.
-        """
+        """Return the derivative of PRESSURE or AREA_FRACTION with respect to the mean separation, without events."""
         sites, c = state.sites, state.contact_index
         a, R = state.contact_radius[c], sites.radius_of_curvature[c]
         growth = radius_slope(self.law, a, R, sites.approach[c], sites.jump_off_approach[c]) * sites.response[c]
         return float(np.sum(nominal_derivative(self, quantity, a, R) * growth))
 
     def stored_energy(self, state: ContactState) -> float:
-        """Return the elastic energy less the energy of adhesion over the nominal area, J/m^2; zero out of contact.
+        """Return the elastic energy minus the energy of adhesion, over the nominal area, J/m^2; zero without contact.
 
-        The energy of a spot is that of a single JKR contact, plus half its force times the displacement by the others.
-        As in eq. (4), force and displacement are those at the centres of the spots. So the interaction of spots of
-        unlike size is only nearly reciprocal: along a path without events the change of the energy differs from the
-        work done by a fraction of the order of (a/r)^2 of that interaction.
+        The energy of a spot is that of a single JKR contact, plus half its force times the displacement by the other
+        spots. As in eq. (4), each spot is a force at its centre, and the displacement is taken at the centre. Therefore
+        the interaction of two spots of different size is not exactly reciprocal: along a path without events, the
+        change of the energy differs from the work done by a fraction of order (a/r)^2 of the energy of interaction.
         """
         spots, law = state.spots, self.law
         a, R = spots.contact_radius, spots.radius_of_curvature
@@ -112,12 +98,8 @@ class InteractingAsperities(AsperityContact):
         return float(np.sum(law.energy(a, R) + 0.5 * law.force(a, R) * displaced)) / self.area
 
     def is_unstable(self, state: ContactState) -> bool:
-        """Return whether d(delta)/du of a spot exceeds 10; on a stable branch it does not."""
+        """Return whether d(delta)/du of a spot exceeds 10, which does not happen on a stable branch."""
         return bool(np.max(state.sites.response[state.contact_index], initial=0.0) > _UNSTABLE_RESPONSE)
-
-    def events_between(self, before: ContactState, after: ContactState) -> Events:
-        """Return the events on the path from one state to a later one."""
-        return Events.concatenate(after.history[len(before.history) :])
 
     def observables(self, surface: Surface) -> AsperityObservables:
         """Return the observables of the states on a surface."""
@@ -126,32 +108,22 @@ class InteractingAsperities(AsperityContact):
 
 @dataclass(frozen=True, eq=False)
 class AsperityObservables:
-    """Observables of interacting asperities, in addition to those of every contact model.
-
-    Parameters
-    ----------
-    contact : contact of the asperities.
-    surface : surface on which they are.
-    """
+    """`icha.contact.model.Observables` of interacting asperities on a surface."""
 
     contact: InteractingAsperities
     surface: Surface
 
     def of_contact(self) -> dict:
-        """Return the values that are the same in all states."""
-        return count_summits(self.contact.asperities)
+        """Return nothing: all values that are the same in all states follow from the surface and the material."""
+        return {}
 
     def of_step(self, state: ContactState) -> dict:
-        """Return the residual, the numbers of events, and the fraction of single spots outside Wu's formula."""
+        """Return the residual, and the fraction of single spots outside the range of Wu's formula."""
         law, spots = self.contact.law, state.spots
         verified = law.is_jump_in_verified(spots.radius_of_curvature[spots.members == 1])
         outside = np.count_nonzero(~verified) / max(len(verified), 1)
         return {
             "residual": state.residual,
-            "jump_in_count": state.jump_ins,
-            "jump_off_count": state.jump_offs,
-            "coalescence_count": state.coalescences,
-            "split_count": state.splits,
             "pending_count": state.barred_count,
             "outside_wu_fraction": outside if self.contact.adhesive else 0.0,
         }
@@ -173,10 +145,7 @@ class AsperityObservables:
         }
 
     def reasons_against(self, separations: Iterable[float], pressed: ContactState | None) -> list[str]:
-        """Return the reasons why the asperities do not represent the surface in the first loading.
-
-        pressed : state with the largest contact area, if any.
-        """
+        """Return the reasons why the asperities do not represent the surface in the first loading."""
         reasons = SummitCoverage.of(self.surface, self.contact.asperities).reasons_against(separations)
         if pressed is None:
             return reasons
@@ -192,12 +161,6 @@ class AsperityObservables:
                 f"{np.exp(LARGEST_DEPARTURE):.2g}"
             )
         return reasons
-
-    @property
-    def summit_pull_off_pressure(self) -> float:
-        """Tension of all summits pulling their most at once, Pa."""
-        contact = self.contact
-        return summit_pull_off_pressure(contact.asperities, contact.law.material.surface_energy, contact.area)
 
 
 def contact_of(surface: Surface, material: Material) -> InteractingAsperities:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from icha.contact.model import JUMP_IN, SPLIT, Events
+from icha.contact.model import JUMP_IN, Events
 from icha.equilibrium.sites import CONTACT, AsperityContact, ContactState, Sites
 
 
@@ -74,11 +74,6 @@ class IterationState:
         single = (self.sites.asperity >= 0) & self.sites.present
         without_site[self.sites.asperity[single]] = False
         return without_site
-
-    @property
-    def splits(self) -> int:
-        """Number of splits along the path so far."""
-        return self.start.splits + sum(row[0] == SPLIT for row in self.log)
 
     @property
     def jumped_in(self) -> list[int]:

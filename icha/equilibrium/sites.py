@@ -86,7 +86,7 @@ class Sites:
     asperity : (n,) int, index of the asperity; -1 for a union.
     members : (n,) int, number of asperities in the spot.
     union : (n,) object, `MergeRecord` of a union; None for other sites.
-    split_number : (n,) int, number of the split that a spot comes from, counted along the path; -1 for others.
+    split_number : (n,) int, number of the split that a spot comes from; -1 for others.
     status : (n,) int, CONTACT, CANDIDATE or REMOVED.
     approach : (n,) float, last known approach, m.
     response : (n,) float, derivative of the approach with respect to the mean separation.
@@ -217,7 +217,6 @@ class ContactState:
     last_approach : (asperities,) float, approach of an asperity when it was evaluated last, m.
     last_separation : (asperities,) float, mean separation at that time, m; inf if the approach is not known.
     residual : largest error of the equilibrium, in h_rms.
-    jump_ins, jump_offs, coalescences, splits : number of events along the path up to this state.
     barred_count : number of asperities out of contact beyond their jump-in approach; they have broken contact at this
         separation, and may not make it again.
     history : events of every equilibrium of the path up to this state.
@@ -230,10 +229,6 @@ class ContactState:
     last_approach: np.ndarray
     last_separation: np.ndarray
     residual: float = 0.0
-    jump_ins: int = 0
-    jump_offs: int = 0
-    coalescences: int = 0
-    splits: int = 0
     barred_count: int = 0
     history: tuple[Events, ...] = ()
 

@@ -1,11 +1,7 @@
 """Search for the equilibrium of all contact spots at a given mean separation, load or contact area.
 
-The search alternates Newton steps and events. With adhesion contact forms and breaks in jumps. As soon as Newton's
-method is close to an equilibrium, all jumps and unions that are due happen at once, and the method continues from
-there.
-
-Unions are undone when the surfaces move apart: a union splits where its two spots would no longer overlap; a union that
-jumps off before that releases its asperities, of which those with a stable state of the law stay in contact.
+The search alternates Newton steps, which solve the equations for the present spots, and events, which change the spots:
+jumps into and out of contact, coalescence of spots, and on unloading splits of unions.
 """
 
 import hashlib
@@ -14,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from icha.contact.model import AREA_FRACTION, COALESCENCE, JUMP_IN, JUMP_OFF, SPLIT, Control, FullContact, NotConverged
+from icha.contact.model import AREA_FRACTION, JUMP_IN, JUMP_OFF, Control, FullContact, NotConverged
 from icha.contact.models import RESIDUAL_TOLERANCE
 from icha.equilibrium.equations import Equations, Evaluation, nominal_value
 from icha.equilibrium.iteration_state import IterationState
@@ -23,20 +19,20 @@ from icha.equilibrium.newton import newton_step, solve_response
 from icha.equilibrium.sites import CANDIDATE, CONTACT, AsperityContact, ContactState
 from icha.equilibrium.unions import absorb_covered, merge_overlapping, set_union_heights, split_unions
 
-# Error in h_rms below which jumps and unions happen. Those that are due by less than ten times the error wait for the
-# equilibrium.
+# Error in h_rms below which the search applies events. Events that are due by less than ten times the error wait for
+# the equilibrium.
 _EVENT_TOLERANCE = 3e-4
 _EVENT_MARGIN = 10.0
-# Largest number of Newton steps between two events, and of steps in all with the exact matrix: where more are needed,
-# the step of the path is too long.
+# Largest number of Newton steps between two events, and of all steps with the exact matrix. If more are needed, the
+# step of the path is too long.
 _MAX_NEWTON_STEPS = 60
 _MAX_EXACT_STEPS = 4
-# Largest number of rounds of events, of which there may be many where many summits are alike; and of rounds that lead
-# to the same spots: if unions are made and undone in a circle, there is no equilibrium.
+# Largest number of rounds of events: a surface with many equal summits may need many. Largest number of rounds that
+# lead to the same spots: if unions form and split again and again, there is no equilibrium.
 _MAX_ROUNDS, _MAX_RETURNS = 1000, 10
 # Distance, in periods, up to which two spots count as the same.
 _SAME_PLACE = 1e-6
-# Contact area fraction from which on spots have lost all meaning.
+# Contact area fraction above which the model of spots has no meaning.
 _FULL_CONTACT = 0.5
 
 
@@ -45,22 +41,14 @@ def find_equilibrium(
 ) -> ContactState:
     """Find the equilibrium at another mean separation, load or contact area, starting from an equilibrium.
 
-    Newton steps solve the equations for the present spots. Whenever they are nearly solved, all events that are due
-    happen at once: spots past jump-off break contact, asperities beyond jump-in make contact, asperities under a spot
-    are taken into it, overlapping spots coalesce, and on unloading unions split. The equilibrium is found when the
-    equations are solved and no event is due.
+    Parameters and errors are those of `icha.contact.model.ContactModel.equilibrium`. Newton steps solve the equations
+    for the present spots. When the equations are nearly solved, all events that are due happen at once: spots past
+    jump-off break contact, asperities beyond jump-in make contact, a spot absorbs the asperities under it, overlapping
+    spots coalesce, and on unloading unions split. The search ends when the equations are solved and no event is due.
 
-    The search ends with an equilibrium or with an error. An asperity that has broken contact may not make contact again
-    at this separation; `barred_count` counts the asperities that this rule keeps out of contact. Without adhesion a
-    single spot of radius zero does no harm and becomes a candidate at the end.
-
-    Parameters
-    ----------
-    separation : mean separation, or its first guess if there is a control, m.
-    control : load or area to hold instead of the separation.
-    let_go : number of spots that break contact first, those closest to jump-off.
-
-    Raises `NotConverged` or `FullContact`, as `icha.contact.model.ContactModel.equilibrium` does.
+    An asperity that has broken contact may not make contact again at this separation; `barred_count` counts the
+    asperities that this rule keeps out of contact. Without adhesion a single spot of radius zero becomes a candidate at
+    the end.
     """
     state = IterationState.towards(contact, start, separation)
     if not contact.adhesive:
@@ -74,7 +62,7 @@ def find_equilibrium(
         state, evaluation = _absorb_and_evaluate(state, evaluation, control)
         equations = Equations(contact, state.sites, control)
         size = equations.error_size(evaluation)
-        # Here a relative error of the load weighs as much as the same error of the separation in h_rms.
+        # With the weight 1, a relative error of the load counts as much as an error of the separation in h_rms.
         closeness = equations.error_size(evaluation, 1.0)
         margin = _EVENT_MARGIN * closeness * contact.rms_height
         changed = False
@@ -84,13 +72,13 @@ def find_equilibrium(
                 return _contact_state(state, evaluation, control)
         elif closeness <= _EVENT_TOLERANCE and not wait:
             state, changed = apply_events(state, evaluation, margin)
-            wait = not changed  # events that are due by less wait for the equilibrium
+            wait = not changed
         if not changed:
-            if steps == _MAX_NEWTON_STEPS or exact_steps == _MAX_EXACT_STEPS:
-                count = f"{steps} Newton steps"
-                if steps < _MAX_NEWTON_STEPS:
-                    count = f"{exact_steps} Newton steps with the exact matrix"
-                raise NotConverged(f"equilibrium error {size:.2e} h_rms after {count}")
+            if steps == _MAX_NEWTON_STEPS:
+                raise NotConverged(f"equilibrium error {size:.2e} h_rms after {steps} Newton steps")
+            if exact_steps == _MAX_EXACT_STEPS:
+                steps_taken = f"{exact_steps} Newton steps with the exact matrix"
+                raise NotConverged(f"equilibrium error {size:.2e} h_rms after {steps_taken}")
             evaluation, smaller, exact = newton_step(equations, evaluation, size)
             exact_steps += exact
             if smaller:
@@ -105,7 +93,12 @@ def find_equilibrium(
 
 
 def apply_events(state: IterationState, evaluation: Evaluation, margin: float) -> tuple[IterationState, bool]:
-    """Apply all jumps and unions due by more than a margin, m, and on unloading all splits; return whether any was."""
+    """Apply all jumps and unions that are due by more than a margin, m, and on unloading all splits.
+
+    Returns
+    -------
+    The new state, and whether there was any event.
+    """
     contact = state.contact
     area = nominal_value(contact, AREA_FRACTION, evaluation.a, state.sites.radius_of_curvature)
     if area > _FULL_CONTACT:
@@ -113,7 +106,7 @@ def apply_events(state: IterationState, evaluation: Evaluation, margin: float) -
     before = state = state.with_approach(evaluation.approach)
     state = apply_jump_off(state, evaluation, margin)
     changed = state is not before
-    # Without adhesion the candidates already cover the expected contacts; the others wait for the equilibrium.
+    # Without adhesion the expected contacts are candidates already; all others wait for the equilibrium.
     if contact.adhesive or margin == 0:
         state, jumped = apply_jump_in(state, evaluation, margin)
         changed |= jumped
@@ -145,9 +138,9 @@ def _absorb_and_evaluate(state, evaluation, control):
 
 
 def _merge_after_failed_step(state, evaluation, margin, size):
-    """Merge overlapping spots after a failed Newton step; if none, those of which one covers the centre of another.
+    """Merge overlapping spots after a failed Newton step; raise `NotConverged` if there are none.
 
-    Raise `NotConverged` if nothing merges.
+    If no spots overlap by more than the margin, those spots merge of which one covers the centre of the other.
     """
     before = state.with_approach(evaluation.approach)
     state = merge_overlapping(before, evaluation, margin)
@@ -160,8 +153,8 @@ def _merge_after_failed_step(state, evaluation, margin, size):
 
 
 def _contact_state(state, evaluation, control):
-    """Return the equilibrium that has been found."""
-    contact, start = state.contact, state.start
+    """Build the equilibrium state from the final state of the search."""
+    contact, history = state.contact, state.start.history
     response = solve_response(Equations(contact, state.sites, control), evaluation)
     if not contact.adhesive:
         state = _update_candidates(state, evaluation)
@@ -175,17 +168,13 @@ def _contact_state(state, evaluation, control):
         last_approach=state.last_approach,
         last_separation=state.last_separation,
         residual=float(np.max(np.abs(evaluation.error), initial=0.0)) / contact.rms_height,
-        jump_ins=start.jump_ins + events.count(JUMP_IN),
-        jump_offs=start.jump_offs + events.count(JUMP_OFF),
-        coalescences=start.coalescences + events.count(COALESCENCE),
-        splits=start.splits + events.count(SPLIT),
         barred_count=state.barred_count,
-        history=(*start.history, events) if len(events) else start.history,
+        history=(*history, events) if len(events) else history,
     )
 
 
 def _update_candidates(state, evaluation):
-    """Set the status of single asperities without adhesion: those that have made contact, and that have lost it."""
+    """Set which single asperities are in contact and which are candidates; used without adhesion."""
     sites, status, site_of_asperity = state.sites, state.sites.status.copy(), state.site_of_asperity.copy()
     made = np.flatnonzero((status == CANDIDATE) & (evaluation.approach > 0))
     status[made] = CONTACT

@@ -144,7 +144,7 @@ def _split(state, site, a):
         approach=law.approach(contact_radius, union.columns["radius_of_curvature"]),
         status=CONTACT,
         was_in_contact=True,
-        split_number=state.splits,
+        split_number=np.max(sites.split_number) + 1,
     )
     # The approach of asperities under the union is not known.
     last_separation = np.where(merged, np.inf, state.last_separation)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -11,7 +11,6 @@ from icha.contact.models import MODELS, REFERENCE_MODEL
 from icha.datasets.variables.model_error import SHORT_RANGE
 from icha.figures.ensembles import draw_members, lines_handles, mark_fewer
 from icha.figures.hysteresis import average_legs
-from icha.figures.legends import legend_below, model_handle, named_handles, words_handle
 from icha.figures.looks import (
     ASPERITIES_NAME,
     BRANCH_DASHES,
@@ -20,6 +19,10 @@ from icha.figures.looks import (
     TRUTH_LINE,
     Contact,
     Looks,
+    legend_below,
+    model_handle,
+    named_handles,
+    words_handle,
 )
 from icha.figures.select import (
     ContactRuns,
@@ -32,7 +35,7 @@ from icha.figures.select import (
     snapshot_label,
     unloading_legs,
 )
-from icha.figures.style import legend_handle, logarithmic_axes
+from icha.figures.style import GREY, legend_handle, logarithmic_axes
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -45,7 +48,7 @@ AREA_LABEL = r"contact area  $A/A_0$"
 SEPARATION_LABEL = r"mean separation  $\bar{u}/h_{\mathrm{rms}}$"
 GAP_LABEL = r"mean gap  $\langle u\rangle/h_{\mathrm{rms}}$"
 
-UNLOADING = {"ls": BRANCH_DASHES["unloading"], "lw": 0.7, "zorder": 2.2}
+_UNLOADING = {"ls": BRANCH_DASHES["unloading"], "lw": 0.7, "zorder": 2.2}
 
 
 def gap_label(data: xr.Dataset) -> str:
@@ -81,14 +84,12 @@ class Curves(NamedTuple):
     looks: Looks
     handles: dict[str, Line2D]
 
-    @property
-    def unloaded(self) -> bool:
-        """True if any run is unloaded."""
-        return any(unloading_legs(run) for line in self.lines for run in line.runs.by_seed.values())
 
+def study_curves(campaign: xr.DataTree, study: str, boundary_elements: str | None = None, **changed: object) -> Curves:
+    """Return the curves of a study, with crosses of boundary elements of this study or another.
 
-def study_curves(campaign: xr.DataTree, study: str, boundary_elements: str | None = None) -> Curves:
-    """Return the curves of a study, with crosses of boundary elements of this study or another."""
+    `changed` overrides the look of all markers.
+    """
     groups = group_by_contact(campaign, select_runs(campaign, study, ragged=False))
     dataset = campaign[study].to_dataset()
     materials = dataset["material"].values.tolist()
@@ -96,14 +97,14 @@ def study_curves(campaign: xr.DataTree, study: str, boundary_elements: str | Non
     looks = Looks(campaign, dataset, contacts)
     name, lines = model_name(dataset), []
     for group in groups:
-        look = looks.look(group.contact, applicable=group.applicable) | {"ls": "-" if looks.scale else "none"}
+        look = looks.look(group.contact, applicable=group.applicable) | {"ls": "-" if looks.scale else "none"} | changed
         if name != ASPERITIES_NAME:
             look |= {"marker": MODEL_MARKERS[name], "ms": look["ms"] + 2}
         lines.append(Curve(group, look))
     other = boundary_elements or (study if name == ASPERITIES_NAME else None)
     truths = select_runs(campaign, other, ragged=False, model=REFERENCE_MODEL) if other else []
     crosses = [Curve(truth, cross_look(looks, truth.contact)) for truth in group_by_contact(campaign, truths)]
-    changed = {"ls": "-" if looks.scale or any(len(group.by_seed) > 1 for group in groups) else "none"}
+    changed |= {"ls": "-" if looks.scale or any(len(group.by_seed) > 1 for group in groups) else "none"}
     changed |= {} if looks.many_places else {"marker": MODEL_MARKERS[name]}
     handles = looks.handles(**changed) | {name: model_handle(name, mfc="white")}
     return Curves(lines, crosses, looks, handles | ({SHORT_RANGE: model_handle(SHORT_RANGE)} if crosses else {}))
@@ -133,21 +134,17 @@ def snapshot_looks(campaign: xr.DataTree, study: str, lines: Sequence[Snapshots]
 
 
 def add_snapshot_legend(
-    figure: Figure,
-    panels: Sequence[Axes],
-    dataset: xr.Dataset,
-    lines: Sequence[Snapshots],
-    looks: Looks,
-    truths: Iterable[str],
+    figure: Figure, panels: Sequence[Axes], dataset: xr.Dataset, lines: Sequence[Snapshots], looks: Looks
 ) -> None:
-    """Add titles and legend of a figure of one snapshot of a study; `truths` names the boundary elements in it."""
+    """Add titles and legend of a figure of one snapshot of a study."""
     shown, model = lines[0].runs.labels, model_name(dataset)
     titles = (snapshot_label(*lines[-1].members[0]), name_of_place(dataset, shown.surface, shown.rms_slope))
     for axes, title in zip(panels, titles, strict=True):
         axes.set_title(title, loc="right")
     handles = looks.handles(ls="-", marker=MODEL_MARKERS[model])
     handles |= {model: model_handle(model, ls="-", lw=0.8, mfc="white")}
-    handles |= {name: model_handle(name, **TRUTH_LINE) for name in truths}
+    if any(line.truths for line in lines):
+        handles[SHORT_RANGE] = model_handle(SHORT_RANGE, **TRUTH_LINE)
     handles |= lines_handles(len(line.members) for line in lines) | named_handles(panels[1:])
     legend_below(figure, handles, scale=looks.scale, panels=panels)
 
@@ -235,17 +232,14 @@ def _draw_unloading(panels, line):
 
     The axes keep their range.
     """
-    import xarray as xr
-
     runs = line.runs.by_seed.values()
-    slope = next(iter(runs))["rms_slope"]
     for leg in average_legs([[("unloading", leg) for leg in unloading_legs(run)] for run in runs]):
-        states = xr.Dataset({name: ("step", values) for name, values in leg.values.items()}).assign(rms_slope=slope)
         for axes, points in panels.items():
-            load, values = points(states)
+            load, values = points(leg.values)
             # Just before separation loads are arbitrarily small.
             pressed = np.where(load > 0, load, np.nan)
-            axes.add_artist(legend_handle(pressed, values, color=line.look["mec"], **UNLOADING))
+            axes.add_artist(legend_handle(pressed, values, color=line.look["mec"], **_UNLOADING))
+            axes.plot([], [], color=GREY, label="unloading", **_UNLOADING)
 
 
 def add_legend(figure: Figure, panels: Sequence[Axes], curves: Curves, further: Mapping[str, object] = {}) -> None:

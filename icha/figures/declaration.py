@@ -6,7 +6,7 @@ modules of all figures. Therefore these modules import libraries for drawing, an
 the functions that draw.
 
 The function `figure` takes the data of the `inputs`, and the `arguments` of the options as keywords. It raises
-ValueError if the campaign has no such study, run or snapshot; the message names the existing ones. It raises
+ValueError if the campaign has no such study or snapshot; the message names the existing ones. It raises
 `icha.figures.select.NothingToDraw` if no run in the figure is complete.
 """
 
@@ -41,7 +41,7 @@ class FigureOptions(Section):
         """Return the studies whose runs the figure shows."""
         return ()
 
-    def arguments(self) -> dict[str, Any]:
+    def arguments(self, campaign: Campaign) -> dict[str, Any]:
         """Return the arguments of the function that draws the figure, without the data."""
         return self.model_dump(exclude_none=True)
 
@@ -51,23 +51,32 @@ def dataset_only(campaign: Campaign, options: FigureOptions, files: results.Resu
     return {"campaign": files.path(results.DATASET)}
 
 
+def dataset_and_theories(campaign: Campaign, options: StudyFigure, files: results.ResultFiles) -> Inputs:
+    """Return the campaign dataset, and the theories for the first surface of the study."""
+    theories = files.path(results.THEORIES, surface=campaign.studies[options.study].surfaces[0])
+    return {"campaign": files.path(results.DATASET), "references": theories}
+
+
+def dataset_and_model_error(campaign: Campaign, options: ComparedFigure, files: results.ResultFiles) -> Inputs:
+    """Return the campaign dataset, which gives the colours of the materials, and the model error."""
+    return {"campaign": files.path(results.DATASET), "model_error": files.path(results.MODEL_ERROR)}
+
+
 @dataclass(frozen=True)
 class Declaration:
     """Everything about a figure except its drawing.
 
     Parameters
     ----------
-    description : what it shows, in a line, for authors of configurations.
-    options : the model of its section; its first line of documentation is part of the schema.
-    inputs : the files of its arguments. Results are read; of other files the paths are passed on.
-    arguments : arguments that the rest of the configuration gives, beside those of the options.
-    holds_topography : whether it takes memory for arrays of the surface's size.
+    description : what the figure shows, in one line, for authors of configurations.
+    options : the class of the figure's section; the first line of its docstring is part of the schema.
+    inputs : function that returns the input files. netCDF files are read; of other files the paths are passed on.
+    holds_topography : whether drawing needs memory for arrays of the size of the surface.
     """
 
     description: str
     options: type[FigureOptions]
     inputs: Callable[[Campaign, Any, results.ResultFiles], Inputs] = dataset_only
-    arguments: Callable[[Campaign, Any], dict[str, Any]] = lambda campaign, options: {}
     holds_topography: bool = False
 
 
@@ -143,12 +152,16 @@ class SnapshotFigure(StudyFigure):
             kind, value = self.snapshot.kind_and_value
             yield ("snapshot",), f"{kind} {value:g}", f"is not kept by study {self.study!r}; expected one of: {kept}"
 
-    def arguments(self) -> dict[str, Any]:
+    def arguments(self, campaign: Campaign) -> dict[str, Any]:
         """Return the arguments, with the kind and the target of the snapshot instead of the snapshot."""
-        arguments = super().arguments()
+        arguments = super().arguments(campaign)
         if arguments.pop("snapshot", None) is not None:
             arguments["kind"], arguments["target"] = self.snapshot.kind_and_value
         return arguments
+
+
+# Options that choose a run, which are also names of labels.
+_RUN_OPTIONS = {"study", "surface", "seed", "rms_slope", "material"}
 
 
 class RunFigure(StudyFigure):
@@ -156,22 +169,20 @@ class RunFigure(StudyFigure):
 
     surface: Label | None = Field(default=None, description="Surface to show.")
     seed: Seed | None = Field(default=None, description="Seed to show.")
-    rms_slope: Positive | None = Field(default=None, description="Rms slope that is shown.")
+    rms_slope: Positive | None = Field(default=None, description="Rms slope to show.")
     material: Label | None = Field(
         default=None, description="Material to show. Default: the first one with adhesion, if there is any."
     )
 
-    def arguments(self) -> dict[str, Any]:
-        """Return the arguments; `surface_name` is the name of the surface, because `surface` is its dataset."""
-        arguments = super().arguments()
-        if "surface" in arguments:
-            arguments["surface_name"] = arguments.pop("surface")
-        return arguments
+    def arguments(self, campaign: Campaign) -> dict[str, Any]:
+        """Return the arguments, with the labels of the run instead of the options that choose the run."""
+        arguments = super().arguments(campaign)
+        return {name: arguments[name] for name in arguments.keys() - _RUN_OPTIONS} | {"run": tuple(self.run(campaign))}
 
     def run(self, campaign: Campaign) -> RunLabels:
         """Return the first requested run with adhesion; without any, return the first requested run."""
         model = first_model(campaign.studies[self.study].models)
-        wanted = self.model_dump(include={"surface", "seed", "rms_slope", "material"}, exclude_none=True)
+        wanted = self.model_dump(include=_RUN_OPTIONS, exclude_none=True)
         runs = [RunLabels(self.study, model, *contact) for contact in campaign.contacts(self.study)]
         runs = [run for run in runs if wanted.items() <= run._asdict().items()]
         return next((run for run in runs if campaign.materials[run.material].surface_energy > 0), runs[0])
@@ -202,11 +213,6 @@ def is_solved_at_finite_range(campaign: Campaign, study: str) -> bool:
     return any(entry.study == study for entry in campaign.finite_range.values())
 
 
-def finite_range_error(campaign: Campaign, study: str, files: results.ResultFiles) -> Inputs:
-    """Return the file of the model error as an input, if an entry of `finite_range` solves the contacts of a study."""
-    return {"model_error": files.path(results.MODEL_ERROR)} if is_solved_at_finite_range(campaign, study) else {}
-
-
 def unloading_problems(campaign: Campaign, location: tuple, name: str, *, partly: bool) -> Iterator[Problem]:
     """Yield a problem if a study does not unload completely; with `partly`, only if it does not unload at all."""
     study = campaign.studies.get(name)
@@ -219,8 +225,3 @@ def studies_problems(campaign: Campaign, key: str, names: Iterable[str]) -> Iter
     for index, name in enumerate(names):
         yield from unknown((key, index), name, campaign.studies)
         yield from unloading_problems(campaign, (key, index), name, partly=False)
-
-
-def campaign_and_model_error(campaign: Campaign, options: ComparedFigure, files: results.ResultFiles) -> Inputs:
-    """Return the files of the model error and of the campaign dataset, which gives the colours of the materials."""
-    return {"campaign": files.path(results.DATASET), "model_error": files.path(results.MODEL_ERROR)}

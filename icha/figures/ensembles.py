@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from icha.figures.legends import FEWER_SEEDS, write_seed_count
+from icha.figures.looks import FEWER_SEEDS
 from icha.figures.select import ContactRuns
 from icha.figures.style import GREY, legend_handle
 from icha.support.statistics import ENOUGH, ensemble
@@ -47,7 +47,7 @@ def draw_members(
     ----------
     positive : whether the axis is logarithmic, so that the band is positive and zeros are left out.
     lines : number of lines in the panel.
-    asked : number of members asked for; marks of means over fewer show it (`mark_fewer`).
+    asked : number of members requested; marks of means over fewer show it (`mark_fewer`).
     alone : look of a single member, beside `look`.
     """
     if len(members) == 1:
@@ -56,12 +56,8 @@ def draw_members(
         return
     mean, known = ensemble(members).mean, np.isfinite(members)
     draw_scatter(axes, x, members, look["color"], positive=positive, lines=lines)
-    every = max(1, -(-len(x) // _MEAN_MARKERS))
-    breaks = _changes(known)
-    marked = every
-    if len(breaks):
-        at = np.arange(0, len(x), every)
-        marked = (at + np.searchsorted(breaks, at, side="right")).tolist()
+    every, breaks = max(1, -(-len(x) // _MEAN_MARKERS)), _changes(known)
+    marked = np.insert(np.arange(len(x)) % every == 0, breaks, False)
     axes.plot(*_break_lines(breaks, x, mean), **{"lw": 0.9} | look | {"ls": "-", "markevery": marked})
     mark_fewer(axes, x, mean, known, look, asked, every)
 
@@ -79,33 +75,27 @@ def _break_lines(breaks, *rows):
 def mark_fewer(
     axes: Axes, x: np.ndarray, y: np.ndarray, known: np.ndarray, look: dict, asked: int | np.ndarray, every: int = 1
 ) -> None:
-    """Draw the marks of means over fewer members than asked for hollow and crossed, with n beside them.
-
-    Successive points that are means over the same members have one n, beside the last of them.
+    """Draw the marks of means over fewer members than requested hollow and crossed.
 
     Parameters
     ----------
     x, y : (k,) float, the means.
     known : (members, k) bool, which members each mean is over.
     look : look of the marks, arguments of `Axes.plot`.
-    asked : number of members asked for, of all points or of each.
-    every : distance between marked points, in points.
+    asked : number of requested members, of all points or of each.
+    every : distance between marked points, in points. The first mean over other members than before is marked as well.
     """
     counts = known.sum(axis=0)
-    fewer = (counts > 0) & (counts < asked) & np.isfinite(y)
-    if not fewer.any():
+    marked = np.arange(len(counts)) % every == 0
+    marked[_changes(known)] = True
+    marked &= (counts > 0) & (counts < asked) & np.isfinite(y)
+    if not marked.any():
         return
-    stretches = [points[fewer[points]] for points in np.split(np.arange(len(counts)), _changes(known))]
-    stretches = [points for points in stretches if len(points)]
-    marks = np.unique(np.concatenate([[*at[at % every == 0], at[0], at[-1]] for at in stretches]))
-    look = {name: look[name] for name in ("color", "mec", "mew", "ms", "marker", "zorder") if name in look}
-    colour, order = look.get("color", look.get("mec")), look.get("zorder", 2) + _BEFORE_POINTS
-    if look.get("marker") not in (None, "none", "+", "x", "1", "2", "3", "4"):
-        axes.plot(x[marks], y[marks], **look | {"ls": "none", "mfc": "white", "zorder": order})
-    cross = {"color": colour, "ms": look.get("ms", _SEED_DOT["ms"]), "zorder": order + 0.001}
-    axes.plot(x[marks], y[marks], **cross | _CROSS)
-    for *_, last in stretches:
-        write_seed_count(axes, counts[last], x[last], y[last], color=colour, zorder=order + 1)
+    order = look.get("zorder", 2) + _BEFORE_POINTS
+    if look.get("marker") not in (None, "none", "+", "x", "1", "2"):
+        ring = {name: look[name] for name in ("color", "mec", "mew", "ms", "marker") if name in look}
+        axes.plot(x[marked], y[marked], ls="none", mfc="white", zorder=order, **ring)
+    axes.plot(x[marked], y[marked], color=look["color"], ms=look.get("ms", 5), zorder=order + 0.001, **_CROSS)
 
 
 def draw_scatter(
@@ -146,7 +136,7 @@ def draw_points(
     x : (k,) or (members, k) float; of members that differ in x, the means have bars along x as well.
     members : (members, k) float, NaN where a member has no value.
     positive : whether values are positive, so that their bars are.
-    asked : number of members asked for, of all points or of each; marks of means over fewer show it (`mark_fewer`).
+    asked : number of members requested, of all points or of each; marks of means over fewer show it (`mark_fewer`).
     """
     known = np.isfinite(members)
     x = np.where(known, x, np.nan)
@@ -185,7 +175,7 @@ class Points:
     ----------
     members : (quantities, seeds, k) float, values of every seed; NaN where a point lacks it.
     same_seeds : whether all points are of the same seeds.
-    asked : (k,) int, numbers of seeds asked for.
+    asked : (k,) int, numbers of seeds requested.
     """
 
     def __init__(self, groups: Sequence[ContactRuns], *quantities: str, factor: float = 1.0):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 
-from icha.figures.declaration import ComparedFigure, Declaration, campaign_and_model_error
+from icha.figures.declaration import ComparedFigure, Declaration, dataset_and_model_error
 from icha.figures.errors import ErrorPanel, draw_errors
 
 DECLARATION = Declaration(
@@ -13,11 +13,11 @@ DECLARATION = Declaration(
         "or an entry of `finite_range`."
     ),
     options=ComparedFigure,
-    inputs=campaign_and_model_error,
+    inputs=dataset_and_model_error,
 )
 
 QUANTITIES = (
-    ErrorPanel("area_error", r"error of $A/A_0$ (%)", 100, other="energetic_area_error"),
+    ErrorPanel("area_error", r"error of $A/A_0$ (%)", 100),
     ErrorPanel("separation_error", r"error of $\bar{u}$ (%)", 100),
 )
 

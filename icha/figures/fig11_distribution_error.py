@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 
-from icha.figures.declaration import ComparedFigure, Declaration, campaign_and_model_error
+from icha.figures.declaration import ComparedFigure, Declaration, dataset_and_model_error
 from icha.figures.errors import ErrorPanel, draw_errors
 
 DECLARATION = Declaration(
@@ -13,7 +13,7 @@ DECLARATION = Declaration(
         "The study needs both `models`, or an entry of `finite_range`."
     ),
     options=ComparedFigure,
-    inputs=campaign_and_model_error,
+    inputs=dataset_and_model_error,
 )
 
 QUANTITIES = (

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 from pydantic import Field
@@ -13,15 +13,14 @@ from icha.figures.curves import drop_rounding_errors
 from icha.figures.declaration import Campaign, Declaration, StudyFigure, studies_problems, unloading_problems
 from icha.figures.ensembles import Points, points_handles
 from icha.figures.hysteresis import name_model, select_detached_lines
-from icha.figures.legends import legend_below
-from icha.figures.looks import looks_of_studies
+from icha.figures.looks import legend_below, looks_of_studies
 from icha.figures.style import (
     GREY,
     ONE_COLUMN,
     TWO_COLUMNS,
     choose_unit,
-    format_number,
     in_style,
+    logarithmic_axes,
     new_panels,
     slope_label,
 )
@@ -37,11 +36,6 @@ class PullOffFigure(StudyFigure):
 
     load_studies: list_of_names("Studies that differ in their largest load.") | None = Field(
         default=None, description="Names of studies that differ in their largest load, for a second panel."
-    )
-    quantity: Literal["pull_off_pressure", "pull_off_over_strength", "pull_off_over_summits"] = Field(
-        default="pull_off_pressure",
-        description="What is drawn: the largest tension, or this divided by the strength of the interface or by the "
-        "tension of all asperities that pull their most at once.",
     )
 
     def studies_of(self, campaign: Campaign) -> tuple[str, ...]:
@@ -59,20 +53,15 @@ DECLARATION = Declaration(
     description="Pull-off against rms slope, and against the largest load.", options=PullOffFigure
 )
 
-_QUANTITIES = {
-    "pull_off_pressure": "pull-off pressure",
-    "pull_off_over_strength": "pull-off / strength of the interface",
-    "pull_off_over_summits": "pull-off / all summits at their most",
-}
 # Ratio of values above which their axis is logarithmic.
 _SPAN = 30.0
 _LINE = {"lw": 0.9}
+# Quantity along y.
+_Y = "pull_off_pressure"
 
 
 @in_style
-def figure(
-    campaign: xr.DataTree, *, study: str, load_studies: Sequence[str] = (), quantity: str = "pull_off_pressure"
-) -> Figure:
+def figure(campaign: xr.DataTree, *, study: str, load_studies: Sequence[str] = ()) -> Figure:
     """Draw the pull-off of all runs of the studies, averaged over the seeds, against slope and largest load."""
     load_studies = list(dict.fromkeys(load_studies))
     by_slope = select_detached_lines(campaign, [study], along_slopes=True)
@@ -83,22 +72,24 @@ def figure(
         by_load = select_detached_lines(campaign, load_studies, along_slopes=True)
     looks = looks_of_studies(campaign, [study, *load_studies], [contact for contact, _ in (*by_slope, *by_load)])
     points = itertools.chain(*by_slope.values(), *by_load.values())
-    largest = max(float(run[quantity]) for point in points for run in point.by_seed.values())
-    factor, unit = choose_unit(largest, "Pa") if quantity == "pull_off_pressure" else (1.0, "")
+    factor, unit = choose_unit(max(float(run[_Y]) for point in points for run in point.by_seed.values()), "Pa")
 
     fig, [panels] = new_panels(2.9, columns=2 if by_load else 1, width=TWO_COLUMNS if by_load else ONE_COLUMN)
     counts = []
     for ax, x, drawn in zip(panels, ("rms_slope", "largest_reduced_pressure"), (by_slope, by_load), strict=False):
-        lines = {key: Points(line, x, quantity, factor=factor) for key, line in drawn.items()}
+        lines = {key: Points(line, x, _Y, factor=factor) for key, line in drawn.items()}
         for (contact, applicable), line in lines.items():
             line.draw(ax, looks.look(contact, applicable=applicable) | _LINE)
             counts += line.counts
         loads, values = np.concatenate([line.means for line in lines.values()], axis=1)
         _scale(ax, values)
-        ax.set_ylabel(_QUANTITIES[quantity] + (f" ({unit})" if unit else ""))
+        ax.set_ylabel(f"pull-off pressure ({unit})")
     _label_slopes(panels[0], sorted({point.labels.rms_slope for line in by_slope.values() for point in line}))
     if by_load:
-        _label_loads(panels[1], loads)
+        panels[1].set_xlabel(r"largest reduced pressure  $F/(E^{\ast}h_{\mathrm{rms}}^{\prime}A_0)$")
+        if loads.min() > 0:
+            logarithmic_axes(panels[1], "x")
+            panels[1].set_xlim(loads.min() / 1.6, loads.max() * 1.6)
         if len(loaded_slopes) == 1:
             panels[1].set_title(slope_label(*loaded_slopes), loc="right")
     name_model(panels[0], campaign, [study, *load_studies])
@@ -112,20 +103,6 @@ def _label_slopes(ax, slopes):
     ax.set_xscale("log" if slopes[-1] > 3 * slopes[0] else "linear")
     ax.set_xticks(slopes, [f"{slope:g}" for slope in slopes])
     ax.minorticks_off()
-
-
-def _label_loads(ax, loads):
-    """Label the axis of the largest loads."""
-    from matplotlib.ticker import LogLocator, NullFormatter
-
-    ax.set_xlabel(r"largest reduced pressure  $F/(E^{\ast}h_{\mathrm{rms}}^{\prime}A_0)$")
-    if loads.min() > 0 and loads.max() > 2 * loads.min():
-        ax.set_xscale("log")
-        ax.xaxis.set_major_locator(LogLocator(subs=(1.0, 3.0)))
-        ax.xaxis.set_major_formatter(lambda value, _: format_number(value))
-        ax.xaxis.set_minor_formatter(NullFormatter())
-    elif np.ptp(loads) < 1e-3 * np.abs(loads).max():
-        ax.set_xlim(0, 2 * loads.max())
 
 
 def _scale(ax, values):

@@ -3,21 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
-from pydantic import Field
 
-from icha.figures.curves import drop_rounding_errors
 from icha.figures.declaration import Campaign, Declaration, FigureOptions, studies_problems
 from icha.figures.ensembles import Points, points_handles
 from icha.figures.hysteresis import name_model, select_detached_lines
-from icha.figures.legends import legend_below
-from icha.figures.looks import looks_of_studies
+from icha.figures.looks import legend_below, looks_of_studies
 from icha.figures.select import ContactRuns, NothingToDraw
 from icha.figures.style import GREY, in_style, logarithmic_axes, new_panels
-from icha.support.formatting import choose_unit
-from icha.support.values import Flag, Problem, list_of_names
+from icha.support.values import Problem, list_of_names
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -28,10 +24,6 @@ class LossFigure(FigureOptions):
     """A figure of the energy lost in the runs of some studies."""
 
     studies: list_of_names("Studies that are drawn; lines join those that differ only in their largest load.")
-    over_surface_energy: Flag = Field(
-        default=True,
-        description="Whether the loss is divided by the surface energy (`true`), or drawn in J/m² (`false`).",
-    )
 
     def studies_of(self, campaign: Campaign) -> tuple[str, ...]:
         """Return all studies."""
@@ -55,6 +47,7 @@ PARTS = {
 # A straight line passes through any two points.
 _LEAST_POINTS = 3
 _FIT_POINTS = 100
+_QUANTITIES = ("largest_contact_area_fraction", "hysteresis_loss_over_surface_energy")
 # Ratio of areas, and of losses, above which both axes are logarithmic.
 _SPAN = 30.0
 # Largest share of a part that is left out of the legend.
@@ -63,98 +56,64 @@ _LEAST_SHARE = 1e-6
 _PALE = 0.35
 
 
-class LinearFit(NamedTuple):
-    """A straight line by least squares.
-
-    Attributes
-    ----------
-    slope, intercept : coefficients of the line.
-    r_squared : coefficient of determination; None if y is constant.
-    exponent : that of a power law through the same points; None if x or y is not positive.
-    """
-
-    slope: float
-    intercept: float
-    r_squared: float | None
-    exponent: float | None
-
-
 @in_style
-def figure(campaign: xr.DataTree, *, studies: Sequence[str], over_surface_energy: bool = True) -> Figure:
-    """Draw the loss of all runs of the studies, averaged over the seeds, and its parts if there is adhesion."""
+def figure(campaign: xr.DataTree, *, studies: Sequence[str]) -> Figure:
+    """Draw the loss of all runs with adhesion of the studies, averaged over the seeds, and its parts."""
     from matplotlib.patches import Patch
 
     studies = list(dict.fromkeys(studies))
     runs = select_detached_lines(campaign, studies)
     looks = looks_of_studies(campaign, studies, [contact for contact, _ in runs])
     sticky = {key: line for key, line in runs.items() if looks.adhesive(key[0][0])}
-    if over_surface_energy and not sticky:
+    if not sticky:
         raise NothingToDraw(f"studies {', '.join(studies)}: no run with adhesion, so no surface energy to compare with")
 
-    widths = (1.25, 1) if sticky else (1,)
-    fig, [(loss, *parts)] = new_panels(3.1, columns=len(widths), width_ratios=widths)
-    handles, counts = _draw_losses(loss, campaign, sticky if over_surface_energy else runs, looks, over_surface_energy)
+    fig, [(loss, parts)] = new_panels(3.1, width_ratios=(1.25, 1))
+    handles, counts = _draw_losses(loss, sticky, looks)
     name_model(loss, campaign, studies)
-    if sticky:
-        shown = _draw_parts(*parts, sticky, looks)
-        handles |= {PARTS[name][0]: Patch(ec="black", lw=0.5, **PARTS[name][1]) for name in shown}
+    shown = _draw_parts(parts, sticky, looks)
+    handles |= {PARTS[name][0]: Patch(ec="black", lw=0.5, **PARTS[name][1]) for name in shown}
     legend_below(fig, handles | points_handles(counts), scale=looks.scale, panels=[loss])
     return fig
 
 
-def _draw_losses(ax, campaign, runs, looks, over_surface_energy):
+def _draw_losses(ax, runs, looks):
     """Draw the losses of all lines with their fits; return what the legend shows, and numbers of seeds."""
-    quantity = "hysteresis_loss_over_surface_energy" if over_surface_energy else "hysteresis_loss"
-    area = "largest_contact_area_fraction"
-    largest = max(np.abs(Points(line, quantity).means).max() for line in runs.values())
-    factor, unit = (1.0, "") if over_surface_energy else choose_unit(largest, "J/m²")
-    drawn = {key: Points(line, area, quantity, factor=factor) for key, line in runs.items()}
+    drawn = {key: Points(line, *_QUANTITIES) for key, line in runs.items()}
     handles = looks.handles(ls="none") if looks.scale else {}
     for (contact, applicable), line in drawn.items():
         handle = line.draw(ax, looks.look(contact, applicable=applicable) | {"ls": "none"})
         if not applicable:
             continue
-        x, y = line.means
-        fit = linear_fit(x, y) if line.same_seeds else None
-        if fit is not None:
+        (x, y), words = line.means, ""
+        if line.same_seeds and len(np.unique(x)) >= _LEAST_POINTS:
             along = np.linspace(x.min(), x.max(), _FIT_POINTS)
-            ax.plot(along, fit.intercept + fit.slope * along, color=looks.colour(contact), lw=0.9, zorder=2)
+            values, r_squared, exponent = fit_line(x, y, along)
+            words = f": $r^2$ = {r_squared:.4f}, exponent {exponent:.2f}"
+            ax.plot(along, values, color=looks.colour(contact), lw=0.9, zorder=2)
         if not looks.scale:
-            handles[looks.name(contact) + _words(fit)] = handle
+            handles[looks.name(contact) + words] = handle
     means = np.concatenate([line.means for line in drawn.values()], axis=1)
-    if all(
-        len(drop_rounding_errors(values)) == len(values) and values.max() > _SPAN * values.min() for values in means
-    ):
+    if all(values.min() > 0 and values.max() > _SPAN * values.min() for values in means):
         logarithmic_axes(ax)
     ax.axhline(0, color=GREY, lw=0.6, zorder=1)
-    loss = r"hysteresis loss over $\Delta\gamma$" if over_surface_energy else f"hysteresis loss ({unit})"
-    ax.set(xlabel=r"contact area at the largest load  $A/A_0$", ylabel=loss)
+    ax.set(xlabel=r"contact area at the largest load  $A/A_0$", ylabel=r"hysteresis loss over $\Delta\gamma$")
     return handles, [count for line in drawn.values() for count in line.counts]
 
 
-def linear_fit(x: np.ndarray, y: np.ndarray) -> LinearFit | None:
-    """Fit a straight line by least squares; return None if there are fewer than three different x."""
+def fit_line(x: np.ndarray, y: np.ndarray, along: np.ndarray) -> tuple[np.ndarray, float, float]:
+    """Fit a straight line by least squares.
+
+    Returns
+    -------
+    Values of the line at `along`; coefficient of determination; exponent of a power law through the same points, NaN
+    unless all y are positive.
+    """
     from scipy.stats import linregress
 
-    if len(np.unique(x)) < _LEAST_POINTS:
-        return None
     line = linregress(x, y)
-    powers = np.all(x > 0) and np.all(y > 0)
-    return LinearFit(
-        float(line.slope),
-        float(line.intercept),
-        float(line.rvalue**2) if np.ptp(y) > 0 else None,
-        float(linregress(np.log(x), np.log(y)).slope) if powers else None,
-    )
-
-
-def _words(fit):
-    """Return the result of a fit in words, for the legend."""
-    if fit is None:
-        return ""
-    words = [] if fit.r_squared is None else [f"$r^2$ = {fit.r_squared:.4f}"]
-    words += [] if fit.exponent is None else [f"exponent {fit.exponent:.2f}"]
-    return ": " + ", ".join(words) if words else ""
+    exponent = linregress(np.log(x), np.log(y)).slope if np.all(y > 0) else np.nan
+    return line.intercept + line.slope * along, line.rvalue**2, exponent
 
 
 def shares(line: Sequence[ContactRuns]) -> dict[str, float]:

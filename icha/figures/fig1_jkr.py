@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from pydantic import Field
 
-from icha.datasets.results import ResultFiles
-from icha.figures.declaration import Campaign, Declaration, FigureOptions, Inputs
+from icha.figures.declaration import Declaration, FigureOptions
 from icha.figures.style import BLUE, GREY, VERMILLION, in_style, new_panels
 from icha.support.values import Positive
 
@@ -22,13 +21,8 @@ class JKRFigure(FigureOptions):
     tabor_parameter: Positive = Field(default=3.0, description="Tabor parameter, which sets the jump-in distance.")
 
 
-def no_inputs(campaign: Campaign, options: JKRFigure, files: ResultFiles) -> Inputs:
-    """Return nothing, because the figure shows the law of one asperity."""
-    return {}
-
-
 DECLARATION = Declaration(
-    description="Force and radius of one asperity against approach.", options=JKRFigure, inputs=no_inputs
+    description="Force and radius of one asperity against approach.", options=JKRFigure, inputs=lambda *_: {}
 )
 
 

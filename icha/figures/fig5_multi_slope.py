@@ -10,14 +10,13 @@ from icha.datasets import results
 from icha.figures.curves import (
     AREA_LABEL,
     PRESSURE_LABEL,
-    UNLOADING,
     add_legend,
     area_points,
     draw_curves,
     study_curves,
 )
 from icha.figures.declaration import Campaign, Declaration, Inputs, TruthFigure
-from icha.figures.style import BLACK, DASHES, GREY, in_style, legend_handle, material_label, new_panels
+from icha.figures.style import BLACK, DASHES, in_style, new_panels
 from icha.support.input_files import read_columns
 
 if TYPE_CHECKING:
@@ -25,29 +24,26 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def inputs(campaign: Campaign, options: TruthFigure, files: results.ResultFiles) -> Inputs:
-    """Return the runs, and tables of measurements that belong to the study, if there are any."""
-    tables = [measurement.path for measurement in _measurements(campaign, options)]
-    return {"campaign": files.path(results.DATASET)} | ({"tables": tables} if tables else {})
+class SlopesAndMaterialsFigure(TruthFigure):
+    """A figure of all runs of a study, with boundary elements and measurements."""
 
+    def arguments(self, campaign: Campaign) -> dict[str, Any]:
+        """Return the arguments, and what the figure needs to know about each table of measurements."""
+        known = [
+            {
+                "label": measurement.label,
+                "columns": measurement.columns,
+                "load_unit": _load_unit(campaign, measurement),
+                "material": measurement.material,
+                "rms_slope": measurement.rms_slope,
+            }
+            for measurement in self.measurements(campaign)
+        ]
+        return super().arguments(campaign) | ({"measurements": known} if known else {})
 
-def arguments(campaign: Campaign, options: TruthFigure) -> dict[str, Any]:
-    """Return what the figure needs to know about each table."""
-    known = [
-        {
-            "label": measurement.label,
-            "columns": measurement.columns,
-            "load_unit": _load_unit(campaign, measurement),
-            "material": measurement.material,
-            "rms_slope": measurement.rms_slope,
-        }
-        for measurement in _measurements(campaign, options)
-    ]
-    return {"measurements": known} if known else {}
-
-
-def _measurements(campaign, options):
-    return [measurement for measurement in campaign.measurements.values() if measurement.study == options.study]
+    def measurements(self, campaign: Campaign) -> list:
+        """Return the measurements that belong to the study."""
+        return [measurement for measurement in campaign.measurements.values() if measurement.study == self.study]
 
 
 def _load_unit(campaign, measurement) -> float:
@@ -57,11 +53,16 @@ def _load_unit(campaign, measurement) -> float:
     return campaign.materials[measurement.material].contact_modulus * measurement.rms_slope
 
 
+def inputs(campaign: Campaign, options: SlopesAndMaterialsFigure, files: results.ResultFiles) -> Inputs:
+    """Return the runs, and tables of measurements that belong to the study, if there are any."""
+    tables = [measurement.path for measurement in options.measurements(campaign)]
+    return {"campaign": files.path(results.DATASET)} | ({"tables": tables} if tables else {})
+
+
 DECLARATION = Declaration(
     description="Contact area against load for all slopes and materials, with measurements.",
-    options=TruthFigure,
+    options=SlopesAndMaterialsFigure,
     inputs=inputs,
-    arguments=arguments,
 )
 
 
@@ -83,27 +84,16 @@ def figure(
     measurements : of each table its `label`, `columns` (headings of load and area, with factors), `load_unit` (the
         divisor that turns a load into p/(E* h'rms)), and `material` and `rms_slope`, None if they are not known.
     """
-    curves = study_curves(campaign, study, boundary_elements)
-    dataset, colours = campaign[study].to_dataset(), curves.looks.colours
-    # All of several curves that coincide stay visible: markers are open, and smaller for every further material.
-    looks = {name: {"mfc": "none", "ms": max(7.0 * 0.7**k, 1.6)} for k, name in enumerate(curves.looks.materials)}
-
+    # Open markers, because curves coincide.
+    curves = study_curves(campaign, study, boundary_elements, mfc="none")
     fig, [(left, right)] = new_panels(3.5, sharey=True)
-    if not curves.looks.scale:
-        lines = [line._replace(look=line.look | looks[line.runs.labels.material]) for line in curves.lines]
-        curves = curves._replace(lines=lines)
     draw_curves(curves, {left: area_points, right: _points_at_load}, unloading=True)
     for k, (table, known) in enumerate(zip(tables, measurements, strict=True)):
-        _draw_measured(left, right, table, known, colours.get(known["material"], BLACK), DASHES[k % len(DASHES)])
+        colour = curves.looks.colours.get(known["material"], BLACK)
+        _draw_measured(left, right, table, known, colour, DASHES[k % len(DASHES)])
     left.set(xlabel=PRESSURE_LABEL, ylabel=AREA_LABEL)
     right.set_xlabel(r"relative load  $F/(E^{\ast}A_0)$")
-
-    further = {"unloading": legend_handle(color=GREY, **UNLOADING)} if curves.unloaded else {}
-    if not curves.looks.scale:
-        for name, look in looks.items():
-            shape = {"ls": "none", "marker": "o", "mew": 1.1, "color": colours[name]}
-            further[material_label(dataset, name)] = legend_handle(**shape | look)
-    add_legend(fig, [left, right], curves, further)
+    add_legend(fig, [left, right], curves)
     return fig
 
 

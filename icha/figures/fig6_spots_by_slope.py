@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 from pydantic import Field
 
 from icha.figures.declaration import Campaign, Declaration, StudyFigure
-from icha.figures.legends import legend_below
-from icha.figures.looks import NOT_APPLICABLE_ALONE, Scale
+from icha.figures.looks import NOT_APPLICABLE_ALONE, Scale, legend_below
 from icha.figures.maps import draw_spots, wrap_circles
 from icha.figures.select import is_applicable, pick, select_runs, snapshot_label
 from icha.figures.style import in_style, new_panels, slope_label

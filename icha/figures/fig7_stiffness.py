@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from icha.datasets import results
 from icha.figures.curves import (
     PRESSURE_LABEL,
     add_legend,
@@ -15,7 +14,7 @@ from icha.figures.curves import (
     study_curves,
     theories_handle,
 )
-from icha.figures.declaration import Campaign, Declaration, Inputs, StudyFigure
+from icha.figures.declaration import Declaration, StudyFigure, dataset_and_theories
 from icha.figures.select import NothingToDraw
 from icha.figures.style import BLACK, in_style, new_panels
 
@@ -24,14 +23,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def inputs(campaign: Campaign, options: StudyFigure, files: results.ResultFiles) -> Inputs:
-    """Return the file of the runs, and the file of the theories for the first surface of the study."""
-    theories = files.path(results.THEORIES, surface=campaign.studies[options.study].surfaces[0])
-    return {"campaign": files.path(results.DATASET), "references": theories}
-
-
 DECLARATION = Declaration(
-    description="Contact stiffness against load, with theory.", options=StudyFigure, inputs=inputs
+    description="Contact stiffness against load, with theory.", options=StudyFigure, inputs=dataset_and_theories
 )
 
 

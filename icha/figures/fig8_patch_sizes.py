@@ -36,7 +36,6 @@ _CURVE_POINTS = 300
 def figure(campaign: xr.DataTree, *, study: str, kind: str | None = None, target: float | None = None) -> Figure:
     """Draw the patch sizes of every material on the first surface and slope of a study, means over the seeds."""
     lines = select_snapshots(campaign, study, kind, target)
-    dataset = campaign[study].to_dataset()
     each_look, looks = snapshot_looks(campaign, study, lines)
     fig, [(left, right)] = new_panels(3.1, sharex=True)
     period = float(lines[0].members[0][0]["period"])
@@ -60,8 +59,7 @@ def figure(campaign: xr.DataTree, *, study: str, kind: str | None = None, target
         ax.set_xlabel(f"patch area  $A$ ({unit}²)")
     left.set_ylabel(f"number density  $n(A)$ ({unit}$^{{-4}}$)")
     right.set_ylabel(f"patches larger than $A$ ({unit}$^{{-2}}$)")
-    truths = [SHORT_RANGE] if any(line.truths for line in lines) else []
-    add_snapshot_legend(fig, [left, right], dataset, lines, looks, truths)
+    add_snapshot_legend(fig, [left, right], campaign[study].to_dataset(), lines, looks)
     return fig
 
 

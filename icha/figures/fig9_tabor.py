@@ -10,8 +10,7 @@ import numpy as np
 from icha.figures.curves import AREA_LABEL, gap_label
 from icha.figures.declaration import Campaign, Declaration, SnapshotFigure
 from icha.figures.ensembles import Points, points_handles
-from icha.figures.legends import legend_below, named_handles
-from icha.figures.looks import Looks
+from icha.figures.looks import Looks, legend_below, named_handles
 from icha.figures.select import ContactRuns, NothingToDraw, group_by_contact, select_runs, snapshot_label
 from icha.figures.style import GREY, in_style, material_label, new_panels
 from icha.support.values import Problem

@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 
 # Tension below this fraction of the largest pressure is rounding.
 ROUNDING = 1e-9
-_LEG_VARIABLES = ("reduced_separation", "reduced_pressure", "contact_area_fraction")
 
 
 class Leg(NamedTuple):
@@ -34,12 +33,12 @@ class Leg(NamedTuple):
     Attributes
     ----------
     branch : `loading` or `unloading`.
-    values : reduced separation, reduced pressure and contact area fraction along the leg, (k,) each.
+    values : reduced separation, reduced pressure and contact area fraction along the leg.
     members : reduced pressure and contact area fraction of every seed, (seeds, k) each; empty for a single run.
     """
 
     branch: str
-    values: dict[str, np.ndarray]
+    values: xr.Dataset
     members: dict[str, np.ndarray]
 
 
@@ -51,16 +50,14 @@ def average_legs(runs: Sequence[Sequence[tuple[str, xr.Dataset]]]) -> list[Leg]:
     from icha.analysis.common_loads import at_common_displacements
 
     if len(runs) == 1 or len({len(legs) for legs in runs}) > 1:
-        return [
-            Leg(branch, {name: leg[name].values for name in _LEG_VARIABLES}, {})
-            for legs in runs
-            for branch, leg in legs
-        ]
+        return [Leg(branch, leg, {}) for legs in runs for branch, leg in legs]
     found = []
     for members in zip(*runs, strict=True):
+        branch, first = members[0]
         separation, values = at_common_displacements([leg for _, leg in members])
-        means = {name: of_seeds.mean(axis=0) for name, of_seeds in values.items()}
-        found.append(Leg(members[0][0], means | {"reduced_separation": separation}, values))
+        means = {name: ("step", of_seeds.mean(axis=0)) for name, of_seeds in values.items()}
+        means["reduced_separation"] = ("step", separation)
+        found.append(Leg(branch, first.drop_dims("step").assign(means), values))
     return found
 
 

@@ -1,4 +1,4 @@
-"""Colours and markers of lines, the same in all figures of a campaign.
+"""Colours, markers and legends of lines, the same in all figures of a campaign.
 
 A colour stands for a material, a marker for a model. Closed markers are asperities with adhesion, open markers
 asperities without adhesion, crosses boundary elements. If a figure has several surfaces and slopes, the shapes of the
@@ -8,8 +8,9 @@ distinguish them instead.
 
 from __future__ import annotations
 
+import itertools
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -21,7 +22,6 @@ from icha.figures.style import (
     COLOURS,
     GREY,
     INTERFACE,
-    choose_unit,
     legend_handle,
     material_label,
     slope_label,
@@ -90,13 +90,16 @@ class Looks:
         self.colours = {material: BLACK if self.many_places else palette[material] for material in self.materials}
         self._place_colours = {}
         if self.by_place:
-            scale = places_scale(self.places)
+            scale = Scale([self.place_name(place) for place in self.places])
             self._place_colours = dict(zip(self.places, scale.colours, strict=True))
             self.scale = scale if self.many_places else None
         elif len(self.materials) > MOST_COLOURS:
-            self.scale = materials_scale(interfaces, self.materials)
+            self.scale = Scale(self.materials)
             self.colours = dict(zip(self.materials, self.scale.colours, strict=True))
-        self._markers = place_markers(self.places)
+        # The steepest slope of a surface has the first marker.
+        surfaces = list(dict.fromkeys(surface for surface, _ in self.places))
+        ordered = sorted(self.places, key=lambda place: (surfaces.index(place[0]), -(place[1] or 0)))
+        self._markers = dict(zip(ordered, itertools.cycle(PLACE_MARKERS)))
         self._sizes = {}
         for adhesive, largest in ((False, _BARE_SIZE), (True, _ADHESIVE_SIZE)):
             alike = [material for material in self.materials if self.adhesive(material) == adhesive]
@@ -177,28 +180,9 @@ def looks_of_studies(campaign: xr.DataTree, studies: Sequence[str], contacts: It
 
 
 def material_colours(campaign: xr.DataTree) -> dict[str, str]:
-    """Return a colour for every material of a campaign dataset, in the order in which its studies name them.
-
-    Materials of one study have different colours, unless the study has more materials than there are colours.
-    """
-    studies = [node["material"].values.tolist() for node in campaign.children.values()]
-    colours: dict[str, str] = {}
-    for material in dict.fromkeys(name for names in studies for name in names):
-        of_same_studies = {colours.get(name) for names in studies if material in names for name in names}
-        for taken in (set(colours.values()), of_same_studies, set()):
-            free = [colour for colour in MATERIAL_COLOURS if colour not in taken]
-            if free:
-                colours[material] = free[0]
-                break
-    return colours
-
-
-def place_markers(places: Iterable[tuple[str, float | None]]) -> dict[tuple, str]:
-    """Return a marker for every surface and rms slope; the steepest of a surface comes first."""
-    places = list(dict.fromkeys(places))
-    surfaces = list(dict.fromkeys(surface for surface, _ in places))
-    ordered = sorted(places, key=lambda place: (surfaces.index(place[0]), -(place[1] or 0)))
-    return {place: PLACE_MARKERS[k % len(PLACE_MARKERS)] for k, place in enumerate(ordered)}
+    """Return a colour for every material of a campaign dataset, in the order in which its studies name them."""
+    materials = (name for study in campaign.children.values() for name in study["material"].values.tolist())
+    return dict(zip(dict.fromkeys(materials), itertools.cycle(MATERIAL_COLOURS)))
 
 
 def collect_interfaces(datasets: Iterable[xr.Dataset]) -> xr.Dataset:
@@ -208,7 +192,7 @@ def collect_interfaces(datasets: Iterable[xr.Dataset]) -> xr.Dataset:
     found = {}
     for dataset in datasets:
         for material in dataset["material"].values.tolist():
-            found.setdefault(material, dataset[list(INTERFACE)].sel(material=material))
+            found.setdefault(material, dataset[INTERFACE].sel(material=material))
     return xr.concat(found.values(), "material", coords="minimal", compat="override")
 
 
@@ -230,23 +214,24 @@ _BRIGHTEST = 0.9
 class Scale:
     """A colour for each of many names, and the bar that shows them.
 
+    The title of the bar is the common beginning of the names, which the labels of the bar then lack.
+
     Parameters
     ----------
     names : the names in the order of their colours.
-    title : title of the bar; left out, the common beginning of the names, which they then lose.
-    darkest : fraction of the colour map of the darkest colour, from 0 to 0.9.
     """
 
-    def __init__(self, names: Sequence[str], title: str = "", *, darkest: float = 0.0):
+    def __init__(self, names: Sequence[str]):
         """Distribute the colours."""
         import matplotlib as mpl
         from matplotlib.colors import to_hex
 
-        common = "" if title else _beginning(names)
+        alike = itertools.takewhile(lambda letters: len(set(letters)) == 1, zip(*names, strict=False))
+        # Digits that all names share belong to their numbers.
+        common = re.sub(r"[-+.\d]*$", "", "".join(letters[0] for letters in alike))
         self.names = [name.removeprefix(common) for name in names]
-        self.title = title or common.rstrip("-_ ")
-        places = np.linspace(darkest, _BRIGHTEST, len(names))
-        self.colours = [to_hex(colour) for colour in mpl.colormaps["viridis"](places)]
+        self.title = common.rstrip("-_= ")
+        self.colours = [to_hex(colour) for colour in mpl.colormaps["viridis"](np.linspace(0, _BRIGHTEST, len(names)))]
 
     def draw(self, figure: Figure, axes: Sequence[Axes]) -> None:
         """Draw the colour bar beside the panels, with at most `_MOST_TICKS` names."""
@@ -262,32 +247,65 @@ class Scale:
         bar.set_label(self.title)
 
 
-def places_scale(places: Sequence[tuple[str, float | None]]) -> Scale:
-    """Return the scale of surfaces and rms slopes."""
-    surfaces, slopes = (list(dict.fromkeys(each)) for each in zip(*places, strict=True))
-    if len(surfaces) == 1:
-        return Scale([f"{slope:g}" for _, slope in places], r"$h_{\mathrm{rms}}^{\prime}$")
-    if len(slopes) == 1:
-        return Scale([surface for surface, _ in places])
-    return Scale([f"{surface}, {slope:g}" for surface, slope in places])
+# --- legends ---
+
+FEWER_SEEDS = "crossed: mean over fewer seeds than requested"
+# Largest number of names in the larger font.
+_MANY_NAMES = 12
+_MOST_COLUMNS = 4
+_PALE_GREY = "0.72"
 
 
-def materials_scale(interfaces: xr.Dataset, materials: Sequence[str]) -> Scale:
-    """Return the scale of materials, labelled by the quantity in which they differ if there is only one."""
-    interfaces = interfaces.sel(material=list(materials))
-    differing = [name for name in INTERFACE if len(np.unique(interfaces[name].values)) > 1]
-    if len(differing) != 1:
-        return Scale([material_label(interfaces, material) for material in materials])
-    (name,) = differing
-    symbol, unit = INTERFACE[name]
-    factor, prefixed = choose_unit(float(interfaces[name].max()), unit)
-    return Scale([f"{factor * value:.4g}" for value in interfaces[name].values.tolist()], f"{symbol} ({prefixed})")
+def legend_below(
+    figure: Figure, handles: Mapping[str, object], *, scale: Scale | None = None, panels: Sequence[Axes] = ()
+) -> None:
+    """Add a legend below the panels, in as many columns as have room; the figure grows by its height.
+
+    Parameters
+    ----------
+    figure : the figure, in which all else is drawn.
+    handles : handles of the legend, by name.
+    scale : scale of colours that is added beside the `panels`, if any.
+    """
+    if scale:
+        scale.draw(figure, list(panels))
+    handles = dict(handles) | _marks(figure)
+    look = {"loc": "outside lower center", "fontsize": 8 if len(handles) <= _MANY_NAMES else 7}
+    for columns in range(_MOST_COLUMNS if handles else 0, 0, -1):
+        legend = figure.legend(handles.values(), handles.keys(), ncols=columns, **look)
+        size = legend.get_window_extent().size / figure.dpi
+        if size[0] < figure.get_figwidth() or columns == 1:
+            figure.set_figheight(figure.get_figheight() + size[1])
+            break
+        legend.remove()
 
 
-def _beginning(names):
-    """Return the common beginning of all names, without digits of a number."""
-    if len(set(names)) < 2:
-        return ""
-    first, last = min(names), max(names)
-    alike = next(k for k in range(len(first) + 1) if first[: k + 1] != last[: k + 1])
-    return re.sub(r"[-+.\d]*$", "", first[:alike])
+def _marks(figure):
+    """Return handles of crossed and pale marks, if a panel has some."""
+    shown = named_handles(figure.axes)
+    ring = {"ls": "none", "marker": "o", "ms": 5, "mew": 0.9, "mfc": "white"}
+    cross = ring | {"marker": "x", "mew": 0.7}
+    looks = {
+        FEWER_SEEDS: (legend_handle(color=GREY, **ring), legend_handle(color=GREY, **cross)),
+        NOT_APPLICABLE: legend_handle(color=_PALE_GREY, **ring | {"ls": "-", "lw": 0.9}),
+    }
+    return {name: look for name, look in looks.items() if name in shown}
+
+
+def named_handles(panels: Iterable[Axes]) -> dict[str, object]:
+    """Return the handles of all names in some panels."""
+    found: dict[str, object] = {}
+    for axes in panels:
+        for handle, name in zip(*axes.get_legend_handles_labels(), strict=True):
+            found.setdefault(name, handle)
+    return found
+
+
+def model_handle(name: str, **look: object) -> Line2D:
+    """Return the handle of a model."""
+    return legend_handle(**{"ls": "none", "marker": MODEL_MARKERS[name], "color": GREY, "mec": GREY, "ms": 6} | look)
+
+
+def words_handle(text: str) -> dict[str, object]:
+    """Return an entry of a legend without a mark."""
+    return {text: legend_handle(color=GREY, ls="none")}

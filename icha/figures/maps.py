@@ -1,27 +1,77 @@
-"""Maps of the nodes of a surface, and contact spots as circles of true size."""
+"""Maps of a surface, and contact spots as circles of true size."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from icha.support.formatting import choose_unit
+
 if TYPE_CHECKING:
+    import xarray as xr
     from matplotlib.axes import Axes
+    from matplotlib.image import AxesImage
 
 # Largest number of cells a side that are distinguishable in a panel.
 _MOST_CELLS = 1024
 
 
-def draw_whole(axes, means: np.ndarray, n: int, side: float, **look):
-    """Draw a periodic map of n nodes a side, or `average_blocks` of it.
+class Topography(NamedTuple):
+    """Heights of a run, in the units of the axes.
+
+    Attributes
+    ----------
+    heights : (n, n) float along y and x, heights in the surface file.
+    scale : factor from `heights` to the heights of the run in `height_unit`.
+    highest : largest magnitude of the heights of the run, in `height_unit`.
+    height_unit : unit of the heights.
+    side : side of the surface in `length_unit`.
+    length : factor from metres to `length_unit`.
+    length_unit : unit of the axes x and y.
+    """
+
+    heights: np.ndarray
+    scale: float
+    highest: float
+    height_unit: str
+    side: float
+    length: float
+    length_unit: str
+
+    def draw(self, axes: Axes, **look) -> AxesImage:
+        """Draw a map of the heights; `look` has keywords of `Axes.imshow`."""
+        return draw_map(axes, self.heights, self.side, self.scale, **look)
+
+    def label(self, axes: Axes) -> None:
+        """Set the limits and the labels of x and y."""
+        axes.set(xlim=(0, self.side), ylim=(0, self.side))
+        axes.set(xlabel=f"x ({self.length_unit})", ylabel=f"y ({self.length_unit})")
+        axes.tick_params(direction="out", top=False, right=False)
+
+
+def topography_of(run: xr.Dataset, surface: xr.Dataset) -> Topography:
+    """Return the topography of a run from the dataset of its surface file."""
+    heights = surface["height"].transpose("y", "x").values
+    factor = float(run["rms_height"]) / float(surface["rms_height"])
+    # Without a copy of the array, which may be large.
+    highest = max(float(heights.max()), -float(heights.min())) * factor
+    period = float(run["period"])
+    length, length_unit = choose_unit(period, "m")
+    height, height_unit = choose_unit(highest, "m")
+    return Topography(heights, factor * height, highest * height, height_unit, period * length, length, length_unit)
+
+
+def draw_map(axes: Axes, nodes: np.ndarray, side: float, scale: float = 1.0, **look) -> AxesImage:
+    """Draw a periodic map of nodes (n, n) times `scale`, or means over blocks of many nodes.
 
     Nodes are the centres of the cells of the image. The first row and column are repeated at the opposite border.
     """
+    means = average_blocks(nodes) * scale
     drawn = np.pad(means, [(0, 1), (0, 1), (0, 0)][: means.ndim], mode="wrap")
-    half = side / n / 2
-    borders = (-half, side - half + side / (len(drawn) - 1))
-    return axes.imshow(drawn, extent=borders * 2, interpolation="antialiased", **look)
+    half = side / len(nodes) / 2
+    borders = (-half, side - half + side / len(means))
+    return axes.imshow(drawn, extent=borders * 2, origin="lower", interpolation="antialiased", **look)
 
 
 def average_blocks(nodes: np.ndarray, most: int = _MOST_CELLS) -> np.ndarray:
@@ -49,17 +99,6 @@ def draw_spots(axes: Axes, circles: np.ndarray, **look) -> None:
     """Add circles, (m, 3) of x, y and radius in data units, to axes."""
     from matplotlib.collections import EllipseCollection
 
-    if not len(circles):
-        return
     x, y, radius = circles.T
-    axes.add_collection(
-        EllipseCollection(
-            2 * radius,
-            2 * radius,
-            np.zeros(len(radius)),
-            offsets=np.column_stack([x, y]),
-            offset_transform=axes.transData,
-            units="xy",
-            **look,
-        )
-    )
+    look |= {"offsets": np.column_stack([x, y]), "offset_transform": axes.transData, "units": "xy"}
+    axes.add_collection(EllipseCollection(2 * radius, 2 * radius, np.zeros(len(radius)), **look))

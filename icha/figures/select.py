@@ -6,14 +6,14 @@ All functions raise ValueError if the campaign has no such study, run or snapsho
 from __future__ import annotations
 
 import contextlib
+import itertools
 from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from icha.contact.models import REFERENCE_MODEL, first_model
-from icha.datasets.labels import LABELS, RunLabels, place_of, slopes_of
-from icha.datasets.variables.model_error import FINITE_RANGE
+from icha.datasets.labels import LABELS, RunLabels, place_of, slopes_of, surfaces_and_slopes
 from icha.figures.style import format_number, slope_label
 
 if TYPE_CHECKING:
@@ -80,7 +80,8 @@ def select_runs(
     from icha.datasets.campaign import reduced_gap, runs_of_status, select_run
     from icha.datasets.variables.campaign import COMPLETE, RAGGED
 
-    _check_study(campaign, study)
+    if study not in campaign.children:
+        raise ValueError(f"no study {study!r} in this campaign; expected one of: {', '.join(campaign.children)}")
     dataset = campaign[study].to_dataset()
     wanted = model or shown_model(dataset)
     found = [labels for labels in runs_of_status(dataset, study, (COMPLETE,)) if labels.model == wanted]
@@ -110,74 +111,25 @@ def shown_model(study: xr.Dataset) -> str:
     return first_model(study["model"].values.tolist())
 
 
-def _check_study(campaign, study):
-    if study not in campaign.children:
-        raise ValueError(f"no study {study!r} in this campaign; expected one of: {', '.join(campaign.children)}")
-
-
 def pick(label: str, wanted, present: Sequence):
-    """Return `wanted` if it is among the values of a label, or the first of them if it is None."""
+    """Return `wanted`, or the first of the values that a label has in complete runs if `wanted` is None."""
     if wanted is None:
         return present[0]
     if wanted not in present:
-        expected = ", ".join(map(str, dict.fromkeys(present)))
-        raise ValueError(f"no {label} {wanted!r} in this study; expected one of: {expected}")
+        complete = ", ".join(map(str, dict.fromkeys(present)))
+        raise NothingToDraw(f"no run of {label} {wanted} is complete; complete runs have {label}: {complete}")
     return wanted
 
 
-def pick_run(
-    campaign: xr.DataTree,
-    study: str,
-    *,
-    surface: str | None = None,
-    seed: int | None = None,
-    rms_slope: float | None = None,
-    material: str | None = None,
-) -> tuple[RunLabels, xr.Dataset]:
-    """Return the first run of a study and its `shown_model` with these labels.
-
-    If no material is named, the first one with adhesion is preferred.
-
-    Raises
-    ------
-    NothingToDraw
-        If it is not complete.
-    """
-    from icha.datasets.campaign import run_labels, run_place, select_run
+def select_complete_run(campaign: xr.DataTree, labels: RunLabels) -> xr.Dataset:
+    """Return a run of the campaign; raise `NothingToDraw` if it is not complete."""
+    from icha.datasets.campaign import run_place, select_run
     from icha.datasets.variables.campaign import COMPLETE
 
-    _check_study(campaign, study)
-    dataset = campaign[study].to_dataset()
-    model = shown_model(dataset)
-    runs = [
-        labels
-        for labels in run_labels(campaign)
-        if (labels.study, labels.model) == (study, model)
-        and surface in (None, labels.surface)
-        and seed in (None, labels.seed)
-        and (rms_slope is None or np.isclose(rms_slope, labels.rms_slope))
-    ]
-    if not runs:
-        raise ValueError(f"study {study}: no run of surface {surface}, seed {seed}, rms slope {rms_slope}")
-    adhesive_first = sorted(runs, key=lambda labels: dataset["surface_energy"].sel(material=labels.material) <= 0)
-    material = pick("material", material, [labels.material for labels in adhesive_first])
-    labels = next(labels for labels in runs if labels.material == material)
+    dataset = campaign[labels.study].to_dataset()
     if dataset["status"].isel(run_place(dataset, labels)) != COMPLETE:
         raise NothingToDraw(f"{labels}: this run is not complete")
-    return labels, select_run(campaign, labels)
-
-
-def run_on_topography(
-    campaign: xr.DataTree, study: str, topography: xr.Dataset, *, surface_name: str | None = None, **labels: object
-) -> tuple[RunLabels, xr.Dataset]:
-    """Return the run of `pick_run`; raise ValueError unless a surface file's dataset is its topography."""
-    found, run = pick_run(campaign, study, surface=surface_name, **labels)
-    period, grid = float(run["period"]), int(run["grid"])
-    if not np.isclose(float(topography["period"]), period, rtol=1e-9) or int(topography["grid"]) != grid:
-        raise ValueError(f"{found}: the surface has another period or grid; expected {period:g} m and {grid} nodes")
-    if "seed" in topography and int(topography["seed"]) != found.seed:
-        raise ValueError(f"{found}: the surface has seed {int(topography['seed'])}; expected {found.seed}")
-    return found, run
+    return select_run(campaign, labels)
 
 
 def path_steps(run: xr.Dataset) -> xr.Dataset:
@@ -262,28 +214,31 @@ def snapshot_label(run: xr.Dataset, snapshot: int) -> str:
     return f"{_KIND_LABELS[kind]} = {format_number(value)}"
 
 
-def study_errors(model_error: xr.DataTree | None, study: str) -> dict[str, xr.Dataset]:
-    """Return the entries of a model error that compare the runs of a study, by name; none if no error is given."""
-    entries = model_error.children if model_error is not None else {}
-    return {name: node.to_dataset() for name, node in entries.items() if node.attrs["study"] == study}
+def select_errors(
+    model_error: xr.DataTree | None, study: str
+) -> Iterator[tuple[str, tuple[str, str, float], xr.Dataset]]:
+    """Yield the errors of each contact of a study, along seeds and loads.
 
+    Parameters
+    ----------
+    model_error : dataset of `icha.analysis.model_error.model_error`; None without boundary elements.
 
-def finite_range_errors(model_error: xr.DataTree | None, study: str) -> list[xr.Dataset]:
-    """Return those of `study_errors` that compare with boundary elements at a finite range."""
-    return [errors for errors in study_errors(model_error, study).values() if errors.attrs["truth"] == FINITE_RANGE]
-
-
-def errors_of_run(entries: Iterable[xr.Dataset], labels: RunLabels, *names: str) -> Iterator[xr.Dataset]:
-    """Yield the errors of a run from those entries of a model error that contain it; `names`: labels to select by."""
-    for errors in entries:
-        try:
-            yield errors.isel(place_of(errors, {name: getattr(labels, name) for name in names}))
-        except KeyError:
+    Yields
+    ------
+    Name of an entry of the model error; material, surface and rms slope; errors of this entry and contact. A campaign
+    need not request all combinations of the labels of an entry, so that all errors of a contact may be NaN.
+    """
+    for name, node in model_error.children.items() if model_error is not None else ():
+        if node.attrs["study"] != study:
             continue
+        errors = node.to_dataset().transpose("seed", ...)
+        for material, (surface, slope) in itertools.product(errors["material"].values, surfaces_and_slopes(errors)):
+            labels = {"surface": surface, "rms_slope": slope, "material": material}
+            yield name, (str(material), surface, slope), errors.isel(place_of(errors, labels))
 
 
-def asked_of_entry(errors: xr.Dataset) -> np.ndarray:
-    """Return numbers of seeds that an entry of a model error compares, complete or not, along its other labels."""
+def asked_of_entry(errors: xr.Dataset) -> int:
+    """Return the number of seeds, complete or not, for which an entry of a model error compares a contact."""
     from icha.datasets.variables.campaign import NOT_IN_DESIGN
 
-    return (errors["status"] != NOT_IN_DESIGN).sum("seed").values
+    return int((errors["status"] != NOT_IN_DESIGN).sum("seed"))

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import os
 from contextlib import contextmanager
-from functools import cache
+from functools import partial
 from string import ascii_lowercase
 from typing import TYPE_CHECKING
 
@@ -17,6 +17,8 @@ from icha.support.atomic_files import whole_file
 from icha.support.formatting import choose_unit, format_quantity
 
 if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
 
@@ -30,6 +32,8 @@ ORANGE, SKY, PURPLE, BLACK = "#E69F00", "#56B4E9", "#CC79A7", "#000000"
 COLOURS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY, BLACK)
 DASHES = ("-", (0, (5, 2)), (0, (1, 1.5)), (0, (5, 2, 1, 2)), (0, (3, 1, 1, 1, 1, 1)))
 GREY = "0.45"
+# Ratio of the ends of a logarithmic axis below which ticks between powers of ten have labels.
+_SHORT_AXIS = 100
 
 RC = {
     "font.family": "STIXGeneral",
@@ -108,39 +112,21 @@ def save(figure: Figure, png: str | os.PathLike, pdf: str | os.PathLike) -> None
             figure.savefig(temporary, format="pdf", metadata=nothing)
 
 
-def logarithmic_axes(axes, directions: str = "xy") -> None:
-    """Make the axes of these directions logarithmic, with few labels between powers of ten."""
+def logarithmic_axes(axes: Axes, directions: str = "xy") -> None:
+    """Make axes logarithmic; between powers of ten, short axes have labels at twos and fives."""
     for direction in directions:
         axes.set(**{f"{direction}scale": "log"})
-        getattr(axes, f"{direction}axis").set_minor_formatter(_few_labels()())
+        axis = getattr(axes, f"{direction}axis")
+        axis.set_minor_formatter(partial(_minor_label, axis))
 
 
-@cache
-def _few_labels() -> type:
-    """Return the class of labels of logarithmic axes."""
-    from matplotlib.ticker import LogFormatterSciNotation
-
-    class FewLabels(LogFormatterSciNotation):
-        """Labels between powers of ten, of axes that show less than two powers: twos and fives, or else some ticks."""
-
-        _MOST = 3
-
-        def set_locs(self, locs):
-            """Choose the ticks that have a label."""
-            low, high = sorted(self.axis.get_view_interval())
-            powers = np.floor(np.log10(high)) - np.ceil(np.log10(low)) + 1
-            inside = np.array([at for at in locs if low <= at <= high])
-            digits = inside / 10 ** np.floor(np.log10(inside))
-            chosen = inside[np.isclose(digits, 2) | np.isclose(digits, 5)]
-            if len(chosen) + powers < 2:
-                chosen = inside[:: -(-len(inside) // self._MOST) or 1]
-            self._chosen = chosen if powers < 2 else []
-
-        def __call__(self, x, pos=None):
-            """Return the label of a tick."""
-            return super().__call__(x, pos) if x in self._chosen else ""
-
-    return FewLabels
+def _minor_label(axis, value, _):
+    """Return the label of a tick between powers of ten."""
+    low, high = sorted(axis.get_view_interval())
+    exponent = np.floor(np.log10(value))
+    digit = value / 10.0**exponent
+    shown = high < _SHORT_AXIS * low and np.isclose(digit, (2, 5)).any()
+    return rf"${digit:g}\times10^{{{exponent:g}}}$" if shown else ""
 
 
 def legend_handle(x=(), y=(), **look) -> Line2D:
@@ -150,7 +136,7 @@ def legend_handle(x=(), y=(), **look) -> Line2D:
     return Line2D(x, y, **look)
 
 
-def panel_label(axes, letter: str) -> None:
+def panel_label(axes: Axes, letter: str) -> None:
     """Mark a panel as (a), (b), … outside its upper left corner."""
     axes.set_title(f"({letter})", loc="left", fontweight="bold")
 
@@ -167,23 +153,18 @@ def format_number(value: float) -> str:
     return f"${power}$" if mantissa == "1" else rf"${mantissa}\times{power}$"
 
 
-# Variables that distinguish materials, with their symbols and units.
-INTERFACE = {
-    "contact_modulus": (r"$E^{\ast}$", "Pa"),
-    "surface_energy": (r"$\Delta\gamma$", "J/m²"),
-    "interaction_range": ("range of attraction", "m"),
-}
+# Variables that distinguish materials.
+INTERFACE = ["contact_modulus", "surface_energy", "interaction_range"]
 
 
-def material_label(study, material: str) -> str:
+def material_label(study: xr.Dataset, material: str) -> str:
     """Return modulus and surface energy of a material, in the same units for a whole study, for legends.
 
-    The range of attraction is added if the others do not distinguish two materials.
+    The range of attraction is added if modulus and energy do not distinguish two materials of the study.
     """
     values = study.sel(material=material)
     words, alike = [], True
-    for name in ("contact_modulus", "surface_energy"):
-        symbol, unit = INTERFACE[name]
+    for name, symbol, unit in (("contact_modulus", r"$E^{\ast}$", "Pa"), ("surface_energy", r"$\Delta\gamma$", "J/m²")):
         value = float(values[name])
         factor, prefixed = choose_unit(float(study[name].max()), unit)
         words.append(f"{symbol} = {value * factor:.4g} {prefixed}" if value > 0 else f"{symbol} = 0")

@@ -23,9 +23,10 @@ from icha.path.stops import (
     SAME_EXCESS,
     SAME_SEPARATION,
     InsideJump,
-    PendingTargets,
     TargetFunction,
     find_first_target,
+    next_of_each_kind,
+    sort_targets,
 )
 from icha.path.targets import LOADS, MEAN_SEPARATION, Path
 
@@ -144,22 +145,22 @@ class _Cycle:
     ) -> Generator[Waypoint, TargetFunction | None, None]:
         """Yield the equilibria of a leg until all targets are met or, with `until_apart`, until nothing touches."""
         self.leg, self.event_at, self.smooth_length = leg, np.inf, 0.0
-        pending, sent = PendingTargets(targets, self.direction), None
+        pending, sent = sort_targets(targets, self.direction), None
         visited, length_limit = [self.state.separation], np.inf
         while pending or until_apart:
             if not self.loading and self._is_apart():
                 if until_apart:
                     return
-                raise self.path_error(self._apart_too_early(pending.next_of_each_kind[0]))
+                raise self.path_error(self._apart_too_early(pending[0]))
             state, step = self.find_next(min(self._distance_to_station(), length_limit))
-            candidates = [*pending.next_of_each_kind, sent] if sent else pending.next_of_each_kind
+            candidates = next_of_each_kind(pending) + ([sent] if sent else [])
             try:
                 target, met = find_first_target(candidates, self.state, state, self.direction)
             except InsideJump as jump:
                 if jump.target is sent:
                     sent = None
                     continue
-                pending.drop_next(jump.target.target.kind)
+                pending.remove(jump.target)
                 if not until_apart:
                     self.progress.skipped.append(jump)
                     if leg:
@@ -181,7 +182,7 @@ class _Cycle:
             if self._is_new_station(met.separation, visited[-1]):
                 visited.append(met.separation)
             if listed is not None:
-                pending.drop_next(listed.target.kind)
+                pending.remove(listed)
                 if leg == 0:
                     self.progress.record_target(listed.target, met)
             waypoint = waypoint_between(met, leg, step) if target is None else Waypoint(target.target, met, leg, step)

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from icha.asperity.material import Material
-from icha.contact.model import COALESCENCE, JUMP_IN, JUMP_OFF, SPLIT, ContactModel, Events, State
+from icha.contact.model import COALESCENCE, JUMP_IN, JUMP_OFF, SPLIT, ContactModel, Events, State, events_between
 from icha.path.targets import BETWEEN, Target
 
 # In these functions du and dp are the changes of the separation (m) and of the pressure (Pa) in a step; slope and
@@ -82,7 +82,7 @@ class Step:
         The pressure is integrated as the cubic with the pressures and stiffnesses at both ends; jumps count as if they
         happened in the middle of the step.
         """
-        events = contact.events_between(before, after)
+        events = events_between(before, after)
         du = after.separation - before.separation
         p, q = contact.pressure(before), contact.pressure(after)
         slope, end_slope = -contact.stiffness(before), -contact.stiffness(after)

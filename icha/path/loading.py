@@ -4,12 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from operator import itemgetter
 
 import numpy as np
 
 from icha.contact.model import ContactModel, NotConverged, State
 from icha.path.energy_balance import Waypoint
-from icha.path.stops import SAME_EXCESS, SAME_SEPARATION, InsideJump, PendingTargets, TargetFunction, find_first_target
+from icha.path.stops import (
+    SAME_EXCESS,
+    SAME_SEPARATION,
+    InsideJump,
+    TargetFunction,
+    find_first_target,
+    next_of_each_kind,
+    sort_targets,
+)
 from icha.path.targets import Target
 
 # Shortest step after halvings, relative to the longest step.
@@ -68,18 +77,18 @@ class PathProgress:
             )
 
     def require_validity(
-        self, before: State, after: State, target: TargetFunction | None, pending: PendingTargets, loading: bool
+        self, before: State, after: State, target: TargetFunction | None, pending: list[TargetFunction], loading: bool
     ) -> None:
         """Raise `NotConverged` if the model does not cover the state after a step.
 
-        The mean planes may meet in a state that meets a target, because the range of targets is limited already; and
-        with a model that covers full contact.
+        The mean planes must not meet between targets, unless the model covers full contact. At a target they may meet,
+        because the range of targets is limited already.
 
-        target : the target that the state meets, if there is one; pending : targets that are still to be met.
+        target : the target that the state meets, if there is one; pending : sorted targets that are still to be met.
         """
         contact = self.contact
-        ahead = [target] if target else pending.next_of_each_kind
-        name = ahead[0].target.describe() if ahead else "separation"
+        ahead = target or (pending[0] if pending else None)
+        name = ahead.target.describe() if ahead else "separation"
         area = contact.area_fraction(after)
         if area > contact.largest_area_fraction:
             reason = f"the contact area grows to {area:.2f} of the nominal area, outside the range of the model,"
@@ -135,17 +144,18 @@ def first_loading(
         As in `icha.path.follow.follow`.
     """
     state = first_contact = contact.untouched()
-    pending, step, failed_trials, successes = PendingTargets(targets, -1), longest, 0, 0
+    pending, step, failed_trials, successes = sort_targets(targets, -1), longest, 0, 0
     target: TargetFunction | None
     while pending:
         if contact.spot_count(state) == 0 and state.separation > first_contact.separation:
             state = first_contact  # nothing happens above it
-        nearest, expected = _nearest_target(pending.next_of_each_kind, state)
+        following = next_of_each_kind(pending)
+        expected, nearest = max(((each.predict_separation(state), each) for each in following), key=itemgetter(0))
         distance = state.separation - expected
         try:
             if distance <= step and failed_trials < _DIRECT_ATTEMPTS:
                 target = nearest
-                after = _solve_directly(nearest, expected, pending.next_of_each_kind, state, step)
+                after = _solve_directly(nearest, expected, following, state, step)
                 if after is None:
                     # Try a shorter step first; if that fails too, the target is bracketed by two states.
                     failed_trials = failed_trials + 1 if distance > _LONG * longest else _DIRECT_ATTEMPTS
@@ -154,9 +164,9 @@ def first_loading(
                     continue
             else:
                 after = contact.equilibrium(state, state.separation - step)
-                target, after = find_first_target(pending.next_of_each_kind, state, after, -1)
+                target, after = find_first_target(following, state, after, -1)
         except InsideJump as jump:
-            pending.drop_next(jump.target.target.kind)
+            pending.remove(jump.target)
             progress.skipped.append(jump)
             state, failed_trials = jump.before, 0
             continue
@@ -169,19 +179,12 @@ def first_loading(
         state = after
         progress.record_equilibrium(state, loading=True)
         if target is not None:
-            pending.drop_next(target.target.kind)
+            pending.remove(target)
             failed_trials = 0
             progress.record_target(target.target, state)
             yield Waypoint(target.target, state)
     if progress.skipped:
         raise progress.path_error(state, True)
-
-
-def _nearest_target(targets: list[TargetFunction], state: State) -> tuple[TargetFunction, float]:
-    """Return the target that is expected first, and the separation at which it is expected, m."""
-    expected = {target: target.predict_separation(state) for target in targets}
-    first = max(expected, key=expected.__getitem__)
-    return first, expected[first]
 
 
 def _solve_directly(target, expected, pending, state, step) -> State | None:

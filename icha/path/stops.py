@@ -9,28 +9,22 @@ import numpy as np
 from icha.contact.model import PRESSURE, ContactModel, Control, NotConverged, State
 from icha.path.targets import LEAST_PRESSURE, MEAN_SEPARATION, Target
 
-# Largest relative excess over a target that is due to rounding.
+# Largest relative excess over a target that rounding can cause.
 SAME_EXCESS = 1e-9
-# Largest difference of two separations, in h_rms, that is due to rounding. A bracket as narrow as this holds a jump.
+# Largest difference of two separations, in h_rms, that rounding can cause. A bracket as narrow as this holds a jump.
 SAME_SEPARATION = 1e-10
-# Widest bracket, in h_rms, in which a failed solve means that there is a jump: da/d(delta) is infinite there.
+# Widest bracket, in h_rms, in which a failed solve means that there is a jump, where da/d(delta) is infinite.
 CLOSE_TO_A_JUMP = 1e-4
 # Largest number of times that a bracket is halved.
 _MAX_HALVINGS = 80
-# The solver tries the target before each of the first nine halvings, then before the 17th, 33rd, 65th only: a target
-# that was missed so often usually lies inside a jump.
+# The solver tries the target before each of the first nine halvings, then only before the 17th, 33rd and 65th, because
+# a target that was missed so often usually lies inside a jump.
 _TRIALS = 8
 
 
 @dataclass(frozen=True, eq=False)
 class TargetFunction:
-    """Target as a function of the contact state: zero at the target, rising on loading.
-
-    Parameters
-    ----------
-    target : the target.
-    contact : the contact whose states are evaluated.
-    """
+    """Distance of a contact from a target, as a function of its state: zero at the target, rising on loading."""
 
     target: Target
     contact: ContactModel
@@ -38,7 +32,7 @@ class TargetFunction:
     def excess(self, state: State) -> float:
         """Return the relative excess over the target.
 
-        Separations count in h_rms; for a zero load the unit is LEAST_PRESSURE.
+        The unit of a separation is h_rms; the unit of a zero load is LEAST_PRESSURE.
         """
         quantity, value = self.target.quantity, self.target.value
         if quantity.controlled is None:
@@ -50,11 +44,11 @@ class TargetFunction:
 
     @property
     def control(self) -> Control | None:
-        """Load or area that the solver holds to meet the target; None for a separation."""
+        """Load or area that the solver keeps constant to meet the target; None for a separation."""
         return self.target.quantity.control(self.contact, self.target.value)
 
     def predict_separation(self, state: State) -> float:
-        """Extrapolate to the separation at the target, m: load and area grow about exponentially; -inf if unknown."""
+        """Extrapolate load or area exponentially to the target; return the separation there, m, or -inf."""
         control = self.control
         if control is None:
             return self.target.value
@@ -66,45 +60,32 @@ class TargetFunction:
         return self.contact.equilibrium(state, separation, self.control)
 
 
-class PendingTargets:
-    """Targets that are still to be met, in order for each kind; false if empty."""
+def sort_targets(targets: Iterable[TargetFunction], direction: int) -> list[TargetFunction]:
+    """Sort targets so that those of each kind are in the order in which a path meets them.
 
-    def __init__(self, targets: Iterable[TargetFunction], direction: int):
-        """Sort the targets for a direction of the separation: -1 on loading, 1 on unloading."""
-        self._by_kind: dict[str, list[TargetFunction]] = {}
-        for each in sorted(targets, key=lambda each: each.target.value):
-            self._by_kind.setdefault(each.target.kind, []).append(each)
-        for kind, pending in self._by_kind.items():
-            # The next target is the last of its list.
-            if (kind == MEAN_SEPARATION) != (direction < 0):
-                pending.reverse()
+    direction : direction of the separation: -1 on loading, 1 on unloading.
+    """
 
-    def __bool__(self) -> bool:
-        """Return whether there are any."""
-        return any(self._by_kind.values())
+    def place(function):
+        value = function.target.value
+        return direction * (value if function.target.kind == MEAN_SEPARATION else -value)
 
-    @property
-    def next_of_each_kind(self) -> list[TargetFunction]:
-        """The next target of every kind."""
-        return [pending[-1] for pending in self._by_kind.values() if pending]
+    return sorted(targets, key=place)
 
-    def drop_next(self, kind: str) -> None:
-        """Drop the next target of a kind."""
-        self._by_kind[kind].pop()
+
+def next_of_each_kind(pending: Iterable[TargetFunction]) -> list[TargetFunction]:
+    """Select the first target of every kind from sorted targets."""
+    first: dict[str, TargetFunction] = {}
+    for each in pending:
+        first.setdefault(each.target.kind, each)
+    return list(first.values())
 
 
 class InsideJump(NotConverged):
-    """Error: the path jumps over the target, and no equilibrium meets it.
-
-    Parameters
-    ----------
-    target : the target.
-    before : the state just before the jump.
-    after : a state after the jump.
-    """
+    """Error: the path jumps over the target, and no equilibrium meets it."""
 
     def __init__(self, target: TargetFunction, before: State, after: State):
-        """Describe the jump, and keep the target and the state from which the path can continue."""
+        """Describe the jump over a target from the state before it to a state after it."""
         contact = target.contact
         low, high = (contact.area_fraction(state) for state in (before, after))
         super().__init__(
@@ -117,10 +98,11 @@ class InsideJump(NotConverged):
 
 
 def find_target_state(target: TargetFunction, before: State, after: State) -> State:
-    """Find the state at a target that lies between two states of the path, in either direction.
+    """Find the state at a target that lies between two states of the path, on loading or unloading.
 
-    The bracket is halved until the target is met inside it. If it closes on a jump (an event that carries the quantity
-    past its target), the target is met on the branch after the event, where load control would be.
+    The two states bracket the target. The bracket is halved until the solver meets the target inside the bracket. An
+    event may change the quantity beyond its target. Then the bracket becomes very narrow, and the solver looks for the
+    target on the branch after the event, where load control would continue.
 
     Raises
     ------
@@ -177,9 +159,13 @@ def _guess_separation(target, before, after):
 def find_first_target(
     targets: Iterable[TargetFunction], before: State, after: State, direction: int
 ) -> tuple[TargetFunction | None, State]:
-    """Find the target that the path meets first between two states, and its state; without one None and `after`.
+    """Find the target that the path meets first between two states.
 
-    direction : of the separation: -1 on loading, 1 on unloading.
+    direction : direction of the separation: -1 on loading, 1 on unloading.
+
+    Returns
+    -------
+    The target and the state that meets it; None and `after` if there is no target between the states.
     """
     first: tuple[TargetFunction | None, State] = None, after
     for target in targets:

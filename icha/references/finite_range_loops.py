@@ -1,16 +1,15 @@
 """Loading and unloading at a finite range of attraction, with boundary elements, from no contact to no contact.
 
 The mean gap is prescribed, as in a stiff machine. Each solution starts from the one before and so stays on its branch
-until the branch ends; at its end the surfaces jump, and the energy that the jump releases is lost. Between jumps the
-work done on the contact, minus the integral of the nominal pressure over the mean gap, is the change of its stored
-energy. On a step the work and the change of the energy differ by the energy that jumps dissipate, and by the error of
-the trapezoidal rule. Steps with a difference are halved, down to a limit; the position of a jump within the smallest
-step remains unknown.
+until the branch ends. At the end of a branch the surfaces jump, and the energy that the jump releases is lost. The work
+done on the contact is minus the integral of the nominal pressure over the mean gap. Between jumps the work equals the
+change of the stored energy. In a step with a jump they differ by the energy that the jump dissipates. They also differ
+by the error of the trapezoidal rule. Steps with a difference are halved, at most five times; where a jump lies within
+the smallest step remains unknown.
 """
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
@@ -30,14 +29,14 @@ from icha.references.finite_range import (
 from icha.support.rules import POSITIVE, TOLERANCE
 from icha.surfaces.surface import Surface
 
-# Surfaces are apart where every gap exceeds this many ranges: at most 0.7 % of the interface's strength acts there.
+# Surfaces are apart if every gap exceeds this many ranges, where at most 0.7 % of the interface's strength acts.
 _APART = 5.0
-# Height of the start of the loop above the highest summit, in ranges; attraction reduces the gap from there.
+# Mean gap at the start of the loop minus the height of the highest summit, in ranges.
 _START = 6.0
-# Error of the work of a step, over the surface energy, above which the step is halved; and the most halvings.
+# Error of the work of a step, over the surface energy, above which the step is halved; and largest number of halvings.
 _WORK_TOLERANCE = 1e-4
 _MAX_HALVINGS = 5
-# Relative error of the largest load, unless it lies within a jump; and the tries to reach it within one step.
+# Relative error of the largest load, unless it lies within a jump; and number of tries to reach it within one step.
 _LOAD_TOLERANCE = 1e-3
 _MAX_LOAD_SEARCHES = 12
 # A loop that takes more solutions than this does not end.
@@ -55,7 +54,7 @@ def finite_range_loop(
     seed: int = -1,
     progress: Callable[[str], None] | None = None,
 ) -> xr.Dataset:
-    """Load two surfaces that are apart up to a load and unload them until they are apart, with boundary elements.
+    """Compute a loop with boundary elements: from surfaces that are apart to a load, and back until they are apart.
 
     Parameters
     ----------
@@ -66,8 +65,8 @@ def finite_range_loop(
 
     Returns
     -------
-    xarray.Dataset of `icha.datasets.variables.boundary_elements.LOOP`. The first and the last `step` are the same
-    state, apart; work is zero at the first.
+    xarray.Dataset of `icha.datasets.variables.boundary_elements.LOOP`. At the first and the last `step` the surfaces
+    are apart at the same mean gap; the work is zero at the first step.
 
     Raises
     ------
@@ -84,21 +83,8 @@ def finite_range_loop(
     return _dataset(surface, solver, legs, separation_step, seed)
 
 
-@dataclass(frozen=True)
-class _Record:
-    """Values of a state that the dataset holds, in SI units."""
-
-    separation: float
-    pressure: float
-    energy: float
-    area: float
-    area_raw: float
-    energetic_area: float
-    residual: float
-
-
 class _LoopSolver:
-    """Solves states one after the other, each from the one before."""
+    """Solver of the states of a loop, each of which starts from the state before."""
 
     def __init__(self, fine, material, tolerance):
         self.fine, self.material, self.tolerance = fine, material, tolerance
@@ -108,7 +94,7 @@ class _LoopSolver:
         self.range = material.interaction_range if adhesive else 0.0
 
     def solve_from_undeformed(self, separation):
-        """Solve at a mean gap (m), from the undeformed surfaces."""
+        """Solve at a mean gap, m; start from the undeformed surfaces."""
         return self.solve(separation - self.fine.heights, separation)
 
     def is_apart(self, state):
@@ -116,14 +102,14 @@ class _LoopSolver:
         return not state.contact.any() and state.gap.min() >= _APART * self.range
 
     def solve(self, gap, separation):
-        """Solve at a mean gap (m), from the gaps (n, n) of another state."""
+        """Solve at a mean gap, m; start from the gaps (n, n) of another state."""
         if self.contact.solves >= _MAX_SOLVES:
             raise NotSolved(f"the loop has not ended after {self.contact.solves} solutions")
         self.contact.start_from(gap)
         return self.contact.solve(separation)
 
     def steps(self, state, separation, halvings=_MAX_HALVINGS):
-        """Yield states up to a mean gap (m), in steps that resolve the work or are the smallest."""
+        """Yield states up to a mean gap, m; halve each step until its work is known or it is the smallest step."""
         after = self.solve(state.gap, separation)
         if halvings == 0 or self.work_error(state, after) <= self.work_tolerance:
             yield after
@@ -133,31 +119,31 @@ class _LoopSolver:
         yield from self.steps(middle, separation, halvings - 1)
 
     def work_error(self, before, after):
-        """Error of the work of a step by the trapezoidal rule, J/m^2: the smaller of two estimates.
+        """Return the error of the work of a step by the trapezoidal rule, J/m^2: the smaller of two estimates.
 
-        On a branch the error is the work minus the change of the stored energy. Where the pressure jumps, the error is
-        at most half the change of the pressure times the step.
+        On a branch the error is the work minus the change of the stored energy. In a step with a jump the error is at
+        most half the change of the pressure times the step.
         """
         records = [self.record(before), self.record(after)]
         return min(abs(_dissipated(records)[0]), _jump_position_error(records)[0])
 
     def total_work_error(self, records):
-        """Error of the work over all steps, J/m^2: dissipation on branches, which is zero, and positions of jumps."""
+        """Return the error of the work of all steps, J/m^2: dissipation without jumps plus positions of jumps."""
         dissipated = _dissipated(records)
         jump = dissipated > self.work_tolerance
         return abs(dissipated[~jump].sum()) + _jump_position_error(records)[jump].sum()
 
     def record(self, state):
-        """Return the values of a state that the dataset holds."""
-        return _Record(
-            separation=state.mean_separation,
-            pressure=state.nominal_pressure,
-            energy=state.stored_energy(self.material),
-            area=perimeter_correction(state.contact)[0],
-            area_raw=np.count_nonzero(state.contact) / state.contact.size,
-            energetic_area=state.energetic_area_fraction(self.material),
-            residual=state.residual,
-        )
+        """Return the values of a state by the names of their variables."""
+        return {
+            "mean_separation": state.mean_separation,
+            "nominal_pressure": state.nominal_pressure,
+            "stored_energy": state.stored_energy(self.material),
+            "contact_area_fraction": perimeter_correction(state.contact)[0],
+            "contact_area_fraction_raw": np.count_nonzero(state.contact) / state.contact.size,
+            "energetic_area_fraction": state.energetic_area_fraction(self.material),
+            "residual": state.residual,
+        }
 
     def describe(self, state):
         """Describe a state in a message."""
@@ -174,10 +160,10 @@ def _load_and_unload(solver, step, target, progress):
             for state in states(solver, last, start, step, target):
                 leg.append(solver.record(state))
                 if progress:
-                    area = f"contact area {leg[-1].area:.4g} A0"
+                    area = f"contact area {leg[-1]['contact_area_fraction']:.4g} A0"
                     progress(f"{solver.describe(state)}, {area}, error {state.residual:.2g}")
                 last = state
-        # Where contact lasts longer in unloading than from the start on, loading begins as far away.
+        # If contact breaks at a larger gap than that of the start, loading begins at the larger gap too.
         count = round((last.mean_separation - start) / step)
         farther = [solver.solve_from_undeformed(start + step * k) for k in range(count, 0, -1)]
         legs[0][:0] = map(solver.record, farther)
@@ -204,7 +190,7 @@ def _load(solver, _, start, step, target):
 
 
 def _search_load(solver, before, after, target):
-    """Yield states between two, up to the one at the load; end with the second if the load lies within a jump."""
+    """Yield states between two states, up to the load; if the load lies within a jump, end with the second state."""
     for _ in range(_MAX_LOAD_SEARCHES):
         share = (target - before.nominal_pressure) / (after.nominal_pressure - before.nominal_pressure)
         separation = before.mean_separation + share * (after.mean_separation - before.mean_separation)
@@ -220,7 +206,7 @@ def _search_load(solver, before, after, target):
 
 
 def _unload(solver, state, start, step, target):
-    """Yield states from the largest load until apart, at the mean gaps of loading."""
+    """Yield states from the largest load until the surfaces are apart, at the mean gaps of loading."""
     count = math.ceil((start - state.mean_separation) / step) - 1
     while count >= 0 or not solver.is_apart(state):
         for after in solver.steps(state, start - count * step):
@@ -230,57 +216,49 @@ def _unload(solver, state, start, step, target):
 
 
 def _column(records, name):
-    return np.array([getattr(record, name) for record in records])
+    """Return one value of all records as an array."""
+    return np.array([record[name] for record in records])
 
 
 def _work(records):
-    """Work on each step by the trapezoidal rule, J/m^2."""
-    pressure = _column(records, "pressure")
-    return -np.diff(_column(records, "separation")) * (pressure[1:] + pressure[:-1]) / 2
+    """Integrate the work on each step by the trapezoidal rule, J/m^2."""
+    pressure = _column(records, "nominal_pressure")
+    return -np.diff(_column(records, "mean_separation")) * (pressure[1:] + pressure[:-1]) / 2
 
 
 def _dissipated(records):
-    """Work on each step minus the change of the stored energy, J/m^2."""
-    return _work(records) - np.diff(_column(records, "energy"))
+    """Return the work on each step minus the change of the stored energy, J/m^2."""
+    return _work(records) - np.diff(_column(records, "stored_energy"))
 
 
 def _jump_position_error(records):
-    """Error of the work on each step, J/m^2, if the pressure jumps at one end: half of step times pressure change."""
-    return np.abs(np.diff(_column(records, "separation")) * np.diff(_column(records, "pressure"))) / 2
+    """Return the error of the work on each step if the pressure jumps at one of its ends, J/m^2."""
+    return np.abs(np.diff(_column(records, "mean_separation")) * np.diff(_column(records, "nominal_pressure"))) / 2
 
 
 def _dataset(surface, solver, legs, separation_step, seed):
     material = solver.material
     records = [*legs[0], *legs[1]]
-    columns = {name: _column(records, name) for name in _Record.__annotations__}
+    columns = {name: _column(records, name) for name in records[0]}
     leg = np.repeat([0, 1], [len(one) for one in legs])
     work = np.concatenate([[0.0], np.cumsum(_work(records))])
-    pressure, separation, unit = (
-        columns["pressure"],
-        columns["separation"],
-        material.contact_modulus * surface.rms_slope,
-    )
+    pressure, separation, energy = (columns[name] for name in ("nominal_pressure", "mean_separation", "stored_energy"))
+    unit = material.contact_modulus * surface.rms_slope
     last = len(legs[0]) + int(np.argmin(pressure[leg == 1]))
     values = {
         "step": np.arange(len(records)),
-        "mean_separation": separation,
-        "nominal_pressure": pressure,
+        **columns,
         "reduced_pressure": pressure / unit,
         "reduced_separation": separation / surface.rms_height,
-        "contact_area_fraction": columns["area"],
-        "contact_area_fraction_raw": columns["area_raw"],
-        "energetic_area_fraction": columns["energetic_area"],
-        "residual": columns["residual"],
         "leg": leg,
         "work": work,
-        "stored_energy": columns["energy"],
-        "dissipated": work - (columns["energy"] - columns["energy"][0]),
+        "dissipated": work - (energy - energy[0]),
         "pull_off_pressure": max(0.0, -pressure[last]),
         "pull_off_separation": separation[last],
         "hysteresis_loss": work[-1],
         "hysteresis_loss_error": solver.total_work_error(records),
         "largest_reduced_pressure": pressure.max() / unit,
-        "largest_contact_area_fraction": columns["area"].max(),
+        "largest_contact_area_fraction": columns["contact_area_fraction"].max(),
         "separation_step": separation_step,
         "solve_count": solver.contact.solves,
         **describe_problem(surface, solver.fine, material, solver.tolerance, seed),

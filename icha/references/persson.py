@@ -16,8 +16,8 @@ import numpy as np
 from scipy.integrate import simpson
 from scipy.special import erf
 
-# Share of the full-contact elastic energy that a small contact stores (Yang & Persson, gamma); and share of the variance
-# of the pressure of full contact that it has (Xu et al., gamma).
+# Share of the full-contact elastic energy that a small contact stores (Yang & Persson, gamma); and share of the
+# variance of the pressure of full contact that it has (Xu et al., gamma).
 YANG_PERSSON_GAMMA, XU_GAMMA = 0.45, 0.45
 # Iterations for the area of Xu et al.; each one reduces its error to less than a quarter.
 _AREA_ITERATIONS = 40

@@ -37,7 +37,7 @@ _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(400)
 
 
 def bush_gibson_thomas_area(reduced_pressure):
-    """A/A0 = sqrt(2 pi) p*, the limit of small areas (Bush, Gibson & Thomas 1975)."""
+    """Compute A/A0 = sqrt(2 pi) p*, the limit of small areas (Bush, Gibson & Thomas 1975)."""
     return np.sqrt(2 * np.pi) * np.asarray(reduced_pressure, float)
 
 
@@ -59,7 +59,7 @@ class GaussianSummits(NamedTuple):
 
 
 def gaussian_summits(moments: SpectralMoments) -> GaussianSummits:
-    """Summits of an isotropic Gaussian surface: the means of Nayak, as McCool (1986) uses them.
+    """Return the summits of an isotropic Gaussian surface: the means of Nayak, as McCool (1986) uses them.
 
     Density m4/(6 pi sqrt(3) m2), mean height 4 sqrt(m0/(pi alpha)), variance (1 - 0.8968/alpha) m0, and the radius of
     their mean curvature, 3 sqrt(pi)/(8 sqrt(m4)).
@@ -83,40 +83,43 @@ def gaussian_summits(moments: SpectralMoments) -> GaussianSummits:
 
 
 def greenwood_williamson_area(reduced_separation, moments: SpectralMoments):
-    """A/A0 = pi eta R sigma F_1(d/sigma) at separations of any shape; d is the plane's height above the mean summit."""
+    """Compute A/A0 = pi eta R sigma F_1(d/sigma) of an array of separations.
+
+    eta is the density of the summits, R their radius of curvature, sigma the standard deviation of their heights, and d
+    the height of the plane above their mean height.
+    """
     summits = gaussian_summits(moments)
     scale = np.pi * summits.density * summits.radius_of_curvature * summits.deviation
     return scale * _mean_power_above(_height_above_summits(reduced_separation, moments, summits), 1)
 
 
 def greenwood_williamson_pressure(reduced_separation, moments: SpectralMoments):
-    """p* = 4/3 eta R^(1/2) sigma^(3/2) F_3/2(d/sigma)/h'_rms at separations of any shape."""
+    """Compute p* = 4/3 eta R^(1/2) sigma^(3/2) F_3/2(d/sigma)/h'_rms of an array of separations."""
     summits = gaussian_summits(moments)
     scale = 4 / 3 * summits.density * math.sqrt(summits.radius_of_curvature * summits.deviation**3) / moments.rms_slope
     return scale * _mean_power_above(_height_above_summits(reduced_separation, moments, summits), 1.5)
 
 
-def fuller_tabor_area(reduced_separation, moments: SpectralMoments, material: Material, *, pulled: bool = False):
-    """A/A0 of Greenwood & Williamson's summits under the law of Johnson, Kendall & Roberts (Fuller & Tabor 1975).
+def fuller_tabor_area(reduced_separation, moments: SpectralMoments, material: Material):
+    """Compute A/A0 of the same summits with the law of Johnson, Kendall & Roberts, on loading (Fuller & Tabor 1975).
+
+    Without attraction at a distance a summit makes contact at approach 0, where it jumps to the radius
+    (2 pi dgamma R^2/E*)^(1/3) and is in tension.
 
     Parameters
     ----------
-    reduced_separation : of the plane, over h_rms, any shape.
-    moments : of the surface, at its own rms slope.
-    material : its range of attraction is not used.
-    pulled : whether the surfaces separate after every summit has been in contact. Then, as in Fuller & Tabor, a summit
-        stays in contact until its approach falls to that of jump-off. In loading, which is the default, the law has no
-        attraction at a distance: a summit is in contact from approach 0 on, where it jumps to the radius
-        (2 pi dgamma R^2/E*)^(1/3) and is in tension.
+    reduced_separation : separation of the plane over h_rms, any shape.
+    moments : spectral moments of the surface, at its own rms slope.
+    material : modulus and surface energy; the range of attraction is not used.
     """
     law = JKR(material)
-    return _sum_over_summits(lambda a, R: np.pi * a**2, law, reduced_separation, moments, pulled)
+    return _sum_over_summits(lambda a, R: np.pi * a**2, law, reduced_separation, moments)
 
 
-def fuller_tabor_pressure(reduced_separation, moments: SpectralMoments, material: Material, *, pulled: bool = False):
-    """p* of the same summits, negative in tension; parameters as those of `fuller_tabor_area`."""
+def fuller_tabor_pressure(reduced_separation, moments: SpectralMoments, material: Material):
+    """Compute p* of the same summits, negative in tension; the parameters are those of `fuller_tabor_area`."""
     law = JKR(material)
-    pressure = _sum_over_summits(law.force, law, reduced_separation, moments, pulled)
+    pressure = _sum_over_summits(law.force, law, reduced_separation, moments)
     return pressure / (material.contact_modulus * moments.rms_slope)
 
 
@@ -128,7 +131,7 @@ def separation_at(quantity: Callable, value, moments: SpectralMoments, *argument
     Raises
     ------
     ValueError
-        If a value is not positive, or is not reached within 10 standard deviations of the mean summit.
+        If a value is not positive, or not found within 10 standard deviations of the mean summit.
     """
     summits = gaussian_summits(moments)
     middle, reach = summits.mean_height / moments.rms_height, _FARTHEST_PLANE * summits.deviation / moments.rms_height
@@ -149,25 +152,24 @@ def separation_at(quantity: Callable, value, moments: SpectralMoments, *argument
 
 
 def _height_above_summits(reduced_separation, moments, summits):
-    """Height of the plane above the mean summit, in standard deviations."""
+    """Return the height of the plane above the mean summit, in standard deviations."""
     return (np.asarray(reduced_separation, float) * moments.rms_height - summits.mean_height) / summits.deviation
 
 
 def _mean_power_above(t, n):
-    """F_n(t): the mean of (s - t)^n over standard normal s, where s exceeds t."""
+    """Return F_n(t), the mean of (s - t)^n over standard normal s, where s exceeds t."""
     return gamma(n + 1) / math.sqrt(2 * np.pi) * np.exp(-(t**2) / 4) * pbdv(-n - 1, t)[0]
 
 
-def _sum_over_summits(of_summit, law, reduced_separation, moments, pulled):
+def _sum_over_summits(of_summit, law, reduced_separation, moments):
     """Sum a function of the contact radius and the radius of curvature over the summits in contact, per area.
 
-    The integral runs over the contact radius, which fixes the approach of a summit and so its height above the plane.
+    The variable of integration is the contact radius, which gives the approach of a summit and so its height.
     """
     summits = gaussian_summits(moments)
     plane = np.asarray(reduced_separation, float)[..., None] * moments.rms_height
-    first = float(law.jump_off_approach(summits.radius_of_curvature)) if pulled else 0.0
     above, reach = summits.mean_height - plane, _FARTHEST_SUMMIT * summits.deviation
-    limits = (np.maximum(first, above - reach), np.maximum(first, above + reach))
+    limits = (np.maximum(0.0, above - reach), np.maximum(0.0, above + reach))
     start, end = (law.contact_radius(approach, summits.radius_of_curvature) for approach in limits)
     a = start + (end - start) * (_NODES + 1) / 2
     heights = (plane + law.approach(a, summits.radius_of_curvature) - summits.mean_height) / summits.deviation

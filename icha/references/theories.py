@@ -21,7 +21,8 @@ SUMMIT_AREAS = np.geomspace(1e-5, summit_theories.SEPARATE_SUMMITS_AREA_LIMIT, 8
 def literature(name: str) -> dict:
     """Return published numbers: one entry of `literature.json`, with title, description, citation, DOIs and units.
 
-    Entries are `gfmd_area`, `gfmd_gap`, `area_slope` and `contact_mechanics_challenge`. The lists of an entry have the same points.
+    Entries are `gfmd_area`, `gfmd_gap`, `area_slope` and `contact_mechanics_challenge`. The lists of an entry have the
+    same points.
     """
     return json.loads(files("icha.references").joinpath("literature.json").read_text(encoding="utf-8"))[name]
 

@@ -14,8 +14,7 @@ from icha.analysis.model_error import SUMMARISED
 from icha.datasets.labels import place_of, slopes_of, surfaces_and_slopes
 from icha.datasets.surface_file import measured_scale
 from icha.datasets.variables.model_error import SHORT_RANGE
-from icha.figures.legends import legend_below, named_handles
-from icha.figures.looks import MOST_COLOURS, Scale
+from icha.figures.looks import MOST_COLOURS, Scale, legend_below, named_handles
 from icha.figures.style import COLOURS, TWO_COLUMNS, in_style, logarithmic_axes, new_figure
 from icha.support.formatting import format_quantity
 from icha.support.statistics import ENOUGH, ensemble

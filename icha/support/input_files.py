@@ -63,7 +63,7 @@ def problem_with_path(path: str | os.PathLike) -> str | None:
 def most_memory(file: str | os.PathLike | None = None) -> int:
     """Memory that reading a file may take, bytes; without an environment variable it grows with the size of `file`.
 
-    Raises ValueError if the environment variable is not a number.
+    Raises RefusedFile if the environment variable is not a number.
     """
     limit = os.environ.get(VARIABLE)
     if limit is None:
@@ -71,7 +71,7 @@ def most_memory(file: str | os.PathLike | None = None) -> int:
         needed = 0 if file is None else _COPIES * 512 * os.stat(file).st_blocks
         return max(_DEFAULT_MB * 10**6, needed)
     if not re.fullmatch(r"[0-9]{1,9}", limit):
-        raise ValueError(f"{VARIABLE}: {limit!r} is not a number of MB")
+        raise RefusedFile(f"{VARIABLE}: {limit!r} is not a number of MB")
     return int(limit) * 10**6
 
 

@@ -68,7 +68,6 @@ def changed(run, name, **attrs):
         (lambda run: run.assign(spot_snapshot=run["spot_snapshot"] + 5), "spot_snapshot: 5 is out of range"),
         (lambda run: run.assign(extra=xr.Variable((), 1.0)), "extra: has no attribute units"),
         (lambda run: run.assign(rms_height=run["rms_height"] * np.nan), "rms_height: 1 of 1 values are not finite"),
-        (lambda run: run.assign_attrs(campaign="x", study=""), "attribute study is missing"),
     ],
 )
 def test_changes_of_a_run_are_found(spoil, problem):

@@ -130,7 +130,7 @@ def test_figures_of_either_form_show_the_same():
     study, tree, other = crops.STUDY, crops.tree(), crops.square_tree()
     figures = {
         "fig2": lambda tree, errors: fig2_area_and_gap.figure(tree, None, errors, study=study),
-        "fig3": lambda tree, errors: fig3_distributions.figure(tree, errors, study=study),
+        "fig3": lambda tree, errors: fig3_distributions.figure(tree, study=study),
         "fig5": lambda tree, errors: fig5_multi_slope.figure(tree, study=study),
         "fig6": lambda tree, errors: fig6_spots_by_slope.figure(tree, study=study),
         "fig7": lambda tree, errors: fig7_stiffness.figure(tree, study=study),

@@ -228,13 +228,10 @@ def test_it_has_no_places_times_or_persons(project, published):
 
 @pytest.mark.slow
 def test_computed_again_it_has_the_same_bytes(published, tmp_path):
-    asked = ["--folder", str(tmp_path / "again"), "--json", str(tmp_path / "out.json")]
-    done = CliRunner().invoke(app, ["reproduce", f"{published}.zip", *asked])
+    done = CliRunner().invoke(app, ["reproduce", f"{published}.zip", "--folder", str(tmp_path / "again")])
     assert done.exit_code == 0, done.output
-    files = json.loads((tmp_path / "out.json").read_text())["files"]
-    there = {path for path in files_of(published) if path.endswith((".nc", ".png", ".pdf"))}
-    assert {file["path"] for file in files} == {*there, "report.html", "checks.json", "verdict.txt"}
-    assert {file["verdict"] for file in files} == {"identical"}
+    computed = [path for path in files_of(published) if path.endswith((".nc", ".png", ".pdf"))]
+    assert f"identical: {len(computed) + 3} files, every value" in done.output  # report, checks, verdict
 
 
 # Made in this process.

@@ -261,7 +261,7 @@ POST, PUT, ZIP = ("POST", "depositions"), ("PUT", "depositions"), ("PUT", ".zip"
         (POST, refuse(200, {"id": 1, "links": {"bucket": ELSEWHERE}}), "another server"),
         (POST, refuse(200, [1]), "does not answer as Zenodo does"),
         (POST, refuse(200, {"id": 1, "links": None}), "does not answer as Zenodo does"),
-        (POST, refuse(200, {"id": 1, "links": {"bucket": 3}}), "to send the files to another server"),
+        (POST, refuse(200, {"id": 1, "links": {"bucket": 3}}), "does not answer as Zenodo does"),
         (POST, refuse(400, {"errors": 1}), "(400)"),
         (POST, refuse(503, {"message": "busy"}), "try again in a while"),
         (POST, break_off, "ended the connection"),

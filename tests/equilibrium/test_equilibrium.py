@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from icha import Material, SelfAffineSpectrum, Surface
 from icha.asperity.jkr import JKR
-from icha.contact.model import Control, NotConverged
+from icha.contact.model import COALESCENCE, JUMP_OFF, Control, Events, NotConverged
 from icha.contact.models import RESIDUAL_TOLERANCE
 from icha.equilibrium import solver
 from icha.equilibrium.interacting_asperities import InteractingAsperities, contact_of
@@ -77,7 +77,7 @@ def test_jump_in_of_a_bump_happens_at_wus_gap():
     assert len(before.spots) == 0
     after = contact.equilibrium(before, (top + gap) * (1 - 1e-8))
     assert len(after.spots) == 1
-    assert after.jump_ins == 1
+    assert [len(each) for each in after.history] == [1]
     expected = lone_spot(after.separation, top, ENERGY, contact.law.jump_off_radius(R))
     assert after.spots.contact_radius[0] == pytest.approx(expected, rel=1e-6)
     # The jump is into tension.
@@ -320,7 +320,8 @@ def test_states_along_a_path_are_consistent(energy):
         for level in levels:
             state = contact.equilibrium(state, level * contact.rms_height)
             assert_consistent(contact, state)
-    assert state.coalescences > 0 and state.jump_offs > 0
+    events = Events.concatenate(state.history)
+    assert events.count(COALESCENCE) > 0 and events.count(JUMP_OFF) > 0
 
 
 def test_too_few_newton_steps_are_reported_not_passed_off(monkeypatch):

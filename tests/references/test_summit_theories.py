@@ -15,7 +15,6 @@ MODULUS, ENERGY = 25e6, 0.05
 SOFT, BARE = Material(MODULUS, ENERGY, 2e-9), Material(MODULUS, 0.0, 2e-9)
 MOMENTS = SpectralMoments(2.4e-12, 0.5, 1.5e12)
 SEPARATIONS = np.array([0.5, 1.5, 3.0])
-PULLED = pytest.mark.parametrize("pulled", [False, True], ids=["pressed", "pulled"])
 
 
 # --- summits of Gaussian surfaces -----------------------------------------------------------------------------
@@ -67,19 +66,16 @@ def test_greenwood_williamson_is_the_sum_over_random_summits():
 # --- Fuller & Tabor -------------------------------------------------------------------------------------------
 
 
-@PULLED
-def test_without_adhesion_it_is_greenwood_and_williamsons(pulled):
-    area = theories.fuller_tabor_area(SEPARATIONS, MOMENTS, BARE, pulled=pulled)
-    pressure = theories.fuller_tabor_pressure(SEPARATIONS, MOMENTS, BARE, pulled=pulled)
+def test_without_adhesion_it_is_greenwood_and_williamsons():
+    area = theories.fuller_tabor_area(SEPARATIONS, MOMENTS, BARE)
+    pressure = theories.fuller_tabor_pressure(SEPARATIONS, MOMENTS, BARE)
     np.testing.assert_allclose(area, theories.greenwood_williamson_area(SEPARATIONS, MOMENTS), rtol=1e-10)
     np.testing.assert_allclose(pressure, theories.greenwood_williamson_pressure(SEPARATIONS, MOMENTS), rtol=1e-10)
 
 
-@PULLED
-def test_it_is_the_integral_over_the_heights(pulled):
+def test_it_is_the_integral_over_the_heights():
     theory = theories.gaussian_summits(MOMENTS)
     law, R = JKR(SOFT), theory.radius_of_curvature
-    first = float(law.jump_off_approach(R)) if pulled else 0.0
 
     def integrand(approach, u):
         t = (u * MOMENTS.rms_height + approach - theory.mean_height) / theory.deviation
@@ -87,27 +83,11 @@ def test_it_is_the_integral_over_the_heights(pulled):
         return theory.density * force * math.exp(-t * t / 2) / (math.sqrt(2 * np.pi) * theory.deviation)
 
     for u in SEPARATIONS:
-        middle = first + 0.02 * theory.deviation
+        middle = 0.02 * theory.deviation
         parts = [
             quad(integrand, low, high, args=(u,), limit=400, epsrel=1e-8)[0]
-            for low, high in ((first, middle), (middle, first + 12 * theory.deviation))
+            for low, high in ((0.0, middle), (middle, 12 * theory.deviation))
         ]
         expected = sum(parts) / (MODULUS * MOMENTS.rms_slope)
-        own = float(theories.fuller_tabor_pressure(u, MOMENTS, SOFT, pulled=pulled))
+        own = float(theories.fuller_tabor_pressure(u, MOMENTS, SOFT))
         assert own == pytest.approx(expected, rel=1e-6)
-
-
-def test_summits_of_one_height_are_pulled_off_at_jkrs_force():
-    # With hardly any spread of heights all summits let go together: at most 3/2 pi dgamma R each.
-    energy = 1.0
-    moments = SpectralMoments(1e-12, 0.5, 0.5**2 * 1.5 / 1e-12)
-    theory = theories.gaussian_summits(moments)
-    material = Material(1.0, energy, 1e-9)  # so soft that jump-off lies far beyond the spread
-    law = JKR(material)
-    assert -law.jump_off_approach(theory.radius_of_curvature) > 1e3 * theory.deviation
-    approach = float(
-        law.approach(np.cbrt(9 * np.pi * energy * theory.radius_of_curvature**2 / 8), theory.radius_of_curvature)
-    )
-    u = (theory.mean_height - approach) / moments.rms_height
-    tension = float(theories.fuller_tabor_pressure(u, moments, material, pulled=True)) * moments.rms_slope
-    assert tension == pytest.approx(-theory.density * 1.5 * np.pi * energy * theory.radius_of_curvature, rel=1e-3)

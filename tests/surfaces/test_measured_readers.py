@@ -188,7 +188,9 @@ def test_fourier_list_of_the_challenge(tmp_path, opposite, integers):
         fmt=["%d"] * 2 + ["%.12e"] * 2 if integers else "%.12e",
     )
     keys = {"size": (1e-4, 1e-4)} if integers else {}
-    settings = preparation(boundary="periodic", height_unit=1e-4, grid=24, touches_first="low", **keys)
+    settings = preparation(
+        format="fourier", boundary="periodic", height_unit=1e-4, grid=24, touches_first="low", **keys
+    )
     surface = prepared_topography(tmp_path / "list.dat", settings).surface
     np.testing.assert_allclose(surface.heights, -1e-4 * summed(24), atol=1e-14)
     assert surface.period == pytest.approx(1e-4, rel=1e-10)
@@ -198,7 +200,7 @@ def test_fourier_lists_that_are_none(tmp_path):
     k, h = waves()
     path = tmp_path / "list.dat"
     np.savetxt(path, np.column_stack([k, h.real, h.imag]))
-    settings = preparation(boundary="periodic", height_unit=1e-4)
+    settings = preparation(format="fourier", boundary="periodic", height_unit=1e-4)
     with refused("size"):
         prepared_topography(path, settings)
     settings["size"] = (1e-4, 1e-4)
@@ -325,7 +327,7 @@ def test_an_empty_file_is_refused(tmp_path, name):
         scan(tmp_path / name, height_unit=NM, size=SIZE)
 
 
-@pytest.mark.parametrize("kind", ["auto", "matrix", "xyz", "fourier"])
+@pytest.mark.parametrize("kind", ["matrix", "xyz", "fourier"])
 def test_a_heading_alone_is_refused(tmp_path, kind):
     (tmp_path / "scan.txt").write_text("# width 90 um\n\n  # heights\n")
     with refused("path", "holds no numbers"):

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scans import COLUMNS, HEIGHTS, NM, ROWS, SIZE, refused, scan, write_xyz
+from scans import COLUMNS, HEIGHTS, NM, ROWS, SIZE, preparation, refused, scan, write_xyz
 
 from icha.datasets.format import SURFACE, UnknownFile, identify_file
 from icha.surfaces.measured.array_files import read_height_map
@@ -22,6 +22,7 @@ from icha.surfaces.measured.topography import prepared_topography
 
 HUGE = 200_000  # nodes a side: 320 GB as floats
 LINES = {"height_unit": NM, "size": SIZE}
+WAVES = {"format": "fourier", "height_unit": NM, "size": (SIZE[0], SIZE[0])}
 
 
 def declare_npy(path):
@@ -76,11 +77,10 @@ DECLARED = {
 @pytest.mark.parametrize("name", DECLARED)
 def test_declared_sizes_are_bounded_before_anything_is_read(name, tmp_path):
     DECLARED[name](tmp_path / name)
-    size = SIZE[0] if name == "waves.txt" else SIZE
-    with pytest.raises(UnfitTopography, match=r"needs about .*B of memory; expected at most 2 GB") as e:
-        scan(tmp_path / name, height_unit=NM, size=(size, size) if name == "waves.txt" else size)
-    assert e.value.key == "path"
-    if name.endswith(".nc") or name.endswith(".npy"):
+    keys = WAVES if name == "waves.txt" else LINES
+    with refused("path", r"needs about .*B of memory; expected at most 2 GB"):
+        scan(tmp_path / name, **keys)
+    if name.endswith((".nc", ".npy")):
         with pytest.raises(ValueError, match=r"needs about .* at most 2 GB\. Set .* ICHA_INPUT_MB"):
             read_height_map(tmp_path / name, 1.0)
 
@@ -295,7 +295,7 @@ def test_the_name_tells_where_the_content_cannot(tmp_path):
 def test_waves_that_no_grid_has(tmp_path):
     (tmp_path / "waves.txt").write_text("1 0 1 0\n1e30 0 1 0\n")
     with pytest.raises(UnfitTopography, match=r"waves 1e\+30 times as short as the period, but a grid has at most"):
-        scan(tmp_path / "waves.txt", height_unit=NM, size=(SIZE[0], SIZE[0]))
+        scan(tmp_path / "waves.txt", **WAVES)
 
 
 @pytest.fixture(scope="module")
@@ -352,15 +352,8 @@ def test_damaged_and_changed_files_are_read_or_refused(whole, name, data):
             del content[at:]
     path = folder / f"changed_{name}"
     path.write_bytes(content)
-    size = (SIZE[0], SIZE[0]) if name == "waves.txt" else SIZE
-    settings = {
-        "format": "auto",
-        "boundary": "mirror",
-        "height_unit": NM,
-        "size": size,
-        "missing": "fill",
-        "detrend": "tilt",
-    }
+    keys = WAVES if name == "waves.txt" else LINES
+    settings = preparation(missing="fill", detrend="tilt") | keys
     try:
         surface = prepared_topography(path, settings).surface
     except UnfitTopography as error:

@@ -41,7 +41,7 @@ _EXPECTED = "expected a square array of at least 8 x 8 finite heights (.npy, or 
 
 def read_npy(file, settings: Preparation) -> FileContent:
     """Read a NumPy array, which has no names or units."""
-    return FileContent(put_y_first(_read_npy_array(file.path), settings), data_known=False)
+    return FileContent(put_y_first(_read_npy_array(file.path), settings))
 
 
 def _read_npy_array(path: Path) -> np.ndarray:

@@ -7,7 +7,7 @@ import scipy.fft
 
 from icha.support.input_files import require_room
 from icha.support.rules import GRID
-from icha.surfaces.measured.settings import FileContent, Preparation, UnfitTopography
+from icha.surfaces.measured.settings import FileContent, Preparation, UnfitTopography, WrongFormat
 from icha.surfaces.measured.text_tables import SourceFile
 
 # The spectrum, its conjugate, their difference, the heights, and the masks of waves.
@@ -16,35 +16,18 @@ _BYTES_OF_NODE = 64
 _CONJUGATE = 1e-4
 
 
-def looks_like_fourier(values: np.ndarray) -> bool:
-    """Tell whether lines of four numbers can be wave vectors and amplitudes.
-
-    Some wave numbers are negative, unless the waves are few, which fill no grid of coordinates. Where two wave vectors
-    are opposite, their amplitudes must be conjugate; heights of opposite points are not.
-    """
-    waves, modes = values[:, :2], values[:, 2] + 1j * values[:, 3]
-    if not np.all(np.isfinite(values)):
-        return False
-    if np.all(waves >= 0):
-        return 2 * len(waves) < len(np.unique(waves[:, 0])) * len(np.unique(waves[:, 1])) or len(waves) < 16
-    amplitudes = {tuple(wave): mode for wave, mode in zip(waves.tolist(), modes.tolist(), strict=True)}
-    opposite = [(mode, amplitudes[-x, -y]) for (x, y), mode in amplitudes.items() if (-x, -y) in amplitudes]
-    differences = [abs(mode - other.conjugate()) for mode, other in opposite]
-    return max(differences, default=0.0) <= _CONJUGATE * np.max(np.abs(modes), initial=1e-300)
-
-
 def read_fourier(file: SourceFile, settings: Preparation) -> FileContent:
     """Sum h = sum h_q exp(i q.r) over all waves; opposite ones that are left out are the conjugates."""
     table = file.values
     if table.shape[1] != 4:
-        raise ValueError(f"{table.shape[1]} numbers in a line, not qx qy Re Im")
+        raise WrongFormat(f"{table.shape[1]} numbers in a line, not qx qy Re Im")
     k = _wave_numbers(table[:, :2], settings)
     period = 2 * np.pi * np.max(np.abs(k)) / np.max(np.abs(table[:, :2]))
     modes = table[:, 2] + 1j * table[:, 3]
     if not np.all(np.isfinite(modes)):
-        raise ValueError("some amplitudes are not finite")
+        raise WrongFormat("some amplitudes are not finite")
     if len(np.unique(k, axis=0)) < len(k):
-        raise ValueError("a wave vector is given twice")
+        raise WrongFormat("a wave vector is given twice")
     highest = int(np.max(np.abs(k)))
     n = settings.grid or 2 ** math.ceil(math.log2(max(4 * highest, 8)))
     if 2 * highest >= n:
@@ -61,17 +44,17 @@ def read_fourier(file: SourceFile, settings: Preparation) -> FileContent:
     conjugate, opposite_present = np.conj(spectrum[opposite]), present[opposite]
     differences = np.abs(spectrum - conjugate)[present & opposite_present]
     if np.max(differences, initial=0.0) > _CONJUGATE * np.max(np.abs(modes)):
-        raise ValueError("opposite wave vectors have amplitudes that are not conjugate: the heights would be complex")
+        raise WrongFormat("opposite wave vectors have amplitudes that are not conjugate: the heights would be complex")
     spectrum = np.where(opposite_present & ~present, conjugate, spectrum)
     heights = scipy.fft.ifft2(spectrum, norm="forward", workers=1).real
-    return FileContent(heights, coordinates=(period, period), data_known=False)
+    return FileContent(heights, coordinates=(period, period))
 
 
 def _wave_numbers(q, settings):
     """Wave vectors (n, 2) as multiples of 2 pi over the period: as they are written if they are integers."""
     largest = np.max(np.abs(q))
     if not largest > 0 or not np.all(np.isfinite(q)):
-        raise ValueError("no wave vectors, or some that are not finite")
+        raise WrongFormat("no wave vectors, or some that are not finite")
     if settings.size is not None and settings.size[0] != settings.size[1]:
         raise UnfitTopography("size", "has two sides that differ, for a Fourier series; expected one length")
     if np.all(q == np.rint(q)):
@@ -87,12 +70,12 @@ def _wave_numbers(q, settings):
     # The longest wave fixes the unit only to the digits that it is written with; the shortest one is more accurate.
     k = np.rint(q * (highest / largest))
     if np.max(np.abs(q * (np.max(np.abs(k)) / largest) - k)) > 0.01:
-        raise ValueError("the wave vectors are not multiples of the smallest one")
+        raise WrongFormat("the wave vectors are not multiples of the smallest one")
     _require_few(np.max(np.abs(k)))
     return k.astype(int)
 
 
 def _require_few(highest):
-    """Raise ValueError for waves that no grid resolves."""
+    """Raise WrongFormat for waves that no grid resolves."""
     if highest > GRID.most / 2:
-        raise ValueError(f"waves {highest:g} times as short as the period, but a grid has at most {GRID.most} nodes")
+        raise WrongFormat(f"waves {highest:g} times as short as the period, but a grid has at most {GRID.most} nodes")

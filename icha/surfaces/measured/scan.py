@@ -12,9 +12,9 @@ from icha.support.input_files import RefusedFile, bounded_memory, refuse_traps
 from icha.support.rules import LENGTH
 from icha.surfaces.measured.array_files import format_of_hdf5, read_hdf5, read_instrument, read_netcdf, read_npy
 from icha.surfaces.measured.fourier_files import read_fourier
-from icha.surfaces.measured.settings import LINE_SCAN, Preparation, UnfitTopography
+from icha.surfaces.measured.settings import LINE_SCAN, Preparation, UnfitTopography, WrongFormat
 from icha.surfaces.measured.text_files import format_of_text, read_matrix, read_xyz
-from icha.surfaces.measured.text_tables import SourceFile, reason_against_table
+from icha.surfaces.measured.text_tables import SourceFile, first_damaged_line
 
 READERS = {
     "npy": read_npy,
@@ -112,7 +112,7 @@ def _describe_replaced(settings, found):
 
 def _read(path, settings):
     """Return the format of a file and its content, after checking that these are heights."""
-    file, name = SourceFile(path, settings.data), settings.format
+    file, name = SourceFile(path), settings.format
     try:
         with bounded_memory():
             refuse_traps(path)
@@ -125,9 +125,9 @@ def _read(path, settings):
             importlib.import_module(library)
         with bounded_memory():
             if name == "text":
-                name = format_of_text(file) or "instrument"
-                if name == "instrument" and file.instrument is None and (reason := reason_against_table(path)):
-                    raise UnfitTopography("path", reason)
+                name = format_of_text(file)
+                if name == "instrument" and file.instrument is None and (damage := first_damaged_line(path)):
+                    raise damage
             found = READERS[name](file, settings)
     except UnfitTopography:
         raise
@@ -135,12 +135,13 @@ def _read(path, settings):
         raise UnfitTopography("path", str(error)) from None
     except Exception as error:  # libraries raise all kinds for files that are damaged or of another format
         as_format = "" if name in ("auto", "text") else f" as {name}"
+        reason = f" ({error})" if isinstance(error, WrongFormat) else ""
         raise UnfitTopography(
             "path",
-            f"cannot be read{as_format}{_reason_of_this_package(error)}: the file is damaged or of another format; "
-            "expected a sound file, or another `format`",
+            f"cannot be read{as_format}{reason}: the file is damaged or of another format; expected a sound file, or "
+            "another `format`",
         ) from None
-    if settings.data is not None and not found.data_known:
+    if settings.data is not None and name not in _LIBRARIES:
         raise UnfitTopography(
             "data", f"is given, and a file that is read as {name} has one array without a name; leave it out"
         )
@@ -160,15 +161,6 @@ def _check_heights(heights):
         raise UnfitTopography(
             "path", f"holds an array of shape {heights.shape}{nothing}; expected rows and columns of heights"
         )
-
-
-def _reason_of_this_package(error):
-    """Return the message of an error in brackets if this package raised it; those of libraries are for programmers."""
-    trace = error.__traceback__
-    while trace.tb_next is not None:
-        trace = trace.tb_next
-    module = trace.tb_frame.f_globals.get("__name__", "")
-    return f" ({error})" if type(error) is ValueError and module.startswith("icha.") else ""
 
 
 def _guess_format(path: Path) -> str:

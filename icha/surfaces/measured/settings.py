@@ -27,6 +27,10 @@ class UnfitTopography(ValueError):
         self.key = key
 
 
+class WrongFormat(ValueError):
+    """The reason why the content of a file does not fit the format as which it is read."""
+
+
 @dataclass(frozen=True)
 class Preparation:
     """The meaning of the numbers of a file and the steps that make a surface of them.
@@ -79,7 +83,6 @@ class FileContent:
     format : name of the instrument's format.
     remark : description of what was left out of the file.
     data : name of the array or channel that was read; empty if the file has only one.
-    data_known : whether the reader looked for the name that is asked for.
     """
 
     heights: np.ndarray
@@ -89,7 +92,6 @@ class FileContent:
     format: str = ""
     remark: str = ""
     data: str = ""
-    data_known: bool = True
 
 
 def put_y_first(heights: np.ndarray, settings: Preparation) -> np.ndarray:
@@ -100,24 +102,24 @@ def put_y_first(heights: np.ndarray, settings: Preparation) -> np.ndarray:
 def regular_ticks(values: np.ndarray, axis: str) -> tuple[np.ndarray, int, float]:
     """Return the index (n,) of every coordinate on a regular scale, and the number and distance of its ticks.
 
-    Raises ValueError if the coordinates are not on a regular scale; `axis` is their name in the message.
+    Raises WrongFormat if the coordinates are not on a regular scale; `axis` is their name in the message.
     """
     if not np.all(np.isfinite(values)):
-        raise ValueError(f"{axis} is not finite everywhere")
+        raise WrongFormat(f"{axis} is not finite everywhere")
     low, high = values.min(), values.max()
     steps = np.diff(np.unique(values))
     steps = steps[steps > _ROUNDING * (high - low)]
     if not len(steps):
-        raise ValueError(f"{axis} is the same everywhere")
+        raise WrongFormat(f"{axis} is the same everywhere")
     usual = np.median(steps)
     # If no tick is missing, counting them is safer than trusting the digits of one step.
     count = len(steps) + 1 if np.max(steps) < 1.5 * usual else int(np.rint((high - low) / usual)) + 1
     if count > GRID.most:
-        raise ValueError(f"{axis} is not on a regular grid of at most {GRID.most} points")
+        raise WrongFormat(f"{axis} is not on a regular grid of at most {GRID.most} points")
     step = (high - low) / (count - 1)
     index = np.rint((values - low) / step).astype(int)
     if np.max(np.abs(values - low - index * step)) > _OFF_TICK * step:
-        raise ValueError(f"{axis} is not on a regular grid")
+        raise WrongFormat(f"{axis} is not on a regular grid")
     return index, count, step
 
 

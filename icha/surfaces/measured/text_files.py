@@ -1,24 +1,23 @@
 """Readers of text files with a row of heights per line or with x y z per line; choice between the two."""
 
 import re
-from dataclasses import dataclass
 
 import numpy as np
 
 from icha.support.input_files import require_room
 from icha.surfaces.measured.array_files import is_instrument_text, read_instrument
 from icha.surfaces.measured.coordinate_lines import drop_coordinates
-from icha.surfaces.measured.fourier_files import looks_like_fourier
 from icha.surfaces.measured.settings import (
     LINE_SCAN,
     FileContent,
     Preparation,
     UnfitTopography,
+    WrongFormat,
     metres_of,
     put_y_first,
     regular_ticks,
 )
-from icha.surfaces.measured.text_headings import WIDTH, check_counts, read_heading
+from icha.surfaces.measured.text_headings import check_counts, image_sides, read_heading
 from icha.surfaces.measured.text_tables import SourceFile
 
 # A surface has at least so many columns of heights.
@@ -30,18 +29,14 @@ _NAMES_OF_Z = ("z", "h", "height")
 _FEW_DIGITS = 1e-6
 
 
-def format_of_text(file: SourceFile) -> str | None:
-    """Find the format of a text by its columns; None for an instrument, or without a table of numbers."""
+def format_of_text(file: SourceFile) -> str:
+    """Find the format of a text by its columns; "instrument" for that of an instrument, or without numbers."""
     layout = file.layout
     if layout is not None and _titles(layout):
         return "xyz"
     if layout is None or (layout.words and is_instrument_text(file)):
-        return None
-    if any(map(WIDTH.match, layout.heading)):
-        return "matrix"
-    if layout.columns == 4 and looks_like_fourier(file.values):
-        return "fourier"
-    return "xyz" if 3 <= layout.columns < _FEWEST_COLUMNS else "matrix"
+        return "instrument"
+    return "xyz" if 3 <= layout.columns < _FEWEST_COLUMNS and not image_sides(layout.heading) else "matrix"
 
 
 def read_matrix(file: SourceFile, settings: Preparation) -> FileContent:
@@ -50,7 +45,7 @@ def read_matrix(file: SourceFile, settings: Preparation) -> FileContent:
     file.refuse_blocks()
     heights, steps, remark = drop_coordinates(values)
     check_counts(layout.heading, (values.shape, heights.shape))
-    if layout.heading and not layout.images and (known := _as_instrument_file(file, settings)):
+    if layout.heading and not image_sides(layout.heading) and (known := _as_instrument_file(file, settings)):
         return known
     rows, columns = heights.shape
     heading = read_heading(layout.heading, heights.shape, layout.notation.decimal_comma)
@@ -66,8 +61,6 @@ def read_matrix(file: SourceFile, settings: Preparation) -> FileContent:
         heading.size,
         heading.coordinates or (steps and (columns * steps[0], rows * steps[1])),
         remark=remark,
-        data=layout.data,
-        data_known=bool(layout.images),
     )
 
 
@@ -91,47 +84,50 @@ def read_xyz(file: SourceFile, settings: Preparation) -> FileContent:
     """Read x y z in every line, in any order; points may be missing. A heading may give the units."""
     layout = file.table_layout
     titles = _titles(layout, settings.columns)
-    points = _columns_of_points(file.values, settings, titles)
+    points = _select_columns(file.values, settings, titles)
     heading = read_heading(layout.heading, points.shape, layout.notation.decimal_comma)
     if len(points) > 1 and any(np.ptp(points[:, axis]) == 0 for axis in (0, 1)):
         raise UnfitTopography("path", LINE_SCAN.format(len(points)))
-    (column, nx, dx), (row, ny, dy) = (_ticks(points[:, axis], "xy"[axis]) for axis in (0, 1))
+    try:
+        (column, nx, dx), (row, ny, dy) = (regular_ticks(points[:, axis], "xy"[axis]) for axis in (0, 1))
+    except WrongFormat as error:
+        raise UnfitTopography(
+            "path",
+            f"holds points that are not on a regular grid ({error}); expected rows and columns of points. Interpolate "
+            "them onto a grid in the program of the instrument, such as Gwyddion",
+        ) from None
     node = row * nx + column
     order = np.argsort(node, kind="stable")
     repeated = np.flatnonzero(np.diff(node[order]) == 0)
     if len(repeated):
         x, y = points[order[repeated[0]], :2]
-        raise ValueError(f"the point x = {x:g}, y = {y:g} is given twice")
+        raise WrongFormat(f"the point x = {x:g}, y = {y:g} is given twice")
     require_room(2 * 8 * nx * ny)
     heights = np.full(nx * ny, np.nan)
     heights[node] = _mark_missing(points[:, 2], heading)
-    sides, units = (nx * dx, ny * dy), [titles[axis].unit if axis in titles else None for axis in "xyz"]
-    along_x, along_y = (unit or heading.lateral_unit for unit in units[:2])
-    size = None
-    if along_x and along_y and settings.lateral_unit is None:
-        size = sides[0] * along_x, sides[1] * along_y
-    columns = ", ".join(f"{axis} {titles[axis].column}" for axis in titles)
-    reordered = titles and sorted(titles, key=lambda axis: titles[axis].column) != ["x", "y", "z"]
+    x_unit, y_unit, z_unit = (unit for _, unit in titles.values()) if titles else (None, None, None)
+    x_unit, y_unit = x_unit or heading.lateral_unit, y_unit or heading.lateral_unit
+    sides, size = (nx * dx, ny * dy), None
+    if x_unit and y_unit and settings.lateral_unit is None:
+        size = sides[0] * x_unit, sides[1] * y_unit
+    columns = [column for column, _ in titles.values()]
     return FileContent(
         heights.reshape(ny, nx),
-        units[2] or heading.height_unit,
+        z_unit or heading.height_unit,
         size,
         sides,
-        remark=f"columns {columns} by their names" if reordered else "",
-        data_known=heading.channel == settings.data,
+        remark="columns x {}, y {}, z {} by their names".format(*columns) if columns != sorted(columns) else "",
     )
 
 
-@dataclass(frozen=True)
-class _Title:
-    """The line above a column: number of the column, from 1, and its unit in metres, None if none is given."""
-
-    column: int
-    unit: float | None
-
-
 def _titles(layout, columns=None):
-    """Titles of the columns named x, y and z; none if a name is missing, or if other columns are asked for."""
+    """Read the titles x, y and z above the columns.
+
+    Returns
+    -------
+    For x, y and z the number of the column, from 1, and its unit in m, None if the title gives none. Empty if a title
+    is missing, or if other columns are asked for.
+    """
     if not layout.heading:
         return {}
     delimiters = r"[,;\t]" if layout.notation.delimiter else r"\s+(?![\[(])"
@@ -141,38 +137,27 @@ def _titles(layout, columns=None):
     names = ["z" if name in _NAMES_OF_Z else name for name in names]
     if len(names) != layout.columns or any(names.count(axis) != 1 for axis in "xyz"):
         return {}
-    titles = {axis: _Title(names.index(axis) + 1, metres_of(found[names.index(axis)][2] or "")) for axis in "xyz"}
-    asked = columns is None or list(columns) == [title.column for title in titles.values()]
-    return titles if asked else {}
+    at = [names.index(axis) for axis in "xyz"]
+    if columns is not None and [column - 1 for column in columns] != at:
+        return {}
+    return {axis: (k + 1, metres_of(found[k][2] or "")) for axis, k in zip("xyz", at, strict=True)}
 
 
-def _columns_of_points(values, settings, titles):
-    """Select the columns x, y and z (k, 3) of a table."""
+def _select_columns(values, settings, titles):
+    """Return the columns x, y and z (k, 3) of a table."""
     count = values.shape[1]
-    columns = settings.columns or tuple(titles[axis].column for axis in titles) or (1, 2, 3)
+    columns = settings.columns or [column for column, _ in titles.values()] or [1, 2, 3]
     if max(columns) > count:
         raise UnfitTopography("columns", f"exceeds the {count} numbers of a line; expected 1 to {count}")
     if settings.columns is None and not titles and count != 3:
         if not 3 < count < _FEWEST_COLUMNS:
-            raise ValueError(f"{count} numbers in a line, not x y z")
-        other = ", and no Fourier series, whose opposite waves have conjugate amplitudes" if count == 4 else ""
+            raise WrongFormat(f"{count} numbers in a line, not x y z")
+        waves = ". For wave vectors and amplitudes use `format: fourier`" if count == 4 else ""
         raise UnfitTopography(
             "columns",
-            f"is missing, and a line has {count} numbers{other}; expected the columns x, y and z, such as [1, 2, 3]",
+            f"is missing, and a line has {count} numbers; expected the columns x, y and z, such as [1, 2, 3]{waves}",
         )
     return values[:, [column - 1 for column in columns]]
-
-
-def _ticks(values, axis):
-    """Index of every coordinate on a regular scale, number and distance of the ticks."""
-    try:
-        return regular_ticks(values, axis)
-    except ValueError as error:
-        raise UnfitTopography(
-            "path",
-            f"holds points that are not on a regular grid ({error}); expected rows and columns of points. Interpolate "
-            "them onto a grid in the program of the instrument, such as Gwyddion",
-        ) from None
 
 
 def _mark_missing(heights, heading):

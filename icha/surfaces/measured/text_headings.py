@@ -10,10 +10,10 @@ from icha.surfaces.measured.text_lines import AMBIGUOUS_COMMA
 
 # How Gwyddion begins the line with the width of an image that it exports, in the languages of its menus. The line with
 # its name stands above, that with its height below.
-WIDTH = re.compile(r"^#?\s*(Width|Šířka|Breite|Anchura|Largeur|Larghezza|幅|폭|Largura|Ширина)\s*[:：]\s*(.*)$")
-_VALUE = r"([-+]?\d+(?:[.,]\d+)?(?:[eE][-+]?\d+)?)"
-_LENGTH = re.compile(rf"{_VALUE}\s*(\S+)?$")
-_TWO_LENGTHS = re.compile(rf"{_VALUE}\s*(\S+)?\s*[x×*]\s*{_VALUE}\s*(\S+)?$")
+_WIDTH = re.compile(r"^#?\s*(Width|Šířka|Breite|Anchura|Largeur|Larghezza|幅|폭|Largura|Ширина)\s*[:：]\s*(.*)$")
+_NUMBER = r"([-+]?\d+(?:[.,]\d+)?(?:[eE][-+]?\d+)?)"
+# One length or two, such as 12 µm x 12 µm.
+_LENGTHS = re.compile(rf"{_NUMBER}\s*(\S+?)?(?:\s*[x×*]\s*{_NUMBER}\s*(\S+)?)?$")
 # A name; a colon, an equals sign, a delimiter or blanks; and a value.
 _ENTRY = re.compile(r"^[#%/\s\"']*([A-Za-z][A-Za-z _./()-]*?)\s*(?:[:=,;\t]\s*|\s+(?=[-+]?\d))(.+?)[\s\"']*$")
 # Names in small letters, without punctuation.
@@ -39,8 +39,7 @@ class Heading:
     size : (x, y) of the scan, m.
     coordinates : (x, y) of the scan in a unit that the heading does not give.
     missing : numbers that stand for a missing height.
-    ambiguous : a size with a comma that may be decimal or not.
-    channel : name of the channel.
+    ambiguous : text of a size whose comma may be decimal or separate thousands.
     """
 
     height_unit: float | None
@@ -49,28 +48,36 @@ class Heading:
     coordinates: tuple[float, float] | None
     missing: tuple[float, ...]
     ambiguous: str | None
-    channel: str | None
 
 
 def read_heading(lines: Sequence[str], shape: tuple[int, int], decimal_comma: bool) -> Heading:
     """Read the heading of a table of a shape (rows, columns), whose numbers have decimal commas or not."""
-    entries = _entries(lines)
+    entries, sides = _entries(lines), image_sides(lines)
     if {"ncols", "nrows", "cellsize"} <= entries.keys():
         entries.setdefault(_MISSING[0], _ESRI_MISSING)
-    units = [metres_of(entries[name]) for name in _UNITS if name in entries]
-    missing = [found for name in _MISSING if name in entries and (found := _LENGTH.match(entries[name]))]
-    image_sides = _image_sides(lines)
-    lengths = [entries[name] for name in (*_SIZES, *_PIXELS) if name in entries] + image_sides
-    size, coordinates = _sizes(image_sides, entries, shape)
+
+    def given(names):
+        return [entries[name] for name in names if name in entries]
+
+    sizes, pixels = given(_SIZES), given(_PIXELS)
+    commas = [text for text in (*sizes, *pixels, *sides) if AMBIGUOUS_COMMA.match(text)]
+    size, coordinates = _sizes(sides, sizes, pixels, shape)
     return Heading(
-        height_unit=next((unit for unit in units if unit), None),
+        height_unit=next(filter(None, map(metres_of, given(_UNITS))), None),
         lateral_unit=metres_of(entries.get("lateral units", "")),
         size=size,
         coordinates=coordinates,
-        missing=tuple(_value(found[1]) for found in missing),
-        ambiguous=next((text for text in lengths if not decimal_comma and AMBIGUOUS_COMMA.match(text)), None),
-        channel=entries.get("channel"),
+        missing=tuple(_value(found[1]) for found in map(_LENGTHS.match, given(_MISSING)) if found),
+        ambiguous=commas[0] if commas and not decimal_comma else None,
     )
+
+
+def image_sides(lines: Sequence[str]) -> list[str]:
+    """Return the texts of width and height of an image that Gwyddion exported; an empty list for others."""
+    for line, following in itertools.pairwise(lines):
+        if (found := _WIDTH.match(line)) and ":" in following:
+            return [found[2].strip(), following.partition(":")[2].strip()]
+    return []
 
 
 def check_counts(lines: Sequence[str], shapes: Sequence[tuple[int, int]]) -> None:
@@ -95,44 +102,30 @@ def _entries(lines):
     return entries
 
 
-def _image_sides(lines):
-    """Return the texts of width and height of the first image of Gwyddion; an empty list without Gwyddion's heading."""
-    for line, following in itertools.pairwise(lines):
-        if (found := WIDTH.match(line)) and ":" in following:
-            return [found[2].strip(), following.partition(":")[2].strip()]
-    return []
-
-
-def _sizes(image_sides, entries, shape):
-    """Return the size in m and the size in an unknown unit; a size that the heading does not contain is None."""
-    rows, columns = shape
-    sides = [_length(text) for text in image_sides]
+def _sizes(image_sides, sizes, pixels, shape):
+    """Return the size (x, y) in m and the size in an unknown unit; a size that the heading does not contain is None."""
+    sides = [_lengths(text) for text in image_sides]
     if sides and all(side and side[1] for side in sides):
-        return tuple(side[0] for side in sides), None
-    for names, factors in ((_SIZES, (1, 1)), (_PIXELS, (columns, rows))):
-        for text in (entries[name] for name in names if name in entries):
-            if two := _TWO_LENGTHS.match(text):
-                sides = [_length(f"{value} {two[4] or ''}".strip()) for value in (two[1], two[3])]
-            else:
-                sides = [_length(text)] * 2
-            if not all(sides):
-                continue
-            lengths = tuple(side[0] * factor for side, factor in zip(sides, factors, strict=True))
-            if sides[0][1]:
-                return lengths, None
-            if names is _PIXELS:
-                return None, lengths
+        return tuple(lengths[0] for lengths, _ in sides), None
+    rows, columns = shape
+    for texts, (nx, ny) in ((sizes, (1, 1)), (pixels, (columns, rows))):
+        for (x, y), in_metres in filter(None, map(_lengths, texts)):
+            if in_metres:
+                return (x * nx, y * ny), None
+            if texts is pixels:
+                return None, (x * nx, y * ny)
     return None, None
 
 
-def _length(text):
-    """Value of a length, in m if its unit is given, and whether it is; None for other text."""
-    if not (found := _LENGTH.match(text)):
+def _lengths(text):
+    """Return the lengths (x, y) in a text, and whether they are in m or in an unknown unit; None for other text."""
+    if not (found := _LENGTHS.match(text)):
         return None
-    if not found[2]:
-        return _value(found[1]), False
-    unit = metres_of(found[2])
-    return None if unit is None else (_value(found[1]) * unit, True)
+    x, y, unit = _value(found[1]), _value(found[3] or found[1]), found[4] if found[3] else found[2]
+    if unit is None:
+        return (x, y), False
+    metres = metres_of(unit)
+    return None if metres is None else ((x * metres, y * metres), True)
 
 
 def _value(text):

@@ -3,7 +3,6 @@
 import csv
 import gzip
 import re
-import zlib
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,15 +19,14 @@ _NO_DATA = re.compile(r"\bno data\b", re.IGNORECASE)
 # Windows writes nan as 1.#IND and 1.#QNAN.
 _REMARK = re.compile(r"(?<!1\.)#(?!N/A|NA\b|VALUE!|NUM!|DIV/0!|NULL!|REF!)", re.IGNORECASE)
 _NAN = re.compile(r"[-+]?(1\.#(ind|qnan|snan)\d*|nan\(.*\))|\*+", re.IGNORECASE)
-_FORTRAN = re.compile(r"([\d.])[dD]([-+]?\d+)$")
+# An exponent of double precision in Fortran, such as 1.5D-3.
+_FORTRAN = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)[dD][-+]?\d+")
 _DECIMAL_COMMA = re.compile(r"[-+]?\d+,\d+([eE][-+]?\d+)?$")
 # A number with three digits after its comma, which may be decimal or separate thousands.
 AMBIGUOUS_COMMA = re.compile(r"[-+]?[1-9]\d{0,2},\d{3}")
 _QUOTED = re.compile(r"\"[^\"]*\"")
 # The beginning of a number, whatever separates its thousands.
-LIKE_A_NUMBER = re.compile(r"[-+−]?\d[\d.,' ]*$")
-# Exceptions that libraries raise for a damaged compressed file.
-DAMAGED = (EOFError, zlib.error, gzip.BadGzipFile)
+LIKE_A_NUMBER = re.compile(r"[-+]?\d[\d.,' ]*$")
 
 
 def open_text(path: Path) -> TextIO:
@@ -42,14 +40,9 @@ def open_text(path: Path) -> TextIO:
 
 
 def _guess_encoding(start: bytes) -> str:
-    """Guess the encoding: UTF-16 or UTF-32 by byte order mark or zero bytes, else UTF-8, else Windows-1252."""
-    if start.startswith((b"\xff\xfe\0\0", b"\0\0\xfe\xff")):
-        return "utf-32"
+    """Guess the encoding: UTF-16 if the text begins with its byte order mark, else UTF-8, else Windows-1252."""
     if start.startswith((b"\xff\xfe", b"\xfe\xff")):
         return "utf-16"
-    for zeros, others, encoding in ((start[1::2], start[::2], "utf-16-le"), (start[::2], start[1::2], "utf-16-be")):
-        if zeros and not any(zeros) and all(byte in b"\t\r\n" or 32 <= byte < 127 for byte in others):
-            return encoding
     try:
         # The last line may end within a character.
         start[: start.rfind(b"\n") + 1].decode("utf-8-sig")
@@ -85,7 +78,8 @@ class Notation:
         return cls(notation.delimiter, has_decimal_commas(notation.fields(text)))
 
     def fields(self, text: str) -> list[str]:
-        """Split a line into its fields, without blanks and quotes around them."""
+        """Split a line into its fields, without blanks and quotes around them, and with the minus sign of programs."""
+        text = text.replace("−", "-")
         if self.delimiter is None:
             fields = _NO_DATA.sub("nan", text).split()
         elif '"' in text:
@@ -95,21 +89,14 @@ class Notation:
         return [field.strip().strip("\"'").strip() for field in fields]
 
     def number(self, field: str) -> float | None:
-        """Return the number in a field, nan for a missing one; None for other fields."""
-        if field.lower() in _MISSING or _NAN.fullmatch(field):
-            return np.nan
-        if "_" in field:
-            return None
-        if self.decimal_comma:
-            field = field.replace(",", ".")
+        """Return the number in a field, nan if the field stands for a missing height; None for any other text."""
+        text = field.replace(",", ".") if self.decimal_comma else field
         try:
-            return float(_FORTRAN.sub(r"\1e\2", field.replace("−", "-")))
+            return float(text.replace("_", "?"))  # Python would read 1_000 as a thousand
         except ValueError:
-            return None
-
-    def wrong_fields(self, fields: Iterable[str]) -> list[int]:
-        """Return the indices of the fields that are not numbers."""
-        return [k for k, field in enumerate(fields) if self.number(field) is None]
+            if _FORTRAN.fullmatch(text):
+                return float(text.lower().replace("d", "e"))
+            return np.nan if field.lower() in _MISSING or _NAN.fullmatch(field) else None
 
 
 def has_decimal_commas(fields: Iterable[str]) -> bool:
