@@ -92,7 +92,7 @@ def _linearise(equations, evaluation):
         _returns_to_contact(sites, evaluation)[present] & equations.contact.adhesive, jump_off_approach, approach
     )
     slope = radius_slope(equations.contact.law, a, R, approach, jump_off_approach)
-    tangent = evaluation.interaction.tangent(evaluation.a)
+    tangent, approximate_tangent = evaluation.interaction.tangent(evaluation.a)
 
     def radius_change(x):
         change = np.zeros(len(sites))
@@ -103,7 +103,7 @@ def _linearise(equations, evaluation):
         return tangent(radius_change(x))[present]
 
     def approximate(x):
-        return tangent.approximate(radius_change(x))[present]
+        return approximate_tangent(radius_change(x))[present]
 
     return present, slope, exact, approximate
 
