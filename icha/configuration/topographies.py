@@ -72,7 +72,7 @@ def _facts(path: str, version: tuple[int, int] | None, preparation: str) -> Topo
 
 
 def _inspect_map(surface: FileSurface, *, with_slope: bool, with_energy: bool) -> Topography:
-    from icha.surfaces.measured.array_files import read_height_map
+    from icha.surfaces.measured.scan import read_height_map
 
     heights = read_height_map(surface.path, surface.height_unit)
     slope, full_contact = None, (math.nan, math.nan)
