@@ -395,7 +395,7 @@ def test_leading_dimensions_of_one_entry_are_passed_over(tmp_path, name):
     assert_read(scan(write_netcdf(tmp_path / name, leading=("time",))))
 
 
-@pytest.mark.parametrize("unit", ["px", "pixels", "pica", "point", "hand", "pt", "au", "pc", "li"])
+@pytest.mark.parametrize("unit", ["px", "pixels", "pica", "point", "hand", "pt", "au", "pc", "li", "ly", "furlong"])
 def test_units_that_no_microscope_writes_are_no_lengths(tmp_path, unit):
     with refused("size", "is missing"):
         scan(write_netcdf(tmp_path / "scan.nc", lateral=unit))
