@@ -67,29 +67,20 @@ class BesideStudy(Section):
         contacts = campaign.contacts_beside(self)
         if not contacts and MEASURED not in study.rms_slopes:
             yield (), self.study, "has none of the chosen combinations; expected combinations of the study"
-        materials: dict[str, dict[str, None]] = {}
-        for each in contacts:
-            materials.setdefault(each.surface, {})[each.material] = None
-        for name in materials:
+        pairs = list(dict.fromkeys((each.surface, each.material) for each in contacts))
+        for name in dict.fromkeys(name for name, _ in pairs):
             if campaign.is_free(name):
                 reason = f"has the surface {name!r} with free edges; expected a study of periodic surfaces"
                 yield ("study",), self.study, reason
-                continue
-            if campaign.grid(name) is None:
-                continue
-            yield from self._unresolved(campaign, name, materials[name])
-            nodes = campaign.grid(name) * self.refinement
-            if nodes > GRID.most:
-                reason = f"gives {nodes} nodes a side on {name!r}; expected at most {GRID.most}"
-                yield ("refinement",), self.refinement, reason
-
-    def _unresolved(self, campaign, surface, materials):
-        """Report materials whose attraction the grid of a surface does not resolve."""
-        spacing = campaign.period(surface) / (campaign.grid(surface) * self.refinement)
-        for label in materials:
-            material = Material(**campaign.materials[label].model_dump(exclude_none=True))
-            if problem := resolution_problem(material, spacing):
-                yield ("materials",), label, f"on surface {surface!r}: {problem}"
+            elif campaign.grid(name) is not None:
+                nodes = campaign.grid(name) * self.refinement
+                if nodes > GRID.most:
+                    reason = f"gives {nodes} nodes a side on {name!r}; expected at most {GRID.most}"
+                    yield ("refinement",), self.refinement, reason
+                for label in (material for surface, material in pairs if surface == name):
+                    material = Material(**campaign.materials[label].model_dump(exclude_none=True))
+                    if problem := resolution_problem(material, campaign.period(name) / nodes):
+                        yield ("materials",), label, f"on surface {name!r}: {problem}"
 
 
 Loads = Annotated[

@@ -47,8 +47,8 @@ class Topography(NamedTuple):
     period : side, m.
     rms_slope : None if no study asks for it.
     sha256 : checksum of the file.
-    full_contact_energy : U_full/E* at rms slope 1, m; NaN without adhesion.
-    complete_contact_pressure : pressure over E* for complete contact at rms slope 1; NaN without adhesion.
+    full_contact_energy : U_full/E* at rms slope 1, m.
+    complete_contact_pressure : pressure over E* for complete contact at rms slope 1.
     """
 
     grid: int
