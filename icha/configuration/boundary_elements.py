@@ -29,24 +29,26 @@ from icha.support.values import (
     unknown,
 )
 
-_Labels = list_of_names("Labels of the study.", Label)
+_Labels = list_of_names(Label)
 
 
 class BesideStudy(Section):
     """Boundary elements on the topographies of a study."""
 
-    study: Name = Field(description="Name of the study with the topographies.")
-    surfaces: _Labels | None = Field(default=None, description="Surfaces of the study. Default: all.")
-    seeds: Seeds | None = Field(default=None, description="Seeds of the study. Default: all.")
-    rms_slopes: Annotated[list[Positive], Field(min_length=1), AfterValidator(distinct)] | None = Field(
-        default=None, description="Rms slopes of the study. Default: all."
-    )
-    materials: _Labels | None = Field(
-        default=None,
-        description="Materials of the study. Default: all. With adhesion the grid must resolve their "
-        "`interaction_range`.",
-    )
-    tolerance: number(TOLERANCE) = Field(default=1e-8, description="Relative error at which the solver stops.")
+    study: Name
+    """Name of the study with the topographies."""
+    surfaces: _Labels | None = None
+    """Surfaces of the study. Default: all."""
+    seeds: Seeds | None = None
+    """Seeds of the study. Default: all."""
+    rms_slopes: Annotated[list[Positive], Field(min_length=1), AfterValidator(distinct)] | None = None
+    """Rms slopes of the study. Default: all."""
+    materials: _Labels | None = None
+    """Materials of the study. Default: all. With adhesion the grid must resolve their `interaction_range`."""
+    tolerance: number(TOLERANCE) = 1e-8
+    """Relative error at which the solver stops."""
+    refinement: integer(REFINEMENT) = 1
+    """Cells per cell of the grid of the surface, along a side; heights are interpolated."""
 
     def problems(self, campaign: Any) -> Iterator[Problem]:
         """Report entries that its `icha.configuration.campaign.Campaign` does not have or that cannot be solved."""
@@ -83,30 +85,18 @@ class BesideStudy(Section):
                         yield ("materials",), label, f"on surface {name!r}: {problem}"
 
 
-Loads = Annotated[
-    stops(ReducedPressure, increasing),
-    Field(description="Loads p/(E* h'rms), increasing. Those of `finite_range` become snapshots of the study's runs."),
-]
-Refinement = Annotated[
-    integer(REFINEMENT),
-    Field(description="Cells per cell of the grid of the surface, along a side; heights are interpolated."),
-]
-
-
 class BoundaryElements(BesideStudy):
     """Boundary elements at a finite range of attraction on the topographies of a study, to compare with its runs."""
 
-    reduced_pressures: Loads
-    refinement: Refinement = 1
+    reduced_pressures: stops(ReducedPressure, increasing)
+    """Loads p/(E* h'rms), increasing. They become snapshots of the study's runs."""
 
 
 class BoundaryElementLoops(BesideStudy):
     """Boundary elements at a finite range of attraction, loaded to the largest load of a study and unloaded."""
 
-    refinement: Refinement = 1
-    separation_step: number(STEP) = Field(
-        default=0.05, description="Change of the mean gap from one solution to the next, in units of h_rms."
-    )
+    separation_step: number(STEP) = 0.05
+    """Change of the mean gap from one solution to the next, in units of h_rms."""
 
     def _study_problems(self, campaign, study):
         """Report also why a study does not suit unloading."""

@@ -62,46 +62,46 @@ class Topography(NamedTuple):
 class Defaults(Section):
     """Default values for the entries of a section."""
 
-    surfaces: dict[str, Any] = Field(
-        default={}, description="Keys of surfaces; every surface takes the keys of its kind."
-    )
-    materials: dict[str, Any] = Field(default={}, description="Keys of materials.")
-    studies: dict[str, Any] = Field(default={}, description="Keys of studies.")
+    surfaces: dict[str, Any] = {}
+    """Keys of surfaces; every surface takes the keys of its kind."""
+    materials: dict[str, Any] = {}
+    """Keys of materials."""
+    studies: dict[str, Any] = {}
+    """Keys of studies."""
 
 
 class Campaign(Section):
     """A campaign, the content of one configuration file."""
 
-    name: Name = Field(description="Name of the campaign; results go to `results/<name>/`.")
-    title: Text = Field(description="Title of the campaign, one line.")
-    summary: Text = Field(description="A few sentences for readers of datasets and report.")
-    license: Text = Field(description="Licence of the data, as an SPDX identifier such as `CC-BY-4.0`.")
-    confirmed: Annotated[list[Text], AfterValidator(distinct)] = Field(
-        default=[],
-        description="Keys of unusual values that are intended, such as `materials.soft.contact_modulus`; for entries "
-        "of a list the key of the list. Other unusual values are refused.",
-    )
-    defaults: Defaults = Field(default=Defaults(), description="Default values for all surfaces, materials or studies.")
-    surfaces: Annotated[dict[Name, AnySurface], Field(min_length=1)] = Field(
-        description="Surfaces by name: `kind: self_affine`, `kind: measured` or `kind: file`."
-    )
-    materials: Annotated[dict[Name, MaterialSection], Field(min_length=1)] = Field(description="Materials by name.")
-    studies: Annotated[dict[Name, Study], Field(min_length=1)] = Field(description="Studies by name.")
-    finite_range: Annotated[dict[Name, BoundaryElements], _FEW] = Field(
-        default={},
-        description="Boundary elements at a finite range of attraction by name, to compare with the runs of a study.",
-    )
-    boundary_element_loops: Annotated[dict[Name, BoundaryElementLoops], _FEW] = Field(
-        default={},
-        description="The same in loading and unloading by name, to compare with the runs of a study that unloads.",
-    )
-    measurements: Annotated[dict[Name, Measurement], _FEW] = Field(
-        default={}, description="Measurements by name, drawn over figure 5. ICHA has none."
-    )
-    figures: Figures = Field(default=Figures(), description="Figures and their options.")
-    publication: Publication = Field(
-        default=Publication(), description="Metadata of a deposit; results do not depend on them."
-    )
+    name: Name
+    """Name of the campaign; results go to `results/<name>/`."""
+    title: Text
+    """Title of the campaign, one line."""
+    summary: Text
+    """A few sentences for readers of datasets and report."""
+    license: Text
+    """Licence of the data, as an SPDX identifier such as `CC-BY-4.0`."""
+    confirmed: Annotated[list[Text], AfterValidator(distinct)] = []
+    """Keys of unusual values that are intended, such as `materials.soft.contact_modulus`; for entries of a list the key
+    of the list. Other unusual values are refused."""
+    defaults: Defaults = Defaults()
+    """Default values for all surfaces, materials or studies."""
+    surfaces: Annotated[dict[Name, AnySurface], Field(min_length=1)]
+    """Surfaces by name: `kind: self_affine`, `kind: measured` or `kind: file`."""
+    materials: Annotated[dict[Name, MaterialSection], Field(min_length=1)]
+    """Materials by name."""
+    studies: Annotated[dict[Name, Study], Field(min_length=1)]
+    """Studies by name."""
+    finite_range: Annotated[dict[Name, BoundaryElements], _FEW] = {}
+    """Boundary elements at a finite range of attraction by name, to compare with the runs of a study."""
+    boundary_element_loops: Annotated[dict[Name, BoundaryElementLoops], _FEW] = {}
+    """The same in loading and unloading by name, to compare with the runs of a study that unloads."""
+    measurements: Annotated[dict[Name, Measurement], _FEW] = {}
+    """Measurements by name, drawn over figure 5. ICHA has none."""
+    figures: Figures = Figures()
+    """Figures and their options."""
+    publication: Publication = Publication()
+    """Metadata of a deposit; results do not depend on them."""
 
     _contacts: dict[str, tuple[Contact, ...]] = PrivateAttr(default={})
     _topographies: dict[str, Topography] = PrivateAttr(default={})

@@ -316,15 +316,15 @@ def stops(kind, in_order):
     return Annotated[list[kind], Field(min_length=1), AfterValidator(in_order)]
 
 
-def list_of_names(description, kind=Name):
+def list_of_names(kind=Name):
     """Type of a list of at least one name, each given once."""
-    return Annotated[list[kind], Field(min_length=1, description=description), AfterValidator(distinct)]
+    return Annotated[list[kind], Field(min_length=1), AfterValidator(distinct)]
 
 
 class Section(BaseModel):
     """A section of the configuration: immutable, without unknown keys."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, use_attribute_docstrings=True)
 
 
 def _seeds(value: Any) -> Any:
