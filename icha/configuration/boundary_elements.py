@@ -48,7 +48,7 @@ class BesideStudy(Section):
     tolerance: number(TOLERANCE) = 1e-8
     """Relative error at which the solver stops."""
     refinement: integer(REFINEMENT) = 1
-    """Cells per cell of the grid of the surface, along a side; heights are interpolated."""
+    """Number of cells of the solver per cell of the surface's grid, along a side. The heights are interpolated."""
 
     def problems(self, campaign: Any) -> Iterator[Problem]:
         """Report entries that its `icha.configuration.campaign.Campaign` does not have or that cannot be solved."""
@@ -68,7 +68,11 @@ class BesideStudy(Section):
                     yield (key, index), value, f"is not in study {self.study!r}; expected one of {expected}"
         contacts = campaign.contacts_beside(self)
         if not contacts and MEASURED not in study.rms_slopes:
-            yield (), self.study, "has none of the chosen combinations; expected combinations of the study"
+            yield (
+                (),
+                self.study,
+                "has no run with the chosen surfaces, seeds, slopes and materials; expected combinations of the study",
+            )
         pairs = list(dict.fromkeys((each.surface, each.material) for each in contacts))
         for name in dict.fromkeys(name for name, _ in pairs):
             if campaign.is_free(name):
@@ -89,7 +93,7 @@ class BoundaryElements(BesideStudy):
     """Boundary elements at a finite range of attraction on the topographies of a study, to compare with its runs."""
 
     reduced_pressures: stops(ReducedPressure, increasing)
-    """Loads p/(E* h'rms), increasing. They become snapshots of the study's runs."""
+    """Loads p/(E* h'rms), increasing. The runs of the study save a snapshot at each of these loads."""
 
 
 class BoundaryElementLoops(BesideStudy):

@@ -23,7 +23,7 @@ from icha.support.values import ROUNDING, Name, Problem, Section, Text, distinct
 
 # Sections whose entries belong to a study.
 BESIDE_STUDIES = ("finite_range", "boundary_element_loops")
-# Each of these entries goes through all runs of its study.
+# Limit of the entries of a section, because the check of an entry goes through all runs of its study.
 _FEW = Field(max_length=100)
 # Cells per shortest wavelength: the fewest without a warning, and those to recommend.
 _LEAST_CELLS, _ADVISABLE_CELLS = 4, 8
@@ -63,11 +63,11 @@ class Defaults(Section):
     """Default values for the entries of a section."""
 
     surfaces: dict[str, Any] = {}
-    """Keys of surfaces; every surface takes the keys of its kind."""
+    """Default values of keys of surfaces. A surface takes only the keys that its kind has."""
     materials: dict[str, Any] = {}
-    """Keys of materials."""
+    """Default values of keys of materials."""
     studies: dict[str, Any] = {}
-    """Keys of studies."""
+    """Default values of keys of studies."""
 
 
 class Campaign(Section):
@@ -82,8 +82,8 @@ class Campaign(Section):
     license: Text
     """Licence of the data, as an SPDX identifier such as `CC-BY-4.0`."""
     confirmed: Annotated[list[Text], AfterValidator(distinct)] = []
-    """Keys of unusual values that are intended, such as `materials.soft.contact_modulus`; for entries of a list the key
-    of the list. Other unusual values are refused."""
+    """Keys of unusual values that you intend, such as `materials.soft.contact_modulus`. For an entry of a list, give
+    the key of the list. Unusual values without such a confirmation are refused."""
     defaults: Defaults = Defaults()
     """Default values for all surfaces, materials or studies."""
     surfaces: Annotated[dict[Name, AnySurface], Field(min_length=1)]
@@ -93,15 +93,16 @@ class Campaign(Section):
     studies: Annotated[dict[Name, Study], Field(min_length=1)]
     """Studies by name."""
     finite_range: Annotated[dict[Name, BoundaryElements], _FEW] = {}
-    """Boundary elements at a finite range of attraction by name, to compare with the runs of a study."""
+    """Solutions by boundary elements at a finite range of attraction, by name, to compare with the runs of a study."""
     boundary_element_loops: Annotated[dict[Name, BoundaryElementLoops], _FEW] = {}
-    """The same in loading and unloading by name, to compare with the runs of a study that unloads."""
+    """Loading and unloading with boundary elements at a finite range of attraction, by name, to compare with the runs
+    of a study that unloads."""
     measurements: Annotated[dict[Name, Measurement], _FEW] = {}
-    """Measurements by name, drawn over figure 5. ICHA has none."""
+    """Your measurements by name, drawn over figure 5. ICHA itself has no measurements."""
     figures: Figures = Figures()
     """Figures and their options."""
     publication: Publication = Publication()
-    """Metadata of a deposit; results do not depend on them."""
+    """Metadata of a deposit. They do not change any result."""
 
     _contacts: dict[str, tuple[Contact, ...]] = PrivateAttr(default={})
     _topographies: dict[str, Topography] = PrivateAttr(default={})
@@ -115,7 +116,7 @@ class Campaign(Section):
         )
 
     def compares_models(self, study: str) -> bool:
-        """Tell whether a study has runs with both models at given loads."""
+        """Return whether a study has runs with both models at given loads."""
         section = self.studies[study]
         return set(section.models) == set(MODELS) and bool(section.targets.reduced_pressures)
 
@@ -124,7 +125,7 @@ class Campaign(Section):
         return list(self._contacts[study])
 
     def with_contacts(self, contacts: Mapping[str, Iterable[Contact]]) -> Campaign:
-        """Return the campaign with the runs of its studies, and the lists of the studies to match."""
+        """Return the campaign with these contacts; the lists of each study become those of its contacts."""
         contacts = {study: tuple(dict.fromkeys(runs)) for study, runs in contacts.items()}
         studies = {}
         for label, study in self.studies.items():
@@ -155,7 +156,7 @@ class Campaign(Section):
         return self._origins.get((section, name), name)
 
     def is_free(self, surface: str) -> bool:
-        """Tell whether a surface is a square with free edges; all others are periodic."""
+        """Return whether a surface is a square with free edges; all other surfaces are periodic."""
         return getattr(self.surfaces[surface], "boundary", None) == "free"
 
     def grid(self, surface: str) -> int | None:
@@ -179,7 +180,7 @@ class Campaign(Section):
         return snapshots + [state for p in loads if (state := ("reduced_pressure", p)) not in known]
 
     def contacts_beside(self, entry: BesideStudy) -> list[Contact]:
-        """Return the contacts of a study for which an entry beside it asks."""
+        """Return the contacts of its study that an entry of `finite_range` or `boundary_element_loops` solves."""
         lists = (entry.surfaces, entry.seeds, entry.rms_slopes, entry.materials)
         asked = [None if values is None else set(values) for values in lists]
 

@@ -55,7 +55,7 @@ class Measurement(Section):
     label: Annotated[Text, Field(max_length=200), AfterValidator(_drawable)]
     """Name in the legend; formulas stand between two `$`."""
     citation: Text
-    """Source of the numbers; printed in the report."""
+    """Source of the numbers, which the report prints."""
     study: Name
     """Name of the study to compare with."""
     load: Column
@@ -64,9 +64,9 @@ class Measurement(Section):
     area: Column
     """Contact area fraction A/A0 (unit `1` or `percent`)."""
     material: Name | None = None
-    """The measured material; a load in Pa needs it."""
+    """Material of the measurement. Needed if the loads are nominal pressures."""
     rms_slope: Positive | None = None
-    """The measured rms slope; a load in Pa needs it."""
+    """Rms slope of the measured surface. Needed if the loads are nominal pressures."""
 
     @property
     def load_is_pressure(self) -> bool:

@@ -214,18 +214,18 @@ class RelatedIdentifier(_Entry):
     identifier: Identifier
     """A DOI, `arXiv:…`, or a web address."""
     relation: Literal[RELATIONS]
-    """Relation of the deposit to the work, by DataCite's names, such as `IsSupplementTo` or `Cites`."""
+    """Relation of the deposit to the other work, by DataCite's names, such as `IsSupplementTo` or `Cites`."""
     resource: Literal[RESOURCES] | None = None
-    """Type of the work, by DataCite's names, such as `JournalArticle`."""
+    """Type of the other work, by DataCite's names, such as `JournalArticle`."""
 
 
 class KnownFailure(_Entry):
     """A run with a failed check that is nevertheless published, with an explanation."""
 
     run: Line
-    """The run by its name in the verdict: `study/surface/seed1/slope1/material`."""
+    """Name of the run in the verdict, such as `study/surface/seed1/slope1/material`."""
     reason: Prose
-    """Explanation for readers: why it failed, and why the data are nevertheless published."""
+    """Explanation for readers: why the check failed, and why the data are published nevertheless."""
 
 
 class Publication(Section):

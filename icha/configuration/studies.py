@@ -167,7 +167,7 @@ Scalar = Annotated[Any, AfterValidator(scalar), WithJsonSchema(SCALAR_SCHEMA)]
 Case = _section_of_scalars(
     "Case",
     Scalar,
-    "An entry of an explicit list of runs. Keys that it lacks take the values of the lists of its study.",
+    "An entry of an explicit list of runs. Parameters that it does not give take all values of the lists of the study.",
     {
         "surface": (Name | None, Field(default=None, description="Name of a surface.")),
         "seed": (Seed | None, Field(default=None, description="Seed of the random phases.")),
@@ -186,18 +186,18 @@ class Study(Section):
     """Seeds of the random phases: a list, or a range such as `1..50`. Surfaces from a file have no seeds and are used
     once."""
     rms_slopes: Slopes = []
-    """Rms slopes h'rms to which the heights of each topography are scaled; `measured` is the slope of a topography from
-    a file."""
+    """Rms slopes h'rms to which the heights of each topography are scaled. `measured` stands for the slope that the
+    topography has in its file."""
     materials: list_of_names() = []
     """Names of materials."""
     vary: Vary | None = None
     """Other values of parameters of the surfaces and materials in this study, in all combinations."""
     zip: list[Annotated[list[Text], Field(min_length=2)]] = []
-    """Groups of lists whose entries are combined one by one (first with first, second with second), instead of in all
-    combinations: `[[rms_slopes, surface_energy]]`."""
+    """Groups of lists that are combined one by one (the first entry with the first, the second with the second) instead
+    of in all combinations: `[[rms_slopes, surface_energy]]`."""
     cases: Annotated[list[Case], Field(min_length=1)] | None = None
-    """An explicit list of runs instead of all combinations. Keys that a case lacks take the values of the lists of the
-    study."""
+    """An explicit list of runs instead of all combinations. Parameters that a case does not give take all values of the
+    lists of the study."""
     models: Annotated[list[Literal[tuple(MODELS)]], Field(min_length=1), AfterValidator(distinct)] = [DEFAULT_MODEL]
     """Contact models of every run: `asperities`, which are fast, and `boundary_elements` in the limit of a short range
     of attraction, which need a periodic surface and a grid of at least 4 cells (better 8) per shortest wavelength."""
@@ -206,16 +206,16 @@ class Study(Section):
     snapshots: (
         Annotated[list[Snapshot], AfterValidator(distinct), WrapValidator(_list_or_word), _OrEveryStop()] | None
     ) = None
-    """States whose spots and distributions are saved; each is reached exactly. `every_stop`: all targets. Default: the
-    last target."""
+    """States at which the run saves its spots and distributions. The path reaches each of these states exactly.
+    `every_stop`: all targets. Default: the last target."""
     unload: Flag = False
     """Whether to unload after loading, until the surfaces no longer touch."""
     turning_points: list[TurningPoint] = []
     """States at which the path turns after its last target: the first ends unloading, the second ends the next loading,
     and so on."""
     control: Literal["separation", "load"] = "separation"
-    """Imposed quantity: the mean separation or the load. Under load control the state jumps where the curve turns back,
-    and all targets and turning points must be loads."""
+    """Quantity that is imposed: the mean separation or the load. Under load control the state jumps where the curve of
+    load against separation turns back; all targets and turning points must then be loads."""
     max_step: number(STEP) = DEFAULT_STEP
     """Largest change of mean separation between two equilibria, in units of h_rms."""
 

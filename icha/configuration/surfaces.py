@@ -81,9 +81,9 @@ class Crop(Section):
     """The square to cut out of a scan."""
 
     x: Position
-    """Distance of the left edge of the square from that of the scan."""
+    """Distance between the left edges of the square and of the scan."""
     y: Position
-    """Distance of the first row of the square from that of the scan."""
+    """Distance between the first rows of the square and of the scan."""
     side: Length
     """Side of the square."""
 
@@ -113,18 +113,20 @@ class MeasuredSurface(Section):
     """Columns of a text with x, y and z, counted from 1, such as `[1, 2, 3]`. Needed if a line has more than three
     numbers."""
     data: Text | None = None
-    """Data to use if the file has several: name of the variable (netcdf), path of the dataset (hdf5), name of the
-    channel (instrument). Default: the only one, or the default of the file."""
+    """Array or channel to use if the file has several: name of the variable (netcdf), path of the dataset (hdf5), name
+    of the channel (instrument). Default: the only one, or the default of the file."""
     first_axis: Literal["y", "x"] = "y"
-    """First axis of the array in npy, netcdf, hdf5 and matrix files: `y` if a row is a line along x, else `x`. Not used
-    if the dimensions in the file are named x and y."""
+    """First axis of the array in npy, netcdf, hdf5 and matrix files: `y` if a row of the array is a line along x, else
+    `x`. ICHA ignores this key if the dimensions in the file are named x and y."""
     height_unit: UnitOfLength | None = None
-    """Unit of the heights, such as `nm` or `0.1 mm`. Needed unless the file has it; replaces that of the file."""
+    """Unit of the heights, such as `nm` or `0.1 mm`. Needed unless the file states it. It takes precedence over the
+    unit in the file."""
     lateral_unit: UnitOfLength | None = None
-    """Unit of the coordinates x and y; for fourier, of 1/q. Default: that of the file, else the unit of the heights."""
+    """Unit of the coordinates x and y; with `format: fourier`, unit of 1/q. Default: the unit in the file, else the
+    unit of the heights."""
     size: Sides | None = None
-    """Size of the whole scan: one length, or two, along x and y. The size of a pixel is this divided by the number of
-    pixels. Needed unless the file has it; replaces that of the file."""
+    """Size of the whole scan: one length, or two lengths, along x and y. The pixel size is the size of the scan divided
+    by the number of pixels. Needed unless the file states the size. It takes precedence over the size in the file."""
     touches_first: Literal["high", "low"] = "high"
     """Points that touch first: those with the largest numbers in the file (`high`), or with the smallest (`low`)."""
     missing: Literal["refuse", "fill"] = "refuse"
@@ -136,18 +138,19 @@ class MeasuredSurface(Section):
     """Trend to remove besides the mean height: `none`, the mean plane (`tilt`), or the best paraboloid (`curvature`).
     Default: `tilt`, or `none` for a periodic topography."""
     cutoff: Length | None = None
-    """Cut-off wavelength: nesting index of a Gaussian S-filter (ISO 25178-3, areal filter of ISO 16610-61), which
-    removes shorter waves before the edges are treated and halves waves of this length. At least 4 pixels. Default: no
-    filter."""
+    """Cut-off wavelength (nesting index) of a Gaussian S-filter (ISO 25178-3, areal filter of ISO 16610-61). The filter
+    removes shorter waves and halves the amplitude of waves of this length, before the edges are treated. At least 4
+    pixels. Default: no filter."""
     boundary: Literal["periodic", "window", "mirror", "free"]
-    """Treatment of the edges. `periodic`: the topography repeats as it is. `window`: its heights fall smoothly to their
-    mean towards the edges, and it repeats. `mirror`: the topography and its mirror images form a periodic cell of twice
-    the side. `free`: one square on a half-space that extends beyond it."""
+    """Treatment of the edges. `periodic`: the topography repeats as it is. `window`: the heights fall smoothly to their
+    mean towards the edges, and the topography repeats. `mirror`: the topography and its mirror images form a periodic
+    cell of twice the side. `free`: one square on a half-space that extends beyond the square."""
     taper: number(FloatRange(above=0, most=0.5)) | None = None
-    """With `window`: fraction of the side, at each edge, over which heights fall. Default: 0.1."""
+    """With `boundary: window`: width of the strip along each edge in which the heights fall to their mean, as a
+    fraction of the side. Default: 0.1."""
     grid: integer(GRID) | None = None
-    """Nodes along a side of the prepared surface, which is resampled by Fourier interpolation; a coarser grid loses the
-    shortest waves. Default: as many as the scan has (`mirror`: twice as many)."""
+    """Nodes along a side of the prepared surface, which is resampled by Fourier interpolation. A coarser grid loses the
+    shortest waves. Default: as many nodes as the scan has (`mirror`: twice as many)."""
 
     @model_validator(mode="after")
     def _check_boundary(self):
@@ -191,8 +194,8 @@ class SelfAffineSurface(Section):
     rolloff_wavelength: Length
     """Roll-off wavelength 2π/q0: the spectrum is flat at longer wavelengths. At most the period."""
     short_wavelength: Length
-    """Short cut-off 2π/q1: the shortest wavelength. Less than the roll-off wavelength; at least 2 grid cells (fewer are
-    an error), better 4 (fewer give a warning) or 8."""
+    """Shortest wavelength 2π/q1. It must be less than the roll-off wavelength and at least 2 grid cells. Less than 4
+    grid cells give a warning; 8 are recommended."""
     hurst: number(HURST)
     """Hurst exponent H, in (0, 1]."""
     grid: integer(GRID)
@@ -249,7 +252,7 @@ class FileSurface(Section):
     """File of a square array of heights, first axis y: `.npy`, or netCDF (`.nc`) with a variable `height`; relative to
     the configuration file. Heights are positive towards the elastic body."""
     height_unit: UnitOfLength
-    """Unit of the heights in the file, such as `um`. All studies scale the heights to their rms slopes."""
+    """Unit of the heights in the file, such as `um`. Each study scales the heights to its rms slopes."""
     period: Length
     """Side L of the periodic cell."""
 

@@ -297,7 +297,7 @@ def total(items: Iterable[Item]) -> Total:
 
 
 def time_on(items: Iterable[Item], cores: int) -> float:
-    """Return expected time from the call to the end on some cores, s; 0 if nothing is to be done.
+    """Return the expected time from the call to the end on some cores, s; 0 if nothing is to be done.
 
     The work of a stage is divided among the cores, but takes at least the time of its longest job, and that of
     scheduling all its jobs one by one.
