@@ -19,7 +19,8 @@ from icha.configuration.errors import MOST_PROBLEMS, problem_of
 from icha.configuration.studies import MEASURED, SCALARS, Study
 from icha.configuration.surfaces import SURFACE_KINDS, MaterialSection
 from icha.datasets.labels import number_label
-from icha.support.values import LONGEST_LABEL, NOTHING, Problem, Unit, list_names
+from icha.support.rules import FloatRange
+from icha.support.values import LONGEST_LABEL, NOTHING, Problem, list_names
 
 MAX_RUNS = 100_000
 # Largest number of targets of all runs together.
@@ -273,7 +274,7 @@ def value_label(section, name: str) -> str:
         text = str(value)
         # Some texts, such as names of channels, cannot be part of a file name.
         return text if re.fullmatch(r"[A-Za-z0-9_.+-]{1,40}", text) else hashlib.sha256(text.encode()).hexdigest()[:8]
-    unit = next((each.si for each in type(section).model_fields[name].metadata if isinstance(each, Unit)), None)
+    unit = next((each.unit for each in type(section).model_fields[name].metadata if isinstance(each, FloatRange)), None)
     if unit is None:
         return number_label(value)
     exact = Decimal(repr(value))
