@@ -332,11 +332,11 @@ def _seeds(value: Any) -> Any:
         if not match:
             raise ValueError(f"{shown}is not a range of seeds; {expected}")
         first, last = map(int, match.groups())
-        if last < first or last - first >= _MOST_SEEDS:
-            raise ValueError(f"{shown}ends before it begins, or has more than {_MOST_SEEDS} seeds; {expected}")
-        found += range(first, last + 1)
-        if len(found) > _MOST_SEEDS:
+        if last < first:
+            raise ValueError(f"{shown}ends before it begins; {expected}")
+        if len(found) + last - first >= _MOST_SEEDS:
             raise ValueError(f"{shown}makes more than {_MOST_SEEDS} seeds; {expected}")
+        found += range(first, last + 1)
     return found if isinstance(value, list | str) else value
 
 
