@@ -76,7 +76,7 @@ def read_surface(section: MeasuredSurface | FileSurface) -> Surface:
         from icha.surfaces.measured.topography import prepared_topography
 
         return prepared_topography(section.path, section.preparation).surface
-    from icha.surfaces.measured.array_files import read_height_map
+    from icha.surfaces.measured.scan import read_height_map
     from icha.surfaces.surface import Surface
 
     return Surface(read_height_map(section.path, section.height_unit), section.period)

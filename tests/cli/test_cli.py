@@ -523,8 +523,6 @@ def test_results_without_checks_are_named(empty_folder):
     write_dataset(reference_dataset(small.SPECTRUM), "theories.nc")
     assert "theories.nc: theories and published points" in printed("check", "theories.nc")
     assert "theories and published points" in printed("show", "theories.nc", status=2)
-    Path("paper-1.0.zip").write_text("text")
-    assert printed("check", "paper-1.0.zip") == "paper-1.0.zip: deposit; use `icha verify`"
     Path("deposit").mkdir()
     assert "deposit: is a folder" in printed("check", "deposit", status=2)
 
