@@ -306,15 +306,15 @@ def stops(kind, in_order):
     return Annotated[list[kind], Field(min_length=1), AfterValidator(in_order)]
 
 
-def list_of_names(description, kind=Name):
+def list_of_names(kind=Name):
     """Type of a list of at least one name, each given once."""
-    return Annotated[list[kind], Field(min_length=1, description=description), AfterValidator(distinct)]
+    return Annotated[list[kind], Field(min_length=1), AfterValidator(distinct)]
 
 
 class Section(BaseModel):
     """A section of the configuration: immutable, without unknown keys."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, use_attribute_docstrings=True)
 
 
 def _seeds(value: Any) -> Any:
@@ -332,11 +332,11 @@ def _seeds(value: Any) -> Any:
         if not match:
             raise ValueError(f"{shown}is not a range of seeds; {expected}")
         first, last = map(int, match.groups())
-        if last < first or last - first >= _MOST_SEEDS:
-            raise ValueError(f"{shown}ends before it begins, or has more than {_MOST_SEEDS} seeds; {expected}")
-        found += range(first, last + 1)
-        if len(found) > _MOST_SEEDS:
+        if last < first:
+            raise ValueError(f"{shown}ends before it begins; {expected}")
+        if len(found) + last - first >= _MOST_SEEDS:
             raise ValueError(f"{shown}makes more than {_MOST_SEEDS} seeds; {expected}")
+        found += range(first, last + 1)
     return found if isinstance(value, list | str) else value
 
 

@@ -10,7 +10,7 @@ import pytest
 from scans import NM, SIZE, UM, centred, preparation, refused, write_xyz
 
 from icha.configuration.surfaces import MeasuredSurface
-from icha.configuration.topographies import inspect_scan
+from icha.configuration.topographies import inspect_file
 from icha.datasets.files import read_dataset
 from icha.datasets.surface_file import read_surface, write_surface
 from icha.surfaces.measured.settings import UnfitTopography
@@ -269,12 +269,12 @@ def test_provenance_and_facts(prepared, tmp_path):
     assert str(tmp_path) not in result.description
     keys = {"kind": "measured", "path": str(tmp_path / "scan.npy"), "height_unit": "m", "size": "5 m"}
     section = MeasuredSurface.model_validate(keys | {"boundary": "free", "detrend": "tilt"})
-    facts = inspect_scan(section)
+    facts = inspect_file(section)
     assert (facts.grid, facts.period, facts.sha256) == (10, 5.0, result.source_sha256)
     assert facts.rms_slope == pytest.approx(result.rms_slope, rel=1e-5)
     # A file that changes is read again.
     np.save(tmp_path / "scan.npy", np.pad(heights, 1))
-    assert inspect_scan(section).grid == 12
+    assert inspect_file(section).grid == 12
 
 
 def test_synthetic_scan_is_what_its_script_makes(tmp_path):

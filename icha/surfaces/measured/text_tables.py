@@ -93,12 +93,11 @@ class SourceFile:
             for line, text in enumerate(map(strip_remark, file), 1):
                 if not text or line <= len(self.table_layout.heading):
                     continue
-                fields = notation.fields(text)
-                row = [notation.number(field) for field in fields]
+                row = notation.numbers(text)
                 if not rows and row[0] is None and is_scale(row[1:]):
                     row[0] = np.nan
                 if None in row:
-                    raise _not_a_number(fields, row.index(None), line)
+                    raise _not_a_number(notation.fields(text), row.index(None), line)
                 rows.append(np.array(row))
                 lines.append(line)
         usual = int(np.bincount([len(row) for row in rows]).argmax())
