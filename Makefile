@@ -91,8 +91,8 @@ short-range error-sources: tamaas
 test: tamaas
 	pytest -n $(CORES) --dist worksteal -m "not slow" $(THOROUGH)
 
-# First the quick tests with more random cases and the coverage of the physics (tool.coverage in pyproject.toml). Then
-# the slow tests, in one process more than there are cores, because many of them wait.
+# First the quick tests with more random cases, and the coverage of the physics by the tests of its folders. Then the
+# slow tests, in one process more than there are cores, because many of them wait.
 test-all: THOROUGH = --hypothesis-profile thorough --cov --cov-report=term
 test-all: test audit
 	pytest -n $$(($(CORES) + 1)) --dist loadfile -m slow --series $(SERIES)

@@ -1,7 +1,8 @@
-"""The smoke campaign, run once for all tests of the workflow, and calls of Snakemake."""
+"""Calls of Snakemake, and the campaign `smoke`, which runs once for all tests of the workflow."""
 
 import contextlib
 import fcntl
+import gc
 import multiprocessing
 import os
 import re
@@ -11,6 +12,9 @@ import sys
 import tempfile
 import time
 from pathlib import Path
+
+# Each worker process of pytest-xdist takes one core. Libraries read the variable when they are imported.
+os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import pytest
 from hypothesis import settings
@@ -22,24 +26,26 @@ REPOSITORY = Path(__file__).parents[1]
 PARTS = ("Snakefile", "icha", "workflow", "config", "profiles", ".gitignore", "Makefile", "LICENSE")
 PARTS += ("pyproject.toml", "uv.lock", "README.md")
 SMOKE = "config/campaigns/smoke.yaml"
-# Figures of the campaign in tests, one for each kind of input, and replacements that make its runs smaller.
-FIGURES = ("fig1_jkr", "fig2_area_and_gap", "fig3_distributions", "fig5_multi_slope")
-FIGURES += ("fig10_model_error", "fig13_loops")
-LESS = {
+# Figures of the campaign `smoke` in tests, one for each kind of input, and replacements that make its runs smaller.
+FIGURES = ("fig1_jkr", "fig2_area_and_gap", "fig10_model_error", "fig13_loops")
+SMALLER = {
     "separation_step: 0.3": "separation_step: 0.5",
     "[1.0e-2, 3.16e-2]\n    unload": "[3.16e-3]\n    unload",
     "[3.16e-3, 1.0e-2]\n    turning_points": "[1.0e-3, 3.16e-3]\n    turning_points",
     "pressure: 5.0e-3\n      - reduced_pressure: 1.0e-2": "pressure: 1.5e-3\n      - reduced_pressure: 3.16e-3",
 }
-# Number of random cases of a test; --hypothesis-profile thorough tries more. They are the same each time, so that no
-# change fails by chance.
-settings.register_profile("fast", max_examples=40, deadline=None, derandomize=True, database=None)
+# Number of random cases of a test; `--hypothesis-profile thorough` tries more. The cases are the same in every session,
+# so no test fails by chance.
+settings.register_profile("fast", max_examples=24, deadline=None, derandomize=True, database=None)
 settings.register_profile("thorough", settings.get_profile("fast"), max_examples=300)
 settings.load_profile("fast")
 
-# Files with the longest tests, the longest first; at the end they would keep one core waiting. With "worksteal" one
-# worker begins with them, and so with the campaign, while another begins in the middle.
-LONG = ("every_case_ends", "slurm", "reruns", "faults", "workflow", "finite_range", "make", "energy_balance")
+# Files with the longest tests, the longest first. If such a file came last, one core would wait for it. With
+# `--dist worksteal` one worker begins with these files and the campaign, the other in the middle of the list.
+LONG = ("one_asperity", "every_case_ends", "full_contact", "slurm", "cli_run", "wheel", "faults", "rough_contacts")
+LONG += ("make", "in_browser", "finite_range_loops", "reruns", "workflow", "finite_range", "energy_balance")
+# Folders of tests whose coverage is measured (`--cov`). Measuring it nearly doubles the time of a test.
+PHYSICS = {"asperity", "boundary_elements", "contact", "equilibrium", "half_space", "path", "surfaces"}
 
 
 def _numbers(text):
@@ -54,18 +60,22 @@ def pytest_addoption(parser):
 
 
 def pytest_collection_modifyitems(items):
-    """Sort the files that take longest to the beginning."""
+    """Sort the longest files to the beginning; exclude imported modules from garbage collection."""
+    gc.freeze()
     rank = {f"test_{name}.py": number for number, name in enumerate(LONG)}
     items.sort(key=lambda item: rank.get(item.path.name, len(LONG)))
+    for item in items:
+        if item.path.parent.name not in PHYSICS:
+            item.add_marker("no_cover")
 
 
 def modules_of(project):
-    """PYTHONPATH of the package and the plugins of a copy of the project."""
+    """Return the PYTHONPATH of the package and the plugins of a copy of the project."""
     return os.pathsep.join([str(project), str(project / "workflow/plugins")])
 
 
 def snakemake_command(*arguments, configuration=SMOKE):
-    """Command and environment of a call of Snakemake in a copy of the project."""
+    """Return command and environment of a call of Snakemake in a copy of the project."""
     environment = os.environ | {"PYTHONDONTWRITEBYTECODE": "1"}
     chosen = ["--configfile", str(configuration)] if configuration else []
     return [sys.executable, "-m", "snakemake", *arguments, *chosen], environment
@@ -74,22 +84,24 @@ def snakemake_command(*arguments, configuration=SMOKE):
 def snakemake(project, *arguments, configuration=SMOKE):
     """Call Snakemake in a copy of the project; return the finished process with its output as `stdout`.
 
-    The call is a fork of this process, which has imported Snakemake, so a dry run takes a fifth of a new process.
+    The call is a fork of this process, which has imported Snakemake. So a dry run takes a fifth of the time of a new
+    process.
     """
     command, environment = snakemake_command(*arguments, configuration=configuration)
     environment["PYTHONPATH"] = modules_of(project)
-    with tempfile.TemporaryFile("w+", encoding="utf-8", errors="replace") as said:
-        call = multiprocessing.get_context("fork").Process(target=_call, args=(project, command[2:], environment, said))
+    with tempfile.TemporaryFile("w+", encoding="utf-8", errors="replace") as output:
+        arguments = project, command[2:], environment, output
+        call = multiprocessing.get_context("fork").Process(target=_call, args=arguments)
         call.start()
         call.join()
-        said.seek(0)
-        return subprocess.CompletedProcess(command, call.exitcode, said.read())
+        output.seek(0)
+        return subprocess.CompletedProcess(command, call.exitcode, output.read())
 
 
-def _call(project, arguments, environment, said):
+def _call(project, arguments, environment, output):
     """Run Snakemake in this process, with the modules of a copy of the project."""
     for descriptor in (1, 2):
-        os.dup2(said.fileno(), descriptor)
+        os.dup2(output.fileno(), descriptor)
     sys.stdout, sys.stderr = (open(descriptor, "w", buffering=1, encoding="utf-8") for descriptor in (1, 2))
     os.chdir(project)
     os.environ.clear()
@@ -104,23 +116,23 @@ def _call(project, arguments, environment, said):
         main(arguments[1:])
     finally:
         if "fingerprint" in sys.modules:
-            sys.modules["fingerprint"].save_cache()  # no handlers of `atexit` run in a fork
+            sys.modules["fingerprint"].save_cache()  # a fork runs no `atexit` handlers
 
 
 def smoke_at_finite_ranges():
-    """Text of the campaign smoke with the sections that Tamaas solves."""
+    """Return the text of the campaign `smoke` with the sections that Tamaas solves."""
     text = (REPOSITORY / SMOKE).read_text(encoding="utf-8")
     assert text.count("figures:\n") == 1
-    asked = (REPOSITORY / "tests/finite_ranges.yaml").read_text(encoding="utf-8")
-    return text.replace("figures:\n", f"{asked}figures:\n")
+    sections = (REPOSITORY / "tests/finite_ranges.yaml").read_text(encoding="utf-8")
+    return text.replace("figures:\n", f"{sections}figures:\n")
 
 
 def smaller_smoke():
-    """Text of the campaign smoke with the sections that Tamaas solves, and with smaller runs and fewer figures."""
+    """Return `smoke_at_finite_ranges` with smaller runs and fewer figures."""
     text = smoke_at_finite_ranges()
-    for much, little in LESS.items():
-        assert much in text
-        text = text.replace(much, little)
+    for large, small in SMALLER.items():
+        assert large in text
+        text = text.replace(large, small)
     figures = "|".join(FIGURES)
     return re.sub(rf"^  (?!({figures}):)fig\w+:\n(    .*\n)+", "", text, flags=re.MULTILINE)
 
@@ -135,16 +147,16 @@ def copy_project(source, target, changed=()):
             shutil.copyfile(source / part, target / part)
     for file, text in dict(changed).items():
         (target / file).write_text(text, encoding="utf-8")
-    who = {"NAME": "nobody", "EMAIL": "nobody@example.org", "DATE": "2000-01-01T00:00:00Z"}
-    told = {f"GIT_{role}_{key}": value for role in ("AUTHOR", "COMMITTER") for key, value in who.items()}
+    author = {"NAME": "nobody", "EMAIL": "nobody@example.org", "DATE": "2000-01-01T00:00:00Z"}
+    variables = {f"GIT_{role}_{key}": value for role in ("AUTHOR", "COMMITTER") for key, value in author.items()}
     for command in (["init", "--quiet"], ["add", "."], ["commit", "--quiet", "--message", "A copy"]):
-        subprocess.run(["git", *command], cwd=target, env=os.environ | told, check=True)
+        subprocess.run(["git", *command], cwd=target, env=os.environ | variables, check=True)
     return target
 
 
 @pytest.fixture(scope="session")
 def smoke(tmp_path_factory):
-    """Copy of the project with the finished small campaign smoke; tests must not change it."""
+    """Copy of the project with the finished, smaller campaign `smoke`; tests must not change it."""
     folder = tmp_path_factory.getbasetemp()
     if "PYTEST_XDIST_WORKER" in os.environ:
         folder = folder.parent  # shared by all worker processes
@@ -158,19 +170,19 @@ def smoke(tmp_path_factory):
     return project
 
 
-def wait_for(what, seconds=120):
-    """Wait until a condition is true; missing files are not an error."""
+def wait_for(condition, seconds=120):
+    """Wait until a condition is true; a missing file counts as false."""
     until = time.monotonic() + seconds
     while time.monotonic() < until:
         with contextlib.suppress(FileNotFoundError):
-            if what():
+            if condition():
                 return
         time.sleep(0.02)
     raise AssertionError(f"the condition was not met in {seconds} s")
 
 
 def is_alive(process):
-    """Return whether a process runs; a zombie does not."""
+    """Return whether a process is running; a zombie is not."""
     try:
         return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
     except OSError:
@@ -179,7 +191,7 @@ def is_alive(process):
 
 @pytest.fixture
 def before_jobs(monkeypatch):
-    """The module of the workflow."""
+    """The module `workflow/before_jobs.py`."""
     monkeypatch.syspath_prepend(str(REPOSITORY / "workflow"))
     import before_jobs
 
@@ -188,5 +200,5 @@ def before_jobs(monkeypatch):
 
 @pytest.fixture
 def project(smoke, tmp_path):
-    """Copy of the finished campaign that a test may change."""
+    """Copy of `smoke` that a test may change."""
     return shutil.copytree(smoke, tmp_path / "project")

@@ -21,10 +21,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.ndimage import correlate1d
-from scipy.sparse import csr_array
+
+# SciPy is imported where it is used, because `icha describe` needs `Front` alone.
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
 
 # Compliance of the last row of a straight contact, with the kernel 2/q, in h/E*; and factor by which that of a bond is
 # larger. With it circular patches follow JKR, wherever they lie on the grid (docs/short_range.md).
@@ -46,6 +49,8 @@ _BATCH = 4096
 
 def average_fractions(fractions: np.ndarray) -> np.ndarray:
     """Return the Gaussian mean w*f of the fractions of every cell, itself included; fields (..., n, n)."""
+    from scipy.ndimage import correlate1d
+
     along_columns = correlate1d(fractions, STENCIL, axis=-2, mode="wrap")
     return correlate1d(along_columns, STENCIL, axis=-1, mode="wrap")
 
@@ -57,6 +62,8 @@ def neighbour_weights(cells: np.ndarray, shape: tuple[int, ...]) -> csr_array:
     ----------
     cells : (k,) int, ascending, of grids of the shape (n, n) or (t, n, n).
     """
+    from scipy.sparse import csr_array
+
     grid, count = shape[-1], len(cells)
     number = np.full(math.prod(shape), -1, np.int32)
     number[cells] = np.arange(count, dtype=np.int32)

@@ -1,4 +1,4 @@
-"""The command `icha check`: check files against their documented format and the identities of the physics."""
+"""The command `icha check`: check the format of files, and the identities of the physics in their results."""
 
 from pathlib import Path
 from typing import Annotated
@@ -6,7 +6,6 @@ from typing import Annotated
 import typer
 
 from icha.cli.project import FAILED, WRONG, echo
-from icha.deposit.verify import CHECKSUMS
 from icha.support.formatting import format_count, printable
 
 
@@ -22,9 +21,6 @@ def check(
 
     status = 0
     for file in files:
-        if (file.suffix == ".zip" and file.is_file()) or (file / CHECKSUMS).is_file():
-            echo(f"{file}: deposit; use `icha verify`")
-            continue
         try:
             kind, data = identify_file(file)
         except UnknownFile as error:
@@ -32,7 +28,7 @@ def check(
             status = WRONG
             continue
         if kind not in (RUN, SURFACE, CAMPAIGN, SOLUTION):
-            echo(f"{file}: {kind}; readable, without checks")
+            echo(f"{file}: {kind}; readable; ICHA has no checks for it")
             continue
         try:
             problems, count = _problems(kind, data)

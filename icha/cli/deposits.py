@@ -29,46 +29,49 @@ Deposit = Annotated[Path, typer.Argument(help="Folder of a deposit, or its zip."
 def verify(deposit: Deposit, large: Large = False) -> None:
     """Verify a deposit: it must contain all its files with the right checksums, and no others.
 
-    Names that lead outside the deposit, links, devices and zips that unpack to far more than their size are problems
-    too. A zip is unpacked into a temporary folder. Nothing in the deposit is executed.
+    Names that lead outside the deposit, links, devices, and zips that unpack to far more than their size are also
+    problems. A zip is unpacked into a temporary folder. Nothing in the deposit is executed.
 
-    Exit status: 0 if it is intact, 1 if not (the first hundred problems are printed), 2 if the file or folder does
-    not exist.
+    Exit status: 0 if the deposit is intact, 1 if not (the command prints the first hundred problems), 2 if the file or
+    folder does not exist.
     """
-    from icha.deposit.verify import DamagedDeposit
-
     try:
         with _intact(deposit, large) as folder:
             echo(f"{printable(deposit)}: intact: {_contents(folder)}")
-    except DamagedDeposit as damaged:
-        echo(_listed(damaged.args))
-        echo(f"{printable(deposit)}: damaged: {format_count(len(damaged.args), 'problem')}", err=True, fg="red")
+    except _Damaged as damaged:
+        echo(damaged.problems)
+        echo(f"{printable(deposit)}: damaged: {format_count(damaged.count, 'problem')}", err=True, fg="red")
         raise typer.Exit(FAILED) from None
+
+
+class _Damaged(UserError):
+    """A damaged deposit; `problems` lists what is wrong, and `count` is the number of problems."""
+
+    def __init__(self, deposit: Path, problems: tuple[str, ...]):
+        more = [f"… and {len(problems) - MOST_PROBLEMS:,} more"] if len(problems) > MOST_PROBLEMS else []
+        self.count, self.problems = len(problems), "\n".join([*problems[:MOST_PROBLEMS], *more])
+        super().__init__(f"{printable(deposit)}: the deposit is damaged:\n{self.problems}")
 
 
 @contextlib.contextmanager
 def _intact(deposit: Path, large: bool) -> Iterator[Path]:
     """Verify a deposit and provide its folder, unpacked if it is a zip."""
-    from icha.deposit.verify import whole_deposit
+    from icha.deposit.verify import DamagedDeposit, whole_deposit
 
     if not deposit.exists():
         raise UserError(f"{deposit}: no such file or folder; expected the folder of a deposit, or its zip")
-    with whole_deposit(deposit, large=large) as folder:
-        yield folder
+    try:
+        with whole_deposit(deposit, large=large) as folder:
+            yield folder
+    except DamagedDeposit as damaged:
+        raise _Damaged(deposit, damaged.args) from None
 
 
 def _contents(folder: Path) -> str:
     from icha.deposit.verify import files_of
 
-    files = files_of(folder)
-    return (
-        f"{format_count(len(files), 'file')}, {formatting.size(sum((folder / file).stat().st_size for file in files))}"
-    )
-
-
-def _listed(problems: tuple[str, ...]) -> str:
-    more = [f"… and {len(problems) - MOST_PROBLEMS:,} more"] if len(problems) > MOST_PROBLEMS else []
-    return "\n".join([*problems[:MOST_PROBLEMS], *more])
+    sizes = [(folder / file).stat().st_size for file in files_of(folder)]
+    return f"{format_count(len(sizes), 'file')}, {formatting.size(sum(sizes))}"
 
 
 def reproduce(
@@ -103,36 +106,32 @@ def reproduce(
     """
     from icha.deposit.compare import compare_folders
     from icha.deposit.reproduce import RerunError, add_surfaces, campaign_name, find_runs, prepare_rerun
-    from icha.deposit.verify import DamagedDeposit
 
+    target = None if folder is None else folder.resolve()
+    keep = folder is not None
     try:
         with _intact(deposit, large) as original:
             name = campaign_name(original)
             runs = find_runs(only or (), original)
             _introduce(deposit, original, folder)
-            target = (folder or Path(tempfile.mkdtemp(prefix="icha-reproduce-"))).resolve()
-            try:
-                copy = prepare_rerun(target, original)
-                status = _run(copy, [f"results/{name}/{path}" for path in runs] or ["all"], cores, anyway)
-                results = copy / "results" / name
-                if not results.is_dir():
-                    echo("Error: nothing was computed", err=True, fg="red")
-                    raise typer.Exit(FAILED)
-            except BaseException:
-                if folder is None:
-                    shutil.rmtree(target)
-                raise
+            target = target or Path(tempfile.mkdtemp(prefix="icha-reproduce-")).resolve()
+            copy = prepare_rerun(target, original)
+            status = _run(copy, [f"results/{name}/{path}" for path in runs] or ["all"], cores, anyway)
+            results = copy / "results" / name
+            if not results.is_dir():
+                echo("Error: nothing was computed", err=True, fg="red")
+                raise typer.Exit(FAILED)
             comparison = compare_folders(original, results, add_surfaces(runs, original) if runs else None)
-    except DamagedDeposit as damaged:
-        raise UserError(f"{printable(deposit)}: the deposit is damaged:\n{_listed(damaged.args)}") from None
+        reproduced = _print_comparison(comparison)
+        keep = keep or not reproduced
     except RerunError as refused:
         raise UserError(f"{printable(deposit)}: {refused}") from None
-    reproduced = _print_comparison(comparison)
+    finally:
+        if target and not keep:
+            shutil.rmtree(target)
     if status:
         echo(f"Some jobs did not run; to continue, add --folder {shorten_path(target)} to the command.", fg="yellow")
-    if folder is None and reproduced:
-        shutil.rmtree(target)
-    else:
+    if keep:
         echo(f"new results: {shorten_path(results)}")
     if not reproduced:
         raise typer.Exit(FAILED)
@@ -164,7 +163,7 @@ def _introduce(deposit: Path, original: Path, folder: Path | None) -> None:
     echo(f"writes to:  {shorten_path(folder) if folder else 'a temporary folder'}")
 
 
-def _run(project: Path, targets: list[str], cores: str | None, anyway: bool) -> int:
+def _run(project: Path, targets: list[str], cores: int | None, anyway: bool) -> int:
     """Run the configuration in a folder with the installed program; return the exit status."""
     from icha.datasets.results import CONFIGURATION
     from icha.support.program import own_workflow
@@ -198,10 +197,9 @@ def upload(
     deposit: Annotated[
         Path, typer.Argument(help="Zip of a deposit, or its folder with the zip beside it.", show_default=False)
     ],
-    sandbox: Annotated[
-        bool, typer.Option("--sandbox", help="Upload to sandbox.zenodo.org, for tests; it needs another token.")
-    ] = False,
-    url: Annotated[str | None, option("Upload to another server with Zenodo's deposit API: https://….")] = None,
+    url: Annotated[
+        str, typer.Option(help="Server with Zenodo's deposit API, such as sandbox.zenodo.org for tests.")
+    ] = "https://zenodo.org",
     draft: Annotated[
         int | None,
         option(
@@ -221,14 +219,12 @@ def upload(
     Exit status: 0 if everything was sent, 1 if not, 2 if it cannot be sent.
     """
     from icha.deposit.metadata import read_zenodo_metadata, summary_of
-    from icha.deposit.upload import SANDBOX, ZENODO, Zenodo, server_address
-    from icha.deposit.verify import CRATE, README, DamagedDeposit
+    from icha.deposit.upload import Zenodo, server_address
+    from icha.deposit.verify import CRATE, README
 
-    if sandbox and url:
-        raise UserError("--sandbox and --url exclude each other; use one of them")
     archive = deposit.resolve().with_name(f"{deposit.resolve().name}.zip") if deposit.is_dir() else deposit
     try:
-        address = server_address(url or (SANDBOX if sandbox else ZENODO))
+        address = server_address(url)
         server = Zenodo(address, _token(address))
         with _intact(archive, large) as folder:
             metadata = read_zenodo_metadata(folder)
@@ -245,8 +241,6 @@ def upload(
                 echo("Nothing was sent.")
                 raise typer.Exit(FAILED)
             _send(server, files, metadata, draft)
-    except DamagedDeposit as damaged:
-        raise UserError(f"{archive}: the deposit is damaged; nothing was sent:\n{_listed(damaged.args)}") from None
     except ValueError as error:
         raise UserError(str(error)) from None
 

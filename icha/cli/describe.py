@@ -7,10 +7,10 @@ from typing import Annotated
 import typer
 
 from icha.cli.project import (
+    DEFAULT_CORES,
     Config,
     Cores,
     Folder,
-    count_cores,
     echo,
     find_configuration,
     find_workflow,
@@ -39,7 +39,7 @@ def describe(
     """
     path = find_configuration(config)
     campaign = read_configuration(path).campaign
-    print_plan(path, campaign, find_workflow(), (folder or project()).resolve(), count_cores(cores), runs=runs)
+    print_plan(path, campaign, find_workflow(), (folder or project()).resolve(), cores or DEFAULT_CORES, runs=runs)
     _print_scans(campaign)
 
 

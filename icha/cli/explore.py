@@ -1,4 +1,4 @@
-"""The command `icha explore`: write a page on which a slider moves along the paths of a campaign."""
+"""The command `icha explore`: write a page on which a slider moves along the loading paths of a campaign."""
 
 from pathlib import Path
 from typing import Annotated
@@ -20,14 +20,15 @@ def explore(
     seed: Annotated[list[int] | None, option("Only this seed; may be repeated.")] = None,
     size: Annotated[float, typer.Option(help="Largest size of the page, MB.")] = 20.0,
 ) -> None:
-    """Write a page for moving along the paths of a campaign.
+    """Write a page on which a slider moves along the loading paths of a campaign.
 
-    Choose a contact and a model; a slider moves spots or patches over the topography, the point on the curves, and the
-    distributions. The page is one file and needs no network. Contacts that do not fit into it are omitted and counted.
+    On the page, choose a contact and a model. The slider changes the spots or patches on the topography, the marked
+    point on the curves, and the distributions. The page is one file and needs no network. Contacts that do not fit on
+    the page are omitted and counted.
     """
     from icha.datasets.results import EXPLORER
     from icha.deposit.verify import CHECKSUMS
-    from icha.report.explorer import NothingToExplore, write_explorer
+    from icha.report.explorer import write_explorer
 
     if not results.is_dir():
         problem = "is a file" if results.exists() else "no such folder"
@@ -41,10 +42,8 @@ def explore(
     only = {name: values for name, values in choices.items() if values}
     try:
         written = write_explorer(results, page, only=only, largest=size)
-    except NothingToExplore as reason:
-        raise UserError(str(reason)) from None
     except ValueError as error:
-        raise UserError(f"{error}; `icha run` computes missing files") from None
+        raise UserError(str(error)) from None
     echo(f"{page}: {format_count(written.shown, 'contact')}, {written.size / 1e6:.1f} MB")
     if written.left_out:
         echo(
@@ -52,4 +51,4 @@ def explore(
             "Use --study, --surface, --material and --seed to choose others, or a larger --size"
         )
     if written.without_steps:
-        echo(f"omitted, since their runs reached no stop: {format_count(written.without_steps, 'contact')}")
+        echo(f"omitted, since their runs reached no target: {format_count(written.without_steps, 'contact')}")

@@ -18,17 +18,12 @@ CAMPAIGNS = Path("config/campaigns")
 DEFAULT = Path("config/config.yaml")
 # Exit statuses.
 FAILED, WRONG = 1, 2
+DEFAULT_CORES = 2  # of profiles/default
 
 
 def option(help_text: str, *names: str, **settings):
     """Declare an option without a printed default; `help_text` includes its default."""
     return typer.Option(*names, help=help_text, show_default=False, **settings)
-
-
-def _check_cores(value: str | None) -> str | None:
-    if value is not None and value != "all" and not re.fullmatch("0*[1-9][0-9]{0,5}", value, re.ASCII):
-        raise typer.BadParameter(f"{value!r}: expected a number of cores, 1 or more, or `all`")
-    return value
 
 
 Config = Annotated[
@@ -37,7 +32,7 @@ Config = Annotated[
 ]
 Anyway = Annotated[bool, typer.Option("--anyway", help="Run even if memory or disk space is probably too small.")]
 Large = Annotated[bool, typer.Option("--large", help="Accept a deposit with very many or very large files.")]
-Cores = Annotated[str | None, option("Cores to use, or `all`. Default: 2.", "--cores", "-c", callback=_check_cores)]
+Cores = Annotated[int | None, option("Number of cores to use. Default: 2.", "--cores", "-c", min=1, max=999_999)]
 Folder = Annotated[
     Path | None,
     option(
@@ -47,13 +42,6 @@ Folder = Annotated[
         resolve_path=True,
     ),
 ]
-
-
-def count_cores(cores: str | None) -> int:
-    """Return the number of cores from the option `--cores`."""
-    if cores == "all":
-        return os.cpu_count() or 1
-    return int(cores) if cores else 2
 
 
 def echo(text: object = "", *, err: bool = False, **style) -> None:
@@ -117,22 +105,11 @@ def list_campaigns() -> dict[str, Path]:
     files: dict[str, Path] = {}
     for folder in (find_workflow(), project()):  # the project's files replace shipped ones of the same name
         default = folder / DEFAULT
-        if default.is_file() and (name := _campaign_name(default)):
-            files[name] = default
+        text = default.read_text(encoding="utf-8", errors="replace") if default.is_file() else ""
+        if name := re.search(r"^name: *([\w-]+)", text, re.MULTILINE):
+            files[name[1]] = default
         files |= {path.stem: path for path in sorted((folder / CAMPAIGNS).glob("*.yaml"))}
     return files
-
-
-def _campaign_name(file: Path) -> str | None:
-    """Return the name of the campaign in a file; None if the file cannot be read, which is reported when it is used."""
-    from icha.configuration.errors import ConfigurationError
-    from icha.configuration.yaml_files import read_yaml
-
-    try:
-        name = read_yaml(file).get("name")
-    except ConfigurationError:
-        return None
-    return name if isinstance(name, str) else None
 
 
 def find_configuration(config: str | None) -> Path:

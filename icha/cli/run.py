@@ -17,13 +17,13 @@ import typer
 from icha.cli.describe import print_plan
 from icha.cli.project import (
     DEFAULT,
+    DEFAULT_CORES,
     FAILED,
     Anyway,
     Config,
     Cores,
     Folder,
     UserError,
-    count_cores,
     echo,
     find_configuration,
     find_workflow,
@@ -94,13 +94,13 @@ def run(
         *(sys.executable, "-P", "-m", "snakemake", *targets),
         *("--snakefile", str(workflow / "Snakefile"), "--directory", str(folder)),
         *(["--configfile", str(path.resolve())] if path.resolve() != (workflow / DEFAULT).resolve() else []),
-        *(["--cores", cores] if cores else []),
+        *(["--cores", str(cores)] if cores else []),
         # Snakemake finds profiles/default on its own.
         *(["--workflow-profile", str(profile_folder)] if profile else []),
     ]
     if dry_run:
         jobs = _dry_run([*command, "--dry-run"], workflow, campaign, targets)
-        print_plan(path, campaign, workflow, folder, count_cores(cores), profile=profile_folder)
+        print_plan(path, campaign, workflow, folder, cores or DEFAULT_CORES, profile=profile_folder)
         echo(jobs)
         return
     from rich.console import Console
@@ -111,7 +111,7 @@ def run(
 
     items = plan(campaign, results)
     if not anyway:
-        _refuse_if_too_large(items, targets, count_cores(cores), results, read_profile(profile_folder))
+        _refuse_if_too_large(items, targets, cores or DEFAULT_CORES, results, read_profile(profile_folder))
     if not set(targets) - set(TARGETS):
         _print_validity(expected_validity(campaign))
     progress = Progress(expected_seconds(items, f"results/{campaign.name}"))
@@ -125,7 +125,7 @@ def run(
             log.unlink(missing_ok=True)
             raise
     # The estimate of `icha describe` is for all targets, and for this machine.
-    expected = None if profile or set(targets) - {"all"} else time_on(items, count_cores(cores))
+    expected = None if profile or set(targets) - {"all"} else time_on(items, cores or DEFAULT_CORES)
     _print_outcome(status, stopped, progress, campaign, folder, log, expected)
     if status:
         raise typer.Exit(FAILED)

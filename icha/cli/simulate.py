@@ -1,6 +1,6 @@
 """The command `icha simulate`: one random surface against one material, without a campaign."""
 
-import contextlib
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -97,8 +97,7 @@ def simulate(
         if pressures is None and areas is None:
             pressures = [1e-3, 3e-3, 1e-2, 3e-2]
         path = icha.Path(pressures, areas, unload=unload)
-        with _progress_bar(len(path.targets)) as progress:
-            run = icha.simulate(surface, material, path, model=model, seed=seed, progress=progress)
+        run = icha.simulate(surface, material, path, model=model, seed=seed, progress=partial(echo, err=True))
     except icha.ConvergenceError as error:
         run = error.dataset
     except ValueError as error:
@@ -107,16 +106,3 @@ def simulate(
     print_run(run, output)
     if why_no_result(run.attrs):
         raise typer.Exit(FAILED)
-
-
-@contextlib.contextmanager
-def _progress_bar(stops: int):
-    """Show a progress bar over the stops of a path; provide the function that takes a line of progress."""
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-
-    count, description = TextColumn("{task.completed:.0f}/{task.total:.0f}"), TextColumn("{task.description}")
-    columns = (count, BarColumn(), TimeElapsedColumn(), description)
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task("first contact", total=stops)
-        yield lambda line: bar.update(task, advance=line.startswith("stop "), description=line)

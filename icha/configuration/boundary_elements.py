@@ -29,24 +29,26 @@ from icha.support.values import (
     unknown,
 )
 
-_Labels = list_of_names("Labels of the study.", Label)
+_Labels = list_of_names(Label)
 
 
 class BesideStudy(Section):
     """Boundary elements on the topographies of a study."""
 
-    study: Name = Field(description="Name of the study with the topographies.")
-    surfaces: _Labels | None = Field(default=None, description="Surfaces of the study. Default: all.")
-    seeds: Seeds | None = Field(default=None, description="Seeds of the study. Default: all.")
-    rms_slopes: Annotated[list[Positive], Field(min_length=1), AfterValidator(distinct)] | None = Field(
-        default=None, description="Rms slopes of the study. Default: all."
-    )
-    materials: _Labels | None = Field(
-        default=None,
-        description="Materials of the study. Default: all. With adhesion the grid must resolve their "
-        "`interaction_range`.",
-    )
-    tolerance: number(TOLERANCE) = Field(default=1e-8, description="Relative error at which the solver stops.")
+    study: Name
+    """Name of the study with the topographies."""
+    surfaces: _Labels | None = None
+    """Surfaces of the study. Default: all."""
+    seeds: Seeds | None = None
+    """Seeds of the study. Default: all."""
+    rms_slopes: Annotated[list[Positive], Field(min_length=1), AfterValidator(distinct)] | None = None
+    """Rms slopes of the study. Default: all."""
+    materials: _Labels | None = None
+    """Materials of the study. Default: all. With adhesion the grid must resolve their `interaction_range`."""
+    tolerance: number(TOLERANCE) = 1e-8
+    """Relative error at which the solver stops."""
+    refinement: integer(REFINEMENT) = 1
+    """Number of cells of the solver per cell of the surface's grid, along a side. The heights are interpolated."""
 
     def problems(self, campaign: Any) -> Iterator[Problem]:
         """Report entries that its `icha.configuration.campaign.Campaign` does not have or that cannot be solved."""
@@ -66,56 +68,39 @@ class BesideStudy(Section):
                     yield (key, index), value, f"is not in study {self.study!r}; expected one of {expected}"
         contacts = campaign.contacts_beside(self)
         if not contacts and MEASURED not in study.rms_slopes:
-            yield (), self.study, "has none of the chosen combinations; expected combinations of the study"
-        materials: dict[str, dict[str, None]] = {}
-        for each in contacts:
-            materials.setdefault(each.surface, {})[each.material] = None
-        for name in materials:
+            yield (
+                (),
+                self.study,
+                "has no run with the chosen surfaces, seeds, slopes and materials; expected combinations of the study",
+            )
+        pairs = list(dict.fromkeys((each.surface, each.material) for each in contacts))
+        for name in dict.fromkeys(name for name, _ in pairs):
             if campaign.is_free(name):
                 reason = f"has the surface {name!r} with free edges; expected a study of periodic surfaces"
                 yield ("study",), self.study, reason
-                continue
-            if campaign.grid(name) is None:
-                continue
-            yield from self._unresolved(campaign, name, materials[name])
-            nodes = campaign.grid(name) * self.refinement
-            if nodes > GRID.most:
-                reason = f"gives {nodes} nodes a side on {name!r}; expected at most {GRID.most}"
-                yield ("refinement",), self.refinement, reason
-
-    def _unresolved(self, campaign, surface, materials):
-        """Report materials whose attraction the grid of a surface does not resolve."""
-        spacing = campaign.period(surface) / (campaign.grid(surface) * self.refinement)
-        for label in materials:
-            material = Material(**campaign.materials[label].model_dump(exclude_none=True))
-            if problem := resolution_problem(material, spacing):
-                yield ("materials",), label, f"on surface {surface!r}: {problem}"
-
-
-Loads = Annotated[
-    stops(ReducedPressure, increasing),
-    Field(description="Loads p/(E* h'rms), increasing. Those of `finite_range` become snapshots of the study's runs."),
-]
-Refinement = Annotated[
-    integer(REFINEMENT),
-    Field(description="Cells per cell of the grid of the surface, along a side; heights are interpolated."),
-]
+            elif campaign.grid(name) is not None:
+                nodes = campaign.grid(name) * self.refinement
+                if nodes > GRID.most:
+                    reason = f"gives {nodes} nodes a side on {name!r}; expected at most {GRID.most}"
+                    yield ("refinement",), self.refinement, reason
+                for label in (material for surface, material in pairs if surface == name):
+                    material = Material(**campaign.materials[label].model_dump(exclude_none=True))
+                    if problem := resolution_problem(material, campaign.period(name) / nodes):
+                        yield ("materials",), label, f"on surface {name!r}: {problem}"
 
 
 class BoundaryElements(BesideStudy):
     """Boundary elements at a finite range of attraction on the topographies of a study, to compare with its runs."""
 
-    reduced_pressures: Loads
-    refinement: Refinement = 1
+    reduced_pressures: stops(ReducedPressure, increasing)
+    """Loads p/(E* h'rms), increasing. The runs of the study save a snapshot at each of these loads."""
 
 
 class BoundaryElementLoops(BesideStudy):
     """Boundary elements at a finite range of attraction, loaded to the largest load of a study and unloaded."""
 
-    refinement: Refinement = 1
-    separation_step: number(STEP) = Field(
-        default=0.05, description="Change of the mean gap from one solution to the next, in units of h_rms."
-    )
+    separation_step: number(STEP) = 0.05
+    """Change of the mean gap from one solution to the next, in units of h_rms."""
 
     def _study_problems(self, campaign, study):
         """Report also why a study does not suit unloading."""

@@ -23,7 +23,7 @@ from icha.support.values import ROUNDING, Name, Problem, Section, Text, distinct
 
 # Sections whose entries belong to a study.
 BESIDE_STUDIES = ("finite_range", "boundary_element_loops")
-# Each of these entries goes through all runs of its study.
+# Limit of the entries of a section, because the check of an entry goes through all runs of its study.
 _FEW = Field(max_length=100)
 # Cells per shortest wavelength: the fewest without a warning, and those to recommend.
 _LEAST_CELLS, _ADVISABLE_CELLS = 4, 8
@@ -47,8 +47,8 @@ class Topography(NamedTuple):
     period : side, m.
     rms_slope : None if no study asks for it.
     sha256 : checksum of the file.
-    full_contact_energy : U_full/E* at rms slope 1, m; NaN without adhesion.
-    complete_contact_pressure : pressure over E* for complete contact at rms slope 1; NaN without adhesion.
+    full_contact_energy : U_full/E* at rms slope 1, m.
+    complete_contact_pressure : pressure over E* for complete contact at rms slope 1.
     """
 
     grid: int
@@ -62,46 +62,47 @@ class Topography(NamedTuple):
 class Defaults(Section):
     """Default values for the entries of a section."""
 
-    surfaces: dict[str, Any] = Field(
-        default={}, description="Keys of surfaces; every surface takes the keys of its kind."
-    )
-    materials: dict[str, Any] = Field(default={}, description="Keys of materials.")
-    studies: dict[str, Any] = Field(default={}, description="Keys of studies.")
+    surfaces: dict[str, Any] = {}
+    """Default values of keys of surfaces. A surface takes only the keys that its kind has."""
+    materials: dict[str, Any] = {}
+    """Default values of keys of materials."""
+    studies: dict[str, Any] = {}
+    """Default values of keys of studies."""
 
 
 class Campaign(Section):
     """A campaign, the content of one configuration file."""
 
-    name: Name = Field(description="Name of the campaign; results go to `results/<name>/`.")
-    title: Text = Field(description="Title of the campaign, one line.")
-    summary: Text = Field(description="A few sentences for readers of datasets and report.")
-    license: Text = Field(description="Licence of the data, as an SPDX identifier such as `CC-BY-4.0`.")
-    confirmed: Annotated[list[Text], AfterValidator(distinct)] = Field(
-        default=[],
-        description="Keys of unusual values that are intended, such as `materials.soft.contact_modulus`; for entries "
-        "of a list the key of the list. Other unusual values are refused.",
-    )
-    defaults: Defaults = Field(default=Defaults(), description="Default values for all surfaces, materials or studies.")
-    surfaces: Annotated[dict[Name, AnySurface], Field(min_length=1)] = Field(
-        description="Surfaces by name: `kind: self_affine`, `kind: measured` or `kind: file`."
-    )
-    materials: Annotated[dict[Name, MaterialSection], Field(min_length=1)] = Field(description="Materials by name.")
-    studies: Annotated[dict[Name, Study], Field(min_length=1)] = Field(description="Studies by name.")
-    finite_range: Annotated[dict[Name, BoundaryElements], _FEW] = Field(
-        default={},
-        description="Boundary elements at a finite range of attraction by name, to compare with the runs of a study.",
-    )
-    boundary_element_loops: Annotated[dict[Name, BoundaryElementLoops], _FEW] = Field(
-        default={},
-        description="The same in loading and unloading by name, to compare with the runs of a study that unloads.",
-    )
-    measurements: Annotated[dict[Name, Measurement], _FEW] = Field(
-        default={}, description="Measurements by name, drawn over figure 5. ICHA has none."
-    )
-    figures: Figures = Field(default=Figures(), description="Figures and their options.")
-    publication: Publication = Field(
-        default=Publication(), description="Metadata of a deposit; results do not depend on them."
-    )
+    name: Name
+    """Name of the campaign; results go to `results/<name>/`."""
+    title: Text
+    """Title of the campaign, one line."""
+    summary: Text
+    """A few sentences for readers of datasets and report."""
+    license: Text
+    """Licence of the data, as an SPDX identifier such as `CC-BY-4.0`."""
+    confirmed: Annotated[list[Text], AfterValidator(distinct)] = []
+    """Keys of unusual values that you intend, such as `materials.soft.contact_modulus`. For an entry of a list, give
+    the key of the list. Unusual values without such a confirmation are refused."""
+    defaults: Defaults = Defaults()
+    """Default values for all surfaces, materials or studies."""
+    surfaces: Annotated[dict[Name, AnySurface], Field(min_length=1)]
+    """Surfaces by name: `kind: self_affine`, `kind: measured` or `kind: file`."""
+    materials: Annotated[dict[Name, MaterialSection], Field(min_length=1)]
+    """Materials by name."""
+    studies: Annotated[dict[Name, Study], Field(min_length=1)]
+    """Studies by name."""
+    finite_range: Annotated[dict[Name, BoundaryElements], _FEW] = {}
+    """Solutions by boundary elements at a finite range of attraction, by name, to compare with the runs of a study."""
+    boundary_element_loops: Annotated[dict[Name, BoundaryElementLoops], _FEW] = {}
+    """Loading and unloading with boundary elements at a finite range of attraction, by name, to compare with the runs
+    of a study that unloads."""
+    measurements: Annotated[dict[Name, Measurement], _FEW] = {}
+    """Your measurements by name, drawn over figure 5. ICHA itself has no measurements."""
+    figures: Figures = Figures()
+    """Figures and their options."""
+    publication: Publication = Publication()
+    """Metadata of a deposit. They do not change any result."""
 
     _contacts: dict[str, tuple[Contact, ...]] = PrivateAttr(default={})
     _topographies: dict[str, Topography] = PrivateAttr(default={})
@@ -115,7 +116,7 @@ class Campaign(Section):
         )
 
     def compares_models(self, study: str) -> bool:
-        """Tell whether a study has runs with both models at given loads."""
+        """Return whether a study has runs with both models at given loads."""
         section = self.studies[study]
         return set(section.models) == set(MODELS) and bool(section.targets.reduced_pressures)
 
@@ -124,7 +125,7 @@ class Campaign(Section):
         return list(self._contacts[study])
 
     def with_contacts(self, contacts: Mapping[str, Iterable[Contact]]) -> Campaign:
-        """Return the campaign with the runs of its studies, and the lists of the studies to match."""
+        """Return the campaign with these contacts; the lists of each study become those of its contacts."""
         contacts = {study: tuple(dict.fromkeys(runs)) for study, runs in contacts.items()}
         studies = {}
         for label, study in self.studies.items():
@@ -155,7 +156,7 @@ class Campaign(Section):
         return self._origins.get((section, name), name)
 
     def is_free(self, surface: str) -> bool:
-        """Tell whether a surface is a square with free edges; all others are periodic."""
+        """Return whether a surface is a square with free edges; all other surfaces are periodic."""
         return getattr(self.surfaces[surface], "boundary", None) == "free"
 
     def grid(self, surface: str) -> int | None:
@@ -179,7 +180,7 @@ class Campaign(Section):
         return snapshots + [state for p in loads if (state := ("reduced_pressure", p)) not in known]
 
     def contacts_beside(self, entry: BesideStudy) -> list[Contact]:
-        """Return the contacts of a study for which an entry beside it asks."""
+        """Return the contacts of its study that an entry of `finite_range` or `boundary_element_loops` solves."""
         lists = (entry.surfaces, entry.seeds, entry.rms_slopes, entry.materials)
         asked = [None if values is None else set(values) for values in lists]
 

@@ -161,7 +161,8 @@ def _study_problems(campaign: Campaign, label: str, study: Study) -> Iterator[Pr
 
     for many, one in _LISTS.items():
         if not lists[one] and (not cases or any(getattr(case, one) is None for case in cases)):
-            yield (*prefix, many), NOTHING, f"the key is missing; expected: {Study.model_fields[many].description}"
+            description = " ".join(str(Study.model_fields[many].description).split())
+            yield (*prefix, many), NOTHING, f"the key is missing; expected: {description}"
     for one, names in (("surface", campaign.surfaces), ("material", campaign.materials)):
         for location, name in values(one):
             if name not in names:

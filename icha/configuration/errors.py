@@ -81,7 +81,7 @@ def _reason_for_key(kind: str, location: tuple) -> str:
     """Return the reason against a key that is unknown or missing in a section."""
     section, name = _section_at(location[:-1]), location[-1]
     if kind == "missing":
-        return f"the key is missing; expected: {section.model_fields[name].description}"
+        return f"the key is missing; expected: {' '.join(str(section.model_fields[name].description).split())}"
     if reason := _FORMER_KEYS.get((section.__name__, name)):
         return reason
     similar = difflib.get_close_matches(str(name), section.model_fields, 1)

@@ -41,28 +41,32 @@ def _factor(unit: str, si_unit: str) -> float | None:
 class Column(Section):
     """A column of a table of measurements."""
 
-    column: Text = Field(description="Heading of the column.")
-    unit: Annotated[str, Field(strict=True)] = Field(
-        description="Unit of the numbers: `1` or `percent` for ratios, a unit of pressure for nominal pressures."
-    )
+    column: Text
+    """Heading of the column."""
+    unit: Annotated[str, Field(strict=True)]
+    """Unit of the numbers: `1` or `percent` for ratios, a unit of pressure for nominal pressures."""
 
 
 class Measurement(Section):
     """Measured contact areas, drawn over the figure of a study."""
 
-    path: File = Field(description="CSV file with a line of headings, relative to the configuration file.")
-    label: Annotated[Text, Field(max_length=200), AfterValidator(_drawable)] = Field(
-        description="Name in the legend; formulas stand between two `$`."
-    )
-    citation: Text = Field(description="Source of the numbers; printed in the report.")
-    study: Name = Field(description="Name of the study to compare with.")
-    load: Column = Field(
-        description="Load: reduced pressures p/(E* h'rms) (unit `1`) or nominal pressures (unit `kPa`, …), which need "
-        "material and rms_slope."
-    )
-    area: Column = Field(description="Contact area fraction A/A0 (unit `1` or `percent`).")
-    material: Name | None = Field(default=None, description="The measured material; a load in Pa needs it.")
-    rms_slope: Positive | None = Field(default=None, description="The measured rms slope; a load in Pa needs it.")
+    path: File
+    """CSV file with a line of headings, relative to the configuration file."""
+    label: Annotated[Text, Field(max_length=200), AfterValidator(_drawable)]
+    """Name in the legend; formulas stand between two `$`."""
+    citation: Text
+    """Source of the numbers, which the report prints."""
+    study: Name
+    """Name of the study to compare with."""
+    load: Column
+    """Load: reduced pressures p/(E* h'rms) (unit `1`) or nominal pressures (unit `kPa`, …), which need material and
+    rms_slope."""
+    area: Column
+    """Contact area fraction A/A0 (unit `1` or `percent`)."""
+    material: Name | None = None
+    """Material of the measurement. Needed if the loads are nominal pressures."""
+    rms_slope: Positive | None = None
+    """Rms slope of the measured surface. Needed if the loads are nominal pressures."""
 
     @property
     def load_is_pressure(self) -> bool:

@@ -5,7 +5,7 @@ import re
 from collections.abc import Callable, Iterator
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema, model_validator
+from pydantic import AfterValidator, BeforeValidator, WithJsonSchema, model_validator
 
 from icha.datasets.labels import RunLabels
 from icha.support.values import Problem, Section, Text, distinct
@@ -147,14 +147,18 @@ class _Entry(Section):
 class Author(_Entry):
     """An author of the data: a person with `family_names` and `given_names`, or an organisation with `name`."""
 
-    family_names: Line | None = Field(default=None, description="Family names of a person.")
-    given_names: Line | None = Field(default=None, description="Given names of a person.")
-    name: Line | None = Field(default=None, description="Name of an organisation or a team.")
-    orcid: Orcid | None = Field(default=None, description="ORCID of a person, such as `0000-0002-1825-0097`.")
-    affiliation: Line | None = Field(default=None, description="Institution of a person.")
-    ror: Ror | None = Field(
-        default=None, description="ROR identifier of the institution, such as `https://ror.org/03yrm5c26`."
-    )
+    family_names: Line | None = None
+    """Family names of a person."""
+    given_names: Line | None = None
+    """Given names of a person."""
+    name: Line | None = None
+    """Name of an organisation or a team."""
+    orcid: Orcid | None = None
+    """ORCID of a person, such as `0000-0002-1825-0097`."""
+    affiliation: Line | None = None
+    """Institution of a person."""
+    ror: Ror | None = None
+    """ROR identifier of the institution, such as `https://ror.org/03yrm5c26`."""
 
     @model_validator(mode="after")
     def _who(self):
@@ -192,64 +196,65 @@ class Author(_Entry):
 class Funding(_Entry):
     """A source of funding."""
 
-    funder: Line = Field(description="Name of the funder.")
-    funder_id: FunderId | None = Field(
-        default=None,
-        description="Identifier of the funder: of ROR (`https://ror.org/…`), or a DOI of the funder registry.",
-    )
-    award_number: Line | None = Field(default=None, description="Number of the grant.")
-    award_title: Line | None = Field(default=None, description="Title of the grant.")
-    award_url: Identifier | None = Field(default=None, description="Web address or DOI of the grant.")
+    funder: Line
+    """Name of the funder."""
+    funder_id: FunderId | None = None
+    """Identifier of the funder: of ROR (`https://ror.org/…`), or a DOI of the funder registry."""
+    award_number: Line | None = None
+    """Number of the grant."""
+    award_title: Line | None = None
+    """Title of the grant."""
+    award_url: Identifier | None = None
+    """Web address or DOI of the grant."""
 
 
 class RelatedIdentifier(_Entry):
     """A work that the deposit is related to, such as the paper that it supplements, or data that it uses."""
 
-    identifier: Identifier = Field(description="A DOI, `arXiv:…`, or a web address.")
-    relation: Literal[RELATIONS] = Field(
-        description="Relation of the deposit to the work, by DataCite's names, such as `IsSupplementTo` or `Cites`."
-    )
-    resource: Literal[RESOURCES] | None = Field(
-        default=None, description="Type of the work, by DataCite's names, such as `JournalArticle`."
-    )
+    identifier: Identifier
+    """A DOI, `arXiv:…`, or a web address."""
+    relation: Literal[RELATIONS]
+    """Relation of the deposit to the other work, by DataCite's names, such as `IsSupplementTo` or `Cites`."""
+    resource: Literal[RESOURCES] | None = None
+    """Type of the other work, by DataCite's names, such as `JournalArticle`."""
 
 
 class KnownFailure(_Entry):
     """A run with a failed check that is nevertheless published, with an explanation."""
 
-    run: Line = Field(description="The run by its name in the verdict: `study/surface/seed1/slope1/material`.")
-    reason: Prose = Field(
-        description="Explanation for readers: why it failed, and why the data are nevertheless published."
-    )
+    run: Line
+    """Name of the run in the verdict, such as `study/surface/seed1/slope1/material`."""
+    reason: Prose
+    """Explanation for readers: why the check failed, and why the data are published nevertheless."""
 
 
 class Publication(Section):
     """Metadata of a deposit. Only `publish` needs them."""
 
-    version: Version | None = Field(
-        default=None, description="Version of the data, such as `1.0.0`; needed to publish."
-    )
-    date: Date | None = Field(default=None, description="Day of publication, such as `2026-01-31`; needed to publish.")
-    authors: Annotated[list[Author], AfterValidator(distinct)] = Field(
-        default=[], description="Authors of the data; at least one is needed to publish."
-    )
-    title: Line | None = Field(default=None, description="Title of the deposit. Default: that of the campaign.")
-    summary: Prose | None = Field(default=None, description="Abstract. Default: the summary of the campaign.")
-    license: Line | None = Field(
-        default=None, description="Licence of the data, an SPDX identifier. Default: that of the campaign."
-    )
-    keywords: Annotated[list[Line], AfterValidator(distinct)] = Field(default=[], description="Keywords.")
-    funding: Annotated[list[Funding], AfterValidator(distinct)] = Field(default=[], description="Sources of funding.")
-    related_identifiers: Annotated[list[RelatedIdentifier], AfterValidator(distinct)] = Field(
-        default=[], description="Papers, data and programs that the deposit is related to."
-    )
-    doi: Doi | None = Field(default=None, description="DOI of this version, if one is reserved.")
-    communities: Annotated[list[Community], AfterValidator(distinct)] = Field(
-        default=[], description="Communities of Zenodo to which the deposit is submitted."
-    )
-    known_failures: Annotated[list[KnownFailure], AfterValidator(distinct)] = Field(
-        default=[], description="Runs with failed checks that are nevertheless published."
-    )
+    version: Version | None = None
+    """Version of the data, such as `1.0.0`; needed to publish."""
+    date: Date | None = None
+    """Day of publication, such as `2026-01-31`; needed to publish."""
+    authors: Annotated[list[Author], AfterValidator(distinct)] = []
+    """Authors of the data; at least one is needed to publish."""
+    title: Line | None = None
+    """Title of the deposit. Default: that of the campaign."""
+    summary: Prose | None = None
+    """Abstract. Default: the summary of the campaign."""
+    license: Line | None = None
+    """Licence of the data, an SPDX identifier. Default: that of the campaign."""
+    keywords: Annotated[list[Line], AfterValidator(distinct)] = []
+    """Keywords."""
+    funding: Annotated[list[Funding], AfterValidator(distinct)] = []
+    """Sources of funding."""
+    related_identifiers: Annotated[list[RelatedIdentifier], AfterValidator(distinct)] = []
+    """Papers, data and programs that the deposit is related to."""
+    doi: Doi | None = None
+    """DOI of this version, if one is reserved."""
+    communities: Annotated[list[Community], AfterValidator(distinct)] = []
+    """Communities of Zenodo to which the deposit is submitted."""
+    known_failures: Annotated[list[KnownFailure], AfterValidator(distinct)] = []
+    """Runs with failed checks that are nevertheless published."""
 
     def problems(self, campaign: Any) -> Iterator[Problem]:
         """Report known failures of runs that its `icha.configuration.campaign.Campaign` does not have."""

@@ -27,8 +27,9 @@ def json_schema() -> str:
 
 
 def _schema() -> dict:
-    # Sections have the names of the configuration.
-    return json.loads(json.dumps(Campaign.model_json_schema()).replace("MaterialSection", "Material"))
+    text = json.dumps(Campaign.model_json_schema())
+    # Sections have the names of the configuration; descriptions have no line breaks.
+    return json.loads(re.sub(r"\\n *", " ", text.replace("MaterialSection", "Material")))
 
 
 def key_tables() -> str:

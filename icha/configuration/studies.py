@@ -102,9 +102,8 @@ class Targets(Section):
         default=None,
         description=f"Contact area fractions A/A0, increasing; with asperities up to {MAX_AREA_FRACTION}.",
     )
-    mean_separations: stops(Length, decreasing) | None = Field(
-        default=None, description="Mean separations with their unit, decreasing."
-    )
+    mean_separations: stops(Length, decreasing) | None = None
+    """Mean separations with their unit, decreasing."""
 
     _check = model_validator(mode="after")(exactly_one)
 
@@ -141,10 +140,10 @@ class _OrEveryStop:
 class TurningPoint(Snapshot):
     """A state at which the path turns: exactly one of the four keys. Loads may be tensile (negative) or zero."""
 
-    reduced_pressure: number(FloatRange(most=LARGEST_REDUCED_PRESSURE)) | None = Field(
-        default=None, description="At this p/(E* h'rms)."
-    )
-    relative_load: number(NUMBER) | None = Field(default=None, description="At this p/E* = F/(E* A0).")
+    reduced_pressure: number(FloatRange(most=LARGEST_REDUCED_PRESSURE)) | None = None
+    """At this p/(E* h'rms)."""
+    relative_load: number(NUMBER) | None = None
+    """At this p/E* = F/(E* A0)."""
 
 
 # Names and descriptions of the parameters that a study may vary: all but files and sections.
@@ -168,7 +167,7 @@ Scalar = Annotated[Any, AfterValidator(scalar), WithJsonSchema(SCALAR_SCHEMA)]
 Case = _section_of_scalars(
     "Case",
     Scalar,
-    "An entry of an explicit list of runs. Keys that it lacks take the values of the lists of its study.",
+    "An entry of an explicit list of runs. Parameters that it does not give take all values of the lists of the study.",
     {
         "surface": (Name | None, Field(default=None, description="Name of a surface.")),
         "seed": (Seed | None, Field(default=None, description="Seed of the random phases.")),
@@ -181,62 +180,44 @@ Case = _section_of_scalars(
 class Study(Section):
     """All combinations of surfaces, seeds, slopes and materials, along one loading path."""
 
-    surfaces: list_of_names("Names of surfaces.") = Field(default=[], description="Names of surfaces.")
-    seeds: Seeds = Field(
-        default=[1],
-        description="Seeds of the random phases: a list, or a range such as `1..50`. Surfaces from a file have no "
-        "seeds and are used once.",
-    )
-    rms_slopes: Slopes = Field(
-        default=[],
-        description="Rms slopes h'rms to which the heights of each topography are scaled; `measured` is the slope of a "
-        "topography from a file.",
-    )
-    materials: list_of_names("Names of materials.") = Field(default=[], description="Names of materials.")
-    vary: Vary | None = Field(
-        default=None,
-        description="Other values of parameters of the surfaces and materials in this study, in all combinations.",
-    )
-    zip: list[Annotated[list[Text], Field(min_length=2)]] = Field(
-        default=[],
-        description="Groups of lists whose entries are combined one by one (first with first, second with second), "
-        "instead of in all combinations: `[[rms_slopes, surface_energy]]`.",
-    )
-    cases: Annotated[list[Case], Field(min_length=1)] | None = Field(
-        default=None,
-        description="An explicit list of runs instead of all combinations. Keys that a case lacks take the values of "
-        "the lists of the study.",
-    )
-    models: Annotated[list[Literal[tuple(MODELS)]], Field(min_length=1), AfterValidator(distinct)] = Field(
-        default=[DEFAULT_MODEL],
-        description="Contact models of every run: `asperities`, which are fast, and `boundary_elements` in the limit "
-        "of a short range of attraction, which need a periodic surface and a grid of at least 4 cells (better "
-        "8) per shortest wavelength.",
-    )
-    targets: Targets = Field(description="Targets of the loading path.")
+    surfaces: list_of_names() = []
+    """Names of surfaces."""
+    seeds: Seeds = [1]
+    """Seeds of the random phases: a list, or a range such as `1..50`. Surfaces from a file have no seeds and are used
+    once."""
+    rms_slopes: Slopes = []
+    """Rms slopes h'rms to which the heights of each topography are scaled. `measured` stands for the slope that the
+    topography has in its file."""
+    materials: list_of_names() = []
+    """Names of materials."""
+    vary: Vary | None = None
+    """Other values of parameters of the surfaces and materials in this study, in all combinations."""
+    zip: list[Annotated[list[Text], Field(min_length=2)]] = []
+    """Groups of lists that are combined one by one (the first entry with the first, the second with the second) instead
+    of in all combinations: `[[rms_slopes, surface_energy]]`."""
+    cases: Annotated[list[Case], Field(min_length=1)] | None = None
+    """An explicit list of runs instead of all combinations. Parameters that a case does not give take all values of the
+    lists of the study."""
+    models: Annotated[list[Literal[tuple(MODELS)]], Field(min_length=1), AfterValidator(distinct)] = [DEFAULT_MODEL]
+    """Contact models of every run: `asperities`, which are fast, and `boundary_elements` in the limit of a short range
+    of attraction, which need a periodic surface and a grid of at least 4 cells (better 8) per shortest wavelength."""
+    targets: Targets
+    """Targets of the loading path."""
     snapshots: (
         Annotated[list[Snapshot], AfterValidator(distinct), WrapValidator(_list_or_word), _OrEveryStop()] | None
-    ) = Field(
-        default=None,
-        description="States whose spots and distributions are saved; each is reached exactly. `every_stop`: all "
-        "targets. Default: the last target.",
-    )
-    unload: Flag = Field(
-        default=False, description="Whether to unload after loading, until the surfaces no longer touch."
-    )
-    turning_points: list[TurningPoint] = Field(
-        default=[],
-        description="States at which the path turns after its last target: the first ends unloading, the second ends "
-        "the next loading, and so on.",
-    )
-    control: Literal["separation", "load"] = Field(
-        default="separation",
-        description="Imposed quantity: the mean separation or the load. Under load control the state jumps where the "
-        "curve turns back, and all targets and turning points must be loads.",
-    )
-    max_step: number(STEP) = Field(
-        default=DEFAULT_STEP, description="Largest change of mean separation between two equilibria, in units of h_rms."
-    )
+    ) = None
+    """States at which the run saves its spots and distributions. The path reaches each of these states exactly.
+    `every_stop`: all targets. Default: the last target."""
+    unload: Flag = False
+    """Whether to unload after loading, until the surfaces no longer touch."""
+    turning_points: list[TurningPoint] = []
+    """States at which the path turns after its last target: the first ends unloading, the second ends the next loading,
+    and so on."""
+    control: Literal["separation", "load"] = "separation"
+    """Quantity that is imposed: the mean separation or the load. Under load control the state jumps where the curve of
+    load against separation turns back; all targets and turning points must then be loads."""
+    max_step: number(STEP) = DEFAULT_STEP
+    """Largest change of mean separation between two equilibria, in units of h_rms."""
 
     @property
     def own_snapshots(self) -> list[tuple[str, float]]:

@@ -28,18 +28,16 @@ class MaterialSection(Section):
 
     model_config = ConfigDict(title="Material")
 
-    contact_modulus: Modulus = Field(description="Composite elastic modulus E*.")
-    surface_energy: SurfaceEnergy = Field(description="Energy of adhesion Δγ per area; `0 J/m^2` is adhesionless.")
-    interaction_range: Length = Field(
-        description="Range ε of the attraction, which sets the separation at which asperities jump into contact. The "
-        "Tabor parameter of a surface with rms curvature 1/R is μ = (RΔγ²/E*²)^(1/3)/ε."
-    )
-    flaw_radius: Length | None = Field(
-        default=None,
-        description="Radius a of the largest flaw of the interface. Full contact then opens at √(πE*Δγ/(2a)), the "
-        "tension at which a penny-shaped crack grows, if this is less than the theoretical strength 1.03 Δγ/ε. "
-        "Default: no flaw.",
-    )
+    contact_modulus: Modulus
+    """Composite elastic modulus E*."""
+    surface_energy: SurfaceEnergy
+    """Energy of adhesion Δγ per area; `0 J/m^2` is adhesionless."""
+    interaction_range: Length
+    """Range ε of the attraction, which sets the separation at which asperities jump into contact. The Tabor parameter
+    of a surface with rms curvature 1/R is μ = (RΔγ²/E*²)^(1/3)/ε."""
+    flaw_radius: Length | None = None
+    """Radius a of the largest flaw of the interface. Full contact then opens at √(πE*Δγ/(2a)), the tension at which a
+    penny-shaped crack grows, if this is less than the theoretical strength 1.03 Δγ/ε. Default: no flaw."""
 
 
 def _unit_of_length(value: Any) -> float:
@@ -82,9 +80,12 @@ Sides = Annotated[tuple[float, float], BeforeValidator(_sides), WithJsonSchema(_
 class Crop(Section):
     """The square to cut out of a scan."""
 
-    x: Position = Field(description="Distance of the left edge of the square from that of the scan.")
-    y: Position = Field(description="Distance of the first row of the square from that of the scan.")
-    side: Length = Field(description="Side of the square.")
+    x: Position
+    """Distance between the left edges of the square and of the scan."""
+    y: Position
+    """Distance between the first rows of the square and of the scan."""
+    side: Length
+    """Side of the square."""
 
     def __repr__(self):
         """Describe the square for messages."""
@@ -99,81 +100,57 @@ class MeasuredSurface(Section):
     # The waves of a file are not known.
     cells_per_short_wave: ClassVar[float] = math.inf
 
-    kind: Literal["measured"] = Field(description="A topography from a measurement.")
-    path: File = Field(description="File of the topography, relative to the configuration file.")
-    format: Literal["auto", "npy", "netcdf", "matrix", "xyz", "hdf5", "fourier", "instrument"] = Field(
-        default="auto",
-        description="Format of the file: `npy`; `netcdf`; `matrix` (text, a row of heights per line); `xyz` (text, x y "
-        "z per line in any order); `hdf5`; `fourier` (text, qx qy Re Im per line); `instrument` (a format "
-        "of a microscope that SurfaceTopography can read). `auto` chooses by the ending of the file name "
-        "and, for text, by the number of columns.",
-    )
-    columns: Annotated[list[integer(IntegerRange(1))], Field(min_length=3, max_length=3)] | None = Field(
-        default=None,
-        description="Columns of a text with x, y and z, counted from 1, such as `[1, 2, 3]`. Needed if a line has more "
-        "than three numbers.",
-    )
-    data: Text | None = Field(
-        default=None,
-        description="Data to use if the file has several: name of the variable (netcdf), path of the dataset (hdf5), "
-        "name of the channel (instrument). Default: the only one, or the default of the file.",
-    )
-    first_axis: Literal["y", "x"] = Field(
-        default="y",
-        description="First axis of the array in npy, netcdf, hdf5 and matrix files: `y` if a row is a line along x, "
-        "else `x`. Not used if the dimensions in the file are named x and y.",
-    )
-    height_unit: UnitOfLength | None = Field(
-        default=None,
-        description="Unit of the heights, such as `nm` or `0.1 mm`. Needed unless the file has it; replaces that of "
-        "the file.",
-    )
-    lateral_unit: UnitOfLength | None = Field(
-        default=None,
-        description="Unit of the coordinates x and y; for fourier, of 1/q. Default: that of the file, else the unit of "
-        "the heights.",
-    )
-    size: Sides | None = Field(
-        default=None,
-        description="Size of the whole scan: one length, or two, along x and y. The size of a pixel is this divided by "
-        "the number of pixels. Needed unless the file has it; replaces that of the file.",
-    )
-    touches_first: Literal["high", "low"] = Field(
-        default="high",
-        description="Points that touch first: those with the largest numbers in the file (`high`), or with the "
-        "smallest (`low`).",
-    )
-    missing: Literal["refuse", "fill"] = Field(
-        default="refuse",
-        description="Treatment of points without a height: `refuse` the file, or `fill` them with the solution of "
-        "Laplace's equation.",
-    )
-    crop: Crop | None = Field(default=None, description="The square to use. Default: the largest one, in the middle.")
-    detrend: Literal["none", "tilt", "curvature"] | None = Field(
-        default=None,
-        description="Trend to remove besides the mean height: `none`, the mean plane (`tilt`), or the best paraboloid "
-        "(`curvature`). Default: `tilt`, or `none` for a periodic topography.",
-    )
-    cutoff: Length | None = Field(
-        default=None,
-        description="Cut-off wavelength: nesting index of a Gaussian S-filter (ISO 25178-3, areal filter of ISO "
-        "16610-61), which removes shorter waves before the edges are treated and halves waves of this length. At least "
-        "4 pixels. Default: no filter.",
-    )
-    boundary: Literal["periodic", "window", "mirror", "free"] = Field(
-        description="Treatment of the edges. `periodic`: the topography repeats as it is. `window`: its heights fall "
-        "smoothly to their mean towards the edges, and it repeats. `mirror`: the topography and its mirror images form "
-        "a periodic cell of twice the side. `free`: one square on a half-space that extends beyond it."
-    )
-    taper: number(FloatRange(above=0, most=0.5)) | None = Field(
-        default=None,
-        description="With `window`: fraction of the side, at each edge, over which heights fall. Default: 0.1.",
-    )
-    grid: integer(GRID) | None = Field(
-        default=None,
-        description="Nodes along a side of the prepared surface, which is resampled by Fourier interpolation; a "
-        "coarser grid loses the shortest waves. Default: as many as the scan has (`mirror`: twice as many).",
-    )
+    kind: Literal["measured"]
+    """A topography from a measurement."""
+    path: File
+    """File of the topography, relative to the configuration file."""
+    format: Literal["auto", "npy", "netcdf", "matrix", "xyz", "hdf5", "fourier", "instrument"] = "auto"
+    """Format of the file: `npy`; `netcdf`; `matrix` (text, a row of heights per line); `xyz` (text, x y z per line in
+    any order); `hdf5`; `fourier` (text, qx qy Re Im per line); `instrument` (a format of a microscope that
+    SurfaceTopography can read). `auto` chooses by the ending of the file name and, for text, by the number of
+    columns."""
+    columns: Annotated[list[integer(IntegerRange(1))], Field(min_length=3, max_length=3)] | None = None
+    """Columns of a text with x, y and z, counted from 1, such as `[1, 2, 3]`. Needed if a line has more than three
+    numbers."""
+    data: Text | None = None
+    """Array or channel to use if the file has several: name of the variable (netcdf), path of the dataset (hdf5), name
+    of the channel (instrument). Default: the only one, or the default of the file."""
+    first_axis: Literal["y", "x"] = "y"
+    """First axis of the array in npy, netcdf, hdf5 and matrix files: `y` if a row of the array is a line along x, else
+    `x`. ICHA ignores this key if the dimensions in the file are named x and y."""
+    height_unit: UnitOfLength | None = None
+    """Unit of the heights, such as `nm` or `0.1 mm`. Needed unless the file states it. It takes precedence over the
+    unit in the file."""
+    lateral_unit: UnitOfLength | None = None
+    """Unit of the coordinates x and y; with `format: fourier`, unit of 1/q. Default: the unit in the file, else the
+    unit of the heights."""
+    size: Sides | None = None
+    """Size of the whole scan: one length, or two lengths, along x and y. The pixel size is the size of the scan divided
+    by the number of pixels. Needed unless the file states the size. It takes precedence over the size in the file."""
+    touches_first: Literal["high", "low"] = "high"
+    """Points that touch first: those with the largest numbers in the file (`high`), or with the smallest (`low`)."""
+    missing: Literal["refuse", "fill"] = "refuse"
+    """Treatment of points without a height: `refuse` the file, or `fill` them with the solution of Laplace's
+    equation."""
+    crop: Crop | None = None
+    """The square to use. Default: the largest one, in the middle."""
+    detrend: Literal["none", "tilt", "curvature"] | None = None
+    """Trend to remove besides the mean height: `none`, the mean plane (`tilt`), or the best paraboloid (`curvature`).
+    Default: `tilt`, or `none` for a periodic topography."""
+    cutoff: Length | None = None
+    """Cut-off wavelength (nesting index) of a Gaussian S-filter (ISO 25178-3, areal filter of ISO 16610-61). The filter
+    removes shorter waves and halves the amplitude of waves of this length, before the edges are treated. At least 4
+    pixels. Default: no filter."""
+    boundary: Literal["periodic", "window", "mirror", "free"]
+    """Treatment of the edges. `periodic`: the topography repeats as it is. `window`: the heights fall smoothly to their
+    mean towards the edges, and the topography repeats. `mirror`: the topography and its mirror images form a periodic
+    cell of twice the side. `free`: one square on a half-space that extends beyond the square."""
+    taper: number(FloatRange(above=0, most=0.5)) | None = None
+    """With `boundary: window`: width of the strip along each edge in which the heights fall to their mean, as a
+    fraction of the side. Default: 0.1."""
+    grid: integer(GRID) | None = None
+    """Nodes along a side of the prepared surface, which is resampled by Fourier interpolation. A coarser grid loses the
+    shortest waves. Default: as many nodes as the scan has (`mirror`: twice as many)."""
 
     @model_validator(mode="after")
     def _check_boundary(self):
@@ -210,22 +187,22 @@ class SelfAffineSurface(Section):
 
     random: ClassVar[bool] = True
 
-    kind: Literal["self_affine"] = Field(description="A random surface with a self-affine spectrum.")
-    period: Length = Field(description="Side L of the periodic cell.")
-    rolloff_wavelength: Length = Field(
-        description="Roll-off wavelength 2π/q0: the spectrum is flat at longer wavelengths. At most the period."
-    )
-    short_wavelength: Length = Field(
-        description="Short cut-off 2π/q1: the shortest wavelength. Less than the roll-off wavelength; at least 2 grid "
-        "cells (fewer are an error), better 4 (fewer give a warning) or 8."
-    )
-    hurst: number(HURST) = Field(description="Hurst exponent H, in (0, 1].")
-    grid: integer(GRID) = Field(description="Grid points along a side of the cell.")
-    amplitudes: Literal["fixed", "gaussian"] = Field(
-        default="fixed",
-        description="Amplitudes of the waves: `fixed` by the spectrum, so that all seeds have the same rms height and "
-        "slope, or `gaussian`, random with the spectrum as their mean square.",
-    )
+    kind: Literal["self_affine"]
+    """A random surface with a self-affine spectrum."""
+    period: Length
+    """Side L of the periodic cell."""
+    rolloff_wavelength: Length
+    """Roll-off wavelength 2π/q0: the spectrum is flat at longer wavelengths. At most the period."""
+    short_wavelength: Length
+    """Shortest wavelength 2π/q1. It must be less than the roll-off wavelength and at least 2 grid cells. Less than 4
+    grid cells give a warning; 8 are recommended."""
+    hurst: number(HURST)
+    """Hurst exponent H, in (0, 1]."""
+    grid: integer(GRID)
+    """Grid points along a side of the cell."""
+    amplitudes: Literal["fixed", "gaussian"] = "fixed"
+    """Amplitudes of the waves: `fixed` by the spectrum, so that all seeds have the same rms height and slope, or
+    `gaussian`, random with the spectrum as their mean square."""
 
     @property
     def lengths_and_hurst(self) -> tuple[float, float, float, float]:
@@ -269,15 +246,15 @@ class FileSurface(Section):
     # The waves of a file are not known.
     cells_per_short_wave: ClassVar[float] = math.inf
 
-    kind: Literal["file"] = Field(description="A height map from a file.")
-    path: File = Field(
-        description="File of a square array of heights, first axis y: `.npy`, or netCDF (`.nc`) with a "
-        "variable `height`; relative to the configuration file. Heights are positive towards the elastic body."
-    )
-    height_unit: UnitOfLength = Field(
-        description="Unit of the heights in the file, such as `um`. All studies scale the heights to their rms slopes."
-    )
-    period: Length = Field(description="Side L of the periodic cell.")
+    kind: Literal["file"]
+    """A height map from a file."""
+    path: File
+    """File of a square array of heights, first axis y: `.npy`, or netCDF (`.nc`) with a variable `height`; relative to
+    the configuration file. Heights are positive towards the elastic body."""
+    height_unit: UnitOfLength
+    """Unit of the heights in the file, such as `um`. Each study scales the heights to its rms slopes."""
+    period: Length
+    """Side L of the periodic cell."""
 
 
 # Models of surfaces by their key `kind`.

@@ -13,7 +13,6 @@ from requests.adapters import HTTPAdapter
 from urllib3 import Retry
 
 ZENODO = "https://zenodo.org"
-SANDBOX = "https://sandbox.zenodo.org"
 # Longest wait for the connection, and for an answer, in s; the server computes checksums of large files.
 _TIMEOUT = (20, 900)
 # HTTP statuses of a server that is busy or has failed.

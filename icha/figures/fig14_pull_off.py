@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 class PullOffFigure(StudyFigure):
     """A figure of the pull-off of all runs of some studies."""
 
-    load_studies: list_of_names("Studies that differ in their largest load.") | None = Field(
+    load_studies: list_of_names() | None = Field(
         default=None, description="Names of studies that differ in their largest load, for a second panel."
     )
 

@@ -23,7 +23,8 @@ if TYPE_CHECKING:
 class LossFigure(FigureOptions):
     """A figure of the energy lost in the runs of some studies."""
 
-    studies: list_of_names("Studies that are drawn; lines join those that differ only in their largest load.")
+    studies: list_of_names()
+    """Studies that are drawn; lines join those that differ only in their largest load."""
 
     def studies_of(self, campaign: Campaign) -> tuple[str, ...]:
         """Return all studies."""

@@ -7,7 +7,7 @@ short-ranged half is summed pairwise.
 
 A square on a free half-space is not loaded outside the square. The square is put into a periodic cell of twice its
 side. In this cell two points of the square are closer to each other than to any image. The displacement by images and
-counter-pressure is subtracted again (`icha.half_space.free_square`), so that the plain sum of F/(pi E* r) remains.
+counter-pressure is subtracted (`icha.half_space.free_square`), so that the sum of F/(pi E* r) over the square remains.
 """
 
 from __future__ import annotations
@@ -21,16 +21,16 @@ import scipy.sparse
 from scipy.spatial import cKDTree
 from scipy.special import erf, erfc
 
-from icha.half_space.free_square import basis, image_field, interpolated
+from icha.half_space.free_square import basis, image_field
 from icha.surfaces.square import cell_of, periodic_difference
 
 # Value of alpha r at which both halves of the Ewald sum are cut off, erfc(4.3) = 1.2e-9, and tolerance of the FFTs.
 _CUT = 4.3
 _NUFFT_TOLERANCE = 1e-9
-# The same for the operator of a linear solve, which need not be accurate: erfc(2.75) = 1e-4.
+# The same for the approximate operator of a linear solve: erfc(2.75) = 1e-4.
 _LOOSE_CUT = 2.75
 _LOOSE_NUFFT_TOLERANCE = 1e-4
-# Number of points within the near field if its pairs serve many sums, and if they serve one.
+# Number of points within the near field if its pairs are used in many sums, and if they are used once.
 NEIGHBOURS = 60
 NEIGHBOURS_ONCE = 20
 # Distance, in mean spacings of the points, below which the fields of the moments are constant. They are singular at
@@ -155,7 +155,8 @@ class Ewald:
     def image_displacement(self, sources, targets, moments):
         """Return the displacement (n,) at the targets by the images of the sources; both given by their `bases`."""
         field = image_field(*sources, moments, self.period, self.contact_modulus)
-        return interpolated(field, *targets)
+        by, bx = targets
+        return np.einsum("ia,ia->i", by @ field, bx)
 
     @cached_property
     def alpha(self):

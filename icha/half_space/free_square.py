@@ -52,11 +52,6 @@ def image_field(by, bx, moments, cell: float, contact_modulus: float) -> np.ndar
     return field / (np.pi * contact_modulus * cell)
 
 
-def interpolated(field, by, bx) -> np.ndarray:
-    """Interpolate a field of `image_field` to points with the bases by, bx: (n,)."""
-    return np.einsum("ia,ia->i", by @ field, bx)
-
-
 @lru_cache(maxsize=1)
 def _chebyshev():
     """Return the nodes in [0, 1/2], the barycentric weights, and the matrix of the second derivative."""

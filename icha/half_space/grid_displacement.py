@@ -1,10 +1,10 @@
 """Displacement of the half-space at all nodes of a grid, and the nodes around every spot.
 
 The sum over spots and images is split as in `icha.half_space.ewald`: a smooth half by its Fourier series, and a
-short-ranged half in a window around every spot. The displacement is needed at every node, so the time depends on the
-total area of the windows. More moments of the pressure make the windows smaller: four moments represent a spot beyond
-five radii. In return, the smooth half of a large spot must be smooth on the scale of that spot. So spots of similar
-size form groups, and every group has a Fourier series of its own length.
+short-ranged half in a window around every spot. The time depends on the total area of the windows, since the
+displacement is needed at every node. Four moments of the pressure represent a spot beyond five radii, which makes the
+windows small. But the smooth half of a large spot must be smooth on the scale of that spot. So spots of similar size
+form groups, and every group has a Fourier series of its own length.
 
 With the moments M_k = integral of p r^(2k) / (4^k k!^2) a spot displaces points far away by the sum over k of
 M_k Lap^k (1/(pi E* r)). Its Fourier transform is that of a point with the sum of M_k (-q^2)^k in place of its force.

@@ -1,10 +1,10 @@
 """Elastic interaction of contact spots: the displacement at each by all others and all images, the sum of eq. (4).
 
-A spot is not a point. Within eight of its radii its exact displacement is used. Farther away its axisymmetric pressure
-acts by its moments, the integrals of p s^(2k) (k = 0, 1, 2) with the weights 1, 1/4 and 9/64, whose fields fall as 1/r,
-1/r^3 and 1/r^5. The third one matters only where the field is summed pairwise. Images farther than half the cell act by
-the first two. What depends on the positions alone is computed once (`icha.half_space.ewald`); this is nearly
-everything. Only the pairs with exact displacement follow the radii.
+Within eight radii of a spot its exact displacement is used. Farther away, the moments of its axisymmetric pressure
+represent the spot: the integrals of p s^(2k) (k = 0, 1, 2) with the weights 1, 1/4 and 9/64, whose fields fall as 1/r,
+1/r^3 and 1/r^5. The third moment is used only in pairwise sums. Images farther than half the cell act by the first two
+moments. `icha.half_space.ewald` computes once what depends on the positions alone, which is nearly everything. Only the
+pairs with exact displacement depend on the radii.
 """
 
 from __future__ import annotations

@@ -119,12 +119,12 @@ class Cost:
 
 
 def job_threads(grid: int) -> int:
-    """Cores of a job of a surface: two on a grid so large that they pay, otherwise one."""
+    """Return the number of cores of each job of a surface: two on large grids, where this saves time, otherwise one."""
     return 2 if grid >= LARGE_GRID else 1
 
 
 def _memory_before(grid):
-    """Memory of the job of a surface before its work, bytes; only jobs of one core are forks."""
+    """Memory of the job of a surface before its work, bytes. Only jobs of one core are forks of a common process."""
     return WORKFLOW.program if job_threads(grid) > 1 else WORKFLOW.forked
 
 
@@ -138,7 +138,7 @@ def surface_cost(grid: int) -> Cost:
 
 
 def spots(summits: float, load: float) -> float:
-    """Return number of spots at a reduced pressure, to a factor of two for surfaces of 10 to 200 000 summits."""
+    """Estimate the number of spots at a reduced pressure, to a factor of two for 10 to 200 000 summits."""
     return max(1.0, summits * min(0.6, math.sqrt(load)))
 
 
@@ -257,7 +257,7 @@ def derived_cost(kind: str, runs: int, disk: float, values: float = 0.0, *, node
 def correction(pairs: Sequence[tuple[float, float]]) -> float:
     """Factor on the expected times of jobs, from pairs (expected, measured) of jobs of the same kind.
 
-    It is the median ratio, closer to 1 for few pairs, and 1 without any.
+    The factor is the median of measured over expected times. Few pairs move it towards 1; without pairs it is 1.
     """
     if not pairs:
         return 1.0

@@ -76,7 +76,33 @@ def plan(campaign: Campaign, results: Path) -> list[Item]:
     campaign : the campaign.
     results : its folder of results, whose benchmarks calibrate the expected times for this machine.
     """
-    return list(_calibrate(_items(campaign, results), results))
+    items = _items(campaign, results)
+    kinds: dict[str, list[Item]] = {}
+    for item in items:
+        kinds.setdefault(_kind(item), []).append(item)
+    factors = {kind: _correction(members, results) for kind, members in kinds.items()}
+    return [replace(item, cost=replace(item.cost, seconds=item.cost.seconds * factors[_kind(item)])) for item in items]
+
+
+def _kind(item: Item) -> str:
+    """Return the name of the jobs that take similar times: a study, or a part and a folder of results."""
+    return item.part if item.part.startswith("study ") else item.path.split("/")[0] + item.part
+
+
+def _correction(items: list[Item], results: Path) -> float:
+    """Return the factor on the expected times of jobs of one kind, from the measured times of completed ones."""
+    done = [item for item in items if item.state in (DONE, FAILED)]
+    measured = [(item.cost.seconds, _benchmark(results, item)) for item in done[:: max(1, len(done) // _SAMPLE)]]
+    return costs.correction([(expected, seconds) for expected, seconds in measured if seconds])
+
+
+def _benchmark(results: Path, item: Item) -> float | None:
+    """Time of the last job of a file, s; None if it is unknown."""
+    try:
+        lines = (results / job_file(item.path, "benchmarks", ".jsonl")).read_text(encoding="utf-8").splitlines()
+        return float(json.loads(lines[-1])["s"])
+    except (OSError, ValueError, KeyError, IndexError, TypeError):
+        return None
 
 
 def _items(campaign, results) -> list[Item]:
@@ -165,16 +191,11 @@ def _cost_parameters(settings, rms_slope) -> dict:
     """Arguments of `run_cost` from the settings of a run."""
     path, snapshots = settings["path"], settings["path"]["snapshots"]
     # Estimates of the reduced pressure: half of an area fraction; a guess for separations.
-    loads = {
-        "reduced_pressure": lambda value: value,
-        "relative_load": lambda value: value / rms_slope,
-        "area_fraction": lambda value: value / 2,
-        "mean_separation": lambda value: _UNKNOWN_LOAD,
-    }
-    stops = {(kind, value) for kind in loads for value in path.get(f"{kind}s") or ()}
+    factors = {"reduced_pressure": 1, "relative_load": 1 / rms_slope, "area_fraction": 1 / 2, "mean_separation": 0}
+    stops = {(kind, value) for kind in factors for value in path.get(f"{kind}s") or ()}
     stops |= {tuple(snapshot) for snapshot in snapshots or ()}
     return {
-        "load": max(loads[kind](value) for kind, value in stops),
+        "load": max(value * factors[kind] or _UNKNOWN_LOAD for kind, value in stops),
         "stops": len(stops),
         "snapshots": 1 if snapshots is None else len(snapshots),
         "adhesive": settings["material"]["surface_energy"] > 0,
@@ -236,33 +257,6 @@ def whole_cost(campaign: Campaign, results: Path) -> costs.Cost:
     return costs.Cost(time_on(items, 1), memory_on(items, 1), total(items).disk)
 
 
-def _calibrate(items: list[Item], results: Path) -> Iterator[Item]:
-    """Scale the times of items by the measured times of completed jobs of the same kind."""
-    kinds: dict[str, list[Item]] = {}
-    for item in items:
-        kinds.setdefault(_kind(item), []).append(item)
-    factors = {}
-    for kind, members in kinds.items():
-        done = [item for item in members if item.state in (DONE, FAILED)]
-        measured = [(item, _benchmark(results, item)) for item in done[:: max(1, len(done) // _SAMPLE)]]
-        factors[kind] = costs.correction([(item.cost.seconds, seconds) for item, seconds in measured if seconds])
-    for item in items:
-        yield replace(item, cost=replace(item.cost, seconds=item.cost.seconds * factors[_kind(item)]))
-
-
-def _kind(item):
-    return item.part if item.part.startswith("study ") else item.path.split("/")[0] + item.part
-
-
-def _benchmark(results: Path, item: Item) -> float | None:
-    """Time of the last job of a file, s; None if it is unknown."""
-    try:
-        lines = (results / job_file(item.path, "benchmarks", ".jsonl")).read_text(encoding="utf-8").splitlines()
-        return float(json.loads(lines[-1])["s"])
-    except (OSError, ValueError, KeyError, IndexError, TypeError):
-        return None
-
-
 @dataclass(frozen=True)
 class Total:
     """Totals of several items.
@@ -271,7 +265,6 @@ class Total:
     ----------
     count, done, failed, to_do : numbers of items, of all and by state.
     work : of items to do, core-seconds.
-    longest : longest job to do, s.
     memory : of the largest job, bytes.
     disk : of all files, bytes.
     typical : median time of a job, s.
@@ -282,7 +275,6 @@ class Total:
     failed: int
     to_do: int
     work: float
-    longest: float
     memory: float
     disk: float
     typical: float
@@ -298,7 +290,6 @@ def total(items: Iterable[Item]) -> Total:
         sum(item.state == FAILED for item in items),
         len(left),
         sum(item.cost.seconds * item.threads for item in left),
-        max((item.cost.seconds for item in left), default=0.0),
         max((item.cost.memory for item in items), default=0.0),
         sum(item.cost.disk for item in items),
         statistics.median(item.cost.seconds for item in items) if items else 0.0,
@@ -306,7 +297,7 @@ def total(items: Iterable[Item]) -> Total:
 
 
 def time_on(items: Iterable[Item], cores: int) -> float:
-    """Return expected time from the call to the end on some cores, s; 0 if nothing is to be done.
+    """Return the expected time from the call to the end on some cores, s; 0 if nothing is to be done.
 
     The work of a stage is divided among the cores, but takes at least the time of its longest job, and that of
     scheduling all its jobs one by one.
@@ -314,9 +305,10 @@ def time_on(items: Iterable[Item], cores: int) -> float:
     items = list(items)
     seconds = start_up(items)
     for stage in {item.stage for item in items}:
-        sums = total(item for item in items if item.stage == stage)
-        scheduling = WORKFLOW.job * sums.to_do
-        seconds += max((sums.work + scheduling) / cores, sums.longest, scheduling)
+        left = [item for item in items if item.stage == stage and item.to_do]
+        scheduling = WORKFLOW.job * len(left)
+        longest = max((item.cost.seconds for item in left), default=0.0)
+        seconds += max((total(left).work + scheduling) / cores, longest, scheduling)
     return seconds
 
 

@@ -91,40 +91,31 @@ def free_disk(folder: Path) -> int:
     return shutil.disk_usage(existing).free
 
 
-def _memory_shortage(items, cores, available, most):
-    """Describe the missing memory if parallel jobs need more than is available; `most`: their limit together, bytes."""
-    needed = memory_on(items, cores, most)
-    if needed <= available:
-        return None
-    message = (
-        f"about {formatting.size(needed)} of memory are needed on {format_count(cores, 'core')}, and this machine has "
-        f"{formatting.size(available)}"
-    )
-    for fewer in range(cores - 1, 0, -1):
-        if (less := memory_on(items, fewer, most)) <= available:
-            return f"{message}; --cores {fewer} needs {formatting.size(less)}"
-    return message
-
-
-def _disk_shortage(items, results, available):
-    """Describe that the results need more disk space than is available."""
-    needed = sum(item.cost.disk for item in items if item.to_do)
-    if needed <= available:
-        return None
-    return (
-        f"about {formatting.size(needed)} of disk are needed for {results}, and {formatting.size(available)} are free "
-        "there; free some space, or work in another folder: --directory FOLDER"
-    )
-
-
 def find_shortages(items: Collection[Item], cores: int, results: Path, profile: Mapping) -> list[str]:
     """Describe the memory or disk space that this machine lacks for the remaining jobs.
 
     `profile` holds the settings of a profile of Snakemake: the executor, and the memory that jobs may take together.
     """
-    shortages = [_disk_shortage(items, results, free_disk(results))]
-    if profile.get("executor", "local") in ("local", "icha"):
-        limits = [str(each).partition("=") for each in profile.get("resources") or ()]
-        most = next((1e6 * float(value) for name, _, value in limits if name == "mem_mb"), math.inf)
-        shortages.append(_memory_shortage(items, cores, memory_of_machine(), most))
-    return [shortage for shortage in shortages if shortage]
+    shortages = []
+    disk, free = sum(item.cost.disk for item in items if item.to_do), free_disk(results)
+    if disk > free:
+        shortages.append(
+            f"about {formatting.size(disk)} of disk are needed for {results}, and {formatting.size(free)} are free "
+            "there; free some space, or work in another folder: --directory FOLDER"
+        )
+    if profile.get("executor", "local") not in ("local", "icha"):
+        return shortages
+    limits = [str(each).partition("=") for each in profile.get("resources") or ()]
+    most = next((1e6 * float(value) for name, _, value in limits if name == "mem_mb"), math.inf)
+    available = memory_of_machine()
+    if (needed := memory_on(items, cores, most)) > available:
+        message = (
+            f"about {formatting.size(needed)} of memory are needed on {format_count(cores, 'core')}, and this machine "
+            f"has {formatting.size(available)}"
+        )
+        for fewer in range(cores - 1, 0, -1):
+            if (less := memory_on(items, fewer, most)) <= available:
+                message += f"; --cores {fewer} needs {formatting.size(less)}"
+                break
+        shortages.append(message)
+    return shortages

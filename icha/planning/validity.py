@@ -24,7 +24,8 @@ from icha.boundary_elements.front import Front
 from icha.configuration.campaign import Campaign
 from icha.configuration.cases import run_cases
 from icha.configuration.plausibility import energy_ratio
-from icha.configuration.surfaces import MeasuredSurface, SelfAffineSurface
+from icha.configuration.surfaces import SelfAffineSurface
+from icha.configuration.topographies import read_surface
 from icha.contact.models import MODELS
 from icha.surfaces.moments import (
     SpectralMoments,
@@ -80,7 +81,7 @@ def surface_facts(campaign: Campaign, name: str) -> dict[str, float]:
     else:
         from icha.surfaces.summits import locate_summits
 
-        surface = _read(section)
+        surface = read_surface(section)
         moments, (skewness, kurtosis) = spectral_moments(surface), height_statistics(surface)
         anisotropy, free, grid = slope_anisotropy(surface), surface.free, surface.grid
         found = locate_summits(surface)
@@ -99,18 +100,6 @@ def surface_facts(campaign: Campaign, name: str) -> dict[str, float]:
         "rms_curvature": math.sqrt(moments.m4 / (2 * moments.m2)),
         COMPLETE: complete,
     }
-
-
-def _read(section):
-    # These imports load SciPy, which campaigns without such a surface do not need.
-    if isinstance(section, MeasuredSurface):
-        from icha.surfaces.measured.topography import prepared_topography
-
-        return prepared_topography(section.path, section.preparation).surface
-    from icha.surfaces.measured.array_files import read_height_map
-    from icha.surfaces.surface import Surface
-
-    return Surface(read_height_map(section.path, section.height_unit), section.period)
 
 
 def expected_validity(campaign: Campaign) -> list[Statement]:

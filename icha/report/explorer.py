@@ -7,9 +7,11 @@ results and choices always give exactly the same file.
 from __future__ import annotations
 
 import base64
+import contextlib
 import io
 import json
 import os
+from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -41,19 +43,15 @@ LEVELS = 255  # of a picture
 CONTACT_COLOUR = (230, 0, 13)  # red, green and blue, of spots and patches
 
 
-class NothingToExplore(ValueError):
-    """Results from which no page can be made; the message gives the reason."""
-
-
 class PageSummary(NamedTuple):
     """Summary of a page.
 
     Attributes
     ----------
-    size : bytes.
+    size : size of the file, bytes.
     shown : number of contacts on the page.
-    left_out : contacts omitted because the page would be too large.
-    without_steps : contacts omitted because their runs reached no stop.
+    left_out : number of contacts omitted because the page would be too large.
+    without_steps : number of contacts omitted because their runs reached no target.
     """
 
     size: int
@@ -78,15 +76,15 @@ def write_explorer(
 
     Raises
     ------
-    NothingToExplore
-        If the campaign dataset or everything in `only` is missing, or no contact fits.
     ValueError
-        If a file cannot be read.
+        If the campaign dataset or everything in `only` is missing, no contact fits, or a file cannot be read.
     """
+    from plotly.offline import get_plotlyjs
+
     folder = Path(folder)
     campaign = read_campaign(_dataset(folder))
     contacts = _contacts(run_labels(campaign), only)
-    library = _library()
+    library = get_plotlyjs()
     room = largest * 1e6 - len(library.encode()) - len(_filled(campaign, {}, library="", largest=largest))
     included: list[dict] = []
     topographies: dict[str, dict] = {}
@@ -104,10 +102,9 @@ def write_explorer(
             break
         included.append(entry | {"topography": name})
         topographies |= new
-    if left_out and not included:
-        raise NothingToExplore(f"not even one contact fits on a page of {largest:g} MB; use a larger page")
     if not included:
-        raise NothingToExplore("no run reached a stop; there is nothing to show")
+        reason = f"not even one contact fits on a page of {largest:g} MB; use a larger page"
+        raise ValueError(reason if left_out else "no run reached a target; there is nothing to show")
     data = {"contacts": included, "topographies": topographies}
     text = _filled(campaign, data, library=library, largest=largest, left_out=left_out, without_steps=without_steps)
     with whole_file(page) as temporary:
@@ -120,24 +117,25 @@ def _dataset(folder: Path) -> Path:
     files = sorted(folder.glob(results.DATASET.format(campaign="*")))
     if len(files) != 1:
         count = f"{len(files)} campaign datasets" if files else "no campaign dataset"
-        raise NothingToExplore(f"{folder}: has {count} in dataset/; expected the results of one campaign")
+        raise ValueError(f"{folder}: has {count} in dataset/; expected the results of one campaign")
     return files[0]
 
 
 def _contacts(labels: list[RunLabels], only: Mapping[str, Collection]) -> list[list[RunLabels]]:
-    """Group runs that differ in their model only. The groups with the first seed of each contact come first."""
+    """Group runs that differ only in their model. The groups with the first seed of each contact come first."""
     for name, values in only.items():
         known = list(dict.fromkeys(getattr(run, name) for run in labels))
         if unknown := [value for value in values if value not in known]:
-            raise NothingToExplore(f"{name} {unknown[0]}: not in this campaign; expected {', '.join(map(str, known))}")
+            raise ValueError(f"{name} {unknown[0]}: not in this campaign; expected {', '.join(map(str, known))}")
     contacts: dict[tuple, list[RunLabels]] = {}
     for run in labels:
         if all(getattr(run, name) in values for name, values in only.items()):
             contacts.setdefault(run._replace(model=""), []).append(run)
-    seeds: dict[tuple, int] = {}
+    seeds: Counter = Counter()
     ranks = {}
     for contact in contacts:
-        ranks[contact] = seeds[contact._replace(seed=0)] = seeds.get(contact._replace(seed=0), -1) + 1
+        ranks[contact] = seeds[contact._replace(seed=0)]
+        seeds[contact._replace(seed=0)] += 1
     return [
         sorted(contacts[contact], key=lambda run: list(MODELS).index(run.model))
         for contact in sorted(contacts, key=ranks.get)
@@ -145,7 +143,7 @@ def _contacts(labels: list[RunLabels], only: Mapping[str, Collection]) -> list[l
 
 
 def _contact(campaign: xr.DataTree, folder: Path, labels: list[RunLabels]) -> dict | None:
-    """Return the data of a contact with all models; None if no run reached a stop."""
+    """Return the data of a contact with all models; None if no run reached a target."""
     runs = {run.model: select_run(campaign, run) for run in labels}
     entries = {
         run.model: encode_run(runs[run.model], _maps(folder, run, runs[run.model]))
@@ -161,9 +159,9 @@ def _contact(campaign: xr.DataTree, folder: Path, labels: list[RunLabels]) -> di
 
 
 def _maps(folder: Path, labels: RunLabels, run: xr.Dataset) -> list[str] | None:
-    """Return the picture of contact at every snapshot of a run with boundary elements; None without its file.
+    """Return the map of contact at every snapshot of a run with boundary elements; None if the run has no file.
 
-    Only the file of the run contains maps; its snapshots may have another order than in the campaign.
+    Only the file of the run contains maps. The order of its snapshots may differ from that in the campaign dataset.
     """
     file = folder / results.RUN.format(**path_fields(labels))
     if not MODELS[labels.model].by_cells or not file.is_file():
@@ -173,14 +171,8 @@ def _maps(folder: Path, labels: RunLabels, run: xr.Dataset) -> list[str] | None:
         return [encode_map(data["contact_map"][find_snapshot(data, *state)].values) for state in states]
 
 
-def _library() -> str:
-    from plotly.offline import get_plotlyjs
-
-    return get_plotlyjs()
-
-
 def _printable(data):
-    """Replace control characters in all texts and keys."""
+    """Escape control characters in all texts and keys of nested data."""
     if isinstance(data, dict):
         return {_printable(name): _printable(value) for name, value in data.items()}
     if isinstance(data, list):
@@ -204,9 +196,6 @@ def _filled(campaign, data, *, library, largest, left_out=0, without_steps=0) ->
         left_out=left_out and format_count(left_out, "contact"),
         without_steps=without_steps and format_count(without_steps, "contact"),
     )
-
-
-# --- data of a contact ---
 
 
 def _base64(data: bytes) -> str:
@@ -269,11 +258,13 @@ def _snapshot(run: xr.Dataset, snapshot: int, maps: Sequence[str] | None) -> dic
     visible = density > LEAST_DENSITY * density.max(initial=0)
     data = {
         "step": int(run["snapshot_step"].values[snapshot]),
-        "gap": _points(gap_densities([(run, snapshot)])),
+        "gap": ["", ""],
         "pressure": [encode_floats(pressure[visible]), encode_floats(density[visible])],
         "sizes": _points(patch_density(areas, cell)),
         "larger": _points(patches_above(areas, cell)),
     }
+    with contextlib.suppress(ValueError):  # near full contact there are too few gaps for a distribution
+        data["gap"] = _points(gap_densities([(run, snapshot)]))
     if maps is not None:
         data["map"] = maps[snapshot]
     elif not by_cells:
@@ -307,29 +298,24 @@ def encode_map(contact: np.ndarray) -> str:
 
 
 def find_partners(one: xr.Dataset, other: xr.Dataset) -> list[int]:
-    """Find, for every step of a run, the step of another run at the same state of the path, or -1 if there is none.
+    """Find, for every step of a run, the step of another run at the same state of the path; -1 if there is none.
 
-    The partner of a stop is the stop of the other run with the same target on the same leg. The partner of another
-    equilibrium is the step on the same leg with the nearest mean separation.
+    A step that reaches a target corresponds to the step of the other run at the same target on the same leg. Any other
+    step corresponds to the step on the same leg with the nearest mean separation.
 
     Parameters
     ----------
-    one, other : runs, with `step_kind`, `step_target`, `leg` and `mean_separation`.
+    one : run with `step_kind`, `step_target`, `leg` and `mean_separation`.
+    other : the other run, with the same variables.
     """
-
-    def stops(run):
-        kinds = map(str, run["step_kind"].values)
-        return list(zip(run["leg"].values.tolist(), kinds, run["step_target"].values.tolist(), strict=True))
-
-    step_of_stop = {stop: k for k, stop in enumerate(stops(other)) if stop[1] != BETWEEN}
     legs, separations = other["leg"].values, other["mean_separation"].values
+    kinds, targets = other["step_kind"].values.astype(str), other["step_target"].values
     steps = []
-    for stop, separation in zip(stops(one), one["mean_separation"].values, strict=True):
-        same_leg = np.flatnonzero(legs == stop[0])
-        if stop[1] != BETWEEN:
-            steps.append(step_of_stop.get(stop, -1))
-        elif len(same_leg):
-            steps.append(int(same_leg[np.argmin(np.abs(separations[same_leg] - separation))]))
-        else:
-            steps.append(-1)
+    columns = (one[name].values for name in ("leg", "mean_separation", "step_kind", "step_target"))
+    for leg, separation, kind, target in zip(*columns, strict=True):
+        candidates = legs == leg
+        if str(kind) != BETWEEN:
+            candidates &= (kinds == str(kind)) & (targets == target)
+        distances = np.where(candidates, np.abs(separations - separation), np.inf)
+        steps.append(int(distances.argmin()) if candidates.any() else -1)
     return steps

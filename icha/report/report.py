@@ -1,18 +1,18 @@
 """The report of a campaign: one HTML page that needs neither network nor other files.
 
 The same data always give exactly the same file. Times and memory differ from one execution to the next, so they are on
-another page, which this one embeds. Long tables contain their first rows only; all rows are in the data, to which the
-page links.
+another page, which the report embeds. Long tables contain only their first rows; the page links to the data, which
+contain all rows.
 """
 
 from __future__ import annotations
 
 import base64
-import importlib.metadata
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from importlib.metadata import version
 from pathlib import Path
 
 import xarray as xr
@@ -24,7 +24,7 @@ from icha.contact.models import MODEL_PAPER
 from icha.datasets.results import EXPLORER
 from icha.figures.captions import count_runs
 from icha.figures.registry import figure_number
-from icha.report.sections import build_provenance, draw_spectra, list_sources, summarise_errors, summarise_surface
+from icha.report.sections import draw_spectra, list_sources, summarise_errors, summarise_surface
 from icha.report.studies import summarise_study
 from icha.report.template import MOST_ROWS, write_page
 
@@ -38,9 +38,11 @@ class ReportFigure:
 
     Attributes
     ----------
-    name, caption : its name and caption.
-    png, pdf : its files.
-    studies : studies whose runs it shows.
+    name : name of the figure, such as `fig2_area_and_gap`.
+    caption : its caption.
+    png : its PNG file, which the page contains.
+    pdf : its PDF file, to which the page links.
+    studies : names of the studies whose runs it shows.
     """
 
     name: str
@@ -87,27 +89,44 @@ def write_report(
     further_software : packages that this campaign needs besides `SOFTWARE`.
     """
     link = partial(_link, Path(path).parent)
-    pictures = _pictures(figures, campaign, link)
+    checks, surfaces = list(checks), list(surfaces)
     studies = [summarise_study(campaign, name, comparison) for name in campaign.children]
-    surfaces = list(surfaces)
-    linked = {name: link(target) for name, target in files.items()}
+    totals = {
+        name: sum(study[name] for study in studies)
+        for name in ("asked", "complete", "beyond_model", "failed", "missing")
+    }
+    errors = list(model_error.children.values()) if model_error is not None else []
+    texts = ";".join(node.attrs.get("references", "") for node in [*campaign.children.values(), *errors])
     write_page(
         path,
         "report.html",
-        **_campaign_values(campaign, studies),
-        **_check_values(list(checks)),
-        **_surface_values(surfaces),
-        figures=pictures,
-        graph=build_provenance(studies, surfaces, pictures, model_error, linked, link(dataset_path)),
-        **_source_values(campaign, model_error),
+        title=campaign.attrs.get("title", "Rough contact campaign"),
+        summary=campaign.attrs.get("summary", ""),
+        attributes=campaign.attrs,
+        studies=studies,
+        totals=totals | {"not_applicable": sum(len(study["not_applicable"]) for study in studies)},
+        validity=statements_on_dataset(campaign),
+        most_rows=MOST_ROWS,
+        folded=FOLDED_ROWS,
+        paper=MODEL_PAPER.line,
+        checks=worst(checks),
+        check_count=len(checks),
+        failed=[check for check in checks if not check.passed],
+        surfaces=[summarise_surface(surface) for surface in surfaces[:MOST_ROWS]],
+        surface_count=len(surfaces),
+        sources=list_sources(surfaces),
+        spectra=draw_spectra(surfaces),
+        figures=_pictures(figures, campaign, link),
+        entries=[summarise_errors(node.to_dataset()) for node in errors],
+        references=list(dict.fromkeys(source.strip() for source in texts.split(";") if source.strip())),
         dataset=link(dataset_path),
         times=link(times_path),
         results=link(results),
         explorer=link(Path(results, EXPLORER)) if results is not None else None,
-        files=linked,
+        files={name: link(target) for name, target in files.items()},
         configuration=configuration,
         citations=citations,
-        software={name: _version(name) for name in (*SOFTWARE, *further_software)},
+        software={name: version(name) for name in (*SOFTWARE, *further_software)},
     )
 
 
@@ -116,41 +135,10 @@ def _link(folder: Path, target: str | os.PathLike | None) -> str | None:
     return None if target is None else Path(os.path.relpath(target, folder)).as_posix()
 
 
-def _campaign_values(campaign: xr.DataTree, studies: list[dict]) -> dict:
-    """Return what the page prints about the campaign as a whole."""
-    counted = ("asked", "complete", "beyond_model", "failed", "missing")
-    totals = {name: sum(study[name] for study in studies) for name in counted}
-    return {
-        "title": campaign.attrs.get("title", "Rough contact campaign"),
-        "summary": campaign.attrs.get("summary", ""),
-        "attributes": campaign.attrs,
-        "studies": studies,
-        "totals": totals | {"not_applicable": sum(len(study["not_applicable"]) for study in studies)},
-        "validity": statements_on_dataset(campaign),
-        "most_rows": MOST_ROWS,
-        "folded": FOLDED_ROWS,
-        "paper": MODEL_PAPER.line,
-    }
-
-
-def _check_values(checks: list[Check]) -> dict:
-    failed = [check for check in checks if not check.passed]
-    return {"checks": worst(checks), "check_count": len(checks), "failed": failed}
-
-
-def _surface_values(surfaces: list[xr.Dataset]) -> dict:
-    return {
-        "surfaces": [summarise_surface(surface) for surface in surfaces[:MOST_ROWS]],
-        "surface_count": len(surfaces),
-        "sources": list_sources(surfaces),
-        "spectra": draw_spectra(surfaces),
-    }
-
-
 def _pictures(figures: Sequence[ReportFigure], campaign: xr.DataTree, link) -> list[dict]:
-    """Return what the page shows of the figures: first those of no study or of several, then those of each study.
+    """Return the figures of the page: first those of no study or of several studies, then those of each study.
 
-    A figure has the number of its name, on the page as in the documentation. Captions count missing and pale runs.
+    The number of a figure is that in its name. Captions give the numbers of missing and of pale runs.
     """
     studies = list(campaign.children)
     pictures = [
@@ -165,20 +153,3 @@ def _pictures(figures: Sequence[ReportFigure], campaign: xr.DataTree, link) -> l
         for figure in figures
     ]
     return sorted(pictures, key=lambda picture: [None, *studies].index(picture["study"]))
-
-
-def _source_values(campaign: xr.DataTree, model_error: xr.DataTree | None) -> dict:
-    """Return the error of the model, and the sources that its datasets and those of the campaign name."""
-    entries = list(model_error.children.values()) if model_error is not None else []
-    texts = ";".join(node.attrs.get("references", "") for node in [*campaign.children.values(), *entries])
-    return {
-        "entries": [summarise_errors(node.to_dataset()) for node in entries],
-        "references": list(dict.fromkeys(source.strip() for source in texts.split(";") if source.strip())),
-    }
-
-
-def _version(name: str) -> str | None:
-    try:
-        return importlib.metadata.version(name)
-    except importlib.metadata.PackageNotFoundError:
-        return None

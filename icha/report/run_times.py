@@ -55,23 +55,8 @@ def read_benchmark(path: Path, job: str) -> Benchmark:
 def write_times_page(path: str | os.PathLike, jobs: Sequence[Benchmark]) -> None:
     """Write a page with the sums by kind of job, and the longest jobs."""
     kinds: dict[str, list[Benchmark]] = {}
+    jobs = sorted(jobs, key=lambda job: -job.seconds)
     for job in jobs:
         kinds.setdefault(job.job.split("/")[0], []).append(job)
-    rows = [
-        {
-            "name": name,
-            "count": len(members),
-            "total": sum(job.seconds for job in members),
-            "longest": max(job.seconds for job in members),
-            "memory": max(job.megabytes or 0 for job in members),
-        }
-        for name, members in kinds.items()
-    ]
-    write_page(
-        path,
-        "run_times.html",
-        kinds=sorted(rows, key=lambda row: -row["total"]),
-        total=sum(job.seconds for job in jobs),
-        count=len(jobs),
-        longest=sorted(jobs, key=lambda job: -job.seconds)[:LONGEST_JOBS],
-    )
+    ordered = sorted(kinds.items(), key=lambda kind: -sum(job.seconds for job in kind[1]))
+    write_page(path, "run_times.html", kinds=dict(ordered), jobs=jobs, longest=jobs[:LONGEST_JOBS])

@@ -1,4 +1,4 @@
-"""Sections of the studies: runs, results, means over the seeds, pull-off and loss."""
+"""Sections of the report on the studies: runs, results, means over seeds, pull-off and hysteresis loss."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from markupsafe import Markup
 
 from icha.checks.findings import IDENTITY_LIMIT
 from icha.datasets.campaign import loading_stops, reduced_gap, run_place, runs_of_status, select_run
-from icha.datasets.labels import LABELS, RunLabels, labels_at, slopes_of
+from icha.datasets.labels import LABELS, RunLabels, slopes_of
 from icha.datasets.variables.campaign import (
     BEYOND_MODEL,
     COMPLETE,
@@ -34,6 +34,7 @@ SHOWN_AT = {
 MOST_STOPS = 12  # columns of a table, evenly chosen
 FORMATS = {"pressure": format_scientific, "area": format_scientific, "gap": "{:.3f}".format}
 EVENT_COUNTS = ("spot_count", "jump_in_count", "jump_off_count", "coalescence_count")
+STATISTICS = ("asperity_count", "nayak_parameter", "stickiness", "tabor_parameter", "full_contact_energy_ratio")
 # Contributions to a loss, and their names on the page.
 LOSS_NAMES = {
     "loss_by_jump_in": "jumping in",
@@ -61,7 +62,6 @@ def summarise_study(campaign: xr.DataTree, name: str, comparison: xr.DataTree | 
     # Spots and events are many, and the page does not need them.
     small = xr.DataTree.from_dict({f"/{name}": dataset.drop_dims([dim for dim in RAGGED if dim in dataset.dims])})
     runs = [(labels, select_run(small, labels)) for labels in complete[:MOST_ROWS]]
-    has_comparison = comparison is not None and name in comparison
     return {
         "name": name,
         "asked": int(np.isin(status, (*COMPUTED_RUNS, MISSING)).sum()),
@@ -80,8 +80,8 @@ def summarise_study(campaign: xr.DataTree, name: str, comparison: xr.DataTree | 
         "runs": [_run(labels, run) for labels, run in runs],
         "table": _table(runs),
         "means": _means(dataset, complete),
-        "loops": _loops(name, dataset),
-        "spread": _spread(comparison[name].to_dataset()) if has_comparison else None,
+        "loops": _loops(small, dataset, complete),
+        "spread": _spread(comparison[name].to_dataset()) if comparison and name in comparison else None,
     }
 
 
@@ -99,33 +99,16 @@ def _material(dataset: xr.Dataset) -> dict[str, str]:
 
 
 def _run(labels: RunLabels, run: xr.Dataset) -> dict:
-    """Return the statistics of a run: events up to the end of its first loading, since none remain after separation."""
+    """Return the statistics of a run; events up to the end of its first loading, since none remain after separation."""
     loaded = np.flatnonzero(loading_stops(run).values)[-1:]
-    adhesive = float(run["surface_energy"]) > 0
-    snapshots = []
-    for k in range(run.sizes["snapshot"]):
-        step = int(run["snapshot_step"].values[k])
-        snapshots.append(
-            {
-                "kind": str(run["snapshot_kind"].values[k]),
-                "target": float(run["snapshot_target"].values[k]),
-                "area": float(run["contact_area_fraction"].values[step]),
-                "spots": int(run["spot_count"].values[step]),
-                "overlap": float(run["overlap_fraction"].values[k]),
-            }
-        )
     return {
         "labels": labels,
         "steps": run.sizes["step"],
-        "tabor": float(run["tabor_parameter"]) if adhesive else None,
-        "asperities": int(run["asperity_count"]),
-        "nayak_parameter": float(run["nayak_parameter"]),
-        "stickiness": float(run["stickiness"]),
-        "energy_ratio": float(run["full_contact_energy_ratio"]) if adhesive else None,
+        "adhesive": float(run["surface_energy"]) > 0,
         "residual": float(run["residual"].max()) if run.sizes["step"] else None,
         "events": {name: int(run[name].values[k]) for name in EVENT_COUNTS for k in loaded},
         "beyond_wu": float(run["outside_wu_fraction"].values[loaded[0]]) if len(loaded) else None,
-        "snapshots": snapshots,
+        **{name: float(run[name]) for name in STATISTICS},
     }
 
 
@@ -171,22 +154,30 @@ def _table(runs) -> dict:
     return table | {"rows": [(labels, [cell(stops, target) for target in table["stops"]]) for labels, stops in states]}
 
 
+def _ensembles(dataset: xr.Dataset, runs: list[RunLabels]) -> dict[tuple[RunLabels, bool], list[RunLabels]]:
+    """Group runs that differ only in their seed, by their labels with seed 0 and whether the model is applicable."""
+    groups: dict[tuple[RunLabels, bool], list[RunLabels]] = {}
+    for run in runs:
+        groups.setdefault((run._replace(seed=0), not _reason(dataset, "applicability", run)), []).append(run)
+    return groups
+
+
+def _ensemble_row(dataset: xr.Dataset, labels: RunLabels, applicable: bool, runs: list[RunLabels]) -> dict:
+    """Return what identifies a row of means, with the numbers of its seeds and of all requested seeds."""
+    return {"labels": labels, "applicable": applicable, "count": len(runs), "asked": asked_seeds(dataset, labels)}
+
+
 def _means(dataset: xr.Dataset, complete: list[RunLabels]) -> dict:
-    """Return rows with means over seeds and their accuracy; runs to which the model is not applicable are separate."""
-    lines: dict[tuple, list[RunLabels]] = {}
-    for labels in complete:
-        applicable = not _reason(dataset, "applicability", labels)
-        line = labels.surface, labels.rms_slope, labels.material, labels.model, applicable
-        lines.setdefault(line, []).append(labels)
-    lines = {line: runs for line, runs in lines.items() if len(runs) > 1 or asked_seeds(dataset, runs[0]) > 1}
+    """Return rows with means over seeds and their accuracy."""
+    groups = [(_ensemble_row(dataset, *key, runs), runs) for key, runs in _ensembles(dataset, complete).items()]
+    groups = [(row, runs) for row, runs in groups if row["asked"] > 1]
     variables = ["reduced_pressure", "contact_area_fraction", "reduced_separation", "leg", "step_kind", "step_target"]
     steps = dataset[[*variables, "step_count", "mean_gap", "rms_height", "boundary"]]
     members = []
-    for line, labels in list(lines.items())[:MOST_ROWS]:
+    for row, labels in groups[:MOST_ROWS]:
         runs = [steps.isel(run_place(dataset, each)) for each in labels]
-        states = [collect_states(run.isel(step=slice(0, int(run["step_count"])))) for run in runs]
-        members.append((line, _seed_count(len(labels), asked_seeds(dataset, labels[0])), states))
-    table = _stops_of([stops for *_, states in members for stops in states])
+        members.append((row, [collect_states(run.isel(step=slice(0, int(run["step_count"])))) for run in runs]))
+    table = _stops_of([stops for _, states in members for stops in states])
 
     def cell(states, target):
         at_stop = [stops[table["kind"], target] for stops in states if (table["kind"], target) in stops]
@@ -196,13 +187,8 @@ def _means(dataset: xr.Dataset, complete: list[RunLabels]) -> dict:
             _mean(np.array([state[name] for state in at_stop]), FORMATS[name]) for name in table["shown"]
         )
 
-    rows = [(line, count, [cell(states, target) for target in table["stops"]]) for line, count, states in members]
-    return table | {"count": len(lines), "rows": rows}
-
-
-def _seed_count(count: int, asked: int) -> str:
-    """Return the number of seeds of a mean, and that of the requested ones if these are more."""
-    return f"{count}" if count == asked else f"{count} of {asked}"
+    rows = [row | {"cells": [cell(states, target) for target in table["stops"]]} for row, states in members]
+    return table | {"count": len(groups), "rows": rows}
 
 
 def _mean(values: np.ndarray, form) -> Markup:
@@ -212,7 +198,7 @@ def _mean(values: np.ndarray, form) -> Markup:
 
 
 def _range(values: np.ndarray, form) -> Markup | str:
-    """Format the 95 % interval of a mean, or the extremes of fewer than five values; nothing without scatter.
+    """Format the 95 % interval of a mean, or the extremes of fewer than five values; empty if all values are equal.
 
     If the interval of positive values would reach below zero, the interval of the logarithm is used.
     """
@@ -232,65 +218,51 @@ def _range(values: np.ndarray, form) -> Markup | str:
 # --- tables of pull-off and loss ---
 
 
-def _loops(name: str, dataset: xr.Dataset) -> dict:
+def _loops(campaign: xr.DataTree, dataset: xr.Dataset, complete: list[RunLabels]) -> dict:
     """Return pull-off and loss of the unloaded runs, averaged over seeds."""
     if "hysteresis_loss" not in dataset:
         return {"rows": [], "parts": {}, "count": 0}
-    status = dataset["status"].transpose(*LABELS)
-    whole = (status.values == COMPLETE) & np.isfinite(_along_labels(dataset, "hysteresis_loss"))
-    lines: dict[tuple, list] = {}
-    seeds: dict[tuple, int] = {}
-    for place in np.argwhere(whole).tolist():
-        labels = RunLabels(name, *labels_at(dataset, place, LABELS))
-        line = tuple((label, getattr(labels, label)) for label in LABELS if label != "seed")
-        line += (("applicable", not _reason(dataset, "applicability", labels)),)
-        lines.setdefault(line, []).append(tuple(place))
-        seeds[line] = asked_seeds(dataset, labels)
-    rows = [dict(line) | _loop(dataset, places, seeds[line]) for line, places in list(lines.items())[:MOST_ROWS]]
+    runs = {labels: select_run(campaign, labels) for labels in complete}
+    groups = _ensembles(dataset, [labels for labels, run in runs.items() if np.isfinite(run["hysteresis_loss"])])
+    rows = [
+        _ensemble_row(dataset, *key, members) | _loop([runs[labels] for labels in members])
+        for key, members in list(groups.items())[:MOST_ROWS]
+    ]
     shown = {name for row in rows for name, share in row["shares"].items() if share}
     parts = {name: text for name, text in LOSS_NAMES.items() if name in shown}
-    return {"rows": rows, "parts": parts, "count": len(lines)}
+    return {"rows": rows, "parts": parts, "count": len(groups)}
 
 
-def _along_labels(dataset: xr.Dataset, name: str) -> np.ndarray:
-    """Return a variable, repeated along the labels on which it does not depend; the last dimension is the step."""
-    return dataset[name].broadcast_like(dataset["status"]).transpose(*LABELS, ...).values
-
-
-def _loop(dataset: xr.Dataset, members: list[tuple], asked: int) -> dict:
-    """Return the row of runs that differ in their seed only; `members` are their indices along the labels."""
-    places = tuple(np.transpose(members))
+def _loop(runs: list[xr.Dataset]) -> dict:
+    """Return the cells of runs that differ only in their seed."""
 
     def values(name):
-        return _along_labels(dataset, name)[places].astype(float)
-
-    def mean_at_the_end(name):
-        return float(values(name)[np.arange(len(members)), values("step_count").astype(int) - 1].mean())
+        return np.array([float(run[name]) for run in runs])
 
     # A smaller loss of a closed loop is a rounding error.
-    rounding = IDENTITY_LIMIT * np.nanmax(np.abs(values("work")), axis=-1)
+    rounding = IDENTITY_LIMIT * np.array([np.nanmax(np.abs(run["work"].values)) for run in runs])
     loss = values("hysteresis_loss")
     lost = np.abs(loss) > rounding
-    adhesive = values("surface_energy")[0] > 0
     cells = {
         "largest_pressure": _with_unit(values("largest_reduced_pressure")),
         "largest_area": _with_unit(values("largest_contact_area_fraction")),
         "pull_off": _with_unit(values("pull_off_pressure"), "Pa"),
         "loss": _with_unit(np.where(lost, loss, 0.0), "J/m²"),
     }
-    adhesive_cells = {
-        "at": (values("pull_off_separation") / values("rms_height"), ""),
-        "over_strength": (values("pull_off_over_strength"), ""),
-        "over_summits": (values("pull_off_over_summits"), ""),
-        "detachment": (values("detachment_pressure"), "Pa"),
-        "over_energy": (values("hysteresis_loss_over_surface_energy"), ""),
-    }
-    cells |= {name: _with_unit(*cell) if adhesive else None for name, cell in adhesive_cells.items()}
+    if values("surface_energy")[0] > 0:
+        cells |= {
+            "at": _with_unit(values("pull_off_separation") / values("rms_height")),
+            "over_strength": _with_unit(values("pull_off_over_strength")),
+            "over_summits": _with_unit(values("pull_off_over_summits")),
+            "detachment": _with_unit(values("detachment_pressure"), "Pa"),
+            "over_energy": _with_unit(values("hysteresis_loss_over_surface_energy")),
+        }
     return cells | {
-        "asked": asked,
-        "seeds": _seed_count(len(members), asked),
         "shares": {name: values(name).sum() / loss.sum() if lost.any() else None for name in LOSS_NAMES},
-        "events": {text: [mean_at_the_end(name) for name in names] for text, names in EVENT_NAMES.items()},
+        "events": {
+            text: [np.mean([float(run[name][-1]) for run in runs]) for name in names]
+            for text, names in EVENT_NAMES.items()
+        },
     }
 
 

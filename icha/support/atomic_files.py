@@ -1,8 +1,8 @@
-"""Atomic writes: a file appears whole or not at all, survives a power cut, and is written only by the owner of results.
+"""Atomic writes: a file is complete or does not exist, survives a power cut, and is written only by the owner.
 
-A folder of results belongs to the call of the program that began last. Jobs of an earlier call, which may still run on
-another machine, cannot complete a result: each move into place checks the owner first, under a lock that a new call
-needs as well.
+The call of the program that started last owns a folder of results. Jobs of an earlier call may still run on another
+machine, but cannot complete a result: before a file is moved to its place, the owner is checked under a lock, which a
+new call needs as well.
 """
 
 import fcntl
@@ -23,7 +23,7 @@ _SUPERSEDED = "a later call of this campaign owns this result and computes it; n
 
 @contextmanager
 def whole_file(path: str | os.PathLike, *, lasting: bool = True) -> Iterator[Path]:
-    """Give a temporary path beside `path`; move it there if the block succeeds, remove it if it fails.
+    """Provide a temporary path beside `path`; move the file to `path` if the block succeeds, else remove it.
 
     The folder is created if it is missing. The temporary path is unique, so two programs may write the same file.
     Unless `lasting` is False, the content is synchronised to the disk before the move, and the name after it.
@@ -62,7 +62,7 @@ def whole_file(path: str | os.PathLike, *, lasting: bool = True) -> Iterator[Pat
 
 
 def move_only_while_owned() -> None:
-    """For jobs: from now on, write results only while the call that started this process owns the results."""
+    """Let this process, a job, write results only while the call that started it owns the results."""
     global _moving
     _moving = while_owned
 
@@ -87,7 +87,7 @@ def sync_folder(folder: Path) -> None:
 
 
 def find_obstacle(folder: Path) -> str | None:
-    """Describe the file or broken link in the place of a folder; None if the folder exists or can be created."""
+    """Describe the file or broken link that prevents a folder; None if the folder exists or can be created."""
     for path in (folder, *folder.parents):
         # The methods of Path raise errors below a folder that may not be entered.
         if os.path.exists(path):

@@ -1,13 +1,12 @@
-"""Checksum sidecars of results: they tell whether a result is whole, and from what it was made.
+"""Checksum sidecars of results, which record whether a result is whole and from what it was made.
 
-The sidecar of `results/<campaign>/<path>` is `results/<campaign>/checksums/<path>.json`. It contains the SHA-256, the
-size and the modification time of the file or folder. A file with the same size and time is trusted, any other one is
-hashed. Errors of the storage change neither; they are found where every file is hashed (`thorough`).
+The sidecar of `results/<campaign>/<path>` is `results/<campaign>/checksums/<path>.json`. It contains the SHA-256, size
+and modification time of the file or folder. A file with the same size and time is trusted; any other file is hashed.
+Errors of the storage change neither; a `thorough` check, which hashes every file, finds them.
 
-A sidecar without its result means that the result existed, or was about to be written, and must be made again.
-
-The sidecar also holds a checksum of the parameters of the job, and those of the results that the job read. A whole
-result may still belong to other settings, another program version, or other input data.
+The sidecar also contains a checksum of the parameters of the job, and the checksums of the results that the job read,
+because a whole result may belong to other settings, another program version, or other input data. A sidecar without its
+result means that the result must be made again.
 """
 
 import contextlib
@@ -22,7 +21,7 @@ from typing import NamedTuple
 from icha.support.atomic_files import whole_file
 
 FOLDER = "checksums"
-# Reason that Snakemake also finds, if its own record belongs to the result.
+# Reason that Snakemake also finds if its own record of the result is valid.
 OTHER_SETTINGS = "it was made with other settings, or by another version of the program"
 
 
@@ -45,7 +44,7 @@ class Checksum(NamedTuple):
 
 
 def hash_parameters(parameters: Iterable[str]) -> str:
-    """Checksum of the parameters of a job, given as Python represents them, in any order."""
+    """Return the checksum of the parameters of a job, given as Python represents them, in any order."""
     return hashlib.sha256("\n".join(sorted(parameters)).encode()).hexdigest()
 
 
@@ -57,22 +56,22 @@ def write_checksum(results: str | os.PathLike, path: str, *, asked: str = "", in
 
 
 def begin(results: str | os.PathLike, path: str) -> None:
-    """Record that a result is about to be written; until its checksum is written, it counts as stale, not damaged."""
+    """Record that a job starts to write a result; until its checksum is written, it counts as stale, not damaged."""
     _write(results, path, _BEGUN, lasting=False)
 
 
 def distrust(results: str | os.PathLike, path: str) -> None:
-    """Force the next check to hash a result, whatever its size and time."""
+    """Make the next check hash a result even if its size and time are unchanged."""
     written = _read(results, path)
     if written not in (None, _BEGUN):
         _write(results, path, written._replace(mtime_ns=0))
 
 
 def is_whole(results: str | os.PathLike, path: str, *, thorough: bool = False) -> bool:
-    """Return whether the result `path` in the campaign's folder `results` is what was written, or has no sidecar.
+    """Return whether the result `path` in the campaign's folder `results` equals its checksum, or has no sidecar.
 
-    A file of the same size and time counts as whole unless `thorough`. The sidecar of a file that was only copied or
-    touched gets the new time. A result whose sidecar cannot be read does not count as whole.
+    Unless `thorough`, a file of the same size and time counts as whole. If only the time differs, the new time is
+    written to the sidecar. A result whose sidecar cannot be read does not count as whole.
     """
     file = Path(results, path)
     try:
@@ -98,14 +97,14 @@ def is_whole(results: str | os.PathLike, path: str, *, thorough: bool = False) -
 
 
 def damaged(results: str | os.PathLike, *, thorough: bool = False) -> list[str]:
-    """Paths of all results of a campaign that exist but are not what was written, sorted."""
+    """Return the paths of all existing results of a campaign that differ from their checksums, sorted."""
     return [path for path in with_sidecar(results) if not is_whole(results, path, thorough=thorough)]
 
 
 def stale(
     results: str | os.PathLike, paths: Iterable[str], asked: Callable[[str], str] | None = None
 ) -> Iterator[tuple[str, str]]:
-    """Yield the existing results that are not those of the present settings or inputs, with the reason.
+    """Yield the existing results that were made with other settings or inputs, and the reason.
 
     Parameters
     ----------
@@ -137,12 +136,12 @@ def stale(
 
 
 def recorded_hash(results: str | os.PathLike, path: str) -> str:
-    """Checksum of the parameters of the job that made a result, by its sidecar; empty if unknown."""
+    """Return the checksum of the parameters of the job that made a result, from its sidecar; empty if unknown."""
     return _known(results, path).asked
 
 
 def sha256_as_written(results: str | os.PathLike, path: str) -> str:
-    """SHA-256 of a result by its sidecar, or of its content if there is no sidecar."""
+    """Return the SHA-256 of a result from its sidecar, or of its content if it has no sidecar."""
     return _known(results, path).sha256 or sha256_of(Path(results, path))
 
 
@@ -153,7 +152,7 @@ def _known(results, path) -> Checksum:
 
 
 def with_sidecar(results: str | os.PathLike) -> Iterator[str]:
-    """Paths of all results that have a sidecar, whether they exist or not, sorted."""
+    """Yield the paths of all results that have a sidecar, sorted; the results may be missing."""
     top = os.path.join(results, FOLDER)
     for folder, folders, names in os.walk(top):
         folders.sort()
@@ -169,7 +168,7 @@ def set_aside(results: str | os.PathLike, path: str) -> Path:
     return file.rename(next(name for name in names if not name.exists()))
 
 
-# Record of a result that is about to be written; no file has an empty digest.
+# Record of a result that a job has started to write; no file has an empty digest.
 _BEGUN = Checksum("", 0, 0)
 
 
@@ -202,7 +201,7 @@ def _size_and_time(file) -> tuple[int, int]:
 
 
 def sha256_of(file: Path) -> str:
-    """SHA-256 of a file, hexadecimal; for a folder, of its files with their paths."""
+    """Return the SHA-256 of a file, hexadecimal; for a folder, that of its files and their paths."""
     if not file.is_dir():
         with file.open("rb") as content:
             return hashlib.file_digest(content, "sha256").hexdigest()
@@ -213,5 +212,5 @@ def sha256_of(file: Path) -> str:
 
 
 def _files_in(folder: Path) -> list[Path]:
-    """All files below a folder, sorted, without the timestamp files of Snakemake."""
+    """Return all files below a folder, sorted, without the timestamp files of Snakemake."""
     return sorted(each for each in folder.rglob("*") if each.is_file() and each.name != ".snakemake_timestamp")

@@ -1,7 +1,7 @@
-"""Input files from unknown sources: which are opened, the memory limit of reading, traps in HDF5 files, tables.
+"""Checks of input files from unknown sources: kind of file, memory limit of reading, traps in HDF5 files; CSV tables.
 
 A small file can declare a very large array, or unpack to one. Readers compare declared sizes with the limit
-(`require_room`) and read within it (`bounded_memory`), with whatever library.
+(`require_room`), and limit the memory of the libraries that read the file (`bounded_memory`).
 """
 
 import csv
@@ -19,7 +19,7 @@ from icha.support.rules import POSITIVE
 # Environment variable with the memory limit in MB, and the limit without it.
 VARIABLE = "ICHA_INPUT_MB"
 _DEFAULT_MB = 2000
-# Memory that reading a large file may take, over its size.
+# Largest memory for reading a large file, in multiples of its size.
 _COPIES = 3
 # Most names in an HDF5 file, and most nested groups; visiting more takes minutes.
 _MOST_NAMES, _DEEPEST = 100_000, 50
@@ -50,7 +50,7 @@ class TooLarge(RefusedFile):
 
 
 def problem_with_path(path: str | os.PathLike) -> str | None:
-    """Describe why a path cannot be opened as a file, None if it can; pipes and devices might never end."""
+    """Describe why a path cannot be opened as a file; None if it can. Reading a pipe or device might never end."""
     try:
         kind = stat.S_IFMT(os.stat(path).st_mode)
     except (FileNotFoundError, NotADirectoryError, ValueError):  # ValueError for zero bytes in a path
@@ -61,7 +61,7 @@ def problem_with_path(path: str | os.PathLike) -> str | None:
 
 
 def most_memory(file: str | os.PathLike | None = None) -> int:
-    """Memory that reading a file may take, bytes; without an environment variable it grows with the size of `file`.
+    """Return the memory limit of reading, bytes. Without the environment variable it grows with the size of `file`.
 
     Raises RefusedFile if the environment variable is not a number.
     """
@@ -84,7 +84,7 @@ def require_room(needed: float, most: int | None = None) -> None:
 
 @contextmanager
 def bounded_memory(most: int | None = None) -> Iterator[None]:
-    """Limit the memory that a block allocates, in whatever library, to `most` bytes, by default `most_memory`.
+    """Limit the memory that a block and its libraries allocate to `most` bytes, by default `most_memory`.
 
     Beyond the limit the block raises `TooLarge`; libraries in C may raise their own errors instead. Only Linux supports
     the limit; on other systems only declared sizes are checked.

@@ -1,14 +1,14 @@
-"""Rules for single values: unit and bounds of arguments and of configuration keys, each defined once.
+"""Units and bounds of arguments and configuration keys.
 
 Functions and classes check an argument with `validate`. `icha.support.values` makes the types of configuration keys
-from the same rules. The rules of a path's states are in `icha.path.targets`.
+from the same rules. The rules for targets of a path are in `icha.path.targets`.
 """
 
 import math
 import numbers
 from dataclasses import dataclass
 
-# Python may refuse to print more digits than this.
+# Python may refuse to print integers with thousands of digits.
 _LONGEST_INTEGER = 10**30
 
 
@@ -40,13 +40,13 @@ class FloatRange:
 
     @property
     def interval(self) -> str:
-        """The bounds of a number with a lower and an upper one, such as `(0, 1]`."""
+        """Interval between a lower and an upper bound, such as `(0, 1]`."""
         lower = f"[{_short(self.least)}" if self.above is None else f"({_short(self.above)}"
         return f"{lower}, {_short(self.most)}]"
 
     @property
     def expected(self) -> str:
-        """Words for the expected values, which messages contain after "expected"."""
+        """Description of the valid values, which follows "expected" in messages."""
         if self.above is None and self.least is None:
             return "a number" if self.most is None else f"a number of at most {_short(self.most)}"
         if self.most is None:

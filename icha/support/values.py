@@ -19,14 +19,14 @@ _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _QUANTITY = re.compile(rf"\s*({_NUMBER})\s*(.*?)\s*", re.DOTALL)
 _UNIT = re.compile(r"[A-Za-zµμÅ°%²³⁻·][\w\s*/^().µμÅ°%²³⁻·-]*")
 
-# Most letters of a number or a unit: patterns and pint are slow on longer texts, which are neither.
+# Largest number of letters of a number or a unit, because patterns and pint are slow on long texts.
 _LONGEST = 100
 
 # Quantities of a configuration, by their SI unit.
 PHYSICAL_NAMES = {"m": "length", "Pa": "pressure", "J/m^2": "energy per area", "1": "ratio"}
 
-# The commonest units besides lengths. Loading pint takes longer than reading a configuration without it;
-# tests/support/test_units.py compares these factors with those of pint.
+# The commonest units of pressure and energy per area. With them pint, which takes long to load, is not needed;
+# tests/support/test_units.py compares the factors with those of pint.
 USUAL = {
     ("Pa", "Pa"): "1",
     ("kPa", "Pa"): "1e3",
@@ -58,11 +58,11 @@ _SUGGESTED = {
 PATTERN = rf"^\s*{_NUMBER}\s*[A-Za-zµμÅ].*$"
 # Names become folders and files; commands would read one that begins with a hyphen as an option.
 NAME_PATTERN = r"^[a-z0-9_][a-z0-9_-]*$"
-# Most letters of a name, and of a name with the values that a study varies. A file name may have 255.
+# Largest number of letters of a name, and of a name with varied values. A file name may have 255.
 _LONGEST_NAME, LONGEST_LABEL = 80, 200
 # Relative tolerance of a quotient of two lengths, such as the number of cells per wave.
 ROUNDING = 1e-9
-# Most names that a message lists.
+# Largest number of names in a message.
 _MOST_LISTED = 30
 # Location in a configuration, value, and what is wrong with it and what is expected.
 Problem = tuple[tuple, Any, str]
@@ -72,7 +72,7 @@ Name = Annotated[str, Field(strict=True, pattern=NAME_PATTERN, max_length=_LONGE
 # A name, or the name of a variant that `vary` of a study makes.
 Label = Annotated[str, Field(strict=True, pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.+-]*$", max_length=LONGEST_LABEL)]
 _RANGE = re.compile(r"\s*(\d{1,10})\s*\.\.\s*(\d{1,10})\s*")
-# Most seeds of a range.
+# Largest number of seeds.
 _MOST_SEEDS = 10**5
 
 
@@ -219,7 +219,7 @@ def integer(rule: IntegerRange):
 
 
 def flag(value: Any) -> bool:
-    """Return true or false; refuse the many words that YAML and Python read as them."""
+    """Return true or false; refuse other values that YAML and Python accept for them."""
     if not isinstance(value, bool):
         raise ValueError("is neither true nor false; expected true or false")
     return value
@@ -275,7 +275,7 @@ def unknown(location: tuple, name: str, names: Iterable[str]) -> Iterator[Proble
 
 
 def _without_controls(value: str) -> str:
-    """Refuse characters that a YAML file can hold only as escapes: control characters and surrogates."""
+    """Refuse control characters and surrogates, which a YAML file can contain only as escapes."""
     for char in value:
         if unicodedata.category(char) in ("Cc", "Cs") and char not in "\n\t":
             raise ValueError(f"holds the control character {char!r}; expected text without it")
@@ -286,7 +286,7 @@ Text = Annotated[str, Field(strict=True, min_length=1), AfterValidator(_without_
 
 
 def _file(value: str) -> str:
-    """Refuse paths that Snakemake would read as patterns."""
+    """Refuse paths with braces, which Snakemake would read as patterns."""
     if re.search(r"[{}]", value):
         raise ValueError("has braces; expected the path of a file without { and } in it")
     return value
@@ -306,15 +306,15 @@ def stops(kind, in_order):
     return Annotated[list[kind], Field(min_length=1), AfterValidator(in_order)]
 
 
-def list_of_names(description, kind=Name):
+def list_of_names(kind=Name):
     """Type of a list of at least one name, each given once."""
-    return Annotated[list[kind], Field(min_length=1, description=description), AfterValidator(distinct)]
+    return Annotated[list[kind], Field(min_length=1), AfterValidator(distinct)]
 
 
 class Section(BaseModel):
     """A section of the configuration: immutable, without unknown keys."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, use_attribute_docstrings=True)
 
 
 def _seeds(value: Any) -> Any:
@@ -332,11 +332,11 @@ def _seeds(value: Any) -> Any:
         if not match:
             raise ValueError(f"{shown}is not a range of seeds; {expected}")
         first, last = map(int, match.groups())
-        if last < first or last - first >= _MOST_SEEDS:
-            raise ValueError(f"{shown}ends before it begins, or has more than {_MOST_SEEDS} seeds; {expected}")
-        found += range(first, last + 1)
-        if len(found) > _MOST_SEEDS:
+        if last < first:
+            raise ValueError(f"{shown}ends before it begins; {expected}")
+        if len(found) + last - first >= _MOST_SEEDS:
             raise ValueError(f"{shown}makes more than {_MOST_SEEDS} seeds; {expected}")
+        found += range(first, last + 1)
     return found if isinstance(value, list | str) else value
 
 

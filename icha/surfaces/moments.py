@@ -17,10 +17,10 @@ if TYPE_CHECKING:
     from icha.surfaces.surface import Surface
 
 
-# Cells of a wave in which its summits are resolved.
+# Cells per wavelength with which the summits of a wave are resolved.
 RESOLVED_CELLS = 8
-# Cells of a summit where the shortest waves have half of them, since isotropic surfaces have about 0.2 summits for
-# every square of the shortest wave.
+# Cells per summit of a surface with RESOLVED_CELLS / 2 cells per shortest wave. Isotropic surfaces have about 0.2
+# summits in a square with the side of the shortest wavelength.
 LEAST_CELLS_OF_SUMMIT = 80
 # Fewest cells per shortest wave with which boundary elements represent the surface.
 LEAST_CELLS_PER_WAVE = 1.5
@@ -31,7 +31,7 @@ _DENSE = 64
 
 
 def cells_per_short_wave(grid: int, summits: float) -> float:
-    """Estimate the nodes along the shortest waves of a surface, of `grid` nodes a side, from its number of summits."""
+    """Estimate the number of nodes per shortest wavelength from the nodes a side and the number of summits."""
     return RESOLVED_CELLS / 2 * math.sqrt(grid**2 / max(summits, 1) / LEAST_CELLS_OF_SUMMIT)
 
 

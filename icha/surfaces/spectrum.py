@@ -20,8 +20,6 @@ from icha.surfaces.surface import Surface
 # Relative rounding of wave numbers in units of 2 pi / L, so that a band that ends at L/lambda_s = 64 excludes |k| = 64.
 _ROUNDING = 1e-9
 
-AMPLITUDES = ("fixed", "gaussian")
-
 # Rows or columns to transform at a time.
 _LINES = 64
 
@@ -139,8 +137,8 @@ class SelfAffineSpectrum:
         """
         grid = GRID.validate("grid", grid)
         seed = SEED.validate("seed", seed)
-        if amplitudes not in AMPLITUDES:
-            raise ValueError(f"amplitudes: {amplitudes!r} must be one of {', '.join(AMPLITUDES)}")
+        if amplitudes not in ("fixed", "gaussian"):
+            raise ValueError(f"amplitudes: {amplitudes!r} must be one of fixed, gaussian")
         cells = self.cells_per_short_wave(grid)
         if cells < 2 * (1 - _ROUNDING):
             raise ValueError(

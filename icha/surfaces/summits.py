@@ -57,7 +57,7 @@ _MARGIN = 32
 # Rows or columns of the grid, and points between them, in memory at a time.
 _LINES = 16
 _POINTS = 4096
-# Largest shares of the load without a summit, and of summits without support, with which asperities represent the
+# Largest share of the load without a summit, and of summits without support, with which asperities represent a
 # surface. Smooth random surfaces with at least 5 nodes per shortest wave stay below 0.1 (`tests/surfaces`).
 MAX_SHARE = 0.1
 
@@ -161,7 +161,7 @@ def locate_summits(surface: Surface) -> Asperities:
 
 
 def _is_supported(heights, summit, height):
-    """Tell whether the nodes around the summits at points (k, 2), in cells, support their heights (k,).
+    """Return whether the nodes around summits at points (k, 2), in cells, support the heights (k,) of the summits.
 
     Along each axis a parabola through nodes of second difference -d rises at most d/8 above the higher of two
     neighbours. The smaller second difference at the two nodes on either side of the summit counts, because at the edge
@@ -282,9 +282,9 @@ def _newton_step(gy, gx, hyy, hyx, hxx, flat):
 LARGEST_DEPARTURE = 0.3
 # Directions around a summit in which the surface is compared with its paraboloid.
 _DIRECTIONS = 16
-# Radius of a spot, in cells, below which the interpolated surface is the paraboloid itself.
+# Radius of a spot, in cells, below which the interpolated surface equals its paraboloid.
 _SMALLEST_SPOT = 0.25
-# Smallest height of a summit above its surroundings, over that of its paraboloid, that differs from none.
+# Smallest ratio of the depth around a summit to that of its paraboloid; smaller ratios are raised to it.
 _LEAST_DROP = 1e-2
 
 

@@ -26,7 +26,7 @@ PERIODIC, FREE = "periodic", "free"
 _STEEPNESS = FloatRange(least=1e-24, most=1e9)
 # Rows or columns that are transformed at a time.
 _LINES = 64
-# Largest number of lines whose steps are compared with the step between cells.
+# Largest number of lines inside a cell whose steps are compared with the step between cells.
 _COMPARED_LINES = 256
 # Smallest misfit of a step between cells over the largest one inside a cell; the misfit is a step less the mean of its
 # two neighbours, rms along a line. Measured on periodic surfaces: up to 1.3, and 2.4 on white noise of 8 x 8 nodes; on
@@ -87,7 +87,7 @@ class Surface:
         object.__setattr__(self, "heights", heights)
         if self.boundary not in (PERIODIC, FREE):
             raise ValueError(f"boundary: {self.boundary!r} must be one of {PERIODIC}, {FREE}")
-        # `icha describe` reports it for surfaces that this package makes.
+        # For surfaces that this package makes, `icha describe` reports the step.
         caller = sys._getframe(2).f_globals.get("__name__", "")
         if not self.free and not caller.startswith(("icha.", "dataclasses")) and not edges_fit(heights):
             warnings.warn(MISFIT_OF_EDGES, EdgeWarning, stacklevel=3)
@@ -244,7 +244,7 @@ def full_contact_pressure(heights: np.ndarray, period: float, *, free: bool = Fa
 
 
 def edges_fit(heights: np.ndarray) -> bool:
-    """Tell whether heights (n, n) can be one cell of a periodic surface, without a step between cells."""
+    """Return whether heights (n, n) can be one cell of a periodic surface, without a step between cells."""
     n = len(heights)
     compared = np.unique(np.linspace(1, n - 3, min(n, _COMPARED_LINES)).astype(int))
     for lines in (heights, heights.T):

@@ -71,7 +71,7 @@ def test_without_adhesion_contact_closes_at_the_largest_tension_of_full_contact(
     assert not [check for check in check_run(run) if not check.passed]
 
 
-@pytest.mark.parametrize("control", ["separation", "load"])
+@pytest.mark.parametrize("control", ["separation", pytest.param("load", marks=pytest.mark.slow)])
 def test_sticky_surface_closes_and_opens_at_the_strength_of_its_interface(control):
     surface = rough(48, 6)
     material = icha.Material(25e6, 0.15, 500e-9)

@@ -101,6 +101,7 @@ for part in (state.cells, state.fraction, state.pressure, state.mean_fraction):
 """
 
 
+@pytest.mark.slow
 def test_threads_change_no_byte():
     digests = set()
     for threads in ("1", "2"):

@@ -426,7 +426,7 @@ def test_checks_and_validity_are_printed_separately_after_a_run(tiny, capsys):
     sys.modules["icha.cli.run"]._print_checks(campaign, results)
     checks, _, *statements = capsys.readouterr().out.splitlines()
     assert re.fullmatch(r"checks:  all of \d+ passed: the equations are solved", checks)
-    assert [line.partition(":")[0] for line in statements] == ["models", "adhesion", "jump-in", "surfaces", "accuracy"]
+    assert [line.partition(":")[0] for line in statements] == ["models", "adhesion", "jump-in", "accuracy"]
     assert "asperities in slopes, single" in statements[0]
 
 
@@ -523,8 +523,6 @@ def test_results_without_checks_are_named(empty_folder):
     write_dataset(reference_dataset(small.SPECTRUM), "theories.nc")
     assert "theories.nc: theories and published points" in printed("check", "theories.nc")
     assert "theories and published points" in printed("show", "theories.nc", status=2)
-    Path("paper-1.0.zip").write_text("text")
-    assert printed("check", "paper-1.0.zip") == "paper-1.0.zip: deposit; use `icha verify`"
     Path("deposit").mkdir()
     assert "deposit: is a folder" in printed("check", "deposit", status=2)
 

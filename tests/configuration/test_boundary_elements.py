@@ -52,6 +52,8 @@ def test_loads_of_boundary_elements_are_snapshots_of_the_runs(load):
     campaign = load({**LONG_RANGE, "finite_range": entries, "studies.one.snapshots": []}).campaign
     assert campaign.snapshots_of("one") == loads
     assert load({"studies.one.snapshots": None}).campaign.snapshots_of("one") is None
+    campaign = load({**LONG_RANGE, "finite_range": {"truth": TRUTH}, "studies.one.snapshots": "every_stop"}).campaign
+    assert campaign.snapshots_of("one") == [("reduced_pressure", p) for p in (1e-3, 0.01, 0.003)]
 
 
 def test_boundary_elements_are_periodic(load):

@@ -56,13 +56,6 @@ def test_files_that_are_not_configurations(content, message, tmp_path):
     assert str(error.value).startswith(str(file))
 
 
-def test_missing_file(tmp_path):
-    with pytest.raises(ConfigurationError, match="is a folder; expected a YAML file"):
-        load_configuration(tmp_path)
-    with pytest.raises(ConfigurationError, match="no such file; expected a YAML file"):
-        load_configuration(tmp_path / "none.yaml")
-
-
 @pytest.mark.parametrize(
     ("text", "value"),
     [

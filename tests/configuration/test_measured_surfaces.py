@@ -20,6 +20,8 @@ def test_section_in_si_units():
     assert how["height_unit"] == 1e-4 and how["size"] == (9e-5, 6e-5)
     assert how["crop"] == {"x": 0.0, "y": 5e-6, "side": 4e-5}
     assert how["detrend"] == "tilt" and how["taper"] is None
+    # Without a cut-off a surface has the checksum that it had before there was one.
+    assert "cutoff" not in how
     assert Preparation(**how).missing == "refuse"
     assert MeasuredSurface.model_validate(SECTION | {"boundary": "periodic"}).preparation["detrend"] == "none"
     assert MeasuredSurface.model_validate(SECTION | {"boundary": "window"}).preparation["taper"] == 0.1
@@ -31,13 +33,9 @@ def test_a_measured_surface_at_its_own_slope(load):
     topography = campaign.topography("rough")
     assert (case.seed, case.rms_slope) == (0, topography.rms_slope)
     assert (topography.grid, topography.period) == (128, 64e-6)
-    assert prepared_topography(
-        campaign.surfaces["rough"].path, surface_settings_of_file(campaign, "rough")
-    ).rms_slope == pytest.approx(case.rms_slope, rel=1e-5)
-
-
-def surface_settings_of_file(campaign, name):
-    return {key: value for key, value in surface_settings(campaign, name).items() if key != "kind"}
+    settings = {key: value for key, value in surface_settings(campaign, "rough").items() if key != "kind"}
+    prepared = prepared_topography(campaign.surfaces["rough"].path, settings)
+    assert prepared.rms_slope == pytest.approx(case.rms_slope, rel=1e-5)
 
 
 def test_slopes_that_no_surface_has_are_to_be_confirmed(load, refused):
@@ -48,10 +46,3 @@ def test_slopes_that_no_surface_has_are_to_be_confirmed(load, refused):
     )
     (warning,) = load(changes | {"confirmed": [key]}).warnings
     assert f"{key}: 'rms slope 146' is unusual" in warning and "but confirmed; expected 1e-4 to 5" in warning
-
-
-def test_a_surface_without_a_cutoff_has_the_checksum_that_it_had_before_there_was_one(load):
-    settings = load({"surfaces.rough": measured_surface()}).campaign.surfaces["rough"].preparation
-    assert "cutoff" not in settings
-    settings = load({"surfaces.rough": measured_surface(cutoff="4 um")}).campaign.surfaces["rough"].preparation
-    assert settings["cutoff"] == 4e-6

@@ -1,9 +1,6 @@
 """Key `models` of a study: by which models of contact its runs are computed."""
 
-import pytest
-
 from icha.configuration.cases import run_cases, run_settings, run_sha256
-from icha.configuration.errors import ConfigurationError
 from icha.planning.costs import RUN_SIZES
 from icha.planning.plan import plan
 from icha.planning.requirements import run_memory, run_minutes, surface_threads
@@ -55,13 +52,6 @@ def test_other_models_have_a_folder_of_their_own(load):
     ]
     assert list(campaign_files(campaign).runs)[-1] == "runs/one/rough/seed2/slope1/boundary_elements/soft.nc"
     assert len({run_sha256(campaign, case) for case in run_cases(campaign)}) == 8
-
-
-def test_known_failures_may_be_of_either_model(load):
-    failure = {"run": "one/rough/seed1/slope1/boundary_elements/soft", "reason": "why"}
-    load(BOTH | {"publication": {"known_failures": [failure]}})
-    with pytest.raises(ConfigurationError, match="is not a run"):
-        load({"publication": {"known_failures": [failure]}})
 
 
 def test_boundary_elements_are_planned_as_a_part_of_their_own_at_their_own_cost(load, tmp_path):

@@ -57,6 +57,9 @@ BAD = {
     "funding: ": {"funding": 2 * [{"funder": "A", "award_number": "1"}]},
     "known_failures: ": {"known_failures": 2 * [{"run": GOOD_RUN, "reason": "why"}]},
     "known_failures[0].run: 'one' is not a run": {"known_failures": [{"run": "one", "reason": "why"}]},
+    "known_failures[0].run: 'one/rough/seed1/slope1/boundary_elements/soft' is not a run": {
+        "known_failures": [{"run": "one/rough/seed1/slope1/boundary_elements/soft", "reason": "why"}]
+    },
     "known_failures[0].reason: '\\n' is blank": {"known_failures": [{"run": GOOD_RUN, "reason": "\n"}]},
     "title: 'A title\\n' holds a line break": {"title": "A title\n"},
     "title: ' ' is blank": {"title": " "},

@@ -1,7 +1,7 @@
 """Section `studies`."""
 
 import numpy as np
-from demo_configuration import LONG_RANGE, TRUTH, file_surface
+from demo_configuration import file_surface
 
 import icha
 from icha.configuration.cases import campaign_sha256, run_cases, run_settings, run_sha256
@@ -33,12 +33,6 @@ def test_every_stop_is_the_same_as_all_of_them_one_by_one(load):
     )
     assert run_settings(one, run_cases(one)[0])["path"]["snapshots"] == [("area_fraction", area) for area in areas]
     assert campaign_sha256(one) == campaign_sha256(other)
-
-
-def test_loads_of_boundary_elements_are_added_to_every_stop(load):
-    entry = {"truth": TRUTH}
-    campaign = load({**LONG_RANGE, "finite_range": entry, "studies.one.snapshots": "every_stop"}).campaign
-    assert campaign.snapshots_of("one") == [("reduced_pressure", p) for p in (1e-3, 0.01, 0.003)]
 
 
 def test_the_way_back_is_part_of_the_path(load):

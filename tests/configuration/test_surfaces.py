@@ -56,7 +56,7 @@ def test_a_topography_that_exceeds_the_memory_is_a_message(load, monkeypatch):
     def fail(*_, **__):
         raise MemoryError("Unable to allocate 80 GiB for an array")
 
-    monkeypatch.setattr("icha.configuration.topographies._inspect_map", fail)
+    monkeypatch.setattr("icha.surfaces.measured.scan.read_height_map", fail)
     # Long values are cut short.
     with pytest.raises(ConfigurationError, match=r"surfaces\.rough\.path: '/.* fit .*Unable to allocate 80 GiB"):
         load({"surfaces.rough": file_surface("heights.npy")})

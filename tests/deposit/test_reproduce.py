@@ -131,7 +131,7 @@ def test_what_is_the_same_is_identical_and_leaves_nothing_behind(ending, deposit
     assert "its metadata, which ICHA cannot verify:\n  title:    A \\x1b[2J title\n  authors:  Carb" in output
     assert f"program:    the installed ICHA {version('icha')}; nothing in the deposit is executed" in output
     ((_, targets, cores, anyway),) = computed
-    assert (targets, cores, anyway) == (["all"], "3", True)
+    assert (targets, cores, anyway) == (["all"], 3, True)
     assert list((tmp_path / "temporary").iterdir()) == []
     assert {path: path.stat().st_mtime_ns for path in folder.rglob("*")} == before
 

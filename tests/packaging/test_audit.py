@@ -1,4 +1,4 @@
-"""Installed files have checksums; without a database, an audit for vulnerabilities is skipped."""
+"""All installed files have checksums; the audit for vulnerabilities is skipped if the database cannot be reached."""
 
 import re
 import subprocess
@@ -10,7 +10,7 @@ from conftest import REPOSITORY
 
 
 @pytest.mark.skipif(not (REPOSITORY / ".venv-tools/bin/uv").exists(), reason="uv is not installed: make environment")
-def test_without_a_database_the_audit_is_skipped_and_says_why(monkeypatch):
+def test_without_a_database_the_audit_is_skipped_with_the_reason(monkeypatch):
     monkeypatch.setenv("UV_HTTP_RETRIES", "0")
     monkeypatch.setenv("NO_PROXY", "127.0.0.1")
     command = [sys.executable, REPOSITORY / "tests/packaging/audit.py", "--service-url", "http://127.0.0.1:9"]
@@ -20,7 +20,7 @@ def test_without_a_database_the_audit_is_skipped_and_says_why(monkeypatch):
         assert done.returncode == status and "the database could not be reached: error: " in done.stdout + done.stderr
 
 
-def test_every_file_that_is_locked_has_a_checksum():
+def test_every_locked_file_has_a_checksum():
     packages = tomllib.loads((REPOSITORY / "uv.lock").read_text())["package"]
     for package in packages:
         if "editable" not in package["source"]:
@@ -29,7 +29,10 @@ def test_every_file_that_is_locked_has_a_checksum():
 
 
 def test_make_installs_only_files_with_checksums():
-    """Checks pip and uv pip; `uv sync --locked` always does. Our own files and a code to be compiled have none."""
+    """pip and `uv pip` need the option --require-hashes, `uv sync --locked` does not.
+
+    The executor of this repository and aspher, which is compiled, have no checksums.
+    """
     makefile = (REPOSITORY / "Makefile").read_text()
     calls = re.findall(r"^\t-?(.*pip (?:install|sync) .*)$", makefile, re.MULTILINE)
     without = [call for call in calls if "--require-hashes" not in call]

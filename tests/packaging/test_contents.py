@@ -1,4 +1,4 @@
-"""The wheel has all that campaigns need, and the files that describe the package agree with each other."""
+"""The wheel contains all files that campaigns need; files that describe the package agree with each other."""
 
 import re
 import subprocess
@@ -11,12 +11,12 @@ from conftest import REPOSITORY
 PROJECT = tomllib.loads((REPOSITORY / "pyproject.toml").read_text(encoding="utf-8"))
 METADATA = PROJECT["project"]
 WHEEL = PROJECT["tool"]["hatch"]["build"]["targets"]["wheel"]
-# Files that a wheel does not need.
+# Files that are not in the wheel.
 LEFT_OUT = ("tests/", "docs/", "benchmarks/", "validation/", "recipe/", "results/", ".")
 LEFT_OUT += ("CONTRIBUTING.md", "VISION.md", "Containerfile")
 
 
-def test_all_files_of_the_repository_are_in_the_wheel_or_left_out_on_purpose():
+def test_every_file_of_the_repository_is_in_the_wheel_or_in_the_list_of_omitted_files():
     listed = [*WHEEL["packages"], *WHEEL["hooks"]["custom"]["files"]]
     assert {"Snakefile", "workflow", "config", "profiles", "pyproject.toml", "uv.lock", "Makefile"} <= set(listed)
     assert [name for name in listed if not (REPOSITORY / name).exists()] == []
@@ -34,7 +34,7 @@ def test_the_version_is_the_same_everywhere():
     assert METADATA["version"] == cited["version"] == recipe["context"]["version"]
 
 
-def test_the_recipe_for_conda_asks_for_what_the_package_asks_for():
+def test_the_recipe_for_conda_has_the_requirements_of_the_package():
     recipe = yaml.safe_load((REPOSITORY / "recipe/recipe.yaml").read_text(encoding="utf-8"))
     other_names = {"matplotlib": "matplotlib-base", "snakemake": "snakemake-minimal"}
     library, workflow = (output["requirements"]["run"] for output in recipe["outputs"])
@@ -48,9 +48,9 @@ def test_the_recipe_for_conda_asks_for_what_the_package_asks_for():
     assert recipe["context"]["python_min"] == METADATA["requires-python"].removeprefix(">=")
 
 
-def test_a_release_is_what_the_tag_says():
+def test_the_release_workflow_builds_checks_and_publishes_a_tag():
     release = yaml.safe_load((REPOSITORY / ".github/workflows/release.yml").read_text(encoding="utf-8"))
-    assert release[True] == {"push": {"tags": ["v*"]}}  # YAML takes `on` for a truth value
+    assert release[True] == {"push": {"tags": ["v*"]}}  # YAML reads `on` as true
     publish = release["jobs"]["publish"]
     assert set(publish["needs"]) == {"build", "test"} and publish["permissions"] == {"id-token": "write"}
     assert publish["steps"][-1]["uses"] == "pypa/gh-action-pypi-publish@release/v1"

@@ -1,4 +1,4 @@
-"""The wheel, built from the sdist and installed where nothing else is: the library, a campaign, its deposit."""
+"""The wheel, built from the sdist and installed in an empty environment: the library, a campaign, its deposit."""
 
 import os
 import subprocess
@@ -20,7 +20,7 @@ from icha.deposit.program import locked_versions
 pytestmark = pytest.mark.slow
 
 UV = REPOSITORY / ".venv-tools/bin/uv"
-# NumPy, SciPy and FINUFFT alone have 195 MB, xarray with pandas 51 MB, h5py 16 MB.
+# Bytes of the library and its dependencies. NumPy, SciPy and FINUFFT have 195 MB, xarray with pandas 51 MB, h5py 16 MB.
 LARGEST_LIBRARY = 290e6
 
 LIBRARY = """
@@ -41,7 +41,7 @@ study = xr.open_datatree("campaign.nc")["slopes"].to_dataset()
 print(float(study.contact_area_fraction.sum()))
 """
 
-# Types that editors and type checkers see, and errors that they find.
+# A correct program, whose types mypy reports, and a program with errors that mypy finds.
 TYPED = """
 import icha
 
@@ -76,7 +76,7 @@ publication:
 """
 
 
-# Without this virtual environment.
+# The environment variables without this virtual environment.
 ENVIRONMENT = {name: value for name, value in os.environ.items() if name not in ("PYTHONPATH", "VIRTUAL_ENV")}
 ENVIRONMENT["PATH"] = os.pathsep.join(
     part for part in os.environ["PATH"].split(os.pathsep) if not Path(part).is_relative_to(sys.prefix)
@@ -99,7 +99,7 @@ def call(*command, cwd, status=0):
 
 @pytest.fixture(scope="module")
 def built(tmp_path_factory):
-    """Sdist and wheel of what is committed or about to be, and of nothing else that lies there."""
+    """Build sdist and wheel from all files that git does not ignore; return the source folder and both files."""
     source, dist = tmp_path_factory.mktemp("source"), tmp_path_factory.mktemp("dist")
     listed = ["git", "ls-files", "--cached", "--others", "--exclude-standard"]
     for name in call(*listed, cwd=REPOSITORY).splitlines():
@@ -113,7 +113,7 @@ def built(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def install(built, tmp_path_factory):
-    """Install the wheel, with an extra, in an empty environment, in the versions of the lock."""
+    """Return a function that installs the wheel with the locked versions in an empty environment."""
     locked = tmp_path_factory.mktemp("locked") / "locked.txt"
     versions = locked_versions((REPOSITORY / "uv.lock").read_text())
     locked.write_text("\n".join(f"{name}=={version}" for name, version in versions.items()))
@@ -148,7 +148,7 @@ def test_the_wheel_has_the_package_and_the_workflow_and_nothing_else(built):
     tops = {name.partition("/")[0] for name in content if ".dist-info/" not in name}
     plugins = {path.name for path in (source / "workflow/plugins").iterdir()}
     assert tops == {"icha", "icha_workflow", *plugins}
-    # Every file of the repository that is in the wheel is there with its bytes, and so is every one of these folders.
+    # Files in the wheel have the bytes of the repository, and the wheel contains all files of these folders.
     for name, data in content.items():
         if name.startswith("icha_workflow/"):
             assert (source / name.removeprefix("icha_workflow/")).read_bytes() == data, name
@@ -178,7 +178,7 @@ print(sum(os.path.getsize(file) for file in found if os.path.isfile(file) and fi
     assert float(said) == pytest.approx(float(tree["slopes"].contact_area_fraction.sum()))
 
 
-def test_a_command_without_the_workflow_says_what_to_install(library, tmp_path):
+def test_a_command_without_the_workflow_names_the_missing_package(library, tmp_path):
     for program, *rest in (["icha", "show", "x.nc"], ["python", "-m", "icha"]):
         said = call(library / program, *rest, cwd=tmp_path, status=1)
         assert len(said.splitlines()) == 1 and said.rstrip().endswith("needed: pip install 'icha[workflow]'")
@@ -200,7 +200,7 @@ def test_type_checkers_see_the_types_of_public_names(library, tmp_path):
     assert {int(line.split(":")[1]) for line in said.splitlines() if ": error:" in line} == {4, 5, 6, 7}, said
 
 
-def test_a_campaign_is_written_and_shipped_ones_are_known_in_any_folder(workflow, tmp_path):
+def test_new_and_shipped_campaigns_work_in_any_folder(workflow, tmp_path):
     call(workflow / "icha", "new", "mine", cwd=tmp_path)
     made = {path.relative_to(tmp_path).as_posix() for path in tmp_path.rglob("*") if path.is_file()}
     assert made == {"config/campaigns/mine.yaml", "config/config.schema.json", "config/README.md"}
@@ -212,7 +212,7 @@ def test_a_campaign_is_written_and_shipped_ones_are_known_in_any_folder(workflow
 
 @pytest.fixture(scope="module")
 def work(workflow, tmp_path_factory):
-    """A folder with a campaign that was run and published."""
+    """Run and publish a campaign; return its folder."""
     folder = tmp_path_factory.mktemp("work")
     (folder / "config/campaigns").mkdir(parents=True)
     (folder / "config/campaigns/tiny.yaml").write_text(CAMPAIGN)
@@ -228,7 +228,7 @@ def test_a_campaign_runs_in_any_folder(work, workflow):
     assert "Nothing to do" in call(workflow / "icha", "run", "tiny", cwd=work)
 
 
-def test_its_deposit_holds_what_was_installed_and_computes_the_same_again(built, work, workflow, tmp_path):
+def test_the_deposit_contains_the_installed_program_and_is_reproduced(built, work, workflow, tmp_path):
     source = built[0]
     deposit = work / "results/tiny/publish/tiny-1.0.0"
     for path in (deposit / "source").rglob("*"):
@@ -260,7 +260,7 @@ def test_a_changed_program_is_not_published(work, workflow):
     assert "changed: icha_workflow/workflow/rules/runs.smk" in said and not deposit.exists()
 
 
-def test_the_recipe_for_conda_is_one(tmp_path):
+def test_the_recipe_for_conda_is_valid(tmp_path):
     render = "import sys; from rattler_build import Stage0Recipe, VariantConfig; "
     render += (
         "print(*(each.recipe.package.name for each in Stage0Recipe.from_file(sys.argv[1]).render(VariantConfig())))"

@@ -13,7 +13,7 @@ from PIL import Image
 from typer.testing import CliRunner
 
 from icha.cli import app
-from icha.report.explorer import NothingToExplore, encode_map, encode_topography, find_partners, write_explorer
+from icha.report.explorer import encode_map, encode_run, encode_topography, find_partners, write_explorer
 
 
 @pytest.fixture(scope="module")
@@ -184,7 +184,7 @@ def test_the_size_of_a_page_is_limited(folder, page, data, tmp_path):
     assert {("one", "soft", 1), ("one", "hertz", 1), ("loops", "soft", 1)} <= set(shown)
     assert [seed for *_, seed in shown] == sorted(seed for *_, seed in shown)
     assert f"Omitted: {written.left_out} contacts" in (tmp_path / "less.html").read_text(encoding="utf-8")
-    with pytest.raises(NothingToExplore, match="not even one contact"):
+    with pytest.raises(ValueError, match="not even one contact"):
         write_explorer(folder, tmp_path / "none.html", largest=1)
     assert not (tmp_path / "none.html").exists()
 
@@ -199,6 +199,12 @@ def test_runs_without_files_lack_their_maps_only(folder, tmp_path):
     assert {(each["study"], each["seed"]) for each in contacts} == {("one", 1)}
     for snapshot in contacts[0]["runs"]["boundary_elements"]["snapshots"]:
         assert "map" not in snapshot and "circles" not in snapshot and snapshot["gap"]
+
+
+def test_full_contact_has_no_gaps_but_a_page():
+    run = next(run for labels, run in runs().items() if labels.model == "boundary_elements")
+    shown = encode_run(run.assign(gap_density=run["gap_density"] * 0.0, grid=32), None)
+    assert [snapshot["gap"] for snapshot in shown["snapshots"]] == [["", ""]] * run.sizes["snapshot"]
 
 
 def test_the_command_writes_the_page_and_refuses_wrong_calls(folder, tmp_path):

@@ -1,8 +1,8 @@
-"""A Slurm of one node on this machine's loopback, for tests and benchmarks.
+"""A Slurm of one node on this machine, for tests.
 
-Needs root and, on Debian, `apt-get install --no-install-recommends slurmctld slurmd slurm-client munge`. The daemons
-run as children of this process, with a configuration, a key, a socket and a spool of their own, and end with the
-`with` block. A Slurm that is already set up on the machine is never touched: `why_not` then says so.
+It needs root and, on Debian, `apt-get install --no-install-recommends slurmctld slurmd slurm-client munge`. The daemons
+are children of this process and end with the `with` block; all their files are in one temporary folder. If the machine
+already has a Slurm, none is started: `why_not` returns the reason.
 """
 
 import fcntl
@@ -24,7 +24,7 @@ from icha.support.program import end_with_parent
 PROGRAMS = ("munged", "slurmctld", "slurmd", "sbatch", "srun", "squeue", "sinfo", "scancel")
 PACKAGES = "slurmctld slurmd slurm-client munge"
 FOLDER = "icha-slurm-"
-# Job steps lose the variable SLURM_CONF on their way through the executor, and look here.
+# Job steps read this file, because the executor does not pass the variable SLURM_CONF to them.
 SYSTEM_CONFIGURATION = Path("/etc/slurm/slurm.conf")
 
 CONFIGURATION = """\
@@ -41,12 +41,12 @@ StateSaveLocation={folder}/state
 SlurmdSpoolDir={folder}/spool
 SlurmctldPidFile={folder}/slurmctld.pid
 SlurmdPidFile={folder}/slurmd.pid
-# Nothing here asks for the control groups of the kernel, which containers often do without.
+# Control groups of the kernel are not used, because many containers lack them.
 ProctrackType=proctrack/linuxproc
 TaskPlugin=task/none
 JobAcctGatherType=jobacct_gather/none
 AccountingStorageType=accounting_storage/none
-# What every job asked for and how it ended, a line each.
+# One line for each finished job.
 JobCompType=jobcomp/filetxt
 JobCompLoc={folder}/finished_jobs
 MpiDefault=none
@@ -58,7 +58,7 @@ SchedulerParameters=sched_interval=1,bf_interval=1
 MinJobAge=3600
 KillWait=2
 ReturnToService=2
-# The node has as many cores as is said below, whatever the machine has.
+# The number of cores is the one below, not that of the machine.
 SlurmdParameters=config_overrides
 NodeName={host} NodeAddr=127.0.0.1 CPUs={cores} RealMemory={memory} State=UNKNOWN
 PartitionName=local Nodes={host} Default=YES MaxTime=INFINITE State=UP
@@ -67,13 +67,13 @@ PartitionName=local Nodes={host} Default=YES MaxTime=INFINITE State=UP
 
 @dataclass(frozen=True)
 class SingleNode:
-    """A running Slurm: its folder, and the environment in which its commands find it."""
+    """A running Slurm: its folder, and the environment variables that its commands need."""
 
     folder: Path
     environment: dict[str, str]
 
     def command(self, *arguments: str) -> str:
-        """What a command of Slurm says."""
+        """Run a command of Slurm and return its output."""
         done = subprocess.run(
             arguments, env=self.environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=60
         )
@@ -82,14 +82,14 @@ class SingleNode:
         return done.stdout
 
     def finished_jobs(self) -> list[dict[str, str]]:
-        """Records of the jobs that have ended, in the order in which they ended, as Slurm's controller wrote them."""
+        """Return Slurm's records of the finished jobs, in the order in which they ended."""
         records = self.folder / "finished_jobs"
         lines = records.read_text().splitlines() if records.exists() else []
         return [dict(field.split("=", 1) for field in line.split() if "=" in field) for line in lines]
 
 
 def why_not() -> str | None:
-    """Why a Slurm of one's own cannot be started here; None if it can."""
+    """Return the reason why this machine cannot start a Slurm; None if it can."""
     if os.geteuid() != 0:
         return "Slurm's daemons need root"
     missing = [name for name in PROGRAMS if shutil.which(name) is None]
@@ -104,9 +104,9 @@ def why_not() -> str | None:
 
 @contextmanager
 def single_node(cores: int = 4, memory: int = 8000):
-    """A Slurm with one node of `cores` cores and `memory` megabytes; all of it ends with the block."""
+    """Start a Slurm with one node of `cores` cores and `memory` megabytes, and end it with the block."""
     with ExitStack() as stack:
-        # One at a time on a machine: there is one place for the configuration.
+        # Only one at a time, because all use the same SYSTEM_CONFIGURATION.
         lock = stack.enter_context(open(Path(tempfile.gettempdir(), "icha-slurm.lock"), "w"))
         fcntl.flock(lock, fcntl.LOCK_EX)
         reason = why_not()
@@ -139,13 +139,13 @@ def single_node(cores: int = 4, memory: int = 8000):
             ("slurmctld", "-D", "-c"),
             ("slurmd", "-D"),
         ):  # fmt: skip
-            said = stack.enter_context(open(folder / f"{name}.said", "w"))
+            output = stack.enter_context(open(folder / f"{name}.output", "w"))
             daemon = subprocess.Popen(
                 [shutil.which(name), *options],
                 env=environment,
                 stdin=subprocess.DEVNULL,
-                stdout=said,
-                stderr=said,
+                stdout=output,
+                stderr=output,
                 start_new_session=True,
                 preexec_fn=partial(end_with_parent, os.getpid()),
             )
@@ -158,7 +158,7 @@ def single_node(cores: int = 4, memory: int = 8000):
 
 
 def _ours(path: Path) -> bool:
-    """Whether a configuration is that of a single node of this module, perhaps one that was killed."""
+    """Return whether a configuration belongs to a Slurm of this module, perhaps of a killed test."""
     return path.is_symlink() and os.readlink(path).startswith(str(Path(tempfile.gettempdir(), FOLDER)))
 
 
@@ -177,14 +177,14 @@ def _wait_for(ready, daemon: subprocess.Popen, folder: Path, seconds: float = 30
             if ready():
                 return
         except RuntimeError:
-            pass  # the controller does not answer yet
+            pass  # the controller does not respond yet
         time.sleep(0.1)
-    said = "\n".join(f"{file.name}: {file.read_text()[-2000:]}" for file in sorted(folder.glob("*.said")))
-    raise RuntimeError(f"Slurm did not start:\n{said}")
+    output = "\n".join(f"{file.name}: {file.read_text()[-2000:]}" for file in sorted(folder.glob("*.output")))
+    raise RuntimeError(f"Slurm did not start:\n{output}")
 
 
 def _cancel_all(node: SingleNode) -> None:
-    """Cancel what still runs, and wait until its processes are gone."""
+    """Cancel all jobs, and wait until they have ended."""
     node.command("scancel", "--user=root")
     end = time.monotonic() + 30
     while node.command("squeue", "--noheader") and time.monotonic() < end:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from icha import SelfAffineSpectrum, Surface
+from icha import SelfAffineSpectrum
 from icha.support.parallel import blocks, cores, on_cores
 from icha.surfaces.summits import find_summits
 
@@ -48,12 +48,3 @@ def test_surfaces_and_summits_have_the_same_bits_on_any_number_of_cores(monkeypa
             bits += summits.position.tobytes() + summits.height.tobytes() + summits.radius_of_curvature.tobytes()
         results.append(bits)
     assert results[0] == results[1] == results[2]
-
-
-def test_blocks_leave_no_seam():
-    # The statistics and summits of a wave are everywhere the same, whichever block they fall into.
-    n = 200
-    x = 2 * np.pi * np.arange(n) / n
-    summits = find_summits(Surface(np.cos(20 * x)[None, :] + np.cos(20 * x)[:, None], PERIOD))
-    assert len(summits) == 400
-    np.testing.assert_allclose(summits.radius_of_curvature, summits.radius_of_curvature[0], rtol=1e-9)

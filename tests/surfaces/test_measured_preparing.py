@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scans import NM, SIZE, UM, centred, preparation, refused, scan, write_xyz
+from scans import NM, SIZE, UM, centred, preparation, refused, write_xyz
 
 from icha.configuration.surfaces import MeasuredSurface
-from icha.configuration.topographies import inspect_scan
+from icha.configuration.topographies import inspect_file
 from icha.datasets.files import read_dataset
 from icha.datasets.surface_file import read_surface, write_surface
 from icha.surfaces.measured.settings import UnfitTopography
@@ -194,18 +194,6 @@ def test_the_cutoff_is_that_of_iso_16610(prepared, boundary):
     assert "Gaussian S-filter (ISO 16610-61) with a nesting index of 0.0833333 m" in result.description
 
 
-def test_weights_of_the_cutoff_are_those_of_the_standard(prepared):
-    """s(x, y) = exp(-pi (x^2 + y^2)/(alpha cutoff)^2)/(alpha cutoff)^2 with alpha = sqrt(ln 2/pi), about a spike."""
-    n, cutoff = 65, 12.0
-    heights = np.zeros((n, n))
-    heights[32, 32] = 1.0
-    y, x = np.mgrid[-32:33, -32:33]
-    alpha = np.sqrt(np.log(2) / np.pi)
-    wanted = np.exp(-np.pi * (x**2 + y**2) / (alpha * cutoff) ** 2) / (alpha * cutoff) ** 2
-    surface = prepared(heights, boundary="free", size=(65.0, 65.0), cutoff=cutoff).surface
-    np.testing.assert_allclose(surface.heights, centred(wanted), atol=1e-6 * wanted.max())
-
-
 @pytest.mark.parametrize("cutoff", [3.9, 65.1])
 def test_a_cutoff_that_the_scan_does_not_hold_is_refused(prepared, cutoff):
     heights = np.random.default_rng(1).normal(size=(65, 65))
@@ -251,11 +239,7 @@ def test_too_little_for_a_surface(prepared, heights, key, words, detrend):
         prepared(heights, boundary="free", detrend=detrend, missing=missing, size=(6.0, 6.0))
 
 
-def test_messages_are_short_and_in_units_of_people(tmp_path, prepared):
-    (tmp_path / "words.txt").write_text("no heights in here\n")
-    with pytest.raises(UnfitTopography, match="cannot be read as instrument") as raised:
-        scan(tmp_path / "words.txt", height_unit=NM, size=SIZE)
-    assert len(str(raised.value)) < 200
+def test_messages_have_units_of_people(prepared):
     crop = {"x": 7 * UM, "y": 0.0, "side": 2.5 * UM}
     with pytest.raises(UnfitTopography, match=r"ends at x = 9.5 um, y = 2.5 um, .* at most x = 4 um, y = 3 um"):
         prepared(np.eye(12, 16), size=(4e-6, 3e-6), crop=crop)
@@ -285,12 +269,12 @@ def test_provenance_and_facts(prepared, tmp_path):
     assert str(tmp_path) not in result.description
     keys = {"kind": "measured", "path": str(tmp_path / "scan.npy"), "height_unit": "m", "size": "5 m"}
     section = MeasuredSurface.model_validate(keys | {"boundary": "free", "detrend": "tilt"})
-    facts = inspect_scan(section)
+    facts = inspect_file(section)
     assert (facts.grid, facts.period, facts.sha256) == (10, 5.0, result.source_sha256)
     assert facts.rms_slope == pytest.approx(result.rms_slope, rel=1e-5)
     # A file that changes is read again.
     np.save(tmp_path / "scan.npy", np.pad(heights, 1))
-    assert inspect_scan(section).grid == 12
+    assert inspect_file(section).grid == 12
 
 
 def test_synthetic_scan_is_what_its_script_makes(tmp_path):

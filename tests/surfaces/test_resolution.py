@@ -6,7 +6,6 @@ from scans import preparation
 
 from icha import SelfAffineSpectrum, Surface
 from icha.surfaces.measured.resolution import examine_scan, filtered_slope_share, noise_floor
-from icha.surfaces.summits import find_summits
 
 SIDE, GRID = 100e-6, 200
 SPECTRUM = SelfAffineSpectrum(SIDE, 50e-6, 4e-6, 0.8, rms_slope=0.1)
@@ -76,14 +75,6 @@ def test_above_the_noise_a_cutoff_is_advised_that_removes_it(examined):
     assert again.summits < 0.5 * scan.summits
     clean = examined(noisy(0.0), cutoff=scan.advice["cutoff"])
     assert abs(again.surface.rms_slope / clean.surface.rms_slope - 1) < 0.05
-
-
-def test_summits_are_those_of_the_surface_that_is_used(examined):
-    for keys in ({"boundary": "free"}, {"boundary": "mirror"}, {"boundary": "window", "taper": 0.1, "grid": 96}):
-        scan = examined(noisy(10e-9), **keys)
-        assert scan.summits == len(find_summits(scan.surface)) + len(find_summits(scan.surface).unsupported_height)
-        assert scan.cells_per_summit == pytest.approx(scan.surface.grid**2 / scan.summits)
-        assert scan.measured.grid == GRID
 
 
 @pytest.mark.filterwarnings("ignore:grid")

@@ -149,23 +149,18 @@ BAD_SPECTRA = {
 BAD_REALISATIONS = {"grid": [64.0, 4, "64"], "seed": [-1, 1.5, None], "amplitudes": ["none"]}
 
 
-@pytest.mark.parametrize(("argument", "values"), BAD_SPECTRA.items())
-def test_bad_spectrum_is_refused_by_name(argument, values):
+@pytest.mark.parametrize(("argument", "values"), (BAD_SPECTRA | BAD_REALISATIONS).items())
+def test_bad_arguments_are_refused_by_name(argument, values):
     for value in values:
+        spectrum, realisation = dict(SPECTRUM), {"grid": 64, "seed": 1}
+        (spectrum if argument in BAD_SPECTRA else realisation)[argument] = value
         with pytest.raises(ValueError, match=argument):
-            SelfAffineSpectrum(**(SPECTRUM | {argument: value}))
+            SelfAffineSpectrum(**spectrum).realise(**realisation)
 
 
 def test_a_spectrum_without_any_wave_is_refused():
     with pytest.raises(ValueError, match="short_wavelength"):
         SelfAffineSpectrum(1.0, 1.0, 0.999999999999, 0.8)
-
-
-@pytest.mark.parametrize(("argument", "values"), BAD_REALISATIONS.items())
-def test_bad_realisation_is_refused_by_name(argument, values):
-    for value in values:
-        with pytest.raises(ValueError, match=argument):
-            SelfAffineSpectrum(**SPECTRUM).realise(**({"grid": 64, "seed": 1} | {argument: value}))
 
 
 def _with(value):

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from scans import COLUMNS, HEIGHTS, NM, ROWS, SIZE, preparation, refused, scan, write_xyz
 
 from icha.datasets.format import SURFACE, UnknownFile, identify_file
-from icha.surfaces.measured.array_files import read_height_map
+from icha.surfaces.measured.scan import read_height_map
 from icha.surfaces.measured.settings import UnfitTopography
 from icha.surfaces.measured.topography import prepared_topography
 

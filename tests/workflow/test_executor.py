@@ -1,4 +1,4 @@
-"""The executor that forks jobs, on a workflow of a few scripts and with a package that is soon imported."""
+"""The executor that forks jobs, on a workflow of a few scripts, with a small package in the place of `icha`."""
 
 import json
 import os
@@ -13,22 +13,22 @@ pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="jobs are forked
 
 SNAKEFILE = """
 rule all:
-    input: "told.txt", "again.txt", "alone.txt"
+    input: "one.txt", "two.txt", "alone.txt"
 
-rule told:
+rule report:
     output: "{name}.txt"
     log: "{name}.log"
     benchmark: "{name}.jsonl"
     params: colour="red"
-    script: "workflow/scripts/tell.py"
+    script: "workflow/scripts/report.py"
 
-use rule told as alone with:
+use rule report as alone with:
     output: "alone.txt"
     log: "alone.log"
     benchmark: "alone.jsonl"
     threads: 2
 
-ruleorder: alone > heavy > told
+ruleorder: alone > heavy > report
 
 rule heavy:
     output: "heavy{megabytes}.txt"
@@ -43,11 +43,11 @@ rule long:
     output: "long.txt"
     script: "workflow/scripts/long.py"
 """
-TELL = """
+REPORT = """
 import os, sys
 from beside import WORD
-known = "icha.asked" in sys.modules
-facts = known, WORD, len(sys.argv), os.environ["OMP_NUM_THREADS"], snakemake.params.colour, snakemake.rule
+imported = "icha.ballast" in sys.modules
+facts = imported, WORD, len(sys.argv), os.environ["OMP_NUM_THREADS"], snakemake.params.colour, snakemake.rule
 print(*facts, os.getcwd(), os.getppid(), snakemake.log[0], file=open(snakemake.output[0], "w"))
 """
 WRONG = """
@@ -58,8 +58,8 @@ if snakemake.wildcards.how == "1":
     sys.exit("a message")
 os.kill(os.getpid(), signal.SIGKILL)
 """
-# What the process that jobs are forked from has is no job's own.
-ASKED = """
+# Memory of the process that jobs are forked from, which does not count as memory of a job.
+BALLAST = """
 BALLAST = b"x" * (200 << 20)
 """
 HEAVY = """
@@ -67,7 +67,7 @@ ballast = b"y" * (int(snakemake.wildcards.megabytes) << 20)
 del ballast
 open(snakemake.output[0], "w").close()
 """
-# Only the first one takes long.
+# Only the first run of this job takes long.
 LONG = """
 import os, time
 first = not os.path.exists("pids")
@@ -80,11 +80,16 @@ open(snakemake.output[0], "w").close()
 
 @pytest.fixture(scope="module")
 def workflow(tmp_path_factory):
-    """Start Snakemake on this workflow."""
+    """Return a function that starts Snakemake on this workflow."""
     folder = tmp_path_factory.mktemp("executor")
-    files = {"Snakefile": SNAKEFILE, "icha/__init__.py": "", "icha/asked.py": ASKED, "icha/broken.py": "raise OSError"}
+    files = {
+        "Snakefile": SNAKEFILE,
+        "icha/__init__.py": "",
+        "icha/ballast.py": BALLAST,
+        "icha/broken.py": "raise OSError",
+    }
     files["icha/support/program.py"] = (REPOSITORY / "icha/support/program.py").read_text()
-    scripts = {"tell": TELL, "wrong": WRONG, "long": LONG, "heavy": HEAVY, "beside": "WORD = 'beside'"}
+    scripts = {"report": REPORT, "wrong": WRONG, "long": LONG, "heavy": HEAVY, "beside": "WORD = 'beside'"}
     for name, text in (files | {f"workflow/scripts/{name}.py": text for name, text in scripts.items()}).items():
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         (folder / name).write_text(text)
@@ -107,52 +112,40 @@ def workflow(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def call(workflow):
-    """One call with jobs that do well, that need memory and that fail; what it prints, and its exit status."""
+    """Return the output and the status of one call whose jobs succeed, need memory or fail."""
     process = workflow("all", "heavy0.txt", "heavy100.txt", "wrong3", "wrong1", "wrong9")
     return process.communicate(timeout=120)[0], process.returncode
 
 
-def test_jobs_are_forks_that_are_told_what_snakemake_tells_them(workflow, call):
-    said, _ = call
-    assert (workflow.folder / "alone.txt").exists(), said
-    told, again, alone = ((workflow.folder / f"{name}.txt").read_text().split() for name in ("told", "again", "alone"))
-    assert told[:7] == ["True", "beside", "1", "1", "red", "told", str(workflow.folder)], said
-    assert again[7] == told[7] and (told[8], again[8]) == ("told.log", "again.log")
-    # A job of two threads runs by itself.
-    assert alone[:1] == ["False"] and alone[3] == "2" and alone[7] != told[7]
-    assert float((workflow.folder / "told.jsonl").read_text().split('"max_rss": ')[1].split(",")[0]) > 1
+def test_jobs_are_forks_with_the_settings_of_snakemake(workflow, call):
+    output, _ = call
+    assert (workflow.folder / "alone.txt").exists(), output
+    one, two, alone = ((workflow.folder / f"{name}.txt").read_text().split() for name in ("one", "two", "alone"))
+    assert one[:7] == ["True", "beside", "1", "1", "red", "report", str(workflow.folder)], output
+    assert two[7] == one[7] and (one[8], two[8]) == ("one.log", "two.log")
+    # A job of two threads is not a fork.
+    assert alone[:1] == ["False"] and alone[3] == "2" and alone[7] != one[7]
+    assert float((workflow.folder / "one.jsonl").read_text().split('"max_rss": ')[1].split(",")[0]) > 1
 
 
-def test_the_memory_of_a_job_is_its_own_at_its_peak(workflow, call):
+def test_the_peak_memory_of_a_job_excludes_shared_memory(workflow, call):
     took = {name: json.loads((workflow.folder / f"heavy{name}.jsonl").read_text()) for name in (0, 100)}
     assert took[0]["max_rss"] > 200, call
     assert took[0]["max_uss"] < 50
     assert 100 < took[100]["max_uss"] < 150
 
 
-def test_jobs_that_fail_are_told_with_how_they_ended(call):
-    said, status = call
+def test_failed_jobs_are_reported_with_their_exit_status(call):
+    output, status = call
     assert status == 1
-    assert "wrong.py ended with status 1." in said and "a message" in said
-    assert "wrong.py ended with status 3." in said and "wrong.py was killed by signal 9." in said
-    assert "Traceback" not in said
-
-
-@pytest.mark.slow
-def test_jobs_run_by_themselves_where_nothing_can_be_forked(workflow, tmp_path):
-    """For one, where the path of temporary files is too long for a socket."""
-    folder = tmp_path / ("long" * 30)
-    folder.mkdir()
-    (workflow.folder / "told.txt").unlink(missing_ok=True)
-    process = workflow("told.txt", TMPDIR=str(folder))
-    said = process.communicate(timeout=120)[0]
-    assert process.returncode == 0 and "the fork server cannot be started" in said
-    assert (workflow.folder / "told.txt").read_text().startswith("False"), said
+    assert "wrong.py ended with status 1." in output and "a message" in output
+    assert "wrong.py ended with status 3." in output and "wrong.py was killed by signal 9." in output
+    assert "Traceback" not in output
 
 
 @pytest.fixture
 def long(workflow):
-    """A call whose job takes long; its process and that which it was forked from."""
+    """Return Snakemake, a job that takes long, and the process from which the job was forked."""
     for name in ("pids", "long.txt"):
         (workflow.folder / name).unlink(missing_ok=True)
     process = workflow("long.txt")
@@ -171,19 +164,19 @@ def test_all_processes_end_with_snakemake(long):
 
 
 @pytest.mark.slow
-def test_a_job_whose_fork_server_is_killed_ends_and_is_run_by_the_next_call(workflow, long):
+def test_the_next_call_repeats_a_job_whose_fork_server_was_killed(workflow, long):
     process, job, server = long
     os.kill(server, signal.SIGKILL)
     wait_for(lambda: not is_alive(job))
-    said = process.communicate(timeout=120)[0]
-    assert process.returncode == 1 and "long.py ended with status 255." in said and "Traceback" not in said
+    output = process.communicate(timeout=120)[0]
+    assert process.returncode == 1 and "long.py ended with status 255." in output and "Traceback" not in output
     assert workflow("long.txt").wait(timeout=120) == 0
 
 
 @pytest.mark.slow
-def test_a_call_that_is_interrupted_ends_its_jobs(workflow, long):
+def test_an_interrupted_call_ends_its_jobs(workflow, long):
     process, job, _ = long
     os.kill(job, signal.SIGINT)  # as from a terminal, to all processes
     process.send_signal(signal.SIGINT)
-    said = process.communicate(timeout=60)[0]
-    assert process.returncode and not is_alive(job) and "Traceback" not in said, said
+    output = process.communicate(timeout=60)[0]
+    assert process.returncode and not is_alive(job) and "Traceback" not in output, output

@@ -1,4 +1,4 @@
-"""A run that fails does not stop its campaign: its file says why, the verdict lists it, the rest is drawn."""
+"""A failed run does not stop its campaign: its file states the reason, the verdict lists it, figures show the rest."""
 
 from unittest.mock import Mock
 
@@ -21,7 +21,7 @@ from icha.surfaces.surface import Surface
 ATTRIBUTES = {"campaign": "small", "study": "sticky", "config_sha256": "0", "license": "CC0-1.0"}
 PATH = {"reduced_pressures": [1e-3], "snapshots": [("reduced_pressure", 1e-3)]}
 BOTH_WAYS = PATH | {"unload": True, "max_step": 0.5}
-# The energy is ten times that which it takes to press the summits flat.
+# The surface energy is ten times the energy that presses the summits flat.
 STICKY = {"contact_modulus": 1e6, "surface_energy": 48.0, "interaction_range": 8e-6}
 BARE = {"contact_modulus": 25e6, "surface_energy": 0.0, "interaction_range": 2.071e-9}
 
@@ -38,7 +38,7 @@ def ridges():
 
 
 def pitted():
-    """A rough surface with a pit of some sixty rms heights."""
+    """A rough surface with one pit, sixty rms heights deep."""
     heights = np.array(small.SPECTRUM.realise(grid=64, seed=1).heights)
     heights[5, 7] -= 160 * np.std(heights)
     return Surface(heights, 100e-6).scaled_to_rms_slope(1.0)
@@ -46,7 +46,7 @@ def pitted():
 
 @pytest.fixture
 def sweep(tmp_path):
-    """Press a surface, always the same one unless another is given, by the job's own script; give the file."""
+    """Return a function that computes a run with the script of the job; it returns the file and the progress lines."""
     from run_sweep import run_sweep
 
     def run(name, material, path=PATH, surface=None, model="asperities"):
@@ -61,7 +61,7 @@ def sweep(tmp_path):
 
 @pytest.fixture
 def dataset(tmp_path):
-    """Put files of runs, by material, or by surface/material, into a campaign dataset by the job's own script."""
+    """Return a function that makes a campaign dataset of run files, by material or by surface/material."""
     from make_dataset import make_dataset
 
     def make(files, model="asperities"):
@@ -74,7 +74,7 @@ def dataset(tmp_path):
     return make
 
 
-def test_the_file_of_a_run_without_a_single_stop_says_why(sweep):
+def test_the_file_of_a_run_without_stops_states_the_reason(sweep):
     file, said = sweep("sticky", STICKY)
     run = read_run(file)
     assert run.sizes["step"] == run.sizes["snapshot"] == run.sizes["spot"] == 0
@@ -88,7 +88,7 @@ def test_the_verdict_lists_the_failed_run_and_the_others_are_used(sweep, dataset
     from check_results import check_results
     from judge_results import judge_results
 
-    # The failed one comes first: what a study has is known from the others.
+    # The failed run comes first; the variables of the study are those of the other run.
     files = {"glue": sweep("glue", STICKY, BOTH_WAYS)[0], "soft": sweep("soft", BARE, BOTH_WAYS)[0]}
     file, labels = dataset(files)
     broken = read_run(files["glue"])
@@ -119,7 +119,7 @@ def test_the_verdict_lists_the_failed_run_and_the_others_are_used(sweep, dataset
     assert first.endswith("known failures:") and line == "sticky/rough/seed1/slope1/glue: sticky"
 
 
-def test_a_campaign_of_failed_runs_only_is_a_dataset_and_an_empty_page(sweep, dataset, tmp_path):
+def test_a_campaign_of_failed_runs_has_a_dataset_and_an_empty_figure(sweep, dataset, tmp_path):
     file, _ = dataset({name: sweep(name, STICKY)[0] for name in ("one", "two")})
     tree = read_campaign(file)
     assert tree["sticky"].sizes["step"] == 0
@@ -131,10 +131,10 @@ def test_a_campaign_of_failed_runs_only_is_a_dataset_and_an_empty_page(sweep, da
     assert all(file.stat().st_size > 1000 for file in files)
 
 
-def test_a_surface_that_a_model_cannot_compute_costs_no_other_run(sweep, dataset):
+def test_a_surface_that_a_model_cannot_compute_affects_no_other_run(sweep, dataset):
     path, model = BOTH_WAYS, "asperities"
     odd, said = sweep("ridges", BARE, path, ridges(), model)
-    # A pit is the surface's own matter.
+    # A deep pit is no error.
     pit, _ = sweep("pit", BARE, path, pitted(), model)
     run = read_run(odd)
     assert run.attrs["incomplete"] == (
@@ -159,28 +159,28 @@ def test_boundary_elements_need_no_summits(sweep):
     file, _ = sweep("ridges", BARE, PATH, ridges(), "boundary_elements")
     run = read_run(file)
     assert "incomplete" not in run.attrs and int(run["asperity_count"]) == 0
-    # A ridge of cosine shape on which nothing varies touches along all of its length.
+    # A uniform ridge is in contact along its whole length.
     touched = run["contact_map"].values[0] > 0
     assert touched.any() and np.all(touched.all(axis=1) == touched.any(axis=1))
 
 
 @pytest.mark.parametrize("path", [{"snapshots": [("relative_load", 1e3)]}, {"snapshots": [("mean_separation", 1.0)]}])
-def test_a_state_that_there_is_not_on_this_surface_is_a_failed_run(sweep, path):
+def test_an_impossible_state_is_a_failed_run(sweep, path):
     run = read_run(sweep("far", BARE, PATH | path)[0])
     assert run.sizes["step"] == 0 and run.attrs["incomplete"].startswith("nothing was computed: path: ")
 
 
 @pytest.mark.parametrize("error", [ZeroDivisionError("division by zero"), np.linalg.LinAlgError("singular matrix")])
-def test_whatever_the_data_raise_is_a_failed_run(sweep, monkeypatch, error):
+def test_any_error_of_the_computation_is_a_failed_run(sweep, monkeypatch, error):
     monkeypatch.setattr("icha.simulation.follow", Mock(side_effect=error))
     file, said = sweep("odd", BARE)
     run = read_run(file)
     assert str(error) in run.attrs["incomplete"] and run.sizes["step"] == 0
-    # What nobody expected is for the developers: its traceback is in the log.
+    # The log has the traceback of unexpected errors.
     assert any("Traceback" in line for line in said) == (not isinstance(error, ValueError))
 
 
-def test_values_that_are_not_finite_end_a_run_and_leave_what_came_before(sweep, dataset, monkeypatch):
+def test_values_that_are_not_finite_end_a_run_and_keep_the_steps_before(sweep, dataset, monkeypatch):
     from icha.equilibrium.interacting_asperities import AsperityObservables
 
     of_step, count = AsperityObservables.of_step, iter(range(9))
@@ -197,24 +197,24 @@ def test_values_that_are_not_finite_end_a_run_and_leave_what_came_before(sweep, 
 @pytest.mark.parametrize(
     "error", [MemoryError("no room"), OSError(28, "No space left on device"), RuntimeError("can't start new thread")]
 )
-def test_what_the_machine_lacks_is_no_result(sweep, tmp_path, monkeypatch, error):
+def test_errors_of_the_machine_write_no_result(sweep, tmp_path, monkeypatch, error):
     monkeypatch.setattr("icha.simulation.follow", Mock(side_effect=error))
     with pytest.raises(type(error)):
         sweep("wrong", BARE)
     assert not (tmp_path / "wrong.nc").exists()
 
 
-def test_a_way_back_that_breaks_off_keeps_its_reason_through_its_file(tmp_path):
+def test_the_file_of_an_incomplete_unloading_keeps_the_reason(tmp_path):
     labels, run = next(iter(cyclic.runs().items()))
     write_dataset(run.isel(step=slice(0, 6)).assign_attrs(incomplete="the path ends there"), tmp_path / "run.nc")
     taken = select_run(campaign_tree([(labels, read_run(tmp_path / "run.nc"))]), labels)
     assert taken.attrs["incomplete"] == "the path ends there" and taken.sizes["step"] == 6
 
 
-def test_theories_that_hold_for_no_such_surface_are_left_out(tmp_path, capsys):
+def test_theories_that_do_not_apply_to_a_surface_are_omitted(tmp_path, capsys):
     from make_references import make_references
 
-    # A single cap on a free square: its moments are those of no isotropic Gaussian surface.
+    # The moments of a single cap on a free square are impossible for an isotropic Gaussian surface.
     x = np.linspace(-1, 1, 32)
     cap = Surface(-1e-6 * (x[:, None] ** 2 + x**2), 100e-6, "free").scaled_to_rms_slope(1.0)
     write_surface(tmp_path / "cap.nc", cap, name="cap", seed=1)

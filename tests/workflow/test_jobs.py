@@ -1,4 +1,4 @@
-"""What surrounds the work of every job: records of results, damaged inputs, logs that cannot be written, its end."""
+"""What every job does besides its work: records of results, checks of inputs, its log, its end with Snakemake."""
 
 import json
 import os
@@ -63,18 +63,19 @@ def job(tmp_path):
 
 
 def ended(process):
-    said = process.communicate(timeout=60)[1]
-    return process.returncode, said
+    """Return the status and the error output of a job."""
+    output = process.communicate(timeout=60)[1]
+    return process.returncode, output
 
 
-def test_a_job_records_what_it_wrote_and_what_it_was_asked_for_whatever_it_does_with_it(job):
+def test_a_job_records_its_result_and_its_settings_even_if_it_changes_them(job):
     assert ended(job(f"{WORK}    snakemake.params[0].clear()\n")) == (0, "")
     assert json.loads((job.results / "checksums/runs/b.nc.json").read_text())["size"] == len("a result")
     assert (job.results / "logs/b.log").read_text() == "at work\n"
     assert recorded_hash(job.results, "runs/b.nc") == hash_parameters([repr({"seed": 1}), repr("code")])
 
 
-def test_a_job_that_fails_leaves_its_result_to_be_made_again(job):
+def test_the_result_of_a_failed_job_is_computed_again(job):
     (job.results / "runs/b.nc").write_text("a former result")
     write_checksum(job.results, "runs/b.nc")
     (job.results / "runs/b.nc").unlink()
@@ -83,28 +84,28 @@ def test_a_job_that_fails_leaves_its_result_to_be_made_again(job):
     assert "runs/b.nc" in with_sidecar(job.results) and not (job.results / "runs/b.nc").exists()
 
 
-def test_a_job_refuses_what_the_disk_has_spoilt_and_the_next_call_knows(job):
+def test_a_job_refuses_a_damaged_input_and_records_the_damage(job):
     file = job.results / "surfaces/a.nc"
     before = file.stat()
     file.write_bytes(b"hexghts")
     os.utime(file, ns=(before.st_atime_ns, before.st_mtime_ns))
     assert is_whole(job.results, "surfaces/a.nc")
     assert ended(job(WORK))[0] == 1
-    said = (job.results / "logs/b.log").read_text()
-    assert said.startswith(f"Error: {RESULTS}/surfaces/a.nc: does not match its checksum") and "at work" not in said
+    log = (job.results / "logs/b.log").read_text()
+    assert log.startswith(f"Error: {RESULTS}/surfaces/a.nc: does not match its checksum") and "at work" not in log
     assert not (job.results / "runs/b.nc").exists()
     assert not is_whole(job.results, "surfaces/a.nc")
 
 
-@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a file on which nothing can be written")
-def test_what_a_job_has_to_say_comes_to_the_terminal_if_its_log_cannot_be_written(job):
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
+def test_errors_go_to_the_terminal_if_the_log_cannot_be_written(job):
     (job.results / "logs/full.log").symlink_to("/dev/full")
-    status, said = ended(job(WORK, log="logs/full.log"))
+    status, output = ended(job(WORK, log="logs/full.log"))
     assert status == 1
-    assert said.removeprefix("at work\n") == "Error: [Errno 28] No space left on device\n"
+    assert output.removeprefix("at work\n") == "Error: [Errno 28] No space left on device\n"
 
 
-def test_a_job_ends_with_the_snakemake_that_wants_it(job):
+def test_a_job_ends_when_its_snakemake_ends(job):
     snakemake = subprocess.Popen(["sleep", "600"])
     told = f"{snakemake.pid} {beginning_of(snakemake.pid)}"
     process = job(f"    import time\n{WORK}    time.sleep(600)\n", ICHA_SNAKEMAKE=told)
@@ -116,7 +117,7 @@ def test_a_job_ends_with_the_snakemake_that_wants_it(job):
 
 
 @pytest.mark.parametrize("reused", [False, True])
-def test_a_job_whose_snakemake_is_gone_before_it_begins_writes_nothing(job, reused):
+def test_a_job_whose_snakemake_ended_before_writes_nothing(job, reused):
     snakemake = subprocess.Popen(["true"])
     told = f"{snakemake.pid} {beginning_of(snakemake.pid)}"
     snakemake.wait()
@@ -126,8 +127,8 @@ def test_a_job_whose_snakemake_is_gone_before_it_begins_writes_nothing(job, reus
     assert not (job.results / "runs/b.nc").exists() and "runs/b.nc" not in with_sidecar(job.results)
 
 
-def test_a_job_is_killed_with_the_snakemake_that_started_it(job, tmp_path):
-    busy = "    import re\n    re.match('(a?){60}b', 'a' * 60)  # holds the interpreter for longer than anybody lives\n"
+def test_a_busy_job_is_killed_when_its_snakemake_is_killed(job, tmp_path):
+    busy = "    import re\n    re.match('(a?){60}b', 'a' * 60)  # blocks the interpreter for years\n"
     (tmp_path / "busy.py").write_text(SCRIPT + WORK + busy)
     caller = f"""
 import os, subprocess, sys
@@ -143,14 +144,14 @@ process.wait()
     wait_for((job.results / "runs/b.nc").exists)
     snakemake.kill()
     snakemake.wait()
-    wait_for(lambda: not is_alive(busy), seconds=30)  # far less than its work would take
+    wait_for(lambda: not is_alive(busy), seconds=30)  # far less than the work would take
 
 
-def test_a_job_of_an_earlier_call_completes_nothing_that_a_later_one_owns(job, tmp_path, monkeypatch):
+def test_a_job_of_an_earlier_call_cannot_complete_a_result_of_a_later_call(job, tmp_path, monkeypatch):
     owner = tmp_path / ".snakemake/tiny.owner"
     monkeypatch.setenv("ICHA_OWNER", "")
     take_over(owner)
-    # It writes 25 MPa, and is at it when a later call takes over, whose job has written 30 MPa by the time it goes on.
+    # The job of the earlier call writes 25 MPa. Before it completes the file, a later call writes 30 MPa.
     write = f"""
     from icha.support.atomic_files import whole_file
     with whole_file('{RESULTS}/runs/b.nc') as temporary:
@@ -176,21 +177,21 @@ def campaign(before_jobs, *, dry_run=False):
     return before_jobs.CampaignResults(RESULTS, "tiny", "tiny.yaml", "clone", dry_run=dry_run)
 
 
-def test_a_call_that_has_no_jobs_takes_nothing_from_those_that_run(job, tmp_path, monkeypatch, before_jobs):
+def test_only_a_call_that_starts_jobs_takes_over_the_results(job, tmp_path, monkeypatch, before_jobs):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(before_jobs, "hold_lock", lambda path: None)  # as where files cannot be locked
+    monkeypatch.setattr(before_jobs, "hold_lock", lambda path: None)  # as on a file system without locks
     monkeypatch.setenv("ICHA_OWNER", "")
     take_over(".snakemake/tiny.owner")
     earlier = os.environ["ICHA_OWNER"]
     own = campaign(before_jobs)
     assert ended(job(WORK, ICHA_OWNER=earlier)) == (0, "")
-    # With jobs to start it owns the results, but not if they are not those any more that it has looked at.
+    # A call that starts jobs takes over, unless the results have changed since they were inspected.
     (job.results / "runs/b.nc").write_text("another result")
     with pytest.raises(SystemExit, match=r"runs/b\.nc has changed while"):
         own.begin()
     (job.results / "runs/b.nc").unlink()
     own.begin()
-    # A job of the earlier call that begins late touches nothing, and no record.
+    # A late job of the earlier call changes neither the result nor its record.
     assert ended(job(WORK)) == (0, "")
     record = (job.results / "checksums/runs/b.nc.json").read_bytes()
     assert ended(job(WORK.replace("a result", "another result"), ICHA_OWNER=earlier))[0] == 1
@@ -198,7 +199,7 @@ def test_a_call_that_has_no_jobs_takes_nothing_from_those_that_run(job, tmp_path
     assert (job.results / "runs/b.nc").read_text() == "a result"
 
 
-def test_a_file_that_has_changed_since_it_was_looked_at_is_neither_a_surface_nor_copied(tmp_path, monkeypatch):
+def test_a_file_that_changed_after_its_inspection_is_neither_used_nor_copied(tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(str(REPOSITORY / "workflow/scripts"))
     from make_surface import make_surface
     from write_configuration import write_configuration
@@ -213,50 +214,50 @@ def test_a_file_that_has_changed_since_it_was_looked_at_is_neither_a_surface_nor
         write_configuration(tmp_path / "used.yaml", text="name: a", copies={copy: file}, sha256=[sha256])
 
     np.save(file, np.random.default_rng(1).normal(size=(16, 16)))
-    looked_at = sha256_of(file)
-    both(looked_at)
+    inspected = sha256_of(file)
+    both(inspected)
     assert copy.read_bytes() == file.read_bytes() and surface.exists()
     surface.unlink()
     np.save(file, np.random.default_rng(2).normal(size=(16, 16)))
     with pytest.raises(ValueError, match=r"heights\.npy has changed since the campaign started; repeat the command"):
-        both(looked_at)
+        both(inspected)
     with pytest.raises(ValueError, match=r"heights\.npy has changed"):
-        write_configuration(tmp_path / "used.yaml", text="name: a", copies={copy: file}, sha256=[looked_at])
-    assert not surface.exists() and sha256_of(copy) == looked_at
+        write_configuration(tmp_path / "used.yaml", text="name: a", copies={copy: file}, sha256=[inspected])
+    assert not surface.exists() and sha256_of(copy) == inspected
 
 
-def test_a_shell_gets_pythons_path_in_quotes_and_nobody_else_does(monkeypatch, before_jobs):
+def test_only_shell_commands_get_the_path_of_python_in_quotes(monkeypatch, before_jobs):
     own = sys.executable
     for name in ("ICHA_SNAKEMAKE", "PYTHONSAFEPATH"):
         monkeypatch.setenv(name, "")
     try:
         monkeypatch.setattr(sys, "executable", "/it's a folder/python")
         before_jobs.prepare_process()
-        said = subprocess.run(f"printf %s {sys.executable}", shell=True, capture_output=True, text=True).stdout
-        assert said == "/it's a folder/python" == os.fsdecode(spawn.get_executable())
+        shell = subprocess.run(f"printf %s {sys.executable}", shell=True, capture_output=True, text=True).stdout
+        assert shell == "/it's a folder/python" == os.fsdecode(spawn.get_executable())
     finally:
         spawn.set_executable(own)
 
 
-def test_only_files_that_lie_here_go_after_modules_of_their_names(tmp_path, monkeypatch):
-    clone, folder, asked = (tmp_path / name for name in ("clone", "folder", "asked"))
+def test_files_of_the_working_directory_do_not_replace_modules(tmp_path, monkeypatch):
+    clone, folder, named = (tmp_path / name for name in ("clone", "folder", "named"))
     folder.mkdir()
     own, installed = "/home/anna/.local/lib/python3/site-packages", "/usr/lib/python3/dist-packages"
     monkeypatch.chdir(folder)
-    monkeypatch.setenv("PYTHONPATH", f"{asked}{os.pathsep}")
-    monkeypatch.setattr(sys, "path", [str(clone), "", str(folder), str(asked), own, installed])
+    monkeypatch.setenv("PYTHONPATH", f"{named}{os.pathsep}")
+    monkeypatch.setattr(sys, "path", [str(clone), "", str(folder), str(named), own, installed])
     first = (REPOSITORY / "Snakefile").read_text(encoding="utf-8").partition("from snakemake")[0]
     exec(first, {"workflow": SimpleNamespace(current_basedir=clone)})
-    assert sys.path == [str(asked), own, installed, str(clone), "", str(folder)]
-    # What is asked for stays where it is, wherever it lies.
+    assert sys.path == [str(named), own, installed, str(clone), "", str(folder)]
+    # Folders that PYTHONPATH names keep their places.
     monkeypatch.setenv("PYTHONPATH", str(clone))
     monkeypatch.setattr(sys, "path", [str(folder), str(clone), installed])
     exec(first, {"workflow": SimpleNamespace(current_basedir=clone)})
     assert sys.path == [str(clone), installed, str(folder)]
 
 
-def test_a_library_that_cannot_write_is_told_apart_from_one_that_will_not(tmp_path):
-    # A largest size of files stands for the full disk: netCDF says of both that there was an HDF error.
+def test_a_full_disk_is_reported_as_such_by_netcdf_files(tmp_path):
+    # A limit of file sizes stands for the full disk. The netCDF library reports both as "HDF error".
     code = f"""
 import resource, sys
 import numpy as np, netCDF4
@@ -272,15 +273,15 @@ with whole_file({str(tmp_path / "folder/large.nc")!r}) as temporary:
     assert list((tmp_path / "folder").iterdir()) == []
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="asks /proc which file is meant")
-def test_a_result_is_on_the_disk_before_it_has_its_name_and_its_name_before_its_record(job, monkeypatch):
+@pytest.mark.skipif(sys.platform != "linux", reason="needs /proc")
+def test_content_name_and_record_of_a_result_reach_the_disk_in_this_order(job, monkeypatch):
     done = []
     sync, replace = os.fsync, os.replace
     named = {"runs": "folder", "b.nc": "result", "b.nc.json": "record"}
 
     def what(path):
         name = Path(path).name
-        return named.get(name, named.get(name[1:-14]))  # of a temporary file its own
+        return named.get(name, named.get(name[1:-14]))  # a temporary file counts as its target
 
     monkeypatch.setattr(
         os, "fsync", lambda file: done.append(("sync", what(os.readlink(f"/proc/self/fd/{file}")))) or sync(file)
@@ -293,8 +294,8 @@ def test_a_result_is_on_the_disk_before_it_has_its_name_and_its_name_before_its_
     assert done == [*result, ("sync", "record"), ("name", "record"), ("sync", "folder")]
 
 
-@pytest.mark.parametrize("there", [True, False], ids=["with_its_result", "alone"])
-def test_a_damaged_record_of_snakemake_goes(there, tmp_path, monkeypatch, before_jobs):
+@pytest.mark.parametrize("exists", [True, False], ids=["with_its_result", "alone"])
+def test_a_damaged_record_of_snakemake_is_removed(exists, tmp_path, monkeypatch, before_jobs):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(before_jobs, "hold_lock", lambda path: None)
     result = Path(RESULTS, "b.nc")
@@ -303,10 +304,10 @@ def test_a_damaged_record_of_snakemake_goes(there, tmp_path, monkeypatch, before
     for file, content in ((result, b"a result"), (record, b'{"rule": "run"\xfd')):
         file.parent.mkdir(parents=True)
         file.write_bytes(content)
-    if not there:
+    if not exists:
         result.unlink()
     campaign(before_jobs, dry_run=True)
-    assert record.exists() and result.exists() == there
+    assert record.exists() and result.exists() == exists
     campaign(before_jobs)
     assert not record.exists() and not result.exists()
-    assert (aside.read_bytes() == b"a result") if there else not aside.exists()
+    assert (aside.read_bytes() == b"a result") if exists else not aside.exists()

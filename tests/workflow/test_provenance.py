@@ -1,4 +1,4 @@
-"""Which job made what: told from records that Snakemake itself wrote."""
+"""The jobs that made the results, from the records of Snakemake."""
 
 from pathlib import Path
 
@@ -31,7 +31,7 @@ def recorded_jobs(monkeypatch):
 
 
 def recorded(folder, start=0.0):
-    """Snakemake's records of three jobs, and of a job of another campaign."""
+    """Write records of three jobs and of a job of another campaign with Snakemake's own code; return their folder."""
     persistence = FilePersistence(path=folder / ".snakemake")
 
     def record(rule, script, inputs, outputs, params, campaign="mine", begun=start):
@@ -55,24 +55,24 @@ def recorded(folder, start=0.0):
     return folder / ".snakemake/metadata"
 
 
-def test_jobs_are_those_that_made_the_results_whenever_they_were_run(recorded_jobs, tmp_path):
+def test_jobs_do_not_depend_on_the_times_of_the_records(recorded_jobs, tmp_path):
     found = recorded_jobs(recorded(tmp_path, 1e9), MADE, GIVEN, scripts=WORKFLOW / "scripts")
     figure, run, surface = found
     assert (figure.rule, run.rule, surface.rule) == ("figure", "run", "surface")
     assert surface.inputs == ("inputs/scan 1.npy",) and surface.outputs == (MADE[SURFACE],)
     assert run.inputs == (MADE[SURFACE],) and run.outputs == (MADE[RUN],)
     assert figure.inputs == tuple(sorted((MADE[RUN], "config.used.yaml")))
-    assert figure.outputs == ("figures/fig.pdf", "figures/fig.png")  # one job, and not two
+    assert figure.outputs == ("figures/fig.pdf", "figures/fig.png")  # one job
     assert run.script == "source/workflow/scripts/run_sweep.py"
     assert (WORKFLOW / "scripts/run_sweep.py").read_text().startswith(f'"""{run.description}')
-    # Settings have their names, and no path of this machine.
+    # Settings have names; paths of this machine are omitted.
     assert run.parameters == (("material.contact_modulus", "2000000.0"), ("material.label", "soft"), ("seed", "1"))
     assert figure.parameters == (("study", "load"),) and surface.parameters == (("kind", "measured"),)
     reverse = dict(reversed(MADE.items()))
     assert recorded_jobs(recorded(tmp_path / "again", -1e9), reverse, GIVEN, scripts=WORKFLOW / "scripts") == found
 
 
-def test_a_result_without_a_record_is_named_and_what_to_do(recorded_jobs, tmp_path):
+def test_a_result_without_a_record_is_named_with_the_command_to_use(recorded_jobs, tmp_path):
     records = recorded(tmp_path)
     unknown = f"{RESULTS}/report.html"
     with pytest.raises(ValueError, match=rf"^{unknown}: there is no record of how it was made.*-- --touch --forceall"):
@@ -89,7 +89,7 @@ def test_a_result_without_a_record_is_named_and_what_to_do(recorded_jobs, tmp_pa
         recorded_jobs(records, MADE, GIVEN, scripts=WORKFLOW / "scripts")
 
 
-def test_what_a_result_was_made_from_belongs_to_the_deposit(recorded_jobs, tmp_path):
+def test_inputs_of_results_must_be_in_the_deposit(recorded_jobs, tmp_path):
     without = {USED: GIVEN[USED]}
     with pytest.raises(ValueError, match=rf"^{SCAN}: {SURFACE} was made from it"):
         recorded_jobs(recorded(tmp_path), MADE, without, scripts=WORKFLOW / "scripts")

@@ -1,6 +1,6 @@
-"""What is computed again after an edit: what depends on it, and nothing else.
+"""After an edit only the results that depend on it are computed again.
 
-A copy of the project with a finished campaign is edited; a dry run then says which jobs Snakemake would run.
+A copy of the project with a finished campaign is edited. A dry run then lists the jobs that Snakemake would run.
 """
 
 import ast
@@ -17,20 +17,11 @@ from conftest import REPOSITORY, SMOKE, copy_project, snakemake
 from icha.contact.models import MODELS
 
 BESIDE_RUNS = {"reference", "boundary_elements", "boundary_element_loop"}
-WHAT_FOLLOWS_RUNS = {
-    "run",
-    "campaign_dataset",
-    "comparison",
-    "model_error",
-    "checks",
-    "verdict",
-    "figure",
-    "report_page",
-}
+RUNS_AND_AFTER = {"run", "campaign_dataset", "comparison", "model_error", "checks", "verdict", "figure", "report_page"}
 
 
 def planned(project, *arguments):
-    """Rules that would run, with the number of their jobs, and the messages of those jobs."""
+    """Return the number of jobs of each rule that would run, and the messages of these jobs."""
     plan = snakemake(project, "--dry-run", *arguments)
     text = plan.stdout
     assert plan.returncode == 0, text
@@ -49,14 +40,14 @@ def own(smoke, tmp_path_factory):
 
 @pytest.fixture
 def edit(own):
-    """Replace text of a file of a project with a finished campaign, or add a statement; undone at the end."""
+    """Return a function that replaces text of a file or adds a statement; edits are undone at the end."""
     before = {}
 
     def edited(path, old=None, new="\n_ADDED_BY_A_TEST = 1\n"):
         file = own / path
         before.setdefault(file, (file.read_bytes(), file.stat()))
         text = file.read_text(encoding="utf-8")
-        assert old is None or old in text, f"{path} no longer holds {old!r}"
+        assert old is None or old in text, f"{path} does not contain {old!r}"
         file.write_text(text + new if old is None else text.replace(old, new, 1), encoding="utf-8")
 
     yield edited
@@ -90,11 +81,11 @@ def test_comments_docstrings_formatting_and_touch_run_nothing_nor_does_a_fresh_c
 @pytest.mark.parametrize(
     ("path", "rules", "some"),
     [
-        ("icha/boundary_elements/contact.py", WHAT_FOLLOWS_RUNS, {"run": 6 + 1}),
-        ("icha/figures/fig3_distributions.py", {"figure", "report_page"}, {"figure": 1}),
+        ("icha/boundary_elements/contact.py", RUNS_AND_AFTER, {"run": 6 + 1}),
+        ("icha/figures/fig13_loops.py", {"figure", "report_page"}, {"figure": 1}),
     ],
 )
-def test_a_statement_runs_what_its_module_is_part_of(path, rules, some, own, edit):
+def test_a_new_statement_runs_the_jobs_that_use_its_module(path, rules, some, own, edit):
     edit(path)
     jobs, _ = planned(own)
     assert set(jobs) == rules and some.items() <= jobs.items()
@@ -108,13 +99,13 @@ def test_a_statement_runs_what_its_module_is_part_of(path, rules, some, own, edi
         ({"license: CC-BY-4.0": "license: CC0-1.0"}, {"run": 19, "surface": 3, "campaign_dataset": 1}, set()),
         ({"25 MPa": "25000 kPa", "fig1_jkr: {}": "fig1_jkr: {tabor_parameter: 4}"},
          {"configuration": 1, "figure": 1, "report_page": 1}, {"run", "surface"}),
-        # A curve of Fuller & Tabor is that of the material.
+        # The references contain curves of Fuller & Tabor for each material.
         ({"2 mJ/m^2": "3 mJ/m^2", "refinement: 2": "refinement: 3"},
          {"run": 3 + 1, "reference": 1, "boundary_elements": 4}, {"surface"}),
         ({"seeds: [1, 2]": "seeds: [1, 2, 3]"}, {"surface": 1, "run": 3 + 3, "boundary_elements": 3}, set()),
     ],
 )  # fmt: skip
-def test_a_value_runs_what_it_concerns(changes, some, without, own, edit):
+def test_a_changed_value_runs_the_jobs_that_use_it(changes, some, without, own, edit):
     for old, new in changes.items():
         edit(SMOKE, old, new)
     jobs, messages = planned(own)
@@ -123,7 +114,7 @@ def test_a_value_runs_what_it_concerns(changes, some, without, own, edit):
         assert all("seed 3" in each for each in messages if each.startswith(("Surface", "Sweep", "Boundary")))
 
 
-def test_literature_runs_references_and_a_lost_solution_is_computed_again(own, edit):
+def test_published_points_run_references_and_a_lost_solution_is_computed_again(own, edit):
     edit("icha/references/literature.json", "0.185", "0.186")
     lost = own / "results/smoke/references/boundary_elements/adhesive/challenge/seed2/slope1/cmc_300nm/p0.01.nc"
     aside = lost.rename(lost.with_suffix(".aside"))
@@ -135,7 +126,7 @@ def test_literature_runs_references_and_a_lost_solution_is_computed_again(own, e
 
 @pytest.fixture
 def fingerprint(monkeypatch):
-    """The module of the workflow, as a process begins with it."""
+    """The module `workflow/fingerprint.py`, newly imported."""
     monkeypatch.syspath_prepend(str(REPOSITORY / "workflow"))
     monkeypatch.delitem(sys.modules, "fingerprint", raising=False)
     import fingerprint
@@ -143,15 +134,15 @@ def fingerprint(monkeypatch):
     return fingerprint
 
 
-# Jobs that compute, besides those that follow them in any case.
+# Scripts that take long.
 EXPENSIVE = {"make_surface", "run_sweep", "make_references", "solve_boundary_elements", "follow_boundary_elements"}
 
 
-def test_scripts_whose_fingerprint_a_module_is_part_of(fingerprint):
-    # A run imports its model by name, and so does a figure its module.
-    told = {"run_sweep": [model.module for model in MODELS.values()], "draw_figure": ["icha.figures.fig1_jkr"]}
+def test_fingerprints_contain_the_modules_that_a_script_uses(fingerprint):
+    # A run imports the module of its model by name, a figure its own module.
+    by_name = {"run_sweep": [model.module for model in MODELS.values()], "draw_figure": ["icha.figures.fig1_jkr"]}
     files = {
-        file.stem: fingerprint.files_of(file, *told.get(file.stem, ()))
+        file.stem: fingerprint.files_of(file, *by_name.get(file.stem, ()))
         for file in (REPOSITORY / "workflow/scripts").glob("*.py")
     }
     for module, scripts in {
@@ -159,7 +150,7 @@ def test_scripts_whose_fingerprint_a_module_is_part_of(fingerprint):
         "equilibrium/newton": {"run_sweep"},
         "asperity/jkr": {"run_sweep", "make_references"},
         "simulation": {"run_sweep"},
-        # Boundary elements know nothing of the model: they are not solved again.
+        # Solutions at finite ranges do not depend on the asperity model.
         "references/finite_range": {"solve_boundary_elements", "follow_boundary_elements"},
         "references/persson": {"make_references"},
         "surfaces/spectrum": {"make_surface", "make_references"},
@@ -176,14 +167,14 @@ def test_scripts_whose_fingerprint_a_module_is_part_of(fingerprint):
         assert f"icha/{module}.py" in files[script]
 
 
-def test_models_of_contact_know_nothing_of_each_other_and_nobody_of_what_surrounds_scripts(fingerprint):
+def test_fingerprints_of_contact_models_are_separate_and_exclude_what_changes_no_number(fingerprint):
     script = REPOSITORY / "workflow/scripts/run_sweep.py"
     asperities, patches = (set(fingerprint.files_of(script, model.module)) for model in MODELS.values())
     assert any("/equilibrium/" in name for name in asperities - patches)
     assert "icha/boundary_elements/contact.py" in patches - asperities
     assert not any("/equilibrium/" in name for name in patches - asperities)
     assert not {"job.py", "icha/support/printable.py", "icha/support/program.py"} & (asperities | patches)
-    # What writes and reads datasets is.
+    # Modules that write and read datasets are part of the fingerprint.
     assert {"icha/support/atomic_files.py", "icha/datasets/files.py"} <= asperities
 
 
@@ -194,14 +185,14 @@ def test_fingerprints_refuse_imports_that_they_cannot_follow(tmp_path, fingerpri
         fingerprint.code_fingerprint(script)
 
 
-@pytest.mark.parametrize("kept", ["whole", "cut off", "not to be written"])
-def test_what_a_module_says_is_read_again_when_it_says_something_else(kept, tmp_path, fingerprint, monkeypatch):
-    monkeypatch.setattr(fingerprint, "_CACHE", tmp_path / "kept.json")
+@pytest.mark.parametrize("cache", ["complete", "cut off", "not writable"])
+def test_a_changed_module_is_read_again_despite_the_cache(cache, tmp_path, fingerprint, monkeypatch):
+    monkeypatch.setattr(fingerprint, "_CACHE", tmp_path / "cache.json")
     module = tmp_path / "module.py"
     module.write_text('from os import path, sep\n\nNAME = "data.csv"\n')
     first = fingerprint.code_fingerprint(module)
-    if kept == "not to be written":
-        (tmp_path / "kept.json").mkdir()
+    if cache == "not writable":
+        (tmp_path / "cache.json").mkdir()
     fingerprint.save_cache()
 
     def begin():
@@ -209,10 +200,10 @@ def test_what_a_module_says_is_read_again_when_it_says_something_else(kept, tmp_
         fingerprint._syntax_of.cache_clear()
 
     begin()
-    if kept == "cut off":
-        (tmp_path / "kept.json").write_text((tmp_path / "kept.json").read_text()[:-9])
+    if cache == "cut off":
+        (tmp_path / "cache.json").write_text((tmp_path / "cache.json").read_text()[:-9])
     with monkeypatch.context() as reading:
-        if kept == "whole":
+        if cache == "complete":
             reading.setattr(fingerprint, "_read", None)
         assert fingerprint.code_fingerprint(module) == first
     begin()
@@ -220,7 +211,7 @@ def test_what_a_module_says_is_read_again_when_it_says_something_else(kept, tmp_
     assert fingerprint.code_fingerprint(module) != first
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="needs a file of the system that says something else every time")
+@pytest.mark.skipif(sys.platform != "linux", reason="needs /proc/uptime")
 def test_files_of_the_system_that_a_module_names_are_not_part_of_it(fingerprint, tmp_path):
     script = tmp_path / "ask.py"
     script.write_text("UPTIME = '/proc/uptime'\n")

@@ -1,6 +1,6 @@
-"""A campaign on a Slurm: real daemons, real submissions, on a node of our own that ends with the tests.
+"""A campaign on a real Slurm of one node, which the tests start and end.
 
-`ICHA_REQUIRE_SLURM=1` makes a failure of what would be a skip.
+Without Slurm the tests are skipped, or fail with `ICHA_REQUIRE_SLURM=1`.
 """
 
 import hashlib
@@ -25,11 +25,12 @@ RUNS = {
     for slope in ("0.2", "0.5", "1")
     for material in ("soft", "bare")
 }
-SPOILT = "runs/load/rough/seed2/slope0.5/bare.nc"
+# The job of this run fails.
+FAILING = "runs/load/rough/seed2/slope0.5/bare.nc"
 
 
 def slurm_is_needed():
-    """Skip where there can be no Slurm, unless it is required."""
+    """Skip the test if Slurm cannot be started; fail if it is required."""
     reason = why_not()
     if reason is None and not PYTHON.exists():
         reason = "Snakemake's executor for Slurm is not installed (make slurm-environment)"
@@ -43,12 +44,12 @@ def project_with_campaign(folder):
     return project
 
 
-# These hold times.
+# Files with measured times.
 MEASURED = ("logs", "benchmarks", "checksums", "run_times.tsv", "made_with.txt")
 
 
 def results_of(project):
-    """Checksums of all results but what is measured while they are made."""
+    """Return checksums of all results, without files that contain measured times."""
     folder = project / "results/batches"
     return {
         str(file.relative_to(folder)): hashlib.sha256(file.read_bytes()).hexdigest()
@@ -59,9 +60,9 @@ def results_of(project):
 
 @dataclass
 class Call:
-    """A call of Snakemake, and what Slurm knows of its submissions."""
+    """A call of Snakemake, and the records of Slurm about its submissions."""
 
-    said: str
+    output: str
     returncode: int
     results: dict[str, str]
     records: list[dict[str, str]]
@@ -69,7 +70,7 @@ class Call:
 
 
 def call_with_profile(node, project, *arguments):
-    """Call Snakemake with the profile as it is shipped, but for the time between two questions to Slurm."""
+    """Call Snakemake with the shipped profile, with shorter intervals between checks of the submissions."""
     before = len(node.finished_jobs())
     done = subprocess.run(
         [PYTHON, "-m", "snakemake", "--workflow-profile", "slurm", "--configfile", CONFIGURATION,
@@ -91,60 +92,60 @@ def call_with_profile(node, project, *arguments):
 
 @pytest.fixture(scope="module")
 def calls(tmp_path_factory):
-    """The campaign with one run that cannot be written, then with what was in its way removed, then with an edit."""
+    """Run the campaign with one run that cannot be written, then without this obstacle, then after an edit."""
     slurm_is_needed()
     project = project_with_campaign(tmp_path_factory.mktemp("slurm") / "project")
-    obstacle = project / "results/batches/checksums" / f"{SPOILT}.json"
+    obstacle = project / "results/batches/checksums" / f"{FAILING}.json"
     obstacle.mkdir(parents=True)
     batches = ("--group-components", "surfaces=10", "references=10", "runs=6")
     with single_node() as node:
-        spoilt = call_with_profile(node, project, *batches)
+        failing = call_with_profile(node, project, *batches)
         obstacle.rmdir()
         whole = call_with_profile(node, project, *batches)
-        # All runs of `soft` are outdated, and none of them can be submitted.
+        # All runs with `soft` are outdated, and none of them can be submitted.
         configuration = project / CONFIGURATION
         configuration.write_text(configuration.read_text().replace("50 mJ", "60 mJ"))
         refused = call_with_profile(node, project, "--default-resources", "slurm_partition=nowhere")
         plan = snakemake(project, "--dry-run", configuration=CONFIGURATION)
-    return {"spoilt": spoilt, "whole": whole, "refused": refused, "plan": plan}
+    return {"failing": failing, "whole": whole, "refused": refused, "plan": plan}
 
 
 @pytest.mark.slow
-def test_runs_go_through_slurm_in_batches_with_the_cores_and_the_memory_of_what_runs_side_by_side(calls):
-    call = calls["spoilt"]
+def test_batches_request_the_cores_and_the_memory_of_their_parallel_runs(calls):
+    call = calls["failing"]
     submitted = sorted(call.comments.values())
     assert submitted == ["rule_references_reference", "rule_runs_run", "rule_runs_run", "rule_surfaces_surface"]
-    # Every submission that Snakemake speaks of is in Slurm's records, and nothing else is.
-    assert all(f"SLURM jobid {record['JobId']} " in call.said for record in call.records)
-    assert call.said.count("SLURM jobid") == len(call.records) == 4
+    # Slurm has a record of every submission that Snakemake reports, and no other record.
+    assert all(f"SLURM jobid {record['JobId']} " in call.output for record in call.records)
+    assert call.output.count("SLURM jobid") == len(call.records) == 4
     for record in call.records:
         if call.comments[record["JobId"]] == "rule_runs_run":
-            # Six runs on four cores are a layer of four and one of two: four times a run's memory, twice its time.
+            # Six runs on four cores make layers of four and two runs: four times the memory of a run, twice its time.
             assert record["ProcCnt"] == "4" and "mem=2400M" in record["Tres"] and record["TimeLimit"] == "60"
 
 
 @pytest.mark.slow
-def test_a_run_that_fails_is_reported_and_stops_no_other(calls):
-    call = calls["spoilt"]
+def test_a_failed_run_is_reported_and_stops_no_other(calls):
+    call = calls["failing"]
     assert call.returncode != 0
-    assert {name for name in call.results if name.startswith("runs/")} == RUNS - {SPOILT}
+    assert {name for name in call.results if name.startswith("runs/")} == RUNS - {FAILING}
     assert "references/rough.nc" in call.results and "config.used.yaml" in call.results
     states = [record["JobState"] for record in call.records]
     assert sorted(states) == ["COMPLETED", "COMPLETED", "COMPLETED", "FAILED"]
     failed = next(record["JobId"] for record in call.records if record["JobState"] == "FAILED")
     assert call.comments[failed] == "rule_runs_run"
-    # At the end, that run alone is reported, with its log, which says why; and before it, the log of its batch.
-    *_, reported = call.said.split(f"SLURM-job '{failed}' failed")
+    # The last message reports this run alone, with its log and the error; a message before names the log of the batch.
+    *_, reported = call.output.split(f"SLURM-job '{failed}' failed")
     assert reported.count("Error in rule") == 1
-    assert f"logs/{Path(SPOILT).with_suffix('.log')}" in reported
-    assert "Error: [Errno 21] Is a directory" in reported and f"{SPOILT}.json" in reported
-    assert call.said.count(f"/{failed}.log") >= 1
+    assert f"logs/{Path(FAILING).with_suffix('.log')}" in reported
+    assert "Error: [Errno 21] Is a directory" in reported and f"{FAILING}.json" in reported
+    assert f"/{failed}.log" in call.output
 
 
 @pytest.mark.slow
-def test_the_next_call_computes_what_is_missing_and_nothing_else(calls):
-    before, call = calls["spoilt"], calls["whole"]
-    assert call.returncode == 0, call.said
+def test_the_next_call_computes_only_missing_results(calls):
+    before, call = calls["failing"], calls["whole"]
+    assert call.returncode == 0, call.output
     assert list(call.comments.values()) == ["rule_runs_run"]
     assert call.records[0]["ProcCnt"] == "1"
     assert before.results.items() <= call.results.items()
@@ -161,17 +162,17 @@ def test_results_are_those_of_a_local_run_byte_for_byte(calls, tmp_path):
 
 
 @pytest.mark.slow
-def test_outdated_results_are_not_taken_for_new_ones_when_their_jobs_never_ran(calls):
+def test_outdated_results_are_removed_even_if_their_jobs_never_ran(calls):
     refused, plan = calls["refused"], calls["plan"]
     assert refused.returncode != 0 and not refused.records
-    assert "nowhere" in refused.said
+    assert "nowhere" in refused.output
     outdated = {name for name in RUNS if name.endswith("soft.nc")}
     assert {name for name in refused.results if name.startswith("runs/")} == RUNS - outdated
     assert plan.returncode == 0 and f"run {len(outdated)}" in " ".join(plan.stdout.split())
 
 
 @pytest.mark.slow
-def test_a_slurm_of_the_machine_is_left_alone(monkeypatch, tmp_path):
+def test_a_slurm_of_the_machine_is_not_touched(monkeypatch, tmp_path):
     monkeypatch.setattr("os.geteuid", lambda: 0)
     monkeypatch.setattr("shutil.which", lambda name: f"/usr/sbin/{name}")
     monkeypatch.delenv("SLURM_CONF", raising=False)
@@ -182,13 +183,13 @@ def test_a_slurm_of_the_machine_is_left_alone(monkeypatch, tmp_path):
     with pytest.raises(RuntimeError, match="belongs to a Slurm"), single_node():
         pass
     assert theirs.read_text() == "ClusterName=theirs\n"
-    # What a killed test left is no Slurm of the machine.
+    # The configuration of a killed test does not count as a Slurm of the machine.
     theirs.unlink()
     theirs.symlink_to(f"/tmp/{FOLDER}gone/slurm.conf")
     assert why_not() is None
 
 
-def test_the_profile_names_rules_that_there_are():
+def test_the_profile_names_existing_rules():
     profile = yaml.safe_load((REPOSITORY / "profiles/slurm/config.yaml").read_text())
     rules = " ".join(file.read_text() for file in (REPOSITORY / "workflow/rules").glob("*.smk"))
     assert all(f"rule {name}:" in rules for name in profile["groups"])

@@ -1,7 +1,7 @@
-"""The lowest version of Snakemake that is allowed; the highest one is that of the lock, with which all else is tested.
+"""A campaign with the lowest permitted version of Snakemake; all other tests use the highest one, which is locked.
 
-An environment is made for it, from the index of packages: without one the test is skipped, with
-`ICHA_REQUIRE_SNAKEMAKE=1` it fails.
+The test installs it from the index of packages. Without access to the index the test is skipped, or fails with
+`ICHA_REQUIRE_SNAKEMAKE=1`.
 """
 
 import os
@@ -20,14 +20,14 @@ from tiny_campaign import CAMPAIGN
 
 
 def bounds():
-    """The lowest version that is allowed, and the first one that is not."""
+    """Return the lowest permitted version, and the first version above the permitted ones."""
     listed = tomllib.loads((REPOSITORY / "pyproject.toml").read_text())["project"]["optional-dependencies"]["workflow"]
     requirement = next(found for found in map(Requirement, listed) if found.name == "snakemake")
     limits = {limit.operator: Version(limit.version) for limit in requirement.specifier}
     return limits[">="], limits["<"]
 
 
-def test_the_installed_version_is_the_highest_that_is_allowed_and_the_snakefile_asks_for_the_lowest():
+def test_the_highest_permitted_version_is_installed_and_the_snakefile_requires_the_lowest():
     lowest, first_refused = bounds()
     assert Version(installed.__version__).release[:2] == (first_refused.major, first_refused.minor - 1)
     assert f'min_version("{lowest}")' in (REPOSITORY / "Snakefile").read_text()
@@ -47,7 +47,7 @@ def test_a_campaign_with_the_lowest_version(tmp_path):
             (pytest.fail if os.environ.get("ICHA_REQUIRE_SNAKEMAKE") == "1" else pytest.skip)(done.stderr)
     (tmp_path / "tiny.yaml").write_text(CAMPAIGN)
     command = [python, "-m", "snakemake", "--snakefile", REPOSITORY / "Snakefile", "--directory", tmp_path, "dataset"]
-    for said in ("12 of 12 steps", "Nothing to be done"):
+    for message in ("steps (100%) done", "Nothing to be done"):
         done = subprocess.run(
             [*map(str, command), "report", "--configfile", str(tmp_path / "tiny.yaml")],
             env=os.environ | {"PYTHONPATH": modules_of(REPOSITORY)},
@@ -55,5 +55,5 @@ def test_a_campaign_with_the_lowest_version(tmp_path):
             stderr=subprocess.STDOUT,
             text=True,
         )
-        assert done.returncode == 0 and said in done.stdout, done.stdout
+        assert done.returncode == 0 and message in done.stdout, done.stdout
     assert Path(tmp_path, "results/tiny/report.html").is_file()

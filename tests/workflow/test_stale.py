@@ -1,4 +1,4 @@
-"""Results that are whole but are not those of what is asked for: they never pass for up to date."""
+"""Complete results of other settings or inputs never count as up to date."""
 
 import json
 import os
@@ -19,7 +19,7 @@ METADATA, INCOMPLETE = Path(".snakemake/metadata"), Path(".snakemake/incomplete"
 
 
 class Rule(SimpleNamespace):
-    """What of a rule is looked at, whose result is one file."""
+    """A rule of one result, with the attributes that `have_stale_made_again` reads."""
 
     def __init__(self, path, *params):
         super().__init__(script="script.py", params=params, output=[SimpleNamespace(match=path.__eq__)])
@@ -28,8 +28,8 @@ class Rule(SimpleNamespace):
         return {}
 
 
-def written(path, content, modulus, **made_from):
-    """Write a result, its sidecar and the record of Snakemake, as the job for a modulus does."""
+def write(path, content, modulus, **made_from):
+    """Write a result, its checksum file and Snakemake's record, as a job with this modulus does."""
     (RESULTS / path).write_bytes(content)
     write_checksum(RESULTS, path, asked=hash_parameters([repr(modulus)]), inputs=made_from)
     record = METADATA / urlsafe_b64encode(f"{RESULTS}/{path}".encode()).decode()
@@ -37,62 +37,64 @@ def written(path, content, modulus, **made_from):
     return record
 
 
-def dataset_of_run():
-    return written("dataset.nc", b"of one run", 25, **{"run.nc": sha256_as_written(RESULTS, "run.nc")})
+def write_dataset_of_run():
+    return write("dataset.nc", b"of one run", 25, **{"run.nc": sha256_as_written(RESULTS, "run.nc")})
 
 
-def records_lost():
+def lose_records():
     shutil.rmtree(METADATA)
 
 
-def one_run_restored():
-    """From a backup of results of other settings, of which Snakemake keeps the record of what was there since."""
+def restore_run():
+    """Replace the run by one of other settings, as from a backup; Snakemake's record remains."""
     record = (METADATA / urlsafe_b64encode(f"{RESULTS}/run.nc".encode()).decode()).read_bytes()
-    written("run.nc", b"a harder run", 30).write_bytes(record)
+    write("run.nc", b"a harder run", 30).write_bytes(record)
 
 
-def one_run_of_other_bytes():
-    """From another machine: of the same settings, and older than the dataset."""
-    written("run.nc", b"another", 25)
+def replace_run():
+    """Replace the run by one of the same settings from another machine, older than the dataset."""
+    write("run.nc", b"another", 25)
     os.utime(RESULTS / "run.nc", (1, 1))
     write_checksum(RESULTS, "run.nc", asked=hash_parameters(["25"]))
 
 
-def checksums_lost():
+def lose_checksums():
     shutil.rmtree(RESULTS / "checksums")
 
 
 @pytest.mark.parametrize(
-    ("what", "now", "again"),
+    ("change", "modulus", "expected"),
     [
         (lambda: None, 25, set()),
-        (lambda: None, 30, set()),  # Snakemake sees it by its records
-        (records_lost, 25, set()),
-        (records_lost, 30, {"run.nc", "dataset.nc"}),
-        (one_run_restored, 25, {"run.nc", "dataset.nc"}),
-        (one_run_of_other_bytes, 25, {"dataset.nc"}),
-        (checksums_lost, 25, {"run.nc", "dataset.nc"}),
+        (lambda: None, 30, set()),  # Snakemake detects this itself
+        (lose_records, 25, set()),
+        (lose_records, 30, {"run.nc", "dataset.nc"}),
+        (restore_run, 25, {"run.nc", "dataset.nc"}),
+        (replace_run, 25, {"dataset.nc"}),
+        (lose_checksums, 25, {"run.nc", "dataset.nc"}),
     ],
 )
-def test_what_snakemake_does_not_see_is_made_again(what, now, again, tmp_path, monkeypatch, before_jobs):
+def test_stale_results_that_snakemake_does_not_detect_are_computed_again(
+    change, modulus, expected, tmp_path, monkeypatch, before_jobs
+):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(before_jobs, "hold_lock", lambda path: None)
     for folder in (RESULTS, METADATA):
         folder.mkdir(parents=True)
-    written("run.nc", b"one run", 25)
-    dataset_of_run()
-    what()
+    write("run.nc", b"one run", 25)
+    write_dataset_of_run()
+    change()
     assert damaged(RESULTS) == []
     METADATA.mkdir(exist_ok=True)
     campaign = before_jobs.CampaignResults(str(RESULTS), "tiny", "tiny.yaml", "clone", dry_run=False)
     paths = [f"{RESULTS}/run.nc", f"{RESULTS}/dataset.nc"]
-    campaign.have_stale_made_again(paths, [Rule(path, now) for path in paths])
+    campaign.have_stale_made_again(paths, [Rule(path, modulus) for path in paths])
     marked = {urlsafe_b64decode(file.name).decode() for file in INCOMPLETE.iterdir()} if INCOMPLETE.is_dir() else set()
-    assert marked == {f"{RESULTS}/{path}" for path in again}
+    assert marked == {f"{RESULTS}/{path}" for path in expected}
 
 
 @pytest.mark.slow
-def test_unchanged_results_without_the_workflows_records_are_left_alone(tmp_path):
+def test_unchanged_results_without_records_of_snakemake_are_kept(tmp_path):
     project = copy_project(REPOSITORY, tmp_path / "project")
     (project / CONFIGURATION).write_text(CAMPAIGN)
 
@@ -104,7 +106,7 @@ def test_unchanged_results_without_the_workflows_records_are_left_alone(tmp_path
     dataset()
     shutil.rmtree(project / ".snakemake")
     assert "Nothing to be done" in dataset()
-    # As a deposit asks for where there are none: what made the results is recorded, and they stay as they are.
+    # A deposit requires records. This call, which its message recommends, writes them and computes nothing.
     records = project / METADATA
     assert not any(records.iterdir())
     dataset("--touch", "--forceall")

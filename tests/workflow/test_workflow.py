@@ -1,19 +1,18 @@
-"""The workflow as its users meet it: a whole campaign, interrupted ones, and wrong input."""
+"""A whole campaign as users run it; refused calls and wrong configurations."""
 
 import hashlib
 import json
 import os
-import random
-import shutil
-import signal
 import subprocess
 import time
 from pathlib import Path
+from types import SimpleNamespace
+from unittest.mock import Mock
 
 import pytest
 import xarray as xr
 import yaml
-from conftest import FIGURES, REPOSITORY, SMOKE, modules_of, snakemake, snakemake_command
+from conftest import FIGURES, REPOSITORY, SMOKE, snakemake
 from traces import traces
 
 from icha.configuration.cases import campaign_sha256
@@ -36,7 +35,7 @@ publish/smoke-0.0.1/SHA256SUMS publish/smoke-0.0.1/dataset/smoke.nc publish/smok
 
 
 def results_of(project):
-    """Checksums of all results but what is measured while they are made: logs, benchmarks, run times, time stamps."""
+    """Return checksums of all results, without files that contain measured times."""
     folder = project / "results/smoke"
     return {
         str(file.relative_to(folder)): hashlib.sha256(file.read_bytes()).hexdigest()
@@ -46,7 +45,7 @@ def results_of(project):
     }
 
 
-def test_everything_that_was_promised_is_there(smoke):
+def test_all_promised_files_exist(smoke):
     files = results_of(smoke)
     promised = {*PROMISED.split(), *(f"figures/{figure}.{ending}" for figure in FIGURES for ending in ("png", "pdf"))}
     assert promised <= files.keys()
@@ -55,7 +54,7 @@ def test_everything_that_was_promised_is_there(smoke):
         assert (results / "logs" / job).with_suffix(".log").is_file()
         benchmark = (results / "benchmarks" / job).with_suffix(".jsonl")
         assert json.loads(benchmark.read_text().splitlines()[0])["s"] > 0
-    # A sweep reports its progress; boundary elements whether the grid resolves the attraction, before they start.
+    # A run reports its progress. Boundary elements first report whether the grid resolves the attraction.
     assert len((results / "logs/runs/challenge/challenge/seed1/slope1/cmc.log").read_text().splitlines()) >= 4
     log = results / "logs/boundary_elements/adhesive/challenge/seed1/slope1/cmc_300nm/p0.01.log"
     assert "spacing 1.563e-06 m" in log.read_text().splitlines()[0]
@@ -65,7 +64,7 @@ def test_everything_that_was_promised_is_there(smoke):
     assert used == yaml.safe_load((smoke / SMOKE).read_text())
 
 
-def test_the_dataset_tells_where_it_comes_from(smoke):
+def test_the_dataset_states_its_origin(smoke):
     campaign = load_configuration(smoke / "results/smoke/config.used.yaml").campaign
     with xr.open_datatree(smoke / "results/smoke/dataset/smoke.nc") as tree:
         assert set(tree.children) == {"challenge", "multi_slope", "multi_slope_truth", "pull", "pull_far"}
@@ -81,7 +80,7 @@ def test_the_dataset_tells_where_it_comes_from(smoke):
         assert len(run.attrs["config_sha256"]) == 64
 
 
-def test_the_deposit_is_what_its_checksums_say(smoke):
+def test_the_deposit_agrees_with_its_checksums(smoke):
     deposit = smoke / "results/smoke/publish/smoke-0.0.1"
     subprocess.run(["sha256sum", "--quiet", "--check", "--strict", "SHA256SUMS"], cwd=deposit, check=True)
     listed = {line.split("  ")[1] for line in (deposit / "SHA256SUMS").read_text().splitlines()}
@@ -102,7 +101,7 @@ def test_no_paths_users_hosts_or_times_in_results(smoke):
 
 def test_a_second_call_does_nothing(smoke, tmp_path):
     def times():
-        # Where a job has several outputs Snakemake touches them at its end, and their records get the new time.
+        # Snakemake touches the outputs of a job that has several, and their checksum files record the new time.
         files = (smoke / "results").rglob("*")
         return {file: file.stat().st_mtime_ns for file in files if "checksums" not in file.parts}
 
@@ -113,10 +112,9 @@ def test_a_second_call_does_nothing(smoke, tmp_path):
     assert times() == before
 
 
-@pytest.mark.parametrize("configuration", ["config/config.yaml", "config/campaigns/validation.yaml"])
-def test_large_campaigns_can_be_planned(configuration, smoke, tmp_path):
-    # That of the session has fewer figures.
-    plan = snakemake(smoke, "all", "publish", "-n", "-d", str(tmp_path), configuration=REPOSITORY / configuration)
+def test_a_large_campaign_can_be_planned(smoke, tmp_path):
+    configuration = REPOSITORY / "config/campaigns/validation.yaml"
+    plan = snakemake(smoke, "all", "publish", "-n", "-d", str(tmp_path), configuration=configuration)
     assert plan.returncode == 0 and "campaign_dataset" in plan.stdout and "deposit" in plan.stdout, plan.stdout
 
 
@@ -126,26 +124,7 @@ def test_the_campaign_as_shipped_needs_no_tamaas_and_has_every_figure():
     assert set(campaign.figures.by_name()) == {file.stem for file in (REPOSITORY / "icha/figures").glob("fig*.py")}
 
 
-@pytest.mark.slow
-def test_killed_runs_are_finished_with_the_same_bytes(smoke, tmp_path):
-    project = shutil.copytree(smoke, tmp_path / "project", ignore=shutil.ignore_patterns("results", ".snakemake"))
-    pause = random.Random(1)
-    command, environment = snakemake_command("all", "references", "publish")
-    environment["PYTHONPATH"] = modules_of(project)
-    silent = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "start_new_session": True}
-    for attempt in range(2):
-        run = subprocess.Popen(command, cwd=project, env=environment, **silent)
-        time.sleep(pause.uniform(3, 9))
-        # Of two calls, one is killed alone: its jobs go on for a while, beside those of the next call.
-        (os.kill if attempt % 2 else os.killpg)(run.pid, signal.SIGKILL)
-        run.wait()
-    finished = snakemake(project, "all", "references", "publish")
-    assert finished.returncode == 0, finished.stdout
-    assert results_of(project) == results_of(smoke)
-    assert not [file for file in (project / "results").rglob("*.part")]
-
-
-def test_a_call_removes_what_killed_ones_left_and_refuses_a_second_one(project, before_jobs, monkeypatch):
+def test_a_call_removes_temporary_files_of_killed_calls_and_refuses_a_second_call(project, before_jobs, monkeypatch):
     (project / "results/smoke/verdict.txt").unlink()
     left = project / "results/smoke/publish/.smoke-1.0.0.zip.0a1b2c3d.part"
     left.write_bytes(b"a part")
@@ -160,26 +139,35 @@ def test_a_call_removes_what_killed_ones_left_and_refuses_a_second_one(project, 
     assert Path("results/smoke/verdict.txt").exists() and not left.exists()
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "message"),
-    [
-        ("25 MPa", "25 mPa", "materials.cmc.contact_modulus: '25 mPa' is unusual"),
-        ("grid: 64", "grid: 32", "Warning: surfaces.challenge.grid: 32"),
-    ],
-)
-def test_a_wrong_configuration_is_a_message_and_an_unwise_one_a_warning(old, new, message, smoke, tmp_path):
+def test_a_wrong_configuration_is_a_message_without_traceback(smoke, tmp_path):
     text = (REPOSITORY / SMOKE).read_text()
-    assert old in text
-    (tmp_path / "wrong.yaml").write_text(text.replace(old, new, 1))
-    said = snakemake(smoke, "-n", "-d", str(tmp_path), configuration=tmp_path / "wrong.yaml")
-    assert said.returncode == ("Warning" not in message)
-    assert message in said.stdout and "Traceback" not in said.stdout and ".smk" not in said.stdout
+    (tmp_path / "wrong.yaml").write_text(text.replace("25 MPa", "25 mPa", 1))
+    refused = snakemake(smoke, "-n", "-d", str(tmp_path), configuration=tmp_path / "wrong.yaml")
+    assert refused.returncode == 1 and "materials.cmc.contact_modulus: '25 mPa' is unusual" in refused.stdout
+    assert "Traceback" not in refused.stdout and ".smk" not in refused.stdout
 
 
-def test_wrong_values_on_the_command_line_and_two_configurations_are_messages(smoke):
-    refused = snakemake(smoke, "-n", "--config", "name=My Campaign", "studies={none: {}}")
-    assert refused.returncode == 1 and "Traceback" not in refused.stdout
-    assert "--config: name: 'My Campaign'" in refused.stdout
-    assert "--config: studies.none.targets:" in refused.stdout
-    refused = snakemake(smoke, "-n", "--configfile", "config/config.yaml", SMOKE, configuration=None)
-    assert refused.returncode == 1 and "expected one file" in refused.stdout
+@pytest.fixture
+def configuration_of(monkeypatch):
+    """Return the function that reads the configuration of a call, with the files and values of its command line."""
+    monkeypatch.syspath_prepend(str(REPOSITORY / "workflow"))
+    monkeypatch.chdir(REPOSITORY)
+    import command_line
+
+    monkeypatch.setattr(command_line.logger, "warning", warnings := Mock())
+
+    def read(*files, **values):
+        settings = SimpleNamespace(configfiles=files, config=values)
+        command_line.campaign_configuration(SimpleNamespace(config_settings=settings), str(REPOSITORY))
+        return warnings.call_args.args[0]
+
+    return read
+
+
+def test_wrong_values_on_the_command_line_are_messages_and_unwise_ones_warnings(configuration_of, tmp_path):
+    with pytest.raises(SystemExit, match=r"--config: name: 'My Campaign'(.|\n)*--config: studies.none.targets:"):
+        configuration_of(SMOKE, name="My Campaign", studies={"none": {}})
+    with pytest.raises(SystemExit, match="expected one file"):
+        configuration_of("config/config.yaml", SMOKE)
+    (tmp_path / "coarse.yaml").write_text((REPOSITORY / SMOKE).read_text().replace("grid: 64", "grid: 32", 1))
+    assert configuration_of(tmp_path / "coarse.yaml").startswith("Warning: surfaces.challenge.grid: 32")

@@ -3,7 +3,7 @@
 from job import attributes, job_context, refuse_changed
 
 from icha.datasets.surface_file import write_surface
-from icha.surfaces.measured.array_files import read_height_map
+from icha.surfaces.measured.scan import read_height_map
 from icha.surfaces.measured.topography import prepared_topography
 from icha.surfaces.spectrum import SelfAffineSpectrum
 from icha.surfaces.surface import Surface

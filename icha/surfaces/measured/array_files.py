@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from icha.support.input_files import bounded_memory, problem_with_path, refuse_traps, require_room
-from icha.support.rules import LENGTH
+from icha.support.input_files import require_room
 from icha.surfaces.measured.settings import (
     LINE_SCAN,
     FileContent,
@@ -19,14 +18,13 @@ from icha.surfaces.measured.settings import (
     put_y_first,
     regular_ticks,
 )
-from icha.surfaces.square import problem_with_heights
 
-# Copies of an array, as floats, in memory while it is read.
+# Number of copies of an array, as floats, that are in memory while the array is read.
 _COPIES = 3
 # Formats in which any bytes of the right number are heights; only the ending of the name identifies them.
 _WITHOUT_SIGNATURE = ("hgt", "nms")
-# Formats that do not identify an instrument: SurfaceTopography finds them in any text with numbers, of which it
-# drops other fields, and in any file of a certain length.
+# Formats that do not identify an instrument. SurfaceTopography reads any text with numbers as the first one, and drops
+# fields that are not numbers; it reads any file of certain lengths as the others.
 _OF_ANY_TEXT = ("asc", *_WITHOUT_SIGNATURE)
 # Formats of arrays without a default one.
 _ARRAYS = ("mat", "npz")
@@ -34,20 +32,15 @@ _UNKNOWN = (
     "cannot be read as instrument: the file is damaged, or its format is not known here; expected another `format`, or "
     "an export of the heights as text"
 )
-_EXPECTED = "expected a square array of at least 8 x 8 finite heights (.npy, or .nc with a variable `height`)"
 
 
 def read_npy(file, settings: Preparation) -> FileContent:
     """Read a NumPy array, which has no names or units."""
-    return FileContent(put_y_first(_read_npy_array(file.path), settings))
-
-
-def _read_npy_array(path: Path) -> np.ndarray:
-    # A mapped array cannot declare more than the file holds. NumPy warns of an overflow before it refuses it.
+    # A mapped array cannot declare more than the file holds. NumPy warns of an overflow before it refuses the array.
     with np.errstate(over="ignore"):
-        array = np.lib.format.open_memmap(path, mode="r")
+        array = np.lib.format.open_memmap(file.path, mode="r")
     _require_room(array)
-    return np.array(array)
+    return FileContent(put_y_first(np.array(array), settings))
 
 
 def _read_variable(variable) -> np.ndarray:
@@ -235,46 +228,3 @@ def _choose_channel(opened, settings):
             raise UnfitTopography("path", LINE_SCAN.format(max(channel.nb_grid_pts)))
         raise UnfitTopography("data", f"is a line scan; expected a topography: {', '.join(areal)}")
     return channel, channel.name if len(maps) > 1 else ""
-
-
-def read_height_map(path: str | Path, metres_per_unit: float) -> np.ndarray:
-    """Read the heights of a surface of kind `file`, (n, n) in m, first axis y.
-
-    Parameters
-    ----------
-    path : `.npy`, or netCDF with a variable `height`.
-    metres_per_unit : the unit of the heights in the file.
-
-    Raises
-    ------
-    ValueError
-        If the file cannot be read or its heights are not a square array of finite numbers.
-    """
-    path = Path(path)
-    if problem := problem_with_path(path):
-        raise ValueError(f"{problem}; {_EXPECTED}")
-    try:
-        with bounded_memory():
-            refuse_traps(path)
-            heights = _read_array(path)
-    except Exception as error:  # libraries raise all kinds for files that are damaged or of another format
-        raise ValueError(f"cannot be read ({error}); {_EXPECTED}") from None
-    if heights.dtype.kind not in "iuf":
-        raise ValueError(f"holds {heights.dtype}, not real numbers; {_EXPECTED}")
-    if problem := problem_with_heights(heights):
-        raise ValueError(f"holds {problem}; {_EXPECTED}")
-    heights = heights.astype(float) * metres_per_unit
-    if not LENGTH.contains(float(np.ptp(heights))):
-        raise ValueError(f"holds heights that span {np.ptp(heights):g} m; {_EXPECTED}, and another unit")
-    return heights
-
-
-def _read_array(path: Path) -> np.ndarray:
-    if path.suffix == ".npy":
-        return _read_npy_array(path)
-    if path.suffix != ".nc":
-        raise ValueError(f"unknown kind of file {path.suffix!r}")
-    import netCDF4
-
-    with netCDF4.Dataset(path) as data:
-        return _read_variable(data["height"])

@@ -1,6 +1,6 @@
-"""Rows and columns of a table that hold coordinates, or numbers of points, in place of heights.
+"""Detect rows and columns of a table that contain coordinates or numbers of points instead of heights.
 
-Heights of a rough surface do not rise in equal steps along a line, unless all of them do.
+Heights of a rough surface do not rise in equal steps along a line. If they do so in all lines, the surface is a plane.
 """
 
 import numpy as np
@@ -11,16 +11,16 @@ from icha.surfaces.measured.settings import UnfitTopography
 _EQUAL_STEPS = 1e-2
 # Smallest length of a scale in units of its last digit.
 _FEWEST_UNITS = 4
-# A line of heights resembles the next one if the two differ by less than `_DIFFERENCE` times the difference of the next
-# two, and if either the fraction `_SAME_SIGN` of its steps has the same sign, or those two differ by less than
-# `_SMOOTH` times their heights.
+# Limits with which a line of heights resembles its neighbours, the second and the third line. The first and second line
+# differ by at most `_DIFFERENCE` times the difference of second and third. Besides, the fraction `_SAME_SIGN` of the
+# steps of first and second line has the same sign, or second and third differ by at most `_SMOOTH` times their heights.
 _DIFFERENCE, _SAME_SIGN, _SMOOTH = 3, 0.8, 0.2
 # Fewest numbers of a line that can be a scale.
 _SHORTEST_SCALE = 8
 
 
 def drop_coordinates(values: np.ndarray) -> tuple[np.ndarray, tuple[float, float] | None, str]:
-    """Remove a first row and a first column that number or measure the others.
+    """Remove a first row and a first column that contain coordinates or numbers of points.
 
     Returns
     -------
@@ -29,7 +29,7 @@ def drop_coordinates(values: np.ndarray) -> tuple[np.ndarray, tuple[float, float
     Raises
     ------
     UnfitTopography
-        If a first row or column seems to hold coordinates in unequal steps, or a last one numbers the others.
+        If a first row or column seems to contain coordinates in unequal steps, or a last one contains equal steps.
     """
     heights, steps = values, {}
     for name in ("row", "column"):
@@ -58,12 +58,12 @@ def drop_coordinates(values: np.ndarray) -> tuple[np.ndarray, tuple[float, float
 
 
 def is_scale(numbers: list[float | None]) -> bool:
-    """Tell whether numbers rise or fall in equal steps, but for the first, which may stand in a corner."""
+    """Return whether numbers rise or fall in equal steps; the first one, in the corner of a table, may differ."""
     return len(numbers) >= _SHORTEST_SCALE and None not in numbers and _equal_step(np.array(numbers)) is not None
 
 
 def _coordinate_step(table):
-    """Step of coordinates in the first line of a table, nan if it varies; None if the line holds heights."""
+    """Return the step of coordinates in the first line of a table, nan if it varies; None if the line has heights."""
     line, others = table[0], table[1:3]
     if len(table) < 3 or len(line) < _SHORTEST_SCALE or any(_equal_step(each) is not None for each in others):
         return None
@@ -77,7 +77,7 @@ def _coordinate_step(table):
 
 
 def _resembles(line, others):
-    """Tell whether a line can be the neighbour of two other lines of heights."""
+    """Return whether a line can be the neighbour of two other lines of heights."""
     known = np.isfinite(line) & np.all(np.isfinite(others), axis=0)
     if np.count_nonzero(known) < 3:
         return False
@@ -89,9 +89,9 @@ def _resembles(line, others):
 
 
 def _equal_step(line: np.ndarray, *, rounded: bool = True) -> float | None:
-    """Return the step of a line of numbers, whose first may be any number; None if the steps are not equal.
+    """Return the step of a line of numbers; None if the steps are not equal. The first number may be any number.
 
-    rounded : whether the steps may differ by the last digit that is written.
+    rounded : whether steps may differ by rounding to the digits of the file.
     """
     for numbers in (line, line[1:]):
         steps = np.diff(numbers)
@@ -111,7 +111,7 @@ def _equal_step(line: np.ndarray, *, rounded: bool = True) -> float | None:
 
 
 def _last_digit(numbers):
-    """Return unit of the last digit of the largest number, as far as the numbers show it."""
+    """Return the unit of the last digit with which the largest number was probably written."""
     largest = np.max(np.abs(numbers))
     digits = max(len(f"{abs(number):.14e}".partition("e")[0].replace(".", "").rstrip("0")) for number in numbers)
     return 10.0 ** (np.floor(np.log10(largest)) + 1 - digits) if largest else 0.0

@@ -20,18 +20,18 @@ from icha.surfaces.moments import (
 from icha.surfaces.summits import Asperities, SummitCoverage, locate_summits
 from icha.surfaces.surface import FREE, PERIODIC, Surface, edges_fit
 
-# Largest power of q with which a noise floor falls, and smallest ratio of its wave numbers. The spectrum of a
-# self-affine surface falls at least as q^-2 (its Hurst exponent is not negative); that of uncorrelated noise is flat.
+# Exponent of the steepest power law q^x of a noise floor, and smallest ratio of its last and first wave number. The
+# spectrum of a self-affine surface falls at least as q^-2; the spectrum of uncorrelated noise is flat.
 _FLOOR_FALLS, _FLOOR_SPANS = -1.0, 1.3
 # Power of a floor, relative to the largest power, below which it is rounding.
 _ROUNDING = 1e-20
-# Largest ratio of a new grid to the old one that is worth a change.
+# Largest ratio of a coarser grid to the present one with which the coarser grid is advised.
 _WORTH = 0.75
 
 
 @dataclass(frozen=True)
 class NoiseFloor:
-    """The noise in which the spectrum of a scan ends.
+    """Noise floor at the end of short waves in the spectrum of a scan.
 
     Attributes
     ----------
@@ -49,7 +49,7 @@ class NoiseFloor:
 
 @dataclass(frozen=True, eq=False)
 class ScanResolution(PreparedTopography):
-    """A prepared scan beside the scan before its short waves were filtered.
+    """A prepared scan, and the same scan before its short waves were filtered.
 
     Attributes
     ----------
@@ -77,7 +77,7 @@ class ScanResolution(PreparedTopography):
 
     @property
     def reasons_against_asperities(self) -> list[str]:
-        """Reasons why asperities do not represent the surface 3 to 1 rms heights above its mean, where it touches."""
+        """Reasons why asperities do not represent the surface at mean separations of 3 to 1 rms heights."""
         heights = np.linspace(3, 1, 5) * self.surface.rms_height
         return SummitCoverage.of(self.surface, self.asperities).reasons_against(heights)
 
@@ -154,7 +154,7 @@ def noise_floor(surface: Surface) -> NoiseFloor | None:
     if len(above) and k + 1 < len(q):
         fraction = np.log(power[k] / (2 * floor)) / np.log(power[k] / power[k + 1])
         limit = q[k] * (q[k + 1] / q[k]) ** min(max(fraction, 0.0), 1.0)
-    # Contributions of the rings to the mean square slope, but for a common factor.
+    # Contributions of the rings to the mean square slope, up to a common factor.
     slopes = power * q**2 * np.diff(edges**2)
     return NoiseFloor(
         power=floor,

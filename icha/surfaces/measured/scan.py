@@ -8,13 +8,14 @@ import numpy as np
 
 from icha.support import formatting
 from icha.support.formatting import printable
-from icha.support.input_files import RefusedFile, bounded_memory, refuse_traps
+from icha.support.input_files import RefusedFile, bounded_memory, problem_with_path, refuse_traps
 from icha.support.rules import LENGTH
 from icha.surfaces.measured.array_files import format_of_hdf5, read_hdf5, read_instrument, read_netcdf, read_npy
 from icha.surfaces.measured.fourier_files import read_fourier
 from icha.surfaces.measured.settings import LINE_SCAN, Preparation, UnfitTopography, WrongFormat
 from icha.surfaces.measured.text_files import format_of_text, read_matrix, read_xyz
 from icha.surfaces.measured.text_tables import SourceFile, first_damaged_line
+from icha.surfaces.square import problem_with_heights
 
 READERS = {
     "npy": read_npy,
@@ -106,6 +107,37 @@ def load_scan(path: Path, settings: Preparation) -> Scan:
             "size", f"is {size[0]:g} m by {size[1]:g} m in the file{scan.remark_on_unit}; expected the size here"
         )
     return scan
+
+
+def read_height_map(path: str | Path, metres_per_unit: float) -> np.ndarray:
+    """Read the heights of a surface of kind `file`, (n, n) in m, first axis y.
+
+    Parameters
+    ----------
+    path : `.npy`, or netCDF with a variable `height`.
+    metres_per_unit : the unit of the heights in the file.
+
+    Raises
+    ------
+    ValueError
+        If the file cannot be read or its heights are not a square array of finite numbers.
+    """
+    expected = "expected a square array of at least 8 x 8 finite heights (.npy, or .nc with a variable `height`)"
+    path = Path(path)
+    kind, data = ("netcdf", "height") if path.suffix == ".nc" else ("npy", None)
+    # The side of the surface is given elsewhere.
+    settings = Preparation(kind, "periodic", data, height_unit=metres_per_unit, size=(1.0, 1.0))
+    try:
+        if problem := problem_with_path(path):
+            raise UnfitTopography("path", problem)
+        heights = load_scan(path, settings).heights
+    except UnfitTopography as error:
+        raise ValueError(f"{error}; {expected}") from None
+    if problem := problem_with_heights(heights):
+        raise ValueError(f"holds {problem}; {expected}")
+    if not LENGTH.contains(float(np.ptp(heights))):
+        raise ValueError(f"holds heights that span {np.ptp(heights):g} m; {expected}, and another unit")
+    return heights
 
 
 def _read(path, settings):

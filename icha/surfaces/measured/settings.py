@@ -8,7 +8,7 @@ import numpy as np
 from icha.support.rules import GRID
 from icha.support.values import conversion_factor
 
-# Treatments of the edges besides `periodic` and `free` (`icha.surfaces.surface`); both end in a periodic surface.
+# Treatments of the edges that make a periodic surface; the other two are in `icha.surfaces.surface`.
 WINDOW, MIRROR = "window", "mirror"
 # Message for a file of one profile.
 LINE_SCAN = "is a line scan, one profile of {} points; expected a topography, with heights over x and y"
@@ -19,10 +19,10 @@ _OFF_TICK = 0.05
 
 
 class UnfitTopography(ValueError):
-    """A file that is not a topography or cannot be prepared as asked; `key` is the setting at fault."""
+    """A file is not a topography, or the setting `key` does not fit it."""
 
     def __init__(self, key: str, message: str):
-        """Keep the key and the message, which gives the reason and what is expected."""
+        """Store the key and the message, which states the reason and what is expected."""
         super().__init__(message)
         self.key = key
 
@@ -39,16 +39,17 @@ class Preparation:
     ----------
     format : a name of `READERS`, or "auto".
     boundary : "periodic", "window", "mirror" or "free".
-    data : name of variable, dataset or channel; None for the only one, or the file's own default.
+    data : name of the variable, dataset or channel to read; None for the only one, or the default one of the file.
     first_axis : "y" or "x", the first axis of arrays whose dimensions have no names.
-    height_unit, lateral_unit : m; None for those of the file; the lateral one is else that of the heights.
+    height_unit : m; None for that of the file.
+    lateral_unit : unit of coordinates, m; None for that of the file, else that of the heights.
     size : (x, y) of the whole scan, m; None for that of the file.
-    touches_first : "high" or "low" numbers.
-    missing : "refuse" or "fill".
+    touches_first : the numbers that touch the elastic body first, "high" or "low".
+    missing : treatment of points without a height, "refuse" or "fill".
     crop : x, y, side (m) of the square; None for the largest, in the middle.
     detrend : "none", "tilt" or "curvature".
     cutoff : nesting index of the S-filter, m; None for no filter.
-    taper : with a window, the fraction of the side over which heights fall at each edge.
+    taper : fraction of the side on which the window reduces the heights at each edge.
     grid : nodes along a side of the result; None for those of the scan.
     columns : numbers, from 1, of the columns x, y and z of a text; None if it has only these.
     """

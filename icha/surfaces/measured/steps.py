@@ -32,7 +32,7 @@ _REACH = 6
 
 
 def crop_square(scan: Scan, settings: Preparation) -> Scan:
-    """Cut out a square of whole pixels; if these are oblong, one side may be too long by less than a pixel."""
+    """Cut out a square of whole pixels; if pixels are not square, its sides may differ by less than a pixel."""
     rows, columns = scan.heights.shape
     dx, dy = scan.pixel
     width, height = map(formatting.length, scan.size)
@@ -90,7 +90,7 @@ def remove_trend(scan: Scan, settings: Preparation) -> Scan:
 
 
 def refuse_flat(prepared: Scan, square: Scan, settings: Preparation) -> None:
-    """Raise UnfitTopography if the prepared heights are only rounding of those of the square that was cut out."""
+    """Raise UnfitTopography if the prepared heights are only rounding errors of the original heights."""
     known = np.isfinite(square.heights)
     if np.ptp(prepared.heights) <= _FLAT * np.nanmax(np.abs(square.heights), where=known, initial=0.0):
         without = "" if settings.detrend == "none" else " but for the trend that is removed"
@@ -140,9 +140,9 @@ def _harmonic(heights, missing, *, periodic):
 def resample_to_square_pixels(scan: Scan, settings: Preparation) -> Scan:
     """Resample to square cells as large as the shorter side of a pixel.
 
-    Lines along that side stay as they are. Across them, heights are those of their cosine series, which is
-    band-limited: it keeps all measured waves, hence their rms slope, and adds none that is shorter than two pixels.
-    Periodic scans are resampled by their Fourier series when they get their grid (`treat_edges`).
+    Heights along the longer side of the pixels are interpolated by their cosine series. This series is band-limited: it
+    keeps all measured waves and their rms slope, and adds no wave shorter than two pixels. Periodic scans are resampled
+    by their Fourier series in `treat_edges`.
     """
     dx, dy = scan.pixel
     if settings.boundary == PERIODIC or abs(dx / dy - 1) <= SQUARE:
@@ -172,8 +172,8 @@ def _by_cosine_series(heights, axis, step, count):
 def filter_short_waves(scan: Scan, settings: Preparation) -> Scan:
     """Apply the areal Gaussian filter of ISO 16610-61, whose nesting index is the cut-off.
 
-    A wave of length l is multiplied by 2^-(cutoff/l)^2. Beyond the edges heights continue by reflection (ISO 16610-28),
-    those of a periodic scan by its period.
+    The filter multiplies a wave of length l by 2^-(cutoff/l)^2. Beyond the edges heights continue by reflection (ISO
+    16610-28), or periodically if the scan is periodic.
     """
     if settings.cutoff is None:
         return scan
@@ -214,7 +214,7 @@ def treat_edges(scan: Scan, settings: Preparation) -> tuple[Surface, list[str]]:
     if settings.boundary == MIRROR:
         heights, side = np.pad(heights, [(0, n) for n in heights.shape], mode="symmetric"), 2 * side
         steps.append("joined by its mirror images")
-    # Only periodic pixels can still be oblong.
+    # Pixels of periodic scans may still not be square.
     grid = settings.grid or max(heights.shape)
     if heights.shape != (grid, grid):
         heights = _resampled(heights, grid, free=free)

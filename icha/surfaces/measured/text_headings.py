@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from icha.surfaces.measured.settings import UnfitTopography, metres_of
 from icha.surfaces.measured.text_lines import AMBIGUOUS_COMMA
 
-# How Gwyddion begins the line with the width of an image that it exports, in the languages of its menus. The line with
-# its name stands above, that with its height below.
+# First word of the line with the width of an image that Gwyddion exported, in the languages of its menus. The next line
+# gives the height of the image.
 _WIDTH = re.compile(r"^#?\s*(Width|Šířka|Breite|Anchura|Largeur|Larghezza|幅|폭|Largura|Ширина)\s*[:：]\s*(.*)$")
 _NUMBER = r"([-+]?\d+(?:[.,]\d+)?(?:[eE][-+]?\d+)?)"
 # One length or two, such as 12 µm x 12 µm.
@@ -25,7 +25,7 @@ _COUNTS = {
     "columns": ("ncols", "cols", "columns", "samples", "number of columns"),
 }
 _MISSING = ("nodata value", "nodata", "no data value", "missing value", "bad value", "missing data value")
-# ESRI's grids have this one if their headings give no other.
+# Missing height in grids of ESRI whose headings do not give one.
 _ESRI_MISSING = "-9999"
 
 

@@ -10,7 +10,7 @@ from typing import TextIO
 
 import numpy as np
 
-# Words, in small letters, that stand for a missing height.
+# Words, in small letters, that mark a missing height.
 _MISSING = frozenset(
     "- -- --- * ** *** **** ? nan na n/a #n/a #na bad none null nil nodata no_data missing masked invalid void "
     "undefined undef #value! #num! #div/0! #null! #ref!".split()
@@ -98,23 +98,31 @@ class Notation:
                 return float(text.lower().replace("d", "e"))
             return np.nan if field.lower() in _MISSING or _NAN.fullmatch(field) else None
 
+    def numbers(self, text: str) -> list[float | None]:
+        """Return the numbers in the fields of a line, as `number` does, but faster if the line has nothing else."""
+        try:
+            return [*map(float, text.replace("_", "?").split(self.delimiter))]
+        except ValueError:
+            return [self.number(field) for field in self.fields(text)]
+
 
 def has_decimal_commas(fields: Iterable[str]) -> bool:
-    """Tell whether some fields have decimal commas and none has a decimal point."""
+    """Return whether some fields have decimal commas and none has a decimal point."""
     return any(map(_DECIMAL_COMMA.match, fields)) and not any("." in field for field in fields)
 
 
 def are_decimal_between_blanks(text: str) -> bool:
-    """Tell whether a line has several numbers with decimal commas, separated by blanks or by commas and blanks."""
+    """Return whether a line has several numbers with decimal commas, separated by blanks or by commas and blanks."""
     fields = re.split(r",?\s+", text.strip())
     return len(fields) > 1 and all(map(_DECIMAL_COMMA.match, fields))
 
 
 def are_halves_of_decimals(rows: list[list[str]]) -> bool:
-    """Tell whether the columns are in turn the digits before and after decimal commas.
+    """Return whether columns contain, alternately, the digits before and after decimal commas.
 
-    The digits after a comma have no sign, and each column has one number of them. A column of such digits differs from
-    a column of integers: some numbers begin with a zero, or the numbers in the column before have different lengths.
+    Digits after a comma have no sign, and a column of them has the same number of digits in every row. Such columns
+    differ from columns of integers: some numbers begin with a zero, or numbers in the column before it have other
+    lengths.
     """
     # A row whose last field is empty is shorter.
     width = max(map(len, rows))

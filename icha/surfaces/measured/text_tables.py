@@ -22,7 +22,7 @@ from icha.surfaces.measured.text_lines import (
 
 # Characters in which the first line of numbers is searched, and the largest number of lines of a heading.
 _BEGINNING, _LONGEST_HEADING = 2**20, 1000
-# Fewest fields of a line whose fields are mostly numbers that make it a damaged row, not names of columns.
+# Fewest fields with which a line of mostly numbers counts as a damaged row, not as names of columns.
 _FEWEST_FIELDS = 8
 
 
@@ -33,7 +33,7 @@ class Layout:
     Attributes
     ----------
     heading : lines above the numbers, remarks included.
-    words : whether some lines of the heading are not remarks (#).
+    words : whether the heading contains lines other than remarks (#).
     notation : delimiter and decimal sign.
     columns : numbers in the first line of numbers.
     """
@@ -45,7 +45,7 @@ class Layout:
 
 
 class SourceFile:
-    """The file of a scan; each piece of it is read on demand, and once.
+    """The file of a scan; each attribute is read from the file once, at its first use.
 
     Attributes
     ----------
@@ -93,12 +93,11 @@ class SourceFile:
             for line, text in enumerate(map(strip_remark, file), 1):
                 if not text or line <= len(self.table_layout.heading):
                     continue
-                fields = notation.fields(text)
-                row = [notation.number(field) for field in fields]
+                row = notation.numbers(text)
                 if not rows and row[0] is None and is_scale(row[1:]):
                     row[0] = np.nan
                 if None in row:
-                    raise _not_a_number(fields, row.index(None), line)
+                    raise _not_a_number(notation.fields(text), row.index(None), line)
                 rows.append(np.array(row))
                 lines.append(line)
         usual = int(np.bincount([len(row) for row in rows]).argmax())
@@ -119,9 +118,9 @@ class SourceFile:
         return np.array(rows), np.array(lines)
 
     def refuse_blocks(self) -> None:
-        """Raise UnfitTopography if empty lines or remarks divide the rows into blocks, as several images are written.
+        """Raise UnfitTopography if empty lines or remarks divide the rows into blocks, as in files of several images.
 
-        Such lines between all rows divide nothing.
+        An empty line or a remark after every row is accepted.
         """
         values, lines = self._table
         begins = np.flatnonzero(np.diff(lines) > 1) + 1

@@ -1,12 +1,11 @@
 """Measured topographies: from a file to a surface.
 
-A measurement becomes a surface in this order: heights and lengths in metres (`scan`), the side that touches first up,
-and the steps of `steps`: a square cut out, the trend removed, missing points filled, pixels made square, short waves
-filtered, edges treated as the boundary requires, the grid changed.
+A measurement becomes a surface in this order: read heights and lengths in metres (`scan`), turn the side that touches
+first upwards, then apply the steps of `steps`: cut out a square, remove the trend, fill missing points, make pixels
+square, filter short waves, treat the edges as the boundary requires, change the grid.
 
-SurfaceTopography, which reads the files of instruments, could also remove trends and fill holes. But its import takes
-seconds, and every command that reads a configuration with a measured surface would take that long. It also has neither
-the cosine series of a free square nor windows of cells.
+SurfaceTopography reads the files of instruments. It could also remove trends and fill holes, but its import takes
+seconds, which every command with a measured surface would need.
 """
 
 import os
