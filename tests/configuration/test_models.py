@@ -1,6 +1,9 @@
 """Key `models` of a study: by which models of contact its runs are computed."""
 
+import pytest
+
 from icha.configuration.cases import run_cases, run_settings, run_sha256
+from icha.configuration.errors import ConfigurationError
 from icha.planning.costs import RUN_SIZES
 from icha.planning.plan import plan
 from icha.planning.requirements import run_memory, run_minutes, surface_threads
