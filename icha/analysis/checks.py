@@ -94,7 +94,7 @@ def _check_solver(solution) -> Iterator[Finding]:
 
 
 def _target_pressure(solution):
-    """Nominal pressure that was prescribed, Pa."""
+    """Return the prescribed nominal pressure, Pa."""
     unit = float(solution["contact_modulus"]) * float(solution["rms_slope"])
     return float(solution["target_reduced_pressure"]) * unit
 

@@ -1,6 +1,6 @@
 """Coalescence: overlapping spots become one equivalent spot (Violano & Afferrante, section II; Afferrante et al. 2012).
 
-The height of the equivalent spot follows from the present equilibrium (`icha.equilibrium.unions`).
+`icha.equilibrium.unions` computes the height of the equivalent spot.
 """
 
 import numpy as np
@@ -11,19 +11,20 @@ from icha.surfaces.square import periodic_difference
 
 
 def overlapping_pairs(position, a, first, second, r):
-    """Return the pairs of spots with r_ij < a_i + a_j.
+    """Return the pairs of spots that overlap, r_ij < a_i + a_j.
 
     Parameters
     ----------
     position : (n, 2) float, centres, m.
     a : (n,) float, contact radii, m.
-    first, second : (p,) int, near pairs in both directions; those from the larger spot count.
-    r : (p,) float, their distances, m.
+    first, second : (p,) int, spots of near pairs, each pair in both orders; the order with the larger spot first
+        counts.
+    r : (p,) float, distances of the pairs, m.
 
     Returns
     -------
-    (k, 2) int, the deepest overlap a_i + a_j - r_ij first. Pairs of equal depth are in the order of their positions, so
-    that the order of the input does not matter.
+    (k, 2) int, with the deepest overlap a_i + a_j - r_ij first. Pairs of equal depth are in the order of their
+    positions, so that the result does not depend on the order of the input.
     """
     depth = a[first] + a[second] - r
     larger = (a[second] < a[first]) | ((a[second] == a[first]) & (second > first))
@@ -78,5 +79,5 @@ def covering_spot(points, position, a, period, larger_than=None):
         inside &= (a[j] > larger_than[i]) | ((a[j] == larger_than[i]) & (j < i))
     i, j, depth = i[inside], j[inside], depth[inside]
     order = np.lexsort((-j, depth))
-    covering[i[order]] = j[order]  # the deepest cover comes last and remains
+    covering[i[order]] = j[order]  # the deepest cover comes last and replaces the others
     return covering

@@ -1,7 +1,8 @@
 """Checkpoints: save each equilibrium of a contact, so that an interrupted run can resume.
 
-The name of a checkpoint depends on all solves up to it, in order. So a path that is repeated finds its equilibria up to
-where it was interrupted, with the same states to the last bit. Another path finds those that both have in common.
+The name of a checkpoint depends on all solves before it and on their order. If a path is repeated after an
+interruption, it loads its equilibria, bit by bit the same, up to the interruption. Another path loads only the
+equilibria that both paths have in common at their beginning.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ _OF = "of.txt"
 
 @dataclass(frozen=True, eq=False)
 class CheckpointedContact(Generic[S]):
-    """Contact model that solves for an equilibrium only without a checkpoint of it.
+    """Contact model that loads an equilibrium from its checkpoint, and solves for it only if there is no checkpoint.
 
     Attributes
     ----------

@@ -1,8 +1,8 @@
 """Records of the contact models, without their solvers.
 
-This module imports no solver, so that the fingerprints of figures, plans and configurations do not depend on one. The
-cost of a model is in `icha.planning.costs`, and how figures draw it in `icha.figures.looks`: a change there must not
-recompute runs.
+This module imports no solver, so that the fingerprints of figures, plans and configurations do not depend on solvers.
+The cost of a model is in `icha.planning.costs`, and its colours and markers are in `icha.figures.looks`, because a
+change of these must not recompute runs.
 """
 
 from collections.abc import Iterable, Mapping
@@ -11,7 +11,8 @@ from typing import NamedTuple
 
 # Largest error of an equilibrium of asperities, in h_rms.
 RESIDUAL_TOLERANCE = 1e-9
-# Load over the attraction and repulsion that make it up, below which its error is measured relative to those.
+# With adhesion a load is the difference of repulsion and attraction. If it is less than this fraction of them, the
+# error of the load is relative to this fraction of them, not to the load.
 SMALLEST_LOAD = 1e-4
 # Largest error of a prescribed area without adhesion where contact is counted in whole cells: in cells, and relative to
 # the area.

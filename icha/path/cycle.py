@@ -1,8 +1,8 @@
 """Cycles of loading and unloading: all equilibria of a path that continues after the first loading.
 
 On unloading every spot follows its stable branch until it jumps off, up to complete separation or a turning point.
-Unloading visits separations of the first loading again, the stations, so that both curves can be compared. Where an
-event changes the pressure, steps become so short that the work lost in the event is known, whatever the longest step.
+Unloading visits the separations of the first loading again, the stations, so that both curves can be compared. Where an
+event changes the pressure, steps become so short that the work lost in the event is known.
 """
 
 from __future__ import annotations
@@ -30,8 +30,8 @@ from icha.path.stops import (
 )
 from icha.path.targets import LOADS, MEAN_SEPARATION, Path
 
-# Without adhesion unloading visits a separation so far above first contact, in h_rms, in case the error of an
-# equilibrium leaves a spot in contact there.
+# Distance of the last station above first contact, in h_rms, without adhesion: at first contact itself the error of an
+# equilibrium may leave a spot in contact.
 _ABOVE_CONTACT = 1e-8
 
 
@@ -40,8 +40,8 @@ def follow_cycle(
 ) -> Generator[Waypoint, TargetFunction | None, None]:
     """Yield all equilibria of a path that continues after the first loading, without their energy balances.
 
-    In answer to a waypoint the caller may send one more target (`generator.send`). It is met too if it comes before the
-    others; its waypoint has it as target.
+    After a waypoint the caller may send one more target (`generator.send`). The path meets it too if it comes before
+    the other targets, and yields its waypoint.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ def follow_cycle(
         As in `icha.path.follow.follow`.
     """
     start, targets = contact.untouched(), [TargetFunction(target, contact) for target in path.targets]
-    # Nothing touches at the separations above first contact.
+    # Targets at separations above first contact, where nothing touches.
     above = [t for t in targets if t.target.kind == MEAN_SEPARATION and t.target.value > start.separation]
     for each in sorted(above, key=lambda each: -each.target.value):
         state = contact.equilibrium(start, each.target.value)
@@ -98,10 +98,10 @@ class _Cycle:
     state : last equilibrium.
     leg : number of the leg, even on loading and odd on unloading.
     step_length : length of the next step, m.
-    event_at : end of the shortest step known to contain an unresolved event, as direction times separation, m.
-    resolving_length : length of a step that resolves it, m.
+    event_at : end of the shortest step that is known to contain an unresolved event, as direction times separation, m.
+    resolving_length : length of a step that resolves this event, m.
     smooth_length : length of steps without events, m.
-    accuracy : sums over all steps so far, and the accuracy that they require.
+    accuracy : sums over all steps so far, and the accuracy that further steps need.
     stations : separations visited on loading, which the path will visit again, ascending, m.
     """
 
@@ -173,7 +173,7 @@ class _Cycle:
                 step = Step.between(self.contact, self.state, met)
             listed = None if target is sent else target
             self.progress.require_validity(self.state, met, listed, pending, self.loading)
-            # The first contact forms in a step of `event_length`; after that the longest one is tried.
+            # The first contact forms in a step of `event_length`; the next step is the longest one.
             first = leg == 0 and len(visited) == 1
             self.step_length = self.longest if first else self._next_length(step, met)
             self.accuracy.add(step, met)
@@ -188,18 +188,18 @@ class _Cycle:
             waypoint = waypoint_between(met, leg, step) if target is None else Waypoint(target.target, met, leg, step)
             sent = yield waypoint
         if self.loading:
-            # An inner loop adds only separations below all earlier stations.
+            # A reloading adds only separations below all earlier stations.
             lowest = min(self.stations, default=np.inf)
             new = (separation for separation in [*visited, self.state.separation] if separation < lowest)
             self.stations = sorted({*self.stations, *new})
 
     def find_next(self, length: float) -> tuple[State, Step]:
-        """Find the next equilibrium, so close that the work up to it is known, and the step to it.
+        """Find the next equilibrium and the step to it, so short that its work is known.
 
-        The step is halved until an equilibrium is found, and the work is known or the step is no longer than
-        `event_length`. A step in which the tension has a new maximum ends at the maximum.
+        The step is halved until an equilibrium is found, and until its work is known or its length is at most
+        `event_length`. If the tension has a new maximum within the step, the step ends at the maximum.
 
-        length : length of the step that is tried first, m.
+        length : length of the first trial step, m.
         """
         start, accuracy = self.state, self.accuracy
         while True:
@@ -209,7 +209,7 @@ class _Cycle:
                 length = self._halve(length, failure)
                 continue
             step = Step.between(self.contact, start, state)
-            # Within the error of an equilibrium an event may happen in a long step and not in a short one.
+            # Because of the error of an equilibrium, an event may happen in a long step and not in a short one.
             passed = step.has_jump and self.direction * start.separation + self.event_length >= self.event_at
             sharp = length <= self.event_length or passed
             if sharp or (accuracy.is_work_known(state, step) and accuracy.is_tension_known(start, state, step)):
@@ -233,7 +233,7 @@ class _Cycle:
         """Find the equilibrium at a separation.
 
         On unloading all spots may lose their equilibrium together before any of them has reached its own jump-off. Then
-        the spot that would reach it first breaks contact; if that does not help, two, four, … of them.
+        the spot closest to jump-off breaks contact; if no equilibrium is found, the closest two, four, … spots.
         """
         contact, start = self.contact, self.state
         try:
@@ -257,11 +257,11 @@ class _Cycle:
         return length
 
     def _next_length(self, step, state):
-        """Return the length of the step after one that ends in a state, m.
+        """Return the length of the next step after a step to a state, m.
 
-        Without predicted steps, twice the last length. After an event, at least the length of steps without events.
-        Before a known event, half the distance to it, and all of it once it is short enough. Else twice the last length
-        if the error of the step allows it.
+        If the model does not predict steps, it is twice the last length. After an event it is at least the length of
+        steps without events. Before a known event it is half the distance to the event, or the whole distance if this
+        is short enough to resolve the event. Otherwise it is twice the last length if the error of the step allows it.
         """
         longer = min(self.longest, 2 * self.step_length)
         if not self.contact.path_accuracy.predicts_steps:
@@ -282,16 +282,16 @@ class _Cycle:
         return self.state.separation >= highest
 
     def _is_new_station(self, separation, last):
-        """Return whether a separation is far enough from the last visited one.
+        """Return whether a separation is a new station, that is far enough from the last one.
 
-        So the many short steps around an event do not all become stations.
+        The many short steps around an event do not all become stations.
         """
         contact = self.contact
         between = self.longest / 64 if contact.adhesive else SAME_SEPARATION * contact.rms_height
         return abs(separation - last) > between
 
     def _distance_to_station(self):
-        """Return the distance to the next station, m; without one the length of a step."""
+        """Return the distance to the next station, m; the length of a step if there is no station."""
         at, same, stations = self.state.separation, SAME_SEPARATION * self.contact.rms_height, self.stations
         k = bisect_left(stations, at - same) - 1 if self.loading else bisect_right(stations, at + same)
         return abs(stations[k] - at) if 0 <= k < len(stations) else self.step_length

@@ -1,4 +1,4 @@
-"""Energy balance of a path: the work of every step, what is stored of it, and what is lost in jumps and unions.
+"""Energy balance of a path: the work of every step, the stored energy, and the losses in jumps and unions.
 
 Between two events the stored energy changes by the work done. An event changes the stored energy at constant
 separation, and the energy that it releases is lost. Over a closed path the losses of all events add up to the area of
@@ -35,15 +35,15 @@ def integration_error(du, slope, end_slope):
     return du**2 * abs(end_slope - slope) / 24
 
 
-# A loss of more than this fraction of the work of its step is a loss by jumps, not an error of the model's interaction.
+# If the loss of a step exceeds this fraction of its work, its cause is a jump and not the error of the interaction.
 _CERTAIN_LOSS = 0.1
 
 
 def _beside_full_contact(du, p, q, slope, end_slope):
-    """Pressures, slopes and integration error of a step from or to full contact.
+    """Return pressures, slopes and integration error of a step from or to full contact.
 
-    Full contact is infinitely stiff: its pressure does no work, and jumps where it closes or opens. The pressure at its
-    end of the step is that along the tangent at the other end.
+    Full contact is infinitely stiff: its pressure does no work, and jumps where contact closes or opens. At the end of
+    the step that is in full contact, the pressure is extrapolated along the tangent at the other end.
     """
     if np.isinf(slope) and np.isinf(end_slope):
         return p, q, 0.0, 0.0, 0.0
@@ -79,8 +79,8 @@ class Step:
     def between(cls, contact: ContactModel, before: State, after: State) -> Step:
         """Evaluate the step from one state to the next.
 
-        The pressure is integrated as the cubic with the pressures and stiffnesses at both ends; jumps count as if they
-        happened in the middle of the step.
+        The pressure is integrated as the cubic with the pressures and stiffnesses of both ends. This places jumps of
+        the pressure in the middle of the step.
         """
         events = events_between(before, after)
         du = after.separation - before.separation
@@ -149,11 +149,11 @@ class EnergyBalance:
     def add_step(self, contact: ContactModel, step: Step) -> EnergyBalance:
         """Return the balance after one more step.
 
-        A step without unions loses its energy in its jumps if this loss is within a factor of two of what the same
-        spots would lose alone, or if it is not small compared with the work. Both kinds of jumps then share it in
-        proportion to what they would lose alone. In all other steps jumps lose exactly what their spots would lose
-        alone; this includes steps in which one kind of jump gains energy and the other loses it. The rest is a loss by
-        coalescence if there were unions, and else unattributed.
+        In a step without unions the whole loss is attributed to the jumps if it is within a factor of two of what the
+        same spots would lose alone, or not small compared with the work. Both kinds of jumps then share it in
+        proportion to what they would lose alone. In all other steps, and if one kind of jump gains energy and the other
+        loses energy, each jump is attributed what its spot would lose alone. The rest is a loss by coalescence if spots
+        united or split, and otherwise unattributed.
         """
         events, united = step.events, step.has_union
         jump_in, jump_off = (
@@ -175,7 +175,7 @@ class EnergyBalance:
         )
 
     def add_load_jump(self, contact: ContactModel, before: State, after: State, pressure: float) -> EnergyBalance:
-        """Return the balance after a jump at a constant pressure, Pa, which does work."""
+        """Return the balance after a jump at a constant pressure, Pa; this pressure does work."""
         work = -pressure * (after.separation - before.separation)
         stored = contact.stored_energy(after) - contact.stored_energy(before)
         return replace(self, work=self.work + work, load_jump=self.load_jump + work - stored)
@@ -187,7 +187,7 @@ class Waypoint:
 
     Attributes
     ----------
-    target : target that it meets; of the kind BETWEEN if it lies between two targets.
+    target : target that the state meets; a target of kind BETWEEN for a state between two targets.
     state : state of the contact.
     leg : number of the leg of the path: 0 for the first loading, 1 for the first unloading, and so on.
     step : step from the waypoint before, on a cyclic path.

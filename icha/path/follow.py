@@ -1,4 +1,4 @@
-"""Follow a path of a contact from first contact: to targets that are met exactly, and through unloading."""
+"""Follow a path from first contact to its targets, which it meets exactly, and through unloading."""
 
 from collections.abc import Callable, Generator, Iterator
 from dataclasses import replace
@@ -51,12 +51,12 @@ def _add_balances(contact, waypoints):
 def select_load_control(
     contact: ContactModel, cycle: Generator[Waypoint, TargetFunction | None, None]
 ) -> Iterator[Waypoint]:
-    """Yield the states of a cycle under separation control that load control visits, with their energy balances.
+    """Select the states of a cycle under separation control that load control visits, with their energy balances.
 
-    Load control cannot follow the curve where the pressure turns back. There the state jumps at constant pressure to
-    the next state of the curve with that pressure; if contact breaks, to the state without contact. The states between
-    are left out, and the cycle is asked to meet that pressure again exactly. The events of the left-out states belong
-    to the state after the jump.
+    Where the pressure turns back, load control cannot follow the curve. The state then jumps at constant pressure to
+    the next state of the curve with the same pressure, or to the state without contact. The states between are left
+    out. The cycle meets the pressure after the jump exactly, as an additional target. The events of the states that
+    were left out belong to the state after the jump.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ def select_load_control(
         # The second of two targets at the same load may have a slightly smaller load.
         advances |= waypoint.target.kind != BETWEEN and abs(pressure - level) <= SAME_EXCESS * abs(level)
         landed = landing is not None and waypoint.target is landing.target
-        # The first state is always visited; a jump starts from a visited state only.
+        # The first state is always visited, because a jump can only start from a visited state.
         if visited is not None and not advances and not landed:
             left_out = waypoint
             landing = landing or TargetFunction(Target(REDUCED_PRESSURE, level / contact.pressure_unit), contact)

@@ -1,4 +1,4 @@
-"""First loading from target to target, and the record of how far a path has come."""
+"""First loading from target to target, and the progress of a path."""
 
 from __future__ import annotations
 
@@ -23,20 +23,20 @@ from icha.path.targets import Target
 
 # Shortest step after halvings, relative to the longest step.
 _SMALLEST_STEP = 2.0**-14
-# Largest number of equilibria within a longest step and without a target: a path with more of them makes no progress.
+# Largest number of equilibria within one longest step and without a target. A path with more makes no progress.
 _MOST_EQUILIBRIA = 2000
 
 
 @dataclass(eq=False)
 class PathProgress:
-    """Record of how far a path has come; raises the error of a path that cannot continue.
+    """Record of the progress of a path; it raises the error of a path that cannot continue.
 
     Attributes
     ----------
     contact : contact that the path follows.
     total : number of targets of the first loading.
     longest : longest step of the separation, m.
-    report : function that is called with a line of text at every target; None without one.
+    report : function that is called with a line of text at every target; None for no reports.
     reached : number of targets met so far.
     skipped : errors of the targets that lie inside jumps.
     mark : separation from which equilibria are counted, m.
@@ -98,13 +98,13 @@ class PathProgress:
             raise self.path_error(after, loading, BeyondModel(reason))
 
     def halve(self, step: float, failure: NotConverged, state: State, loading: bool) -> float:
-        """Return half the step after a failed solve; raise the error of the path if shorter steps do not help."""
+        """Return half the step after a failed solve; raise the error of the path if the step is the shortest."""
         if step / 2 < _SMALLEST_STEP * self.longest:
             raise self.path_error(state, loading, failure) from failure
         return step / 2
 
     def path_error(self, state: State, loading: bool, *failures: NotConverged) -> NotConverged:
-        """Return the exception for a path that cannot continue; it adds a note if the surface is sticky."""
+        """Return the exception for a path that cannot continue, with a note if the surface is sticky."""
         contact, failures = self.contact, (*self.skipped, *failures)
         sticky = ""
         # Adhesion alone has spread the contact, or prevents the first equilibrium.
@@ -120,11 +120,11 @@ class PathProgress:
         )
 
 
-# Number of attempts to reach a target in one step, before it is bracketed by two states.
+# Number of attempts to reach a target in one step before two states bracket it.
 _DIRECT_ATTEMPTS = 2
-# A step to a target that failed is shortened to this fraction if it is long, that is longer than `_LONG` longest steps.
+# If a step to a target fails and is longer than `_LONG` longest steps, it is shortened to `_FIRST_FRACTION`.
 _FIRST_FRACTION, _LONG = 0.6, 0.1
-# Number of equilibria after a failed step until steps become longer again: a step that failed usually fails again.
+# Number of equilibria after a failed step before steps become longer again, because a longer step usually fails again.
 _PATIENCE = 8
 
 
@@ -133,7 +133,8 @@ def first_loading(
 ) -> Iterator[Waypoint]:
     """Yield the targets of a path that ends with the first loading.
 
-    A target that is expected within a step is solved for at once; else the separation falls by a step.
+    If a target is expected within the next step, the solver looks for it directly; otherwise the separation falls by
+    one step.
 
     Parameters
     ----------
@@ -149,7 +150,7 @@ def first_loading(
     target: TargetFunction | None
     while pending:
         if contact.spot_count(state) == 0 and state.separation > first_contact.separation:
-            state = first_contact  # nothing happens above it
+            state = first_contact  # there are no events above first contact
         following = next_of_each_kind(pending)
         expected, nearest = max(((each.predict_separation(state), each) for each in following), key=itemgetter(0))
         distance = state.separation - expected
@@ -158,7 +159,7 @@ def first_loading(
                 target = nearest
                 after = _solve_directly(nearest, expected, following, state, step)
                 if after is None:
-                    # Try a shorter step first; if that fails too, the target is bracketed by two states.
+                    # Try a shorter step first. If this fails too, two states bracket the target.
                     failed_trials = failed_trials + 1 if distance > _LONG * longest else _DIRECT_ATTEMPTS
                     if failed_trials < _DIRECT_ATTEMPTS:
                         step, successes = _FIRST_FRACTION * distance, 0
@@ -189,7 +190,7 @@ def first_loading(
 
 
 def _solve_directly(target, expected, pending, state, step) -> State | None:
-    """Solve for the state at a target within a step, m; None if it is not found, or another target comes first."""
+    """Solve for the state at a target within a step, m; return None if there is none, or another target comes first."""
     try:
         found = target.solve(state, expected)
     except NotConverged:

@@ -62,9 +62,9 @@ class StepAccuracy:
     def is_work_known(self, state, step):
         """Return whether the work of a step is known well enough.
 
-        It is not if the events of the step, which may happen anywhere in it, leave too much of the work open; if spots
-        unite in a long step; or if the integral of the pressure is inaccurate and does not agree with the change of the
-        stored energy in a step without events. Steps up to 1/256 of the longest one are exempt from the last test.
+        The work is not known in three cases: the events of the step, which may happen anywhere in it, make the work too
+        uncertain; spots unite in a long step; or, in a step without events, the integral of the pressure is inaccurate
+        and differs from the change of the stored energy. The last test is omitted for steps up to 1/256 of the longest.
         """
         length = abs(step.separation_change)
         if step.unresolved > self.allowed_unknown_work(step):

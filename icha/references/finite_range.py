@@ -1,18 +1,20 @@
 """Contact at a finite range of attraction, solved by the boundary-element code Tamaas.
 
-Tamaas comes with the package's extra `tamaas` and shares no code with ICHA; nothing outside `icha.references` needs it.
+Tamaas is installed with the extra `tamaas` and shares no code with ICHA; nothing outside `icha.references` needs
+Tamaas.
 
 Tamaas (L. Frérot et al., J. Open Source Softw. 5 (2020) 2121, doi:10.21105/joss.02121) minimises the energy of an
 elastic half-space against the nodes of the topography. Without adhesion it minimises over the pressures at a given load
 (I. A. Polonsky and L. M. Keer, Wear 231 (1999) 206, doi:10.1016/S0043-1648(99)00113-1). With adhesion it minimises over
 the gaps at a given mean gap (V. Rey, G. Anciaux and J.-F. Molinari, Comput. Mech. 60 (2017) 69,
-doi:10.1007/s00466-017-1392-5); the traction outside a hard wall is (dgamma/rho) exp(-u/rho). Its load control converges
-to wrong states with adhesion, so ICHA searches for the mean gap that carries a given load.
+doi:10.1007/s00466-017-1392-5); the traction outside a hard wall is (dgamma/rho) exp(-u/rho). With adhesion the load
+control of Tamaas converges to wrong states, so ICHA searches for the mean gap that carries a given load.
 
-Contact is where the gap is zero, and a cohesive zone pulls around it. The law of Johnson, Kendall and Roberts lowers
-the energy by dgamma times the contact area. The area with which this holds at a finite range is the derivative of the
-energy with respect to the surface energy at fixed mean gap: the integral of exp(-u/rho), here the energetic area. It is
-larger than the area of zero gap. Both tend to the area of JKR as the range vanishes, the energetic one much sooner.
+The gap is zero in contact, and there is attraction in a cohesive zone around the contact. In the law of Johnson,
+Kendall and Roberts the contact area lowers the energy by dgamma times the area. At a finite range the energetic area
+has this property: it is the integral of exp(-u/rho), minus the derivative of the energy with respect to the surface
+energy at fixed mean gap. It is larger than the area of zero gap. As the range decreases, both tend to the area of JKR,
+the energetic area much sooner.
 """
 
 import math
@@ -39,13 +41,13 @@ from icha.surfaces.surface import Surface
 
 # Relative error of the minimised energy at which Tamaas stops.
 DEFAULT_TOLERANCE = 1e-8
-# Relative error of the load that the search for its mean gap accepts, and solutions that it may take.
+# Largest relative error of the load after the search for its mean gap, and largest number of solutions of the search.
 LOAD_TOLERANCE = 2e-4
 _MAX_SOLVES = 20
 _MAX_ITERATIONS = 100_000
 # Iterations between two checks of the gap: while it is open everywhere, and otherwise.
 _OPEN_ITERATIONS, _TOUCHING_ITERATIONS = 50, 1000
-# First step of the search, h_rms: on rough surfaces the load falls by a factor e over about this distance.
+# First step of the search, in h_rms. On rough surfaces the load falls by a factor e over about this distance.
 _DECAY = 0.4
 _LONGEST_STEP = 0.3
 
@@ -59,7 +61,7 @@ REFERENCES = (
 
 
 class NotSolved(RuntimeError):
-    """Boundary elements at a finite range did not converge; the message names the state."""
+    """Error: boundary elements at a finite range did not converge; the message names the state."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,17 +101,17 @@ class NodalState:
         return float(self.traction[~self.contact].sum()) / self.contact.size
 
     def energetic_area_fraction(self, material: Material) -> float:
-        """Adhesion energy over that of full contact: the mean of exp(-u/rho), which is 1 in contact."""
+        """Return the energy of adhesion over that of full contact: the mean of exp(-u/rho), which is 1 in contact."""
         raw = np.count_nonzero(self.contact) / self.contact.size
         if material.surface_energy == 0:
             return raw
         return raw - self.outside_pressure * material.interaction_range / material.surface_energy
 
     def stored_energy(self, material: Material) -> float:
-        """Elastic energy minus adhesion energy over the nominal area, J/m^2; 0 far apart.
+        """Return the elastic energy minus the energy of adhesion, over the nominal area, J/m^2; 0 far apart.
 
-        The elastic energy is half the mean of traction times displacement. Between jumps the derivative of the sum with
-        respect to the mean gap is minus the nominal pressure.
+        The elastic energy is half the mean of traction times displacement. Between jumps the derivative of the stored
+        energy with respect to the mean gap is minus the nominal pressure.
         """
         displacement = self.gap + self.surface.heights
         displacement -= displacement.mean()
@@ -166,7 +168,7 @@ def contact_state(
     tolerance: float = DEFAULT_TOLERANCE,
     progress: Callable[[str], None] | None = None,
 ) -> NodalState:
-    """Solve the contact at one load, as `finite_range_solution` does; return it node by node."""
+    """Solve the contact at one load, as `finite_range_solution` does; return the state at all nodes."""
     target = POSITIVE.validate("reduced_pressure", reduced_pressure) * surface.rms_slope * material.contact_modulus
     fine = refine(surface, material, refinement, progress)
     state = _solve_nonadhesive(fine, material, target, TOLERANCE.validate("tolerance", tolerance))
@@ -179,7 +181,7 @@ def contact_state(
 def refine(
     surface: Surface, material: Material, refinement: int, progress: Callable[[str], None] | None = None
 ) -> Surface:
-    """Return the surface on the grid of the solution, which must resolve the attraction; report it as progress."""
+    """Return the surface on the grid of the solution; raise `ValueError` if this grid does not resolve the attraction."""
     surface.require_periodic("the solution by boundary elements")
     fine = surface.refined(REFINEMENT.validate("refinement", refinement))
     numbers = f"{fine.grid} nodes a side, spacing {fine.spacing:.4g} m"
@@ -198,7 +200,7 @@ def refine(
 class _Solver:
     """Tamaas on one surface, in units of h_rms for lengths and E* for pressures.
 
-    `variable` is minimised over and its mean is given: tamaas.PolonskyKeerRey.pressure or .gap.
+    `variable` is the unknown, whose mean is prescribed: tamaas.PolonskyKeerRey.pressure or .gap.
     """
 
     def __init__(self, fine, variable, tolerance):
@@ -240,11 +242,11 @@ def _solve_nonadhesive(fine, material, pressure, tolerance):
 
 
 class GapContact:
-    """Contact at given mean gaps; each solution starts from the last one, the first from `gap` (m).
+    """Contact at given mean gaps. Each solution starts from the one before, the first one from `gap`, m.
 
     Tamaas divides its error by the load of the contact, so its solver does not stop if no node is in contact. Therefore
-    ICHA interrupts the solver from time to time. If the gap is open everywhere, ICHA checks it against the law of the
-    interface.
+    ICHA interrupts the solver from time to time. If the gap is open everywhere, ICHA checks the traction against the
+    law of the interface.
     """
 
     def __init__(self, fine, material, tolerance, gap=None):
@@ -352,10 +354,10 @@ def _next_gap(tried):
 
 
 def perimeter_correction(contact: np.ndarray) -> tuple[float, float]:
-    """Contact area fraction, corrected by the perimeter, and perimeter in spacings of a periodic contact map.
+    """Return the contact area fraction corrected by the perimeter, and the perimeter in spacings, of a periodic map.
 
     Nodes along the edge overestimate the area by (pi - 1 + ln 2)/24 of the perimeter times the spacing (Yastrebov,
-    Anciaux & Molinari 2017, eq. 9 there).
+    Anciaux & Molinari 2017, their eq. 9).
     """
     edges = sum(int(np.count_nonzero(contact != np.roll(contact, 1, axis))) for axis in (0, 1))
     return (np.count_nonzero(contact) - BEYOND_EDGES * edges) / contact.size, float(edges)
@@ -409,7 +411,7 @@ def _dataset(surface, material, state, target, tolerance, seed):
 def describe_problem(
     surface: Surface, fine: Surface, material: Material, tolerance: float, seed: int
 ) -> dict[str, Any]:
-    """Variables of a dataset that describe the problem: surface, grid of the solution, material and settings."""
+    """Return the variables that describe a problem: surface, grid of the solution, material and settings."""
     adhesive = material.surface_energy > 0
     return {
         "tolerance": tolerance,
@@ -425,7 +427,7 @@ def describe_problem(
 
 
 def attributes(material: Material, title: str, summary: str) -> dict[str, str]:
-    """Attributes of a dataset by Tamaas; braces in the title become `with` or `without`."""
+    """Return the attributes of a dataset by Tamaas; braces in the title are replaced by `with` or `without`."""
     return file_attributes(
         title.format("with" if material.surface_energy > 0 else "without"),
         summary,
