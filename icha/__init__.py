@@ -12,24 +12,16 @@ _HOME = {
     "simulate": "simulation",
     "ConvergenceError": "simulation",
 }
-__all__ = [
-    "ConvergenceError",
-    "Material",
-    "Path",
-    "SelfAffineSpectrum",
-    "Surface",
-    "__version__",
-    "read_scan",
-    "simulate",
-]
+__all__ = ["__version__", *_HOME]
 
 if TYPE_CHECKING:  # for editors and type checkers only
-    from icha.asperity.material import Material
-    from icha.configuration.topographies import read_scan
-    from icha.path.targets import Path
-    from icha.simulation import ConvergenceError, simulate
-    from icha.surfaces.spectrum import SelfAffineSpectrum
-    from icha.surfaces.surface import Surface
+    from icha.asperity.material import Material as Material
+    from icha.configuration.topographies import read_scan as read_scan
+    from icha.path.targets import Path as Path
+    from icha.simulation import ConvergenceError as ConvergenceError
+    from icha.simulation import simulate as simulate
+    from icha.surfaces.spectrum import SelfAffineSpectrum as SelfAffineSpectrum
+    from icha.surfaces.surface import Surface as Surface
 
     __version__: str
 else:

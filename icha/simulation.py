@@ -1,4 +1,4 @@
-"""Simulation of one surface and one material along a path of loading and unloading, as a labelled dataset."""
+"""Simulate the contact of one surface and one material along a path, and return it as a labelled dataset."""
 
 import importlib
 import pathlib
@@ -60,13 +60,10 @@ _STICKINESS_PAPER = "L. Pastewka and M. O. Robbins, PNAS 111 (2014) 3298-3303, d
 
 
 class ConvergenceError(RuntimeError):
-    """Error: the path could not be followed to its end.
-
-    `dataset` holds the targets that were reached, and the reason in its attribute `incomplete`.
-    """
+    """Error: the path could not be followed to its end."""
 
     def __init__(self, message: str, dataset: xr.Dataset):
-        """Store the message and the dataset of what was computed."""
+        """Store the dataset of the targets that were reached; its attribute `incomplete` is the reason."""
         super().__init__(message)
         self.dataset = dataset
 
@@ -89,23 +86,23 @@ def simulate(
 
     Parameters
     ----------
-    surface : topography, at the rms slope at which it is pressed.
+    surface : topography with its final rms slope.
     material : modulus, energy and range of the interface.
-    path : loads, areas or separations to reach, in order, and those of which fields and spots are stored.
+    path : loads, areas or separations to reach, in order, and the states of which fields and spots are stored.
     model : "asperities", or "boundary_elements" in the limit of a short range of attraction, which is slower and needs
         a periodic surface.
-    seed : recorded in the dataset; -1 for a surface without one.
-    progress : called with a line of text at every target.
-    kept : folder of checkpoints, from which an interrupted call with the same arguments resumes
-        (`icha.contact.checkpoints`); for boundary elements.
+    seed : number that is recorded in the dataset; -1 for a surface without a seed.
+    progress : function that is called with a line of text at every target.
+    kept : folder of checkpoints (`icha.contact.checkpoints`), with boundary elements only. An interrupted call with the
+        same arguments resumes from them.
 
     Returns
     -------
     xarray.Dataset with dimensions step, snapshot, gap_bin, pressure_bin and spot; every variable has units and a long
-    name. A path that continues after the first loading has all its equilibria as steps, and a dimension event; boundary
-    elements also have dimensions row and column. The attribute `contact_model` names the model; `applicability` gives
-    the reasons why the model is not applicable to this contact, or is empty; `failed_checks`, if there is one, lists
-    the checks that the run fails (`icha.checks.run.check_run`).
+    name. On a path that continues after the first loading, all equilibria are steps, and there is a dimension event.
+    Boundary elements also have dimensions row and column. The attribute `contact_model` names the model.
+    `applicability` gives the reasons why the model is not applicable to this contact; it is empty if there is no such
+    reason. `failed_checks` exists only if the run fails checks (`icha.checks.run.check_run`), and lists them.
 
     Warns
     -----
@@ -118,16 +115,14 @@ def simulate(
         If an argument has the wrong type, the model is unknown, a target is out of range on this surface, the surface
         has no summits, or the model does not cover it.
     ConvergenceError
-        If an equilibrium is not found or a target cannot be reached; its `dataset` holds the targets before.
+        If an equilibrium is not found or a target cannot be reached; its `dataset` has the targets reached before.
     """
-    _check_arguments(surface, material, path)
     if model not in tuple(MODELS):
         raise ValueError(f"model: {model!r} must be one of {', '.join(MODELS)}")
-    if MODELS[model].by_summits:
-        _check_asperity_range(surface, path)
+    _check_arguments(surface, material, path, MODELS[model].by_summits)
     if kept is not None and not MODELS[model].resumable:
         raise ValueError(f"kept: the model {model} has no checkpoints; expected None")
-    # Only this model is imported: the fingerprint of a run covers no other one.
+    # Only this model is imported, because the fingerprint of a run must not depend on other models.
     solver = importlib.import_module(MODELS[model].module)
     seed = IntegerRange(-1).validate("seed", seed)
     dataset = _compute(solver, surface, material, path, model, seed, progress, kept)
@@ -139,7 +134,7 @@ def simulate(
 
 def _compute(solver, surface, material, path, model, seed, progress, kept):
     """Compute the dataset of a run, without its checks; raise `ConvergenceError` if it is incomplete."""
-    # With one thread for linear algebra the order of sums, and with it every bit, is the same everywhere.
+    # With one thread for linear algebra the order of sums, and so every bit of the result, is the same on all machines.
     with threadpool_limits(1):
         contact = solver.contact_of(surface, material)
         observables = contact.observables(surface)
@@ -166,9 +161,9 @@ def _compute(solver, surface, material, path, model, seed, progress, kept):
 def empty_run(
     surface: Surface, material: Material, path: Path, reason: str, *, model: str = DEFAULT_MODEL, seed: int = -1
 ) -> xr.Dataset:
-    """Return the dataset of a run that could not be computed: no step, and the reason in the attribute `incomplete`.
+    """Return the dataset of a run that could not be computed: without steps, with the reason as attribute `incomplete`.
 
-    The arguments are the same as those of `simulate`.
+    All other arguments are those of `simulate`.
     """
     record, summits = _PathRecord(reason), locate_summits(surface)
     coverage = SummitCoverage.of(surface, summits)
@@ -223,35 +218,33 @@ def asperity_applicability(
     return f"asperity model not applicable: {'; '.join(reasons)}" if reasons else ""
 
 
-def _check_arguments(surface, material, path):
-    """Raise `ValueError` for arguments of the wrong type, and for targets out of range on this surface."""
+def _check_arguments(surface, material, path, by_summits):
+    """Raise `ValueError` for arguments of the wrong type, and for targets out of range on this surface.
+
+    by_summits : whether the model represents the surface by its summits, which limits loads and areas.
+    """
     for name, value, kind in (("surface", surface, Surface), ("material", material, Material), ("path", path, Path)):
         if not isinstance(value, kind):
             raise ValueError(f"{name}: a {type(value).__name__} is not an icha.{kind.__name__}")
     for target in (*path.targets, *path.turning_points):
+        if by_summits and target.kind in ASPERITY_RANGES and target.value > 0:
+            ASPERITY_RANGES[target.kind].validate(f"path: {target.kind}", target.value)
         if target.kind == RELATIVE_LOAD:
-            asked = f"path: {RELATIVE_LOAD} = {target.value!r} on a surface of rms slope {surface.rms_slope:.4g}"
+            load = f"path: {RELATIVE_LOAD} = {target.value!r} on a surface of rms slope {surface.rms_slope:.4g}"
             if 0 < abs(target.value) < LEAST_PRESSURE * surface.rms_slope:
                 raise ValueError(
-                    f"{asked} is too small a load; expected a reduced pressure of at least {LEAST_PRESSURE} in "
+                    f"{load} is too small a load; expected a reduced pressure of at least {LEAST_PRESSURE} in "
                     "absolute value, or 0 at a turning point that ends unloading"
+                )
+            if by_summits and target.value > MAX_REDUCED_PRESSURE * surface.rms_slope:
+                raise ValueError(
+                    f"{load} is beyond the range of the asperity model; expected a reduced pressure of at most "
+                    f"{MAX_REDUCED_PRESSURE}"
                 )
         if target.snapshot and target.kind == MEAN_SEPARATION and target.value > _HIGHEST_SNAPSHOT * surface.rms_height:
             raise ValueError(
                 f"path: a snapshot at a mean separation of {target.value!r} m is far above any contact; expected at "
                 f"most {_HIGHEST_SNAPSHOT:g} rms heights ({_HIGHEST_SNAPSHOT * surface.rms_height:.4g} m)"
-            )
-
-
-def _check_asperity_range(surface, path):
-    """Raise `ValueError` for targets beyond the asperity model."""
-    for target in (*path.targets, *path.turning_points):
-        if target.kind in ASPERITY_RANGES and target.value > 0:
-            ASPERITY_RANGES[target.kind].validate(f"path: {target.kind}", target.value)
-        if target.kind == RELATIVE_LOAD and target.value > MAX_REDUCED_PRESSURE * surface.rms_slope:
-            raise ValueError(
-                f"path: {RELATIVE_LOAD} = {target.value!r} on a surface of rms slope {surface.rms_slope:.4g} is beyond "
-                f"the range of the asperity model; expected a reduced pressure of at most {MAX_REDUCED_PRESSURE}"
             )
 
 
@@ -261,7 +254,7 @@ class _PathRecord:
 
     Attributes
     ----------
-    failure : reason why the path ends early; empty if it does not.
+    failure : reason why the path ends early; empty for a complete path.
     steps, snapshots : one row of values for every step and snapshot, by the names of the variables.
     events : events of every step.
     unattributed : loss that belongs to no kind of event, J/m^2.
@@ -321,7 +314,7 @@ def _record_path(contact, observables, path, progress) -> _PathRecord:
 
 
 def _require_finite(values: dict) -> dict:
-    """Return the values; raise `NotConverged` if one is not finite, except for the stiffness of full contact."""
+    """Return the values; raise `NotConverged` if one is not finite. The stiffness of full contact may be infinite."""
     for name, value in values.items():
         numbers = np.asarray(value)
         if name == "contact_stiffness" and np.isposinf(numbers).all():
@@ -388,7 +381,7 @@ def _describe_targets(table: Table, path: Path) -> Table:
 
 
 def _target_unit(kinds: set[str], named_by: str) -> dict:
-    """Return the unit of values of these kinds; if there are two, with a comment on which kinds have which unit."""
+    """Return the unit of values of these kinds; if there are two units, also a comment that tells them apart."""
     metres = kinds.intersection(IN_METRES)
     if not metres or metres == kinds:
         return {"units": "m" if metres else "1"}

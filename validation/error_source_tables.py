@@ -29,7 +29,6 @@ from icha.figures.style import (
     save,
 )
 from validation.error_sources import effects, relative_radius, shape_ratio, shape_ratio_of_fourth_order
-from validation.spot_by_spot import CATEGORIES
 from validation.tables import DOCS, Table, means, pressures, write_tables
 
 NAMES = {
@@ -67,28 +66,6 @@ def steps(error_sources: Sequence[xr.Dataset]) -> Table:
         for source in each[0]["source"].values
     ]
     rows.append(["sum: ln(A/A_BEM) of the model", *means([one.sum("source").values for one in each], "{:+.1f}")])
-    return Table(["", *pressures(error_sources[0]["reduced_pressure"].values)], rows)
-
-
-def split(error_sources: Sequence[xr.Dataset]) -> Table:
-    """Table of areas and loads of spots and patches by category."""
-    rows = []
-    for category, meaning in CATEGORIES.items():
-        own = [one.sel(category=category) for one in error_sources]
-        for what, names in (
-            ("area", ("spot_area_fraction", "patch_area_fraction")),
-            ("load", ("spot_load_share", "patch_load_share")),
-        ):
-            scale = [
-                one["contact_area_fraction"].sel(variant="boundary_elements").values if what == "area" else 1.0
-                for one in error_sources
-            ]
-            sides = [
-                np.mean([100 * one[name].values / unit for one, unit in zip(own, scale, strict=True)], axis=0)
-                for name in names
-            ]
-            cells = [f"{model:.1f} / {truth:.1f}" for model, truth in zip(*sides, strict=True)]
-            rows.append([f"{meaning}: {what}", *cells])
     return Table(["", *pressures(error_sources[0]["reduced_pressure"].values)], rows)
 
 
@@ -204,7 +181,6 @@ def write(adhesionless: Sequence[xr.Dataset], adhesive: xr.Dataset) -> None:
         "area": ratios(adhesionless, "contact_area_fraction"),
         "separation": ratios(adhesionless, "mean_separation"),
         "steps": steps(adhesionless),
-        "spots_and_patches": split(adhesionless),
         "single_spots": single_spots(adhesionless),
         "area_adhesive": ratios([adhesive], "contact_area_fraction"),
         "separation_adhesive": ratios([adhesive], "mean_separation"),

@@ -43,7 +43,7 @@ from icha.surfaces.spectrum import SelfAffineSpectrum
 from icha.surfaces.summits import find_summits
 from icha.surfaces.surface import Surface
 from validation.paraboloids import circular_curvatures, fourth_order_terms, paraboloids, summit_curvatures
-from validation.spot_by_spot import CATEGORIES, split
+from validation.spot_by_spot import compare_single_spots
 from validation.without_unions import discs_apart, independent_discs, union_area_fraction
 
 # Variants from the model to boundary elements, with the change of each step. With adhesion the model is not solved
@@ -81,7 +81,7 @@ def error_sources(
     reduced_pressures,
     seed: int = -1,
 ) -> xr.Dataset:
-    """Solve all variants for one surface, and split the model's error spot by spot.
+    """Solve all variants for one surface; without adhesion also compare single spots with their patches.
 
     Parameters
     ----------
@@ -91,13 +91,12 @@ def error_sources(
 
     Returns
     -------
-    xarray.Dataset: areas and separations along (variant, reduced_pressure). Without adhesion also the split along
-    (category, reduced_pressure), whose sums are the total areas and loads of `icha` and `boundary_elements`, and along
-    `pair` every single spot and its patch.
+    xarray.Dataset: areas and separations along (variant, reduced_pressure). Without adhesion also every single spot and
+    its patch along `pair`.
     """
     path = Path(reduced_pressures=reduced_pressures)
     pressures = [target.value for target in path.targets]
-    states, splits = {}, None
+    states, singles = {}, None
 
     def keep(name, solved):
         states[name] = list(solved)
@@ -126,8 +125,10 @@ def error_sources(
         keep("boundary_elements", map(_state_at_nodes, truth))
         if not contact.adhesive:
             fourth = fourth_order_terms(surface, contact.asperities)
-            splits = [split(contact, state, true, fourth) for state, true in zip(model, truth, strict=True)]
-    return _dataset(surface, material, pressures, states, splits).assign(seed=seed, refinement=_REFINEMENT)
+            singles = [
+                compare_single_spots(contact, state, true, fourth) for state, true in zip(model, truth, strict=True)
+            ]
+    return _dataset(surface, material, pressures, states, singles).assign(seed=seed, refinement=_REFINEMENT)
 
 
 def _model(surface, material, path):
@@ -158,7 +159,7 @@ def _solve_paraboloids(heights, surface, material, reduced_pressure):
     return state._replace(separation=state.separation + float(np.mean(heights)))
 
 
-def _dataset(surface, material, pressures, states, splits):
+def _dataset(surface, material, pressures, states, singles):
     along = ("variant", "reduced_pressure")
     variables = {
         "contact_area_fraction": (along, [[state.area for state in solved] for solved in states.values()]),
@@ -168,16 +169,11 @@ def _dataset(surface, material, pressures, states, splits):
         **{name: getattr(surface, name) for name in ("rms_slope", "rms_height", "rms_curvature", "period", "grid")},
     }
     coordinates = {"variant": list(states), "reduced_pressure": pressures}
-    if splits is not None:
-        coordinates["category"] = list(CATEGORIES)
-        repeated = np.repeat(pressures, [len(one["pair_spot_area"]) for one in splits])
+    if singles is not None:
+        repeated = np.repeat(pressures, [len(one["pair_spot_area"]) for one in singles])
         variables["pair_reduced_pressure"] = ("pair", repeated)
-        for name in splits[0]:
-            of_states = [one[name] for one in splits]
-            if name.startswith("pair_"):
-                variables[name] = ("pair", np.concatenate(of_states))
-            else:
-                variables[name] = (("category", "reduced_pressure"), np.array(of_states).T)
+        for name in singles[0]:
+            variables[name] = ("pair", np.concatenate([one[name] for one in singles]))
     return xr.Dataset(variables, coordinates)
 
 

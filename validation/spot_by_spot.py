@@ -1,4 +1,4 @@
-"""The model's error spot by spot: its spots compared with the contact patches of boundary elements."""
+"""Single spots of the asperity model, compared with the contact patches of boundary elements."""
 
 from typing import NamedTuple
 
@@ -10,15 +10,6 @@ from scipy.sparse.csgraph import connected_components
 from icha.equilibrium.interacting_asperities import InteractingAsperities
 from icha.equilibrium.sites import ContactState
 from icha.references.finite_range import NodalState, perimeter_correction
-
-# Categories of groups of overlapping spots and patches.
-CATEGORIES = {
-    "single": "one spot of one summit, one patch",
-    "several": "spots of one summit each, with a patch in common or several patches under one spot",
-    "united": "with a united spot",
-    "extra": "a spot without a patch",
-    "missed": "a patch without a spot",
-}
 
 
 class Patches(NamedTuple):
@@ -35,20 +26,6 @@ class Patches(NamedTuple):
     area: np.ndarray
     force: np.ndarray
     nodes: np.ndarray
-
-
-class Match(NamedTuple):
-    """Groups of overlapping spots and patches.
-
-    Attributes
-    ----------
-    spot_group, patch_group : (s,), (k,), the group of each spot and patch.
-    category : (g,), a key of `CATEGORIES` for each group.
-    """
-
-    spot_group: np.ndarray
-    patch_group: np.ndarray
-    category: np.ndarray
 
 
 def contact_patches(state: NodalState) -> Patches:
@@ -73,34 +50,24 @@ def contact_patches(state: NodalState) -> Patches:
     return Patches(label, area[1:] * cell, force[1:] * cell, nodes[1:])
 
 
-def match(position, contact_radius, united, patches: Patches, period: float) -> Match:
-    """Group overlapping spots and patches.
+def match(position, contact_radius, united, patches: Patches, period: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return the indices (m,) of single spots, and of the patch that overlaps each of them and no other spot.
 
-    A spot overlaps the patches of all nodes inside it, or of the nearest node.
+    A spot overlaps the patches of all nodes inside it, and the patch of the nearest node. A single spot has one summit
+    and overlaps one patch.
 
     Parameters
     ----------
-    position, contact_radius : (s, 2), (s,), m, of the spots.
-    united : (s,), whether a spot consists of several summits.
+    position, contact_radius : (s, 2), (s,) float, m, of the spots.
+    united : (s,) bool, whether a spot consists of several summits.
     """
-    spots, count = len(position), len(patches.area)
-    spot, patch = [], []
-    for k in range(spots):
-        under = np.unique(patches.label[_nodes_in_disc(position[k], contact_radius[k], len(patches.label), period)])
-        under = under[under > 0]
-        spot += [k] * len(under)
-        patch += list(under - 1 + spots)
-    total = spots + count
-    groups, group = connected_components(coo_array((np.ones(len(spot)), (spot, patch)), shape=(total, total)))
-    spot_group, patch_group = group[:spots], group[spots:]
-    spot_count, patch_count = (np.bincount(group, minlength=groups) for group in (spot_group, patch_group))
-    with_united = np.bincount(spot_group, united, minlength=groups) > 0
-    category = np.select(
-        [spot_count == 0, patch_count == 0, with_united, (spot_count == 1) & (patch_count == 1)],
-        ["missed", "extra", "united", "single"],
-        "several",
-    )
-    return Match(spot_group, patch_group, category)
+    under = []
+    for centre, radius in zip(position, contact_radius, strict=True):
+        labels = np.unique(patches.label[_nodes_in_disc(centre, radius, len(patches.label), period)])
+        under.append(labels[labels > 0] - 1)
+    spots_over = np.bincount(np.concatenate(under), minlength=len(patches.area))
+    single = [k for k, each in enumerate(under) if len(each) == 1 and spots_over[each[0]] == 1 and not united[k]]
+    return np.array(single, int), np.array([under[k][0] for k in single], int)
 
 
 def _nodes_in_disc(centre, radius, grid, period):
@@ -116,34 +83,20 @@ def _nodes_in_disc(centre, radius, grid, period):
     return np.mod(row + offset[i], grid), np.mod(column + offset[j], grid)
 
 
-def split(
+def compare_single_spots(
     contact: InteractingAsperities, state: ContactState, truth: NodalState, fourth: np.ndarray
-) -> dict[str, list | np.ndarray]:
-    """Split one state without adhesion by category and pair; return values by the names of the variables.
+) -> dict[str, np.ndarray]:
+    """Compare the single spots of one state without adhesion with their patches, by the names of the variables.
 
-    `fourth` (n,) are the fourth-order terms of the summits, m^-3. Categories are in the order of `CATEGORIES`.
+    fourth : (n,) float, fourth-order terms of the summits, m^-3.
     """
-    spots, law, period = state.spots, contact.law, contact.asperities.period
+    spots, law = state.spots, contact.law
     patches = contact_patches(truth)
-    found = match(spots.position, spots.contact_radius, spots.members > 1, patches, period)
-    area = np.pi * spots.contact_radius**2
-    force = law.force(spots.contact_radius, spots.radius_of_curvature)
-    of_spots = [found.category[found.spot_group] == category for category in CATEGORIES]
-    of_patches = [found.category[found.patch_group] == category for category in CATEGORIES]
-    single = np.flatnonzero(found.category[found.spot_group] == "single")
-    of_group = np.full(len(found.category), -1)
-    of_group[found.patch_group] = np.arange(len(patches.area))
-    patch = of_group[found.spot_group[single]]
+    single, patch = match(spots.position, spots.contact_radius, spots.members > 1, patches, contact.asperities.period)
     return {
-        "spot_count": [np.count_nonzero(members) for members in of_spots],
-        "patch_count": [np.count_nonzero(members) for members in of_patches],
-        "spot_area_fraction": [np.sum(area[members]) / contact.area for members in of_spots],
-        "patch_area_fraction": [np.sum(patches.area[members]) / contact.area for members in of_patches],
-        "spot_load_share": [np.sum(force[members]) / np.sum(force) for members in of_spots],
-        "patch_load_share": [np.sum(patches.force[members]) / np.sum(patches.force) for members in of_patches],
-        "pair_spot_area": area[single],
+        "pair_spot_area": np.pi * spots.contact_radius[single] ** 2,
         "pair_patch_area": patches.area[patch],
-        "pair_spot_force": force[single],
+        "pair_spot_force": law.force(spots.contact_radius, spots.radius_of_curvature)[single],
         "pair_patch_force": patches.force[patch],
         "pair_patch_nodes": patches.nodes[patch],
         "pair_curvature_radius": spots.radius_of_curvature[single],
@@ -152,7 +105,7 @@ def split(
 
 
 def _summit_of_spots(contact, state):
-    """Return the summit (s,) at the centre of each spot, or -1; a spot may contain covered summits as well."""
+    """Return the summit at the centre of each spot, (s,) int, or -1; a spot may also cover other summits."""
     spots, asperities = state.spots, contact.asperities
     owned = np.flatnonzero(state.spot_of_asperity >= 0)
     position = np.mod(asperities.position[owned], asperities.period)

@@ -182,7 +182,7 @@ class _Apart:
         growth = np.divide(self.R, 2 * a, out=np.zeros(n), where=a > 0)
         stiffness = self.law.force_derivative(a, self.R) * growth
         nominal = self.half_space.ewald.period**2 * self.pressure
-        tangent = self.interaction.tangent(a)
+        tangent, _ = self.interaction.tangent(a)
 
         def apply(y):  # lengths in h_rms
             return np.append(

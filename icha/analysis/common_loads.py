@@ -19,7 +19,7 @@ from icha.support.statistics import ensemble
 _POINTS_PER_DECADE = 8
 # Points of a mean loop on every leg.
 _LEG_POINTS = 200
-# Relative difference below which the loads of two seeds are the same.
+# Relative difference below which the loads of two seeds count as the same.
 _SAME_LOAD = 1e-6
 
 _WITHOUT_SEED = tuple(label for label in LABELS if label != "seed")
@@ -90,7 +90,7 @@ def compare_runs(study: xr.Dataset, *, attrs: Mapping[str, str] = {}) -> xr.Data
     seed alone has no deviation and no confidence interval.
     """
     complete = study["status"].transpose(*LABELS).values == COMPLETE
-    averaged = complete & _is_applicable(study)
+    averaged = complete & (study["applicability"].transpose(*LABELS).values == "")
     asked = np.isin(study["status"].transpose(*LABELS).values, (*COMPUTED_RUNS, MISSING))
     variables = {"status": study["status"]}
     for name, description, counted in (
@@ -120,7 +120,7 @@ def compare_runs(study: xr.Dataset, *, attrs: Mapping[str, str] = {}) -> xr.Data
 
 
 def _loads(study):
-    """Return loads of all steps on both axes; NaN except at compressive targets of the first loading."""
+    """Return the loads of all steps for both axes; NaN unless a step is a compressive target of the first loading."""
     pressure = study["reduced_pressure"].transpose(*LABELS, "step").values
     slope = study["rms_slope"].broadcast_like(study["status"]).transpose(*LABELS).values[..., None]
     shown = loading_stops(study).transpose(*LABELS, "step").values & (pressure > 0)
@@ -146,15 +146,8 @@ def _on_common_grid(study, load, complete):
     return at, on_grid
 
 
-def _is_applicable(study):
-    """Whether the model is applicable to each run, as far as is known."""
-    if "applicability" not in study:  # campaigns of earlier versions lack it
-        return True
-    return study["applicability"].transpose(*LABELS).values == ""
-
-
 def _spreads(on_grid, averaged):
-    """Descriptions and values of statistics over the averaged seeds, and of the spread over materials and slopes."""
+    """Return descriptions and values of statistics over the seeds, and of the spread over materials and slopes."""
     found = {}
     for name, short, symbol in _AVERAGED:
         over_seeds = ensemble(np.where(averaged[..., None], on_grid[name], np.nan), LABELS.index("seed"))
@@ -200,8 +193,9 @@ def at_common_loads(
 def at_common_displacements(legs: Sequence[xr.Dataset]) -> tuple[np.ndarray, dict[str, np.ndarray]]:
     """Evaluate reduced pressure and contact area of an ensemble on one leg of a path, at common displacements.
 
-    Displacements are measured from the largest load of the leg, so that the means of two legs meet where the legs meet.
-    Pressure and area of a separated member are zero. Legs that end in contact are cut at the end of the shortest one.
+    Displacements are measured from the point of the largest load, so that the means of two legs meet where the legs
+    meet. Members that are apart have zero pressure and area. If the legs end in contact, all end where the shortest
+    ends.
 
     Parameters
     ----------
@@ -231,14 +225,14 @@ def at_common_displacements(legs: Sequence[xr.Dataset]) -> tuple[np.ndarray, dic
 
 
 def _spread(area, axis):
-    """Largest over smallest area, minus 1; NaN without a complete run."""
+    """Return the largest over the smallest area, minus 1; NaN without a complete run."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)
         return np.nanmax(area, axis) / np.nanmin(area, axis) - 1
 
 
 def _common_grid(loads):
-    """Return loads that every run covers, evenly spaced by their logarithm; `loads` has positive values of each run."""
+    """Return loads that every run covers, with equal steps of the logarithm, from the positive loads of each run."""
     if not loads or not all(map(len, loads)):
         return np.empty(0)
     lowest = max(float(load.min()) for load in loads)

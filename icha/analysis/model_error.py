@@ -36,7 +36,7 @@ AXES = (*_LABELS, "reduced_pressure")
 # Variables that a run and a solution must share, to this relative accuracy.
 SHARED = ("period", "rms_height", "rms_slope", "contact_modulus", "surface_energy", "interaction_range")
 _ROUNDING = 1e-6
-# Contact fraction from which a cell of a contact map is in contact.
+# Smallest contact fraction of a cell that counts as in contact in a contact map.
 _HALF = 0.5
 
 # Variables with mean and deviation over the seeds.
@@ -118,7 +118,12 @@ def _short_range_entries(select, runs, origins):
         except ValueError as error:
             raise ValueError(f"{labels}: {error}") from None
         origins.setdefault(labels.study, []).extend((run.attrs, truth.attrs))
-    return {study: _with_all_loads(states) for study, states in entries.items() if states}
+    for states in entries.values():
+        # None for states that a run lacks and others of the study have.
+        loads = {labels.reduced_pressure for labels in states}
+        for place in [labels._replace(reduced_pressure=load) for labels in states for load in loads]:
+            states.setdefault(place, None)
+    return {study: states for study, states in entries.items() if states}
 
 
 def _finite_range_entries(select, solutions, origins):
@@ -146,11 +151,7 @@ def _finite_range_entries(select, solutions, origins):
 
 
 def compare_state(run: xr.Dataset, snapshot: int, solution: xr.Dataset) -> dict[str, float | np.ndarray]:
-    """Compare one snapshot of a run with the boundary-element solution of the same state.
-
-    Returns
-    -------
-    The variables of `MODEL_ERROR`.
+    """Compare one snapshot of a run with a boundary-element solution of the same state: the variables of `MODEL_ERROR`.
 
     Raises
     ------
@@ -158,12 +159,11 @@ def compare_state(run: xr.Dataset, snapshot: int, solution: xr.Dataset) -> dict[
         If they are not the same contact, or the contact area or mean separation of the solution is not positive.
     """
     check_same_contact(run, solution)
-    state = state_of(run, snapshot)
-    return _amounts(state, solution) | _shapes(run, snapshot, state, solution)
+    return _amounts(state_of(run, snapshot), solution) | _shapes(run, snapshot, solution)
 
 
 def _compare_stops(labels, run, truth):
-    """Compare the states of both models by label; None if a run failed or lacks the state."""
+    """Compare the states of both models, by label; None for a state that one of the runs lacks."""
     check_same_contact(run, truth)
     failed = why_no_result(run.attrs) or why_no_result(truth.attrs)
     found = {}
@@ -174,16 +174,9 @@ def _compare_stops(labels, run, truth):
             solution = _as_solution(truth, true_stops[load], load)
             state = _amounts(run.isel(step=stops[load]), solution)
             if "contact" in solution and (snapshot := _snapshot_at(run, load)) is not None:
-                state |= _shapes(run, snapshot, state_of(run, snapshot), solution)
+                state |= _shapes(run, snapshot, solution)
         found[SolutionLabels(labels.study, labels.study, *labels[2:], load)] = state
     return found
-
-
-def _with_all_loads(states):
-    """Add None for states that a run lacks and others of the study have."""
-    loads = {labels.reduced_pressure for labels in states}
-    everywhere = {labels._replace(reduced_pressure=load) for labels in states for load in loads}
-    return dict.fromkeys(everywhere) | states
 
 
 def _stops(run):
@@ -193,7 +186,7 @@ def _stops(run):
 
 
 def _snapshot_at(run, load):
-    """Snapshot of a run at a reduced pressure; None if there is none."""
+    """Return the snapshot of a run at a reduced pressure; None if there is no such snapshot."""
     try:
         return find_snapshot(run, REDUCED_PRESSURE, load)
     except ValueError:
@@ -201,9 +194,9 @@ def _snapshot_at(run, load):
 
 
 def _as_solution(run, step, load):
-    """Return a state of a boundary-element run as a solution; a snapshot also has distributions and a map.
+    """Return a state of a boundary-element run in the form of a solution; a snapshot also has distributions and a map.
 
-    Nothing acts outside the edge of such a contact, so its areas of all definitions are equal.
+    In the limit of a short range nothing acts outside contact, so that areas of all definitions are equal.
     """
     state, snapshot = run.drop_dims([*RAGGED, "snapshot"], errors="ignore").isel(step=step), _snapshot_at(run, load)
     if snapshot is not None:
@@ -225,8 +218,8 @@ def _amounts(state, solution):
     for name, value in (("contact area", truth), ("mean separation", true_separation)):
         if not value > 0:
             raise ValueError(f"boundary elements have a {name} of {value:g}; a relative error needs a positive one")
-    # The attraction acts around the area of zero gap. As the range vanishes, the energetic area tends to that of JKR
-    # sooner than the area of zero gap.
+    # At a finite range the attraction also acts around the area of zero gap. As the range decreases, the energetic area
+    # approaches that of JKR sooner than the area of zero gap does.
     adhesive = float(solution["surface_energy"]) > 0
     raw, energetic = float(solution["contact_area_fraction_raw"]), float(solution["energetic_area_fraction"])
     return {
@@ -246,9 +239,9 @@ def _amounts(state, solution):
     }
 
 
-def _shapes(run, snapshot, state, solution):
+def _shapes(run, snapshot, solution):
     """Compare distributions and contact map of a snapshot and a solution; add the densities of the solution."""
-    spots = contact_of_spots(run, snapshot, solution.sizes["x"])
+    state, spots = state_of(run, snapshot), contact_of_spots(run, snapshot, solution.sizes["x"])
     contact = solution["contact"].transpose("y", "x").values == 1
     height, nominal = float(solution["rms_height"]), float(state["nominal_pressure"])
     pressure = float(solution["contact_modulus"]) * float(solution["rms_slope"])
@@ -278,7 +271,7 @@ def check_same_contact(run: xr.Dataset, solution: xr.Dataset) -> None:
 
 
 def run_of_same_contact(runs: Iterable[tuple[RunLabels, xr.Dataset]], solution: xr.Dataset) -> RunLabels:
-    """Labels of the first run of the same contact as a solution; raise ValueError if there is none."""
+    """Return the labels of the first run of the same contact as a solution; raise ValueError if there is none."""
     for labels, run in runs:
         try:
             check_same_contact(run, solution)
@@ -291,36 +284,36 @@ def run_of_same_contact(runs: Iterable[tuple[RunLabels, xr.Dataset]], solution: 
 
 
 def state_of(run: xr.Dataset, snapshot: int) -> xr.Dataset:
-    """Variables of a run at one snapshot, without spots and events."""
+    """Select the variables of a run at one snapshot, without spots and events."""
     step = int(run["snapshot_step"].values[snapshot])
     return run.drop_dims(RAGGED, errors="ignore").isel(snapshot=snapshot, step=step)
 
 
 def contact_of_spots(run: xr.Dataset, snapshot: int, grid: int) -> np.ndarray:
-    """Map of the nodes inside the spots of a snapshot: (n, n) bool along y and x."""
+    """Return whether each node lies inside a spot of a snapshot, (n, n) bool along y and x."""
     spots = spots_of(run, snapshot)
     centres = np.column_stack([spots["spot_x"].values, spots["spot_y"].values])
     return nodes_in_discs(float(run["period"]), grid, centres, spots["spot_radius"].values)
 
 
 def jaccard(one: np.ndarray, other: np.ndarray) -> float:
-    """Jaccard index: nodes in both maps over nodes in either; 1 if both maps are empty."""
+    """Return the Jaccard index: nodes in both maps over nodes in at least one; 1 if both maps are empty."""
     either = np.count_nonzero(one | other)
     return np.count_nonzero(one & other) / either if either else 1.0
 
 
 def shared(one: np.ndarray, other: np.ndarray) -> float:
-    """Nodes in both maps over nodes in the first; 1 if the first is empty."""
+    """Return the nodes in both maps over the nodes in the first; 1 if the first map is empty."""
     count = np.count_nonzero(one)
     return np.count_nonzero(one & other) / count if count else 1.0
 
 
 def distribution_distance(quantity: str, one: xr.Dataset, other: xr.Dataset) -> float:
-    """First Wasserstein distance between two P(u) in m, or P(p) in Pa, over the nominal area.
+    """Return the first Wasserstein distance between two P(u), m, or two P(p), Pa, over the nominal area.
 
-    It is the area between the cumulative distributions. The gap is zero in contact and where surfaces overlap outside
-    it; a bin of gaps stands for the geometric mean of its edges. The pressure is zero out of contact, even where there
-    is attraction; a bin of pressures stands for its mean pressure.
+    This is the area between the cumulative distributions. The gap counts as zero in contact, and where surfaces overlap
+    outside contact; the value of a bin of gaps is the geometric mean of its edges. The pressure counts as zero outside
+    contact, even where there is attraction; the value of a bin of pressures is its mean pressure.
 
     Parameters
     ----------
@@ -332,7 +325,7 @@ def distribution_distance(quantity: str, one: xr.Dataset, other: xr.Dataset) -> 
 
 
 def _values_and_weights(quantity, state):
-    """Values and the shares of the nominal area that have them; zero, for the rest of the area, comes first."""
+    """Return the values of all bins and their shares of the nominal area; the rest of the area has the value zero."""
     edges = state[f"{quantity}_bin_edges"].values
     content = state[f"{quantity}_density"].values * np.diff(edges)
     values = np.sqrt(edges[1:] * edges[:-1]) if quantity == "gap" else state["pressure_bin_mean"].values
@@ -345,7 +338,7 @@ def _name(labels):
 
 
 def _entry_dataset(campaign, entry, states):
-    """Arrange the states of one entry as arrays along `AXES`, in the order of the labels; a failed state is None."""
+    """Arrange the states of one entry as a dataset along `AXES`; a failed state is None."""
     studies = sorted({labels.study for labels in states})
     if len(studies) > 1:
         raise ValueError(f"entry {entry}: its solutions are of several studies: {', '.join(studies)}")
@@ -374,20 +367,15 @@ def _entry_dataset(campaign, entry, states):
     ]
     variables = {"status": make_variable(STATUS._replace(dims=_LABELS), np.reshape(statuses, shape).min(axis=-1))}
     variables |= _arrange(shape, [states.get(labels) for labels in grid])
-    applicable, applicability = True, None
-    if "applicability" in study:  # campaigns of earlier versions lack it
-        applicability = _of_asperities(study["applicability"], labelled)
-        applicable = applicability.values[..., None] == ""
-    variables |= _summarise_over_seeds(variables, applicable)
+    applicability = _of_asperities(study["applicability"], labelled)
+    variables |= _summarise_over_seeds(variables, applicability.values[..., None] == "")
     bins = describe_variables(BINS, bin_values("gap", GAP_BINS) | bin_values("pressure", PRESSURE_BINS))
     coords |= {name: bins.pop(name) for name in BINS if BINS[name].coordinate}
     result = xr.Dataset(variables | bins, coords, {"entry": entry, "study": studies[0]})
     for name in MATERIAL:
         result[name] = study[name].sel(material=axes["material"])
     result["tabor_parameter"] = _of_asperities(study["tabor_parameter"], labelled)
-    if applicability is not None:
-        result["applicability"] = applicability
-    return result
+    return result.assign(applicability=applicability)
 
 
 def _of_asperities(quantity, labelled):
@@ -402,7 +390,7 @@ def _of_asperities(quantity, labelled):
 
 
 def _axes(study, states):
-    """Values of `AXES` in the states of an entry; rms slopes as `arrange_slopes` returns them."""
+    """Return the values of `AXES` in the states of an entry; rms slopes as `arrange_slopes` returns them."""
     asked = {axis: {getattr(labels, axis) for labels in states} for axis in AXES}
     axes = {
         label: [value for value in study[label].values.tolist() if value in asked[label]]
@@ -429,7 +417,7 @@ def _arrange(shape, states):
 
 
 def _summarise_over_seeds(variables, applicable):
-    """Mean and standard deviation over the seeds of `SUMMARISED`, for runs to which the model is applicable."""
+    """Return means and standard deviations of `SUMMARISED` over the seeds to which the model is applicable."""
     seeds = AXES.index("seed")
     others = tuple(axis for axis in AXES if axis != "seed")
     found = {}

@@ -96,19 +96,6 @@ def outside_validation(facts: Mapping[str, float]) -> list[str]:
     ]
 
 
-def describe_surface(runs: Iterable[Mapping[str, float]]) -> str:
-    """Describe a surface by the quantities that are compared with the validation, over its runs."""
-    runs = list(runs)
-    found = []
-    for name, known in VALIDATED.items():
-        if name in ("full_contact_energy_ratio", "free_edges"):
-            continue
-        values = [facts[name] for facts in runs]
-        ends = dict.fromkeys(f"{value:.2g}" for value in (min(values), max(values)))
-        found.append(f"{known.words} {' to '.join(ends)}")
-    return ", ".join(found)
-
-
 class Statement(NamedTuple):
     """One line on the validity of a campaign.
 
@@ -170,7 +157,7 @@ def statements(
     found += _resolution(cases)
     of_asperities = [case for case in cases if MODELS[case.model].by_summits]
     if of_asperities:
-        found += [_surfaces(of_asperities), _accuracy(of_asperities)]
+        found.append(_accuracy(of_asperities))
     return found
 
 
@@ -223,15 +210,6 @@ def _resolution(cases):
             f"{error_of_cells(min(few.values()))}; {RESOLVED_CELLS} recommended"
         )
         yield Statement("grid", text, False)
-
-
-def _surfaces(cases):
-    """State the properties of the surfaces."""
-    of_surface: dict[str, list] = {}
-    for case in cases:
-        of_surface.setdefault(case.surface, []).append(case.facts)
-    descriptions = (f"{name}: {describe_surface(facts)}" for name, facts in of_surface.items())
-    return Statement("surfaces", join_first(descriptions, ". "))
 
 
 def _accuracy(cases):
@@ -300,11 +278,9 @@ def _cases(study):
     status = study["status"].transpose(*LABELS)
     values = {
         name: study[name].broadcast_like(status).transpose(*LABELS).values
-        for name in (*measured, "period", "grid", "asperity_count", "boundary")
+        for name in (*measured, "period", "grid", "asperity_count", "unsupported_summit_count", "boundary")
     }
-    unsupported = np.zeros(status.shape)
-    if "unsupported_summit_count" in study:  # campaigns of earlier versions lack it
-        unsupported = study["unsupported_summit_count"].broadcast_like(status).transpose(*LABELS).values
+    unsupported = values["unsupported_summit_count"]
     labels = [study[label].values for label in LABELS]
     for at in map(tuple, np.argwhere(np.isin(status.values, COMPUTED_RUNS))):
         model, surface, _, _, material = (str(values[index]) for values, index in zip(labels, at, strict=True))

@@ -14,10 +14,10 @@ LOSSES = ("loss_by_jump_in", "loss_by_jump_off", "loss_by_coalescence", "loss_by
 # Counts of events in a run, in the order of the flags of `event_kind`.
 EVENT_COUNTS = ("jump_in_count", "jump_off_count", "coalescence_count", "split_count")
 
-# Largest unknown work of a loop, over its largest work, that excuses a gain of energy.
+# Largest unknown work of a loop, over its largest work, for which a gain of energy may be tolerated.
 LARGEST_UNKNOWN_WORK = 1e-2
-# Largest gain of energy by unions of spots and their splitting, over the largest work. The rule of unions is not
-# conservative: without adhesion loops close to a few hundredths of a per cent (docs/hysteresis.md).
+# Largest gain of energy by unions of spots and their splits, over the largest work. The rule of unions does not
+# conserve energy: without adhesion loops close to a few hundredths of a per cent (docs/hysteresis.md).
 UNION_LIMIT = 1e-3
 
 # Meanings of the checks by name. Energies are relative to the largest work of the run.
@@ -47,8 +47,8 @@ def check_events(run) -> Iterator[tuple]:
 
 
 def check_loop(run) -> Iterator[tuple]:
-    """Yield the checks of a run that ends with separation: its losses, and no contact at the end."""
-    # As differences of works all energies are as accurate as the largest work.
+    """Yield the checks of a run that ends with complete separation: its losses, and that nothing touches at the end."""
+    # All energies are differences of works, so that their errors are relative to the largest work.
     scale = float(np.max(np.abs(run["work"]))) or 1.0
     loss = float(run["hysteresis_loss"])
     parts = sum(float(run[name]) for name in LOSSES if name in run)
@@ -72,7 +72,7 @@ def _has_united(run):
 
 
 def _check_losses(run, scale):
-    """Yield the checks of the losses of a loop: a passive contact does not return more work than was done on it."""
+    """Yield the checks of the losses of a loop, which must not return more work than was done on it."""
     unknown = IDENTITY_LIMIT + (_unresolved_work(run) + work_error(run)) / scale
     model = model_of(run.attrs)
     if model.by_cells:
@@ -89,9 +89,9 @@ def _check_losses(run, scale):
 
     yield "loop loses energy", gain(float(run["hysteresis_loss"])), with_unions
     yield "jumps lose energy", gain(into + out), tolerance
-    # A jump into contact may be uphill, by the law itself or by the forces of other spots: then only its sum with the
-    # jump out of contact is a loss. Old datasets have no count of such jumps.
-    if "uphill_jump_in_count" in run and int(run["uphill_jump_in_count"]) == 0:
+    # A jump into contact may cost energy, by the law itself or by the forces of other spots. Then only the sum of its
+    # loss and that of the jump out of contact must be positive.
+    if int(run["uphill_jump_in_count"]) == 0:
         yield "jumps off lose energy", gain(out), tolerance
     yield "unions lose energy", gain(unions), with_unions
     yield "load jumps lose energy", gain(at_load), tolerance
@@ -100,27 +100,26 @@ def _check_losses(run, scale):
 def count_unshared_separations(run) -> int:
     """Count the separations of later legs that the first loading does not have.
 
-    There one step of the first loading corresponds to two steps of the later leg, each with an error of its work.
+    At such a separation two steps of the later leg correspond to one of the first loading, each with an error of its
+    work.
     """
     first, later = (np.unique(run["mean_separation"][run["leg"] == 0]), run["mean_separation"][run["leg"] > 0])
     same = 10 * RESIDUAL_TOLERANCE * float(run["rms_height"])
     after = np.searchsorted(first, later)
-    nearest = np.minimum(
-        np.abs(later - first[np.minimum(after, len(first) - 1)]), np.abs(later - first[np.maximum(after - 1, 0)])
-    )
-    return int(np.count_nonzero(nearest > same))
+    nearest = [np.abs(later - first[np.clip(k, 0, len(first) - 1)]) for k in (after - 1, after)]
+    return int(np.count_nonzero(np.minimum(*nearest) > same))
 
 
 def finite_stiffness(run) -> np.ndarray:
-    """Contact stiffness, Pa/m; zero in full contact, where no work is done."""
+    """Return the contact stiffness, Pa/m; zero in full contact, where no work is done."""
     return np.where(np.isfinite(run["contact_stiffness"]), run["contact_stiffness"], 0.0)
 
 
 def work_error(run) -> float:
     """Bound the error of the work of a path by the tolerances of its equilibria, J/m^2.
 
-    An error of the separation, times the stiffness, is an error of the pressure. An error of the stiffness changes the
-    cubic through both ends of a step, whose integral is the work.
+    An error of the separation causes an error of the pressure that is larger by the factor of the stiffness. An error
+    of the stiffness changes the cubic through both ends of a step, whose integral is the work.
     """
     width, stiffness = np.abs(np.diff(run["mean_separation"])), finite_stiffness(run)
     ends = np.abs(stiffness[1:]) + np.abs(stiffness[:-1])
@@ -132,10 +131,10 @@ def work_error(run) -> float:
 def _unresolved_work(run):
     """Bound the error of the work of the steps with events, J/m^2; an event may happen anywhere in its step.
 
-    The bound of a step has two terms: `unresolved_work` from the jump of the pressure, and `integration_error` from the
-    change of the stiffness (an event may change the stiffness alone). The sum over all steps with events is limited to
-    their number times the larger of two energies: UNRESOLVED_LOSS times the energy of all jumps, and the model's
-    accuracy of a loss times the sum of all changes of work and loss.
+    The bound of a step is the sum of `unresolved_work`, from the jump of the pressure, and `integration_error`, from
+    the change of the stiffness (an event may change the stiffness alone). The path limits the unknown work of each
+    step, so the total is at most the number of steps times the larger of two energies: UNRESOLVED_LOSS times the energy
+    of all jumps, and the model's accuracy of a loss times the sum of all changes of work and loss.
     """
     events = sum(np.diff(run[name]) for name in EVENT_COUNTS) > 0
     events &= np.diff(run["dissipated_by_load_jump"]) == 0  # there the pressure is constant

@@ -1,7 +1,4 @@
-"""Checks of one run: finite, converged, on target, monotone, and true to its identities.
-
-The checks are identities and bounds of the physics. They need the dataset of the run alone.
-"""
+"""Checks of one run: identities and bounds of the physics that need no more than the dataset of the run."""
 
 import math
 from collections.abc import Hashable, Iterable, Iterator, Mapping
@@ -19,12 +16,12 @@ from icha.path.targets import AREA_FRACTION, BETWEEN
 # Largest error of an equilibrium, in h_rms, and of a target, relative to it.
 RESIDUAL_LIMIT = 1e-8
 TARGET_LIMIT = 1e-8
-# Largest residual of the fronts of boundary elements, which converge to 1e-6 or stagnate below this limit.
+# Largest residual of the fronts of boundary elements. They converge to 1e-6 or stagnate below this limit.
 FRONT_LIMIT = 1e-3
-# Largest fall of the contact area of boundary elements, over its maximum. Positions of fronts within their cells are
+# Largest fall of the contact area of boundary elements, over its maximum. The position of a front within its cell is
 # known less accurately, so that the area may seem to fall a little where a front enters another cell.
 CELL_LIMIT = 1e-3
-# Largest rise of the mean separation where spots unite, in h_rms: the same load may need a larger separation then.
+# Largest rise of the mean separation where spots unite, in h_rms, because the same load may then need a larger one.
 SEPARATION_RISE_LIMIT = 1e-2
 _MAY_BE_INFINITE = {name for name, description in RUN.items() if INFINITE in description.further}
 
@@ -54,11 +51,8 @@ _CHECKS = LOOP_CHECKS | {
 
 
 def check_run(run: xr.Dataset, subject: str = "") -> tuple[Check, ...]:
-    """Check a run dataset: finite, converged, on target, monotone, and true to the identities of its distributions.
+    """Check a dataset of `icha.simulate`: finite, converged, on target, monotone, and with consistent distributions.
 
-    Parameters
-    ----------
-    run : dataset as `icha.simulate` returns it.
     subject : name of the run in the checks.
     """
     return check_variables(run.variables, run.attrs, subject)
@@ -108,7 +102,7 @@ def _check_loading(run) -> Iterator[tuple]:
     limit = CELL_LIMIT if model_of(run.attrs).by_cells else TARGET_LIMIT
     yield "area rises", _largest_fall_in_loading(loading, "contact_area_fraction"), limit
     if not adhesive:
-        # With adhesion the load may fall between targets of separation or area.
+        # With adhesion the load may fall between targets that are separations or areas.
         yield "pressure rises", _largest_fall_in_loading(loading, "nominal_pressure"), TARGET_LIMIT
     rise, rise_at_unions = _largest_rises_of_separation(loading)
     yield "separation falls", rise / height, TARGET_LIMIT
@@ -118,15 +112,15 @@ def _check_loading(run) -> Iterator[tuple]:
 
 
 def _largest_fall(values):
-    """Return the largest fall from one value to the next; 0 without any fall."""
+    """Return the largest fall from one value to the next; 0 if no value falls."""
     return float(np.max(-np.diff(values), initial=0.0))
 
 
 def _largest_fall_in_loading(loading, name):
     """Return the largest fall of a variable from target to target and from step to step, over its largest magnitude.
 
-    A union may carry less load than its two spots at the same separation. So a step in which spots unite may fall, but
-    a target may not.
+    A union may carry less load than its two spots at the same separation. Therefore the variable may fall in a step in
+    which spots unite, but not from one target to the next.
     """
     values, at_targets = loading[name], loading["step_kind"] != BETWEEN
     united = np.cumsum(np.diff(loading["coalescence_count"], prepend=0) != 0)
@@ -137,8 +131,8 @@ def _largest_fall_in_loading(loading, name):
 def _largest_rises_of_separation(loading):
     """Return the largest rise of the mean separation in a step, m, where no spots unite, and where spots unite.
 
-    At a given load a growing contact pulls the surfaces together. At a given area it may push them apart: if the area
-    jumps past a target, the target is met on the branch after the jump.
+    At targets of the area the separation may rise: if the area jumps past a target, the target is met on the branch
+    after the jump. Such steps do not count.
     """
     rise = np.diff(loading["mean_separation"])
     given_area = (loading["step_kind"][1:] == AREA_FRACTION) & (np.diff(loading["contact_area_fraction"]) > 0)
@@ -147,7 +141,7 @@ def _largest_rises_of_separation(loading):
 
 
 def _target_error(run):
-    """Return the largest relative error of a target; of areas in cells the part above their tolerance."""
+    """Return the largest relative error of a target; from areas counted in cells, their tolerance is subtracted."""
     scale = float(run["contact_modulus"])
     reached = {
         "reduced_pressure": run["reduced_pressure"],
@@ -167,7 +161,7 @@ def _target_error(run):
     # The error of a target of zero load is relative to the largest load of the run.
     largest = np.array([np.max(np.abs(reached[kind])) for kind in kinds])
     # With adhesion a load may be the small difference of attraction and repulsion, which are about the stiffness times
-    # h_rms. It is met as accurately as they are.
+    # h_rms. Its error is relative to their size.
     gross = np.abs(finite_stiffness(run)) * float(run["rms_height"]) * adhesive
     unit = {"reduced_pressure": scale * float(run["rms_slope"]), "relative_load": scale}
     least = np.array([SMALLEST_LOAD * gross[k] / unit.get(kind, math.inf) for k, kind in enumerate(kinds)])

@@ -64,7 +64,7 @@ def _resolution(scan, to_scale: bool, models: list[Model]) -> Iterator[str]:
     from icha.surfaces.measured.resolution import LEAST_CELLS_OF_SUMMIT, RESOLVED_CELLS
     from icha.surfaces.moments import LEAST_CELLS_PER_WAVE, error_of_cells
 
-    used = scan.used
+    used = scan.surface
     scale = f" {formatting.length(used.spacing)} apart, rms slope {used.rms_slope:.3g}" if to_scale else ""
     yield (
         f"{used.grid} x {used.grid} nodes{scale}, {format_count(scan.summits, 'summit')}, {scan.cells_per_summit:.0f} "

@@ -6,6 +6,7 @@ Values are in SI units. `icha.configuration.load` makes these objects from the t
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path as FilePath
 from typing import Annotated, Any, NamedTuple
@@ -17,7 +18,7 @@ from icha.configuration.figures import Figures, Measurement
 from icha.configuration.publication import Publication
 from icha.configuration.studies import MEASURED, Study
 from icha.configuration.surfaces import AnySurface, MaterialSection
-from icha.contact.models import MODELS, Model
+from icha.contact.models import MODELS
 from icha.support.values import ROUNDING, Name, Problem, Section, Text, distinct
 
 # Sections whose entries belong to a study.
@@ -118,10 +119,6 @@ class Campaign(Section):
         section = self.studies[study]
         return set(section.models) == set(MODELS) and bool(section.targets.reduced_pressures)
 
-    def loop_load(self, entry: BoundaryElementLoops) -> float:
-        """Return the reduced pressure at which boundary elements begin to unload: the last one of their study."""
-        return self.studies[entry.study].targets.last[1]
-
     def contacts(self, study: str) -> list[Contact]:
         """Return the contacts of a study, run by run."""
         return list(self._contacts[study])
@@ -129,26 +126,23 @@ class Campaign(Section):
     def with_contacts(self, contacts: Mapping[str, Iterable[Contact]]) -> Campaign:
         """Return the campaign with the runs of its studies, and the lists of the studies to match."""
         contacts = {study: tuple(dict.fromkeys(runs)) for study, runs in contacts.items()}
-
-        def lists(runs):
-            columns = (list(dict.fromkeys(column)) for column in zip(*runs, strict=True))
-            return dict(zip(("surfaces", "seeds", "rms_slopes", "materials"), columns, strict=True))
-
-        studies = {label: study.model_copy(update=lists(contacts[label])) for label, study in self.studies.items()}
+        studies = {}
+        for label, study in self.studies.items():
+            lists = [list(dict.fromkeys(column)) for column in zip(*contacts[label], strict=True)]
+            keys = ("surfaces", "seeds", "rms_slopes", "materials")
+            studies[label] = study.model_copy(update=dict(zip(keys, lists, strict=True)))
         campaign = self.model_copy(update={"studies": studies})
         campaign._contacts = contacts
         return campaign
 
     def with_topographies(self, topographies: Mapping[str, Topography]) -> Campaign:
         """Return the campaign with the facts of its topographies, whose slopes replace `measured`."""
-        contacts = {
-            study: [
-                each._replace(rms_slope=topographies[each.surface].rms_slope) if each.rms_slope == MEASURED else each
-                for each in runs
-            ]
-            for study, runs in self._contacts.items()
-        }
-        campaign = self.with_contacts(contacts)
+
+        def with_slope(contact):
+            measured = contact.rms_slope == MEASURED
+            return contact._replace(rms_slope=topographies[contact.surface].rms_slope) if measured else contact
+
+        campaign = self.with_contacts({study: map(with_slope, runs) for study, runs in self._contacts.items()})
         campaign._topographies = dict(topographies)
         return campaign
 
@@ -190,9 +184,10 @@ class Campaign(Section):
         asked = [None if values is None else set(values) for values in lists]
 
         def is_asked_for(contact):
-            has_seed = self.surfaces[contact.surface].random
+            # Surfaces from files have no seeds.
+            any_seed = not self.surfaces[contact.surface].random
             return all(
-                values is None or value in values or (name == "seed" and not has_seed)
+                values is None or value in values or (name == "seed" and any_seed)
                 for name, value, values in zip(Contact._fields, contact, asked, strict=True)
             )
 
@@ -232,51 +227,45 @@ class Campaign(Section):
 
     def _model_problems(self, study: Study) -> Iterator[Problem]:
         """Report surfaces of a study that its models do not support."""
-        for index, model in enumerate(study.models):
-            for name in study.surfaces:
-                for reason in self._reasons_against(MODELS[model], name):
-                    yield ("models", index), model, reason
-
-    def _reasons_against(self, model: Model, name: str) -> Iterator[str]:
-        """Return the reasons why a model does not support a surface."""
-        surface, least = self.surfaces[name], model.least_cells
-        if model.periodic_only and self.is_free(name):
-            yield (
-                f"need a periodic surface, and {name!r} is a square with free edges; expected asperities, or another "
-                "`boundary`, which makes the surface periodic"
-            )
-        if surface.cells_per_short_wave < least * (1 - ROUNDING):
-            yield (
-                f"need at least {least} grid cells per shortest wavelength, and {name!r} has "
-                f"{surface.cells_per_short_wave:.3g}; expected asperities, or a `grid` of "
-                f"{surface.grid_of_cells(least)} or more for {name!r} (better "
-                f"{surface.grid_of_cells(_ADVISABLE_CELLS)})"
-            )
+        for (index, label), name in itertools.product(enumerate(study.models), study.surfaces):
+            surface, model = self.surfaces[name], MODELS[label]
+            least = model.least_cells
+            if model.periodic_only and self.is_free(name):
+                yield (
+                    ("models", index),
+                    label,
+                    f"need a periodic surface, and {name!r} is a square with free edges; expected asperities, or "
+                    "another `boundary`, which makes the surface periodic",
+                )
+            if surface.cells_per_short_wave < least * (1 - ROUNDING):
+                yield (
+                    ("models", index),
+                    label,
+                    f"need at least {least} grid cells per shortest wavelength, and {name!r} has "
+                    f"{surface.cells_per_short_wave:.3g}; expected asperities, or a `grid` of "
+                    f"{surface.grid_of_cells(least)} or more for {name!r} (better "
+                    f"{surface.grid_of_cells(_ADVISABLE_CELLS)})",
+                )
 
     def warnings(self) -> list[str]:
         """Return warnings about valid but coarse grids."""
-        found = []
-        studies = self.studies.values()
-        by_cells = {
-            name
-            for each in studies
-            if any(MODELS[model].least_cells for model in each.models)
-            for name in each.surfaces
-        }
-        for name in dict.fromkeys(name for study in studies for name in study.surfaces):
+        found, studies = [], self.studies.values()
+        models = [(name, MODELS[model]) for each in studies for name in each.surfaces for model in each.models]
+        by_cells = {name for name, model in models if model.by_cells}
+        for name in dict.fromkeys(name for name, _ in models if self.surfaces[name].random):
             surface, origin = self.surfaces[name], self.origin("surfaces", name)
-            variant = "" if origin == name else f" (variant {name})"
-            cells = surface.cells_per_short_wave
+            cells, variant = surface.cells_per_short_wave, "" if origin == name else f" (variant {name})"
+            start = f"surfaces.{origin}.grid: {surface.grid!r} gives"
             if cells < _LEAST_CELLS * (1 - ROUNDING):
                 found.append(
-                    f"surfaces.{origin}.grid: {surface.grid!r} gives {cells:.3g} grid cells per shortest wavelength"
-                    f"{variant}; expected at least {_LEAST_CELLS}, better {_ADVISABLE_CELLS}"
+                    f"{start} {cells:.3g} grid cells per shortest wavelength{variant}; expected at least "
+                    f"{_LEAST_CELLS}, better {_ADVISABLE_CELLS}"
                 )
             elif cells < _ADVISABLE_CELLS * (1 - ROUNDING) and name in by_cells:
                 found.append(
-                    f"surfaces.{origin}.grid: {surface.grid!r} gives boundary elements {cells:.3g} cells per shortest "
-                    f"wavelength{variant}, with which areas have errors of a few per cent; expected a grid of "
-                    f"{surface.grid_of_cells(_ADVISABLE_CELLS)} or more"
+                    f"{start} boundary elements {cells:.3g} cells per shortest wavelength{variant}, with which areas "
+                    f"have errors of a few per cent; expected a grid of at least "
+                    f"{surface.grid_of_cells(_ADVISABLE_CELLS)}"
                 )
         return found
 

@@ -74,8 +74,10 @@ def solution_settings(campaign: Campaign, case: SolutionLabels) -> dict:
 def loop_settings(campaign: Campaign, case: ContactLabels) -> dict:
     """Return the settings of a loop of boundary elements, without its topography, in SI units."""
     entry = campaign.boundary_element_loops[case.entry]
-    loop = {"largest_reduced_pressure": campaign.loop_load(entry), "separation_step": entry.separation_step}
-    return _solver_settings(campaign, entry, case) | loop
+    return _solver_settings(campaign, entry, case) | {
+        "largest_reduced_pressure": campaign.studies[entry.study].targets.last[1],
+        "separation_step": entry.separation_step,
+    }
 
 
 def _solver_settings(campaign: Campaign, entry: BesideStudy, case: SolutionLabels | ContactLabels) -> dict:

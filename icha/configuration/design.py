@@ -15,17 +15,22 @@ from typing import Any
 from pydantic import ValidationError
 
 from icha.configuration.campaign import BESIDE_STUDIES, Campaign, Contact
-from icha.configuration.errors import MOST_PROBLEMS
+from icha.configuration.errors import MOST_PROBLEMS, problem_of
 from icha.configuration.studies import MEASURED, SCALARS, Study
 from icha.configuration.surfaces import SURFACE_KINDS, MaterialSection
 from icha.datasets.labels import number_label
-from icha.support.values import LONGEST_LABEL, NOTHING, Problem, Unit, list_names
+from icha.support.rules import FloatRange
+from icha.support.values import LONGEST_LABEL, NOTHING, Problem, list_names
 
 MAX_RUNS = 100_000
 # Largest number of targets of all runs together.
 _MAX_TARGETS = 5_000_000
 # Lists of a study, and the key of one of their entries in a case.
 _LISTS = {"surfaces": "surface", "seeds": "seed", "rms_slopes": "rms_slope", "materials": "material"}
+# Order of the lists of a study, of which the last one changes first from run to run.
+_OF_MATERIAL = MaterialSection.model_fields
+_ORDER = ("surface", *(name for name in SCALARS if name not in _OF_MATERIAL), "seed", "rms_slope", "material")
+_ORDER += tuple(_OF_MATERIAL)
 _SYMBOLS = {"m": "m", "Pa": "Pa", "J/m^2": "J"}
 _PREFIXES = {-15: "f", -12: "p", -9: "n", -6: "u", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 
@@ -43,13 +48,13 @@ def expand_design(campaign: Campaign, content: Mapping) -> tuple[Campaign, list[
 
     Returns
     -------
-    The expanded campaign and an empty list; or the campaign as it was and all problems. `Campaign.with_topographies`
-    replaces slopes that are `measured`.
+    The expanded campaign, and the problems that prevented the expansion. `Campaign.with_topographies` replaces slopes
+    that are `measured`.
     """
     problems = itertools.chain.from_iterable(
         _study_problems(campaign, label, study) for label, study in campaign.studies.items()
     )
-    problems = list(itertools.islice(problems, MOST_PROBLEMS + 1)) or list(_too_many(campaign))
+    problems = list(itertools.islice(problems, MOST_PROBLEMS + 1)) or list(_too_many_runs(campaign))
     if problems:
         return campaign, problems
     variants = _Variants(campaign, content)
@@ -61,25 +66,20 @@ def expand_design(campaign: Campaign, content: Mapping) -> tuple[Campaign, list[
     sections = {name: getattr(campaign, name) | derived for name, derived in variants.derived.items()}
     expanded = campaign.model_copy(update=sections).with_contacts(contacts)
     expanded._origins = variants.origin
-    expanded = _replace_varied_names(expanded, variants.origin)
-    problems = list(_too_many_beside(expanded))
-    return (campaign, problems) if problems else (expanded, [])
+    expanded = _replace_varied_names(expanded)
+    return expanded, list(_too_many_solutions(expanded))
 
 
 def _lists(label: str, study: Study) -> dict[str, list[_Located]]:
     """Return the lists and varied parameters of a study that are combined; the surfaces come first."""
-    prefix = ("studies", label)
-    lists = {
-        one: [((*prefix, many, index), value) for index, value in enumerate(getattr(study, many))]
-        for many, one in _LISTS.items()
-    }
+
+    def located(values, *keys):
+        return [(("studies", label, *keys, index), value) for index, value in enumerate(values)]
+
     varied = study.vary.model_dump(exclude_none=True) if study.vary else {}
-    for name, values in varied.items():
-        lists[name] = [((*prefix, "vary", name, index), value) for index, value in enumerate(values)]
-    of_material = MaterialSection.model_fields
-    of_surface = (name for name in SCALARS if name not in of_material)
-    names = ["surface", *of_surface, "seed", "rms_slope", "material", *of_material]
-    return {name: lists[name] for name in names if name in lists}
+    lists = {one: located(getattr(study, many), many) for many, one in _LISTS.items()}
+    lists |= {name: located(values, "vary", name) for name, values in varied.items()}
+    return {name: lists[name] for name in _ORDER if name in lists}
 
 
 def _points(label: str, study: Study) -> Iterator[dict[str, _Located]]:
@@ -112,7 +112,7 @@ def _axes(study: Study, lists: Mapping, fixed: Mapping) -> Iterator[list[str]]:
             yield group
 
 
-def _too_many(campaign: Campaign) -> Iterator[Problem]:
+def _too_many_runs(campaign: Campaign) -> Iterator[Problem]:
     """Report too many runs or targets, before they are expanded."""
     runs = {label: _run_count(label, study) for label, study in campaign.studies.items()}
     targets = {}
@@ -123,7 +123,7 @@ def _too_many(campaign: Campaign) -> Iterator[Problem]:
     yield from _excess("studies", targets, "targets of all its runs", _MAX_TARGETS)
 
 
-def _too_many_beside(campaign: Campaign) -> Iterator[Problem]:
+def _too_many_solutions(campaign: Campaign) -> Iterator[Problem]:
     """Report too many solutions beside the expanded runs."""
     for section in BESIDE_STUDIES:
         counts = {
@@ -210,30 +210,29 @@ class _Variants:
     def contact(self, point: Mapping[str, _Located]) -> Contact:
         """Return the contact of a point of the design, after making its surface and material."""
         surface, material = point["surface"][1], point["material"][1]
-        kind = type(self._campaign.surfaces[surface])
+        fields = type(self._campaign.surfaces[surface]).model_fields
         varied = {name: point[name] for name in point if name in SCALARS}
-        of_surface = {name: varied[name] for name in kind.model_fields if name in varied}
-        of_material = {name: varied[name] for name in MaterialSection.model_fields if name in varied}
+        of_surface = {name: varied[name] for name in fields if name in varied}
+        of_material = {name: varied[name] for name in _OF_MATERIAL if name in varied}
         for name, (location, value) in varied.items():
-            if name not in of_surface and name not in of_material:
-                kinds = ", ".join(k for k, section in SURFACE_KINDS.items() if name in section.model_fields)
-                reason = f"surface {surface!r} is of another kind; expected kind {kinds}, or separate studies"
-                self.problems[location[:4]] = (location[:4], value, reason)
-        seed = point["seed"][1] if self._campaign.surfaces[surface].random else 0
+            if name in of_surface or name in of_material:
+                continue
+            kinds = ", ".join(k for k, section in SURFACE_KINDS.items() if name in section.model_fields)
+            reason = f"surface {surface!r} is of another kind; expected kind {kinds}, or separate studies"
+            self.problems[location[:4]] = (location[:4], value, reason)
         return Contact(
             self._variant("surfaces", surface, of_surface),
-            seed,
+            point["seed"][1] if self._campaign.surfaces[surface].random else 0,
             point["rms_slope"][1],
             self._variant("materials", material, of_material),
         )
 
     def _variant(self, section: str, base: str, changes: Mapping[str, _Located]) -> str:
-        if not changes:
-            return base
+        """Return the name of a surface or material with changed values, after making it if it is new."""
         key = (section, base, *((name, repr(value)) for name, (_, value) in changes.items()))
-        if key not in self._names:
+        if changes and key not in self._names:
             self._names[key] = self._make(section, base, changes)
-        return self._names[key]
+        return self._names[key] if changes else base
 
     def _make(self, section: str, base: str, changes: Mapping[str, _Located]) -> str:
         entries = getattr(self._campaign, section)
@@ -241,31 +240,28 @@ class _Variants:
         try:
             variant = type(entries[base]).model_validate(dict(self._content[section][base]) | values)
         except ValidationError as error:
-            for details in error.errors():
-                self._add_problem(base, changes, details)
+            for keys, wrong, reason in map(problem_of, error.errors()):
+                key = str(keys[0]) if keys else ""
+                location, value = changes.get(key) or next(iter(changes.values()))
+                if key not in changes:  # the varied parameter contradicts another parameter of the surface
+                    reason = f"{key} of {base!r}: {wrong!r} {reason}" if key else f"{base!r}: {reason}"
+                self.problems.setdefault(location, (location, value, reason))
             return base
         if hasattr(variant, "path"):
             variant = variant.model_copy(update={"path": entries[base].path})
         name = "-".join([base, *(f"{key}{value_label(variant, key)}" for key in changes)])
-        location, value = next(iter(changes.values()))
+        problem = ""
         if name in entries:
-            reason = f"gives {base!r} a variant named {name!r}, but this name is taken. Rename that entry"
-            self.problems[(section, name)] = (location, value, reason)
-        if len(name) > LONGEST_LABEL:
-            reason = f"gives {base!r} a variant with a name of {len(name)} letters, too long for a file"
-            self.problems[(section, name)] = (location, value, f"{reason}; expected at most {LONGEST_LABEL}")
+            problem = f"variant named {name!r}, but this name is taken. Rename that entry"
+        elif len(name) > LONGEST_LABEL:
+            problem = (
+                f"variant with a name of {len(name)} letters, too long for a file; expected at most {LONGEST_LABEL}"
+            )
+        if problem:
+            self.problems[section, name] = (*next(iter(changes.values())), f"gives {base!r} a {problem}")
         self.derived[section][name] = variant
         self.origin[section, name] = base
         return name
-
-    def _add_problem(self, base, changes, details):
-        key = str(details["loc"][0]) if details["loc"] else ""
-        context = details.get("ctx", {})
-        reason = str(context.get("error") or f"{details['msg']}; expected {context.get('expected', 'see its key')}")
-        location, value = changes.get(key) or next(iter(changes.values()))
-        if key not in changes:  # the varied parameter contradicts another parameter of the surface
-            reason = f"{key} of {base!r}: {details['input']!r} {reason}"
-        self.problems.setdefault(location, (location, value, reason))
 
 
 def value_label(section, name: str) -> str:
@@ -277,7 +273,7 @@ def value_label(section, name: str) -> str:
         text = str(value)
         # Some texts, such as names of channels, cannot be part of a file name.
         return text if re.fullmatch(r"[A-Za-z0-9_.+-]{1,40}", text) else hashlib.sha256(text.encode()).hexdigest()[:8]
-    unit = next((each.si for each in type(section).model_fields[name].metadata if isinstance(each, Unit)), None)
+    unit = next((each.unit for each in type(section).model_fields[name].metadata if isinstance(each, FloatRange)), None)
     if unit is None:
         return number_label(value)
     exact = Decimal(repr(value))
@@ -287,30 +283,26 @@ def value_label(section, name: str) -> str:
     return f"{digits}{_PREFIXES[power]}{_SYMBOLS[unit]}"
 
 
-def _replace_varied_names(campaign: Campaign, origin: Mapping[tuple[str, str], str]) -> Campaign:
-    """Replace names of varied surfaces and materials by their variants, in other sections than studies and figures."""
+def _replace_varied_names(campaign: Campaign) -> Campaign:
+    """Replace names of varied surfaces and materials by their variants, in the sections besides studies."""
 
     def variants(section, study, name):
         names = getattr(campaign.studies[study], section) if study in campaign.studies else []
-        return [name] if name in names else [each for each in names if origin.get((section, each)) == name] or [name]
+        return [name] if name in names else [each for each in names if campaign.origin(section, each) == name] or [name]
 
-    def entry_with_variants(entry):
-        named = {section: getattr(entry, section) for section in ("surfaces", "materials")}
-        update = {
-            section: [each for name in names for each in variants(section, entry.study, name)]
-            for section, names in named.items()
-            if names is not None
-        }
+    def with_variants(entry):
+        update = {}
+        for section in ("surfaces", "materials"):
+            one = section.removesuffix("s")  # a figure shows one surface or material
+            if names := getattr(entry, section, None):
+                update[section] = [each for name in names for each in variants(section, entry.study, name)]
+            elif name := getattr(entry, one, None):
+                update[one] = variants(section, entry.study, name)[0]
         return entry.model_copy(update=update)
 
-    def figure_with_variant(figure):
-        named = {key: getattr(figure, key, None) for key in ("surface", "material")}
-        update = {key: variants(f"{key}s", figure.study, name)[0] for key, name in named.items() if name is not None}
-        return figure.model_copy(update=update)
-
     update: dict[str, Any] = {
-        section: {label: entry_with_variants(entry) for label, entry in getattr(campaign, section).items()}
+        section: {label: with_variants(entry) for label, entry in getattr(campaign, section).items()}
         for section in BESIDE_STUDIES
     }
-    figures = {name: figure_with_variant(figure) for name, figure in campaign.figures.by_name().items()}
+    figures = {name: with_variants(figure) for name, figure in campaign.figures.by_name().items()}
     return campaign.model_copy(update=update | {"figures": campaign.figures.model_copy(update=figures)})

@@ -58,34 +58,35 @@ def _cut(text: str, most: int) -> str:
     return text if len(text) <= most else f"{text[: most - 3]}..."
 
 
-def problem_of(details: Mapping, content: Mapping) -> Problem:
+def problem_of(details: Mapping) -> Problem:
     """Translate an error of pydantic into location, value and reason."""
-    location = _without_tags(details["loc"])
-    value, kind, context = details["input"], details["type"], dict(details.get("ctx", {}))
+    location, value, kind = _without_tags(details["loc"]), details["input"], details["type"]
+    context = details.get("ctx", {})
     if kind == "value_error":
         # The error of a whole section names its keys itself.
         return location, NOTHING if isinstance(value, Mapping | BaseModel) else value, str(context["error"])
     if kind in ("extra_forbidden", "missing"):
-        return location, NOTHING, _reason_for_key(kind, location, _section_at(location[:-1], content))
+        return location, NOTHING, _reason_for_key(kind, details["loc"])
     if kind in ("union_tag_not_found", "union_tag_invalid"):
         given = value.get("kind", NOTHING) if isinstance(value, Mapping) else value
         return (*location, "kind"), given, f"is not a kind of surface; expected one of {', '.join(SURFACE_KINDS)}"
     if kind == "string_pattern_mismatch" and context.get("pattern") == NAME_PATTERN:
         return location, value, "is not a name; expected lower-case letters, digits, '_' and, but not first, '-'"
-    context["unit"] = "characters" if isinstance(value, str) else "entries"
-    return location, value, _REASONS[kind].format(**context) if kind in _REASONS else details["msg"].lower()
+    if kind not in _REASONS:
+        return location, value, details["msg"].lower()
+    return location, value, _REASONS[kind].format(unit="characters" if isinstance(value, str) else "entries", **context)
 
 
-def _reason_for_key(kind: str, location: tuple, section: type[BaseModel] | None) -> str:
+def _reason_for_key(kind: str, location: tuple) -> str:
     """Return the reason against a key that is unknown or missing in a section."""
-    name, fields = location[-1], section.model_fields if section else {}
+    section, name = _section_at(location[:-1]), location[-1]
     if kind == "missing":
-        return f"the key is missing; expected: {fields[name].description if name in fields else 'a value'}"
-    if section and (section.__name__, name) in _FORMER_KEYS:
-        return _FORMER_KEYS[section.__name__, name]
-    similar = difflib.get_close_matches(str(name), fields, 1)
+        return f"the key is missing; expected: {section.model_fields[name].description}"
+    if reason := _FORMER_KEYS.get((section.__name__, name)):
+        return reason
+    similar = difflib.get_close_matches(str(name), section.model_fields, 1)
     hint = f" (did you mean {similar[0]!r}?)" if similar else ""
-    return f"unknown key{hint}; expected one of {', '.join(sorted(fields))}"
+    return f"unknown key{hint}; expected one of {', '.join(sorted(section.model_fields))}"
 
 
 def _without_tags(location: tuple) -> tuple:
@@ -95,18 +96,14 @@ def _without_tags(location: tuple) -> tuple:
     return location[:-1] if location[-1:] == ("[key]",) else location
 
 
-def _section_at(location: tuple, content: Any) -> type[BaseModel] | None:
-    """Return the model of the section at a location; None if it is not a section."""
+def _section_at(location: tuple) -> type[BaseModel]:
+    """Return the model of the section at a location of pydantic, which contains the kind of a surface."""
     model: Any = Campaign
     for key in location:
-        content = content[key]
-        model = model.model_fields[key].annotation if _is_section(model) else get_args(model)[-1]
+        if model in SURFACE_KINDS.values() and key in SURFACE_KINDS:
+            model = SURFACE_KINDS[key]
+            continue
+        model = get_args(model)[-1] if get_origin(model) in (dict, list) else model.model_fields[key].annotation
         while get_origin(model) in (Annotated, Union, UnionType):
-            choices = [each for each in get_args(model) if each is not type(None)]
-            is_surface = get_origin(model) is not Annotated and len(choices) > 1
-            model = SURFACE_KINDS.get(content.get("kind"), choices[0]) if is_surface else choices[0]
-    return model if _is_section(model) else None
-
-
-def _is_section(model: Any) -> bool:
-    return isinstance(model, type) and issubclass(model, BaseModel)
+            model = get_args(model)[0]
+    return model

@@ -1,13 +1,9 @@
-"""Load a configuration file: its text becomes a campaign, or a list of all problems.
-
-`parse_configuration` reads the text alone, which finds most errors at once; `load_configuration` also inspects the
-files that the text names.
-"""
+"""Load a configuration file: its text becomes a campaign, or a list of all problems."""
 
 import itertools
 import os
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 from typing import Any
 
@@ -19,7 +15,6 @@ from icha.configuration.design import expand_design
 from icha.configuration.errors import MOST_PROBLEMS, ConfigurationError, format_problem, problem_of
 from icha.configuration.plausibility import (
     CONFIRMED,
-    Unusual,
     needless_confirmations,
     plausibility_problems,
     sticky_runs,
@@ -30,7 +25,7 @@ from icha.configuration.topographies import inspect_topographies
 from icha.configuration.yaml_files import (
     apply_defaults,
     dump_yaml,
-    excessive_defaults,
+    excessive_size,
     location_in_defaults,
     merge,
     read_yaml,
@@ -57,28 +52,19 @@ class Configuration:
 
 
 @dataclass(frozen=True)
-class Draft:
-    """The text of a configuration, before the files that it names are read.
+class _Source:
+    """Origin of the values of a configuration: its file, and overrides of single values.
 
     Parameters
     ----------
     path : the file.
     from_file : content of the file.
     overrides : values that replace those of the file.
-    written : both together, without defaults.
-    campaign : the campaign; None until it is valid.
     """
 
     path: Path
     from_file: Mapping
     overrides: Mapping
-    written: Mapping
-    campaign: Campaign | None = None
-
-    @property
-    def confirmed(self) -> Any:
-        """Keys of unusual values that are intended, as they are written."""
-        return self.written.get(CONFIRMED)
 
     def format(self, location: tuple, value: Any, reason: str) -> str:
         """Format a problem, or an unusual value, with its source: the file or the command line."""
@@ -86,14 +72,13 @@ class Draft:
         by_option = overridden or not _has(self.from_file, location[:-1])
         return format_problem("--config" if by_option else str(self.path), location, value, reason)
 
-    def fail(self, problems: Iterable[Problem], unusual: Iterable[Unusual] = ()) -> None:
-        """Raise ConfigurationError if there are problems; list unusual values, which may be their cause, with them."""
+    def fail(self, problems: Iterable[Problem], implausible: Iterable[Problem] = ()) -> None:
+        """Raise ConfigurationError if there are problems; list implausible values, which may be their cause, too."""
         found = list(itertools.islice(problems, MOST_PROBLEMS + 1))
         if not found:
             return
-        found = [(location_in_defaults(location, self.written), value, reason) for location, value, reason in found]
-        implausible = itertools.islice(plausibility_problems(unusual, self.confirmed), MOST_PROBLEMS + 1)
-        lines = list(dict.fromkeys(self.format(*problem) for problem in [*found, *implausible]))
+        found += itertools.islice(implausible, MOST_PROBLEMS + 1)
+        lines = list(dict.fromkeys(self.format(*problem) for problem in found))
         if len(lines) > MOST_PROBLEMS:
             lines[MOST_PROBLEMS:] = [f"{self.path}: there are more problems; correct these first"]
         raise ConfigurationError("\n".join(lines))
@@ -110,29 +95,12 @@ def _has(content: Any, keys: tuple) -> bool:
     return True
 
 
-def parse_configuration(path: str | os.PathLike, overrides: Mapping[str, Any] | None = None) -> Draft:
-    """Read and check the text of a configuration; parameters and errors as in `load_configuration`."""
-    path = Path(path)
-    from_file = read_yaml(path)
-    written = merge(from_file, overrides or {})
-    draft = Draft(path, from_file, overrides or {}, written)
-    unusual = unusual_values(written)
-    draft.fail(excessive_defaults(written), unusual)
-    content = apply_defaults(written)
-    try:
-        campaign = Campaign.model_validate(content)
-    except ValidationError as error:
-        draft.fail((problem_of(details, content) for details in error.errors()), unusual)
-    campaign, design_problems = expand_design(campaign.resolve_paths(path.parent), content)
-    draft.fail(design_problems, unusual)
-    draft.fail(itertools.chain(campaign.problems(), plausibility_problems(unusual, draft.confirmed)))
-    return replace(draft, campaign=campaign)
-
-
 def load_configuration(
     path: str | os.PathLike, overrides: Mapping[str, Any] | None = None, *, within: str | os.PathLike | None = None
 ) -> Configuration:
     """Read and check a configuration file and the files that it names.
+
+    The text alone is checked first, because this finds most errors at once.
 
     Parameters
     ----------
@@ -145,26 +113,49 @@ def load_configuration(
     ConfigurationError
         If any key or file is wrong; the message has a line for each.
     """
-    draft = parse_configuration(path, overrides)
-    text, campaign = dump_yaml(draft.written, str(draft.path)), draft.campaign
-    draft.fail(_files_outside(campaign, within) if within is not None else ())
+    source = _Source(Path(path), read_yaml(Path(path)), overrides or {})
+    written = merge(source.from_file, source.overrides)
+    campaign, unusual = _check_text(source, written), unusual_values(written)
+    text, confirmed = dump_yaml(written, str(path)), written.get(CONFIRMED)
+    source.fail(_files_outside(campaign, within) if within is not None else ())
     topographies, unread = inspect_topographies(campaign)
-    draft.fail(itertools.chain(unread, campaign.measurement_problems()))
+    source.fail(itertools.chain(unread, campaign.measurement_problems()))
     campaign = campaign.with_topographies(topographies)
-    unusual = unusual_values(draft.written)
     for name, each in topographies.items():
         location = "surfaces", campaign.origin("surfaces", name)
         unusual += unusual_topography(location, campaign.surfaces[name], each.period, each.rms_slope)
-    sticky, confirmed = list(sticky_runs(campaign)), draft.confirmed
+    sticky = list(sticky_runs(campaign))
     # A contact may be sticky because of another unusual value.
     implausible = list(plausibility_problems(unusual, confirmed)) or plausibility_problems(sticky, confirmed)
     unusual += sticky
-    draft.fail(itertools.chain(campaign.problems(), implausible, needless_confirmations(unusual, confirmed)))
+    source.fail(itertools.chain(campaign.problems(), implausible, needless_confirmations(unusual, confirmed)))
     accepted = [
-        draft.format(each.location, each.value, f"is unusual{each.source}, but confirmed; expected {each.usual}")
+        source.format(each.location, each.value, f"is unusual{each.source}, but confirmed; expected {each.usual}")
         for each in unusual
     ]
-    return Configuration(campaign, text, str(draft.path), (*campaign.warnings(), *accepted))
+    return Configuration(campaign, text, str(path), (*campaign.warnings(), *accepted))
+
+
+def _check_text(source: _Source, written: Mapping) -> Campaign:
+    """Return the campaign of a text, before the files that it names are read."""
+
+    def implausible():
+        return plausibility_problems(unusual_values(written), written.get(CONFIRMED))
+
+    def located(problems):
+        return ((location_in_defaults(location, written), value, reason) for location, value, reason in problems)
+
+    content = apply_defaults(written)
+    if excess := excessive_size(content):
+        raise ConfigurationError(f"{source.path}: {excess}; expected fewer")
+    try:
+        campaign = Campaign.model_validate(content)
+    except ValidationError as error:
+        source.fail(located(map(problem_of, error.errors())), implausible())
+    campaign, problems = expand_design(campaign.resolve_paths(source.path.parent), content)
+    source.fail(located(problems), implausible())
+    source.fail(located(itertools.chain(campaign.problems(), implausible())))
+    return campaign
 
 
 def _named_files(campaign: Campaign) -> dict[tuple[str, str], str]:

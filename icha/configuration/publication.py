@@ -24,12 +24,9 @@ RESOURCES = tuple(
 )
 # Characters of a web address (RFC 3986).
 _ADDRESS = r"[^\s<>\"{}|\\^`\x00-\x1f\u200b-\u200f]+"
-_DOI = re.compile(rf"10\.[0-9]{{4,9}}/{_ADDRESS}")
-_ARXIV = re.compile(r"arXiv:([0-9]{4}\.[0-9]{4,5}|[a-z-]+(\.[A-Z]{2})?/[0-9]{7})(v[0-9]+)?")
-_URL = re.compile(rf"https?://[^\s/]+\.{_ADDRESS}")
-# The digits of Crockford's base 32.
-_BASE_32 = "0123456789abcdefghjkmnpqrstvwxyz"
-_ROR = re.compile(rf"(https?://ror\.org/)?0([{_BASE_32}]{{6}})([0-9]{{2}})")
+_ARXIV = r"arXiv:([0-9]{4}\.[0-9]{4,5}|[a-z-]+(\.[A-Z]{2})?/[0-9]{7})(v[0-9]+)?"
+# Crockford's digits of base 32, and those of Python.
+_FROM_CROCKFORD = str.maketrans("0123456789abcdefghjkmnpqrstvwxyz", "0123456789abcdefghijklmnopqrstuv")
 
 
 def _line(value: str) -> str:
@@ -48,35 +45,31 @@ def _prose(value: str) -> str:
     return value
 
 
-def _orcid(value: str) -> str:
-    """Refuse an ORCID of a wrong form or with a wrong check digit (ISO 7064 mod 11-2); a web address is accepted."""
+def _orcid(value: Any) -> str:
+    """Return the ORCID in a text or a web address; refuse others and wrong check digits (ISO 7064 mod 11-2)."""
     plain = re.sub(r"^https?://orcid\.org/", "", str(value))
-    total = 0
-    for digit in plain.replace("-", "")[:-1]:
-        total = (total + int(digit)) * 2 if digit.isdecimal() else 0
-    check = "0123456789X"[(12 - total % 11) % 11]
-    if not re.fullmatch(r"([0-9]{4}-){3}[0-9]{3}[0-9X]", plain) or plain[-1] != check:
-        raise ValueError("is not an ORCID, or its check digit is wrong; expected one such as '0000-0002-1825-0097'")
-    return plain
+    if re.fullmatch(r"([0-9]{4}-){3}[0-9]{3}[0-9X]", plain):
+        digits = [10 if digit == "X" else int(digit) for digit in reversed(plain.replace("-", ""))]
+        if sum(digit * 2**power for power, digit in enumerate(digits)) % 11 == 1:
+            return plain
+    raise ValueError("is not an ORCID, or its check digit is wrong; expected one such as '0000-0002-1825-0097'")
 
 
 def _ror(value: Any) -> str:
-    """Refuse text that is not a ROR identifier; its check digits follow ISO 7064 mod 97-10."""
-    found, number = _ROR.fullmatch(str(value).lower()), 0
-    for digit in found[2] if found else "":
-        number = 32 * number + _BASE_32.index(digit)
-    if not found or int(found[3]) != 98 - number * 100 % 97:
-        raise ValueError(
-            "is not a ROR identifier, or its check digits are wrong; expected one of https://ror.org, such as "
-            "'https://ror.org/03yrm5c26'"
-        )
-    return f"https://ror.org/0{found[2]}{found[3]}"
+    """Return the address of a ROR identifier; refuse others and wrong check digits (ISO 7064 mod 97-10)."""
+    found = re.fullmatch(r"(?:https?://ror\.org/)?(0([0-9a-hjkmnp-tv-z]{6})([0-9]{2}))", str(value).lower())
+    if found and int(found[3]) == 98 - int(found[2].translate(_FROM_CROCKFORD), 32) * 100 % 97:
+        return f"https://ror.org/{found[1]}"
+    raise ValueError(
+        "is not a ROR identifier, or its check digits are wrong; expected one of https://ror.org, such as "
+        "'https://ror.org/03yrm5c26'"
+    )
 
 
 def _plain_doi(value: Any) -> str | None:
     """Return the DOI in a text or an address of doi.org; None if it is not a DOI."""
     plain = re.sub(r"(?i)^(https?://(dx\.)?doi\.org/|doi:)", "", str(value))
-    return plain if _DOI.fullmatch(plain) else None
+    return plain if re.fullmatch(rf"10\.[0-9]{{4,9}}/{_ADDRESS}", plain) else None
 
 
 def _doi(value: Any) -> str:
@@ -88,24 +81,11 @@ def _doi(value: Any) -> str:
 def _identifier(value: Any) -> str:
     if doi := _plain_doi(value):
         return doi
-    if isinstance(value, str) and (_ARXIV.fullmatch(value) or _URL.fullmatch(value)):
+    if isinstance(value, str) and re.fullmatch(rf"{_ARXIV}|https?://[^\s/]+\.{_ADDRESS}", value):
         return value
     raise ValueError(
         "is not an identifier; expected a DOI such as '10.1007/s11249-017-0900-2', 'arXiv:1234.56789', or a web address"
     )
-
-
-def _funder(value: Any) -> str:
-    """Refuse text that is neither a DOI nor a ROR identifier."""
-    return _plain_doi(value) or _ror(value)
-
-
-def _community(value: Any) -> str:
-    if not re.fullmatch(r"[a-z0-9_-]+", str(value)):
-        raise ValueError(
-            "is not a community of Zenodo; expected the end of its address: lower-case letters, digits, - and _"
-        )
-    return value
 
 
 def _date(value: Any) -> str:
@@ -120,29 +100,40 @@ def _date(value: Any) -> str:
     return value
 
 
-def _version(value: Any) -> str:
-    """Refuse a version that cannot be part of a folder's name, and numbers, because 1.10 would become 1.1."""
-    if not isinstance(value, str) or not re.fullmatch(r"[0-9A-Za-z]([0-9A-Za-z.+_-]{0,38}[0-9A-Za-z])?", value):
-        raise ValueError(
-            "is not a version; expected letters, digits and . + - _ between them, in quotes if it looks like a number, "
-            "such as '1.0.0'"
-        )
-    return value
-
-
 def _example(check: Callable[[Any], str], example: str):
     """Make the type of a text with a check, and with an example for the schema."""
     return Annotated[str, BeforeValidator(check), WithJsonSchema({"type": "string", "examples": [example]})]
+
+
+def _matching(pattern: str, problem: str, example: str):
+    """Make the type of a text that matches a pattern."""
+
+    def check(value: Any) -> str:
+        if not isinstance(value, str) or not re.fullmatch(pattern, value):
+            raise ValueError(problem)
+        return value
+
+    return _example(check, example)
 
 
 Orcid = _example(_orcid, "0000-0002-1825-0097")
 Ror = _example(_ror, "https://ror.org/03yrm5c26")
 Doi = _example(_doi, "10.1007/s11249-017-0900-2")
 Identifier = _example(_identifier, "10.1007/s11249-017-0900-2")
-FunderId = _example(_funder, "https://ror.org/00k4n6c32")
-Community = _example(_community, "contact-mechanics")
+FunderId = _example(lambda value: _plain_doi(value) or _ror(value), "https://ror.org/00k4n6c32")
 Date = _example(_date, "2026-01-31")
-Version = _example(_version, "1.0.0")
+Community = _matching(
+    r"[a-z0-9_-]+",
+    "is not a community of Zenodo; expected the end of its address: lower-case letters, digits, - and _",
+    "contact-mechanics",
+)
+# Part of the name of a folder. YAML reads 1.10 without quotes as the number 1.1.
+Version = _matching(
+    r"[0-9A-Za-z]([0-9A-Za-z.+_-]{0,38}[0-9A-Za-z])?",
+    "is not a version; expected letters, digits and . + - _ between them, in quotes if it looks like a number, such as "
+    "'1.0.0'",
+    "1.0.0",
+)
 Line = Annotated[Text, AfterValidator(_line)]
 Prose = Annotated[Text, AfterValidator(_prose)]
 
@@ -190,12 +181,12 @@ class Author(_Entry):
     @property
     def full_name(self) -> str:
         """Name with given names before family names."""
-        return self.name if self.name is not None else f"{self.given_names} {self.family_names}"
+        return self.name or f"{self.given_names} {self.family_names}"
 
     @property
     def sorted_name(self) -> str:
         """Name with family names before given names."""
-        return self.name if self.name is not None else f"{self.family_names}, {self.given_names}"
+        return self.name or f"{self.family_names}, {self.given_names}"
 
 
 class Funding(_Entry):
@@ -278,12 +269,16 @@ class Publication(Section):
 
 def missing_metadata(publication: Publication) -> list[str]:
     """Return a line for each key that a deposit needs and the section lacks."""
-    missing = {
-        "version": (publication.version is None, "the version of the data, such as '1.0.0'"),
-        "date": (publication.date is None, "the day of publication, such as 2026-01-31"),
-        "authors": (not publication.authors, "at least one, with family_names and given_names, or name"),
+    needed = {
+        "version": "the version of the data, such as '1.0.0'",
+        "date": "the day of publication, such as 2026-01-31",
+        "authors": "at least one, with family_names and given_names, or name",
     }
-    found = [f"publication.{key}: is missing; expected {what}" for key, (lacks, what) in missing.items() if lacks]
+    found = [
+        f"publication.{key}: is missing; expected {what}"
+        for key, what in needed.items()
+        if not getattr(publication, key)
+    ]
     # Those of the campaign, which are the defaults, have not been checked yet.
     for key, check in {"title": _line, "summary": _prose}.items():
         try:

@@ -4,11 +4,12 @@
 """
 
 import json
+import re
+from collections.abc import Iterator
 from pathlib import Path
 
 from icha.configuration.campaign import Campaign
 from icha.configuration.surfaces import SURFACE_KINDS
-from icha.figures.registry import DECLARATIONS
 
 SCHEMA = Path("workflow/schemas/config.schema.json")
 README = Path("config/README.md")
@@ -18,7 +19,7 @@ MARK = "<!-- generated from the model: make schema -->\n"
 def json_schema() -> str:
     """Return the schema, with which editors check and complete a configuration."""
     schema = _schema()
-    for name in _WITH_DEFAULTS:
+    for name in (*(kind.__name__ for kind in SURFACE_KINDS.values()), "Material", "Study"):
         # Required keys may stand among the defaults.
         schema["$defs"][name].pop("required", None)
     schema["$schema"] = "https://json-schema.org/draft/2020-12/schema"
@@ -33,62 +34,33 @@ def _schema() -> dict:
 def key_tables() -> str:
     """Return every key with its description and default, a Markdown table for each section."""
     schema = _schema()
-    sections = {"Campaign": schema} | schema["$defs"]
-    return "\n".join(_table(_HEADINGS[name], sections[name]) for name in _HEADINGS)
+    places: dict[str, list[str]] = {}
+    for name, place in _sections(schema, schema, ""):
+        places.setdefault(name, []).append(place)
+    tables = [_table(", ".join(places[name]), schema["$defs"][name]) for name in places]
+    return "\n".join([_table("Top level", schema), *tables])
 
 
-_WITH_DEFAULTS = (*(kind.__name__ for kind in SURFACE_KINDS.values()), "Material", "Study")
-
-
-def _figure_headings() -> dict[str, str]:
-    """Return the headings of the options of figures, which several figures may share."""
-    sharing: dict[str, list[str]] = {}
-    for name, declaration in DECLARATIONS.items():
-        sharing.setdefault(declaration.options.__name__, []).append(f"`figures.{name}`")
-    return {options: ", ".join(names) for options, names in sharing.items()}
-
-
-_HEADINGS = {
-    "Campaign": "Top level",
-    "Defaults": "`defaults`",
-    "SelfAffineSurface": "`surfaces.<name>` with `kind: self_affine`",
-    "MeasuredSurface": "`surfaces.<name>` with `kind: measured`",
-    "Crop": "`surfaces.<name>.crop`",
-    "FileSurface": "`surfaces.<name>` with `kind: file`",
-    "Material": "`materials.<name>`",
-    "Study": "`studies.<name>`",
-    "Vary": "`studies.<name>.vary`",
-    "Case": "`studies.<name>.cases`, each",
-    "Targets": "`studies.<name>.targets`",
-    "Snapshot": "`studies.<name>.snapshots`, each",
-    "TurningPoint": "`studies.<name>.turning_points`, each",
-    "BoundaryElements": "`finite_range.<name>`",
-    "BoundaryElementLoops": "`boundary_element_loops.<name>`",
-    "Measurement": "`measurements.<name>`",
-    "Column": "`measurements.<name>.load` and `.area`",
-    "Figures": "`figures`",
-    **_figure_headings(),
-    "Publication": "`publication`",
-    "Author": "`publication.authors`, each",
-    "Funding": "`publication.funding`, each",
-    "RelatedIdentifier": "`publication.related_identifiers`, each",
-    "KnownFailure": "`publication.known_failures`, each",
-}
+def _sections(section: dict, schema: dict, place: str) -> Iterator[tuple[str, str]]:
+    """Yield the name and the place of all sections within a section, such as `Study` and `studies.<name>`."""
+    for key, value in section["properties"].items():
+        text = json.dumps(value)
+        where = f"{place}{key}" + (".<name>" if "patternProperties" in text else "")
+        for name in re.findall(r'"\$ref": "#/\$defs/(\w+)"', text):
+            inner = schema["$defs"][name]
+            kind = inner["properties"].get("kind", {}).get("const")
+            yield name, f"`{where}`" + (", each" if '"items"' in text else f" with `kind: {kind}`" if kind else "")
+            yield from _sections(inner, schema, f"{where}.")
 
 
 def _table(heading: str, section: dict) -> str:
     required = section.get("required", [])
     lines = [f"### {heading}", "", section.get("description", ""), "", "| key | default | meaning |", "|---|---|---|"]
     for key, value in section["properties"].items():
-        if key in required:
-            default = "required"
-        elif value.get("default") is None:
-            default = "none"
-        elif isinstance(value["default"], dict):
-            default = "none"  # a section
-        else:
-            default = f"`{json.dumps(value['default'])}`"
-        lines.append(f"| `{key}` | {default} | {value['description']} |")
+        default = value.get("default")
+        # The default of a section is no section.
+        shown = "none" if default is None or isinstance(default, dict) else f"`{json.dumps(default)}`"
+        lines.append(f"| `{key}` | {'required' if key in required else shown} | {value['description']} |")
     return "\n".join([*lines, ""])
 
 

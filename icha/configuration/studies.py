@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Iterator
-from typing import Annotated, Any, Literal, get_args, get_origin
+from typing import Annotated, Any, Literal
 
 from pydantic import (
     AfterValidator,
@@ -23,6 +23,7 @@ from icha.path.targets import (
     LARGEST_REDUCED_PRESSURE,
     MAX_AREA_FRACTION,
     MAX_REDUCED_PRESSURE,
+    RELATIVE_LOAD,
     STEP,
     Path,
 )
@@ -137,38 +138,21 @@ class _OrEveryStop:
         return {"anyOf": [handler(core_schema), {"const": EVERY_STOP}]}
 
 
-class TurningPoint(Section):
+class TurningPoint(Snapshot):
     """A state at which the path turns: exactly one of the four keys. Loads may be tensile (negative) or zero."""
 
     reduced_pressure: number(FloatRange(most=LARGEST_REDUCED_PRESSURE)) | None = Field(
         default=None, description="At this p/(E* h'rms)."
     )
     relative_load: number(NUMBER) | None = Field(default=None, description="At this p/E* = F/(E* A0).")
-    area_fraction: AreaFraction | None = Field(default=None, description="At this contact area fraction A/A0.")
-    mean_separation: Length | None = Field(default=None, description="At this mean separation, with its unit.")
-
-    _check = model_validator(mode="after")(exactly_one)
-
-    @property
-    def kind_and_value(self) -> tuple[str, float]:
-        """Kind and value (SI units) of the state."""
-        ((kind, value),) = self.model_dump(exclude_none=True).items()
-        return kind, value
 
 
-def _scalars(*sections: type[Section]) -> dict[str, str]:
-    """Return the names and descriptions of the parameters that a study may vary."""
-    found: dict[str, str] = {}
-    for section in sections:
-        for name, field in section.model_fields.items():
-            kinds = get_args(field.annotation) or (field.annotation,)
-            composite = any(get_origin(kind) is tuple or isinstance(kind, type(Section)) for kind in kinds)
-            if name not in ("kind", "path") and not composite:
-                found.setdefault(name, field.description)
-    return found
-
-
-SCALARS = _scalars(*SURFACE_KINDS.values(), MaterialSection)
+# Names and descriptions of the parameters that a study may vary: all but files and sections.
+SCALARS: dict[str, str] = {}
+for _section in (*SURFACE_KINDS.values(), MaterialSection):
+    for _name, _field in _section.model_fields.items():
+        if _name not in ("kind", "path", "crop"):
+            SCALARS.setdefault(_name, str(_field.description))
 
 
 def _section_of_scalars(name, kind, doc, fields=None):
@@ -278,33 +262,29 @@ class Study(Section):
 
     def problems(self, snapshots: list[tuple[str, float]] | None) -> Iterator[Problem]:
         """Yield the reasons why the study cannot run with these snapshots (`Campaign.snapshots_of`)."""
+        ranges = ASPERITY_RANGES if DEFAULT_MODEL in self.models else {}
         # The smallest slope makes the largest reduced pressure.
         slope = min((slope for slope in self.rms_slopes if slope != MEASURED), default=math.inf)
-        most = (MAX_REDUCED_PRESSURE if DEFAULT_MODEL in self.models else LARGEST_REDUCED_PRESSURE) * slope
-        snapshots_of_study = [] if self.snapshots == EVERY_STOP else self.snapshots
-        if DEFAULT_MODEL in self.models:
-            yield from self._beyond_asperities(snapshots_of_study or [])
-        for key, states in (("snapshots", snapshots_of_study), ("turning_points", self.turning_points)):
-            for index, state in enumerate(states or []):
-                load = state.relative_load or 0
-                if load > most:
-                    reason = f"at rms slope {slope:g} is a reduced pressure of {load / slope:g}"
-                    yield (key, index, "relative_load"), load, f"{reason}; expected relative loads up to {most:g}"
+        most = (MAX_REDUCED_PRESSURE if ranges else LARGEST_REDUCED_PRESSURE) * slope
+        for location, kind, value in self._states():
+            if kind in ranges and value > ranges[kind].most:
+                reason = f"is out of range; expected {ranges[kind].expected}, or models: [boundary_elements]"
+                yield location, value, reason
+            if kind == RELATIVE_LOAD and value > most:
+                reason = f"at rms slope {slope:g} is a reduced pressure of {value / slope:g}"
+                yield location, value, f"{reason}; expected relative loads up to {most:g}"
         if self.unload or self.turning_points or self.control != "separation":
             yield from self._path_problems(snapshots)
 
-    def _beyond_asperities(self, snapshots):
-        """Report targets beyond the range of the asperity model."""
-        targets = [(("targets", f"{kind}s", k), kind, value) for k, (kind, value) in enumerate(self.targets.states)]
+    def _states(self) -> Iterator[tuple[tuple, str, float]]:
+        """Yield location, kind and value of the targets, snapshots and turning points that are written."""
+        for k, (kind, value) in enumerate(self.targets.states):
+            yield ("targets", f"{kind}s", k), kind, value
+        snapshots = [] if self.snapshots == EVERY_STOP else self.snapshots or []
         for key, states in (("snapshots", snapshots), ("turning_points", self.turning_points)):
-            targets += [((key, k, state.kind_and_value[0]), *state.kind_and_value) for k, state in enumerate(states)]
-        for location, kind, value in targets:
-            if kind in ASPERITY_RANGES and value > ASPERITY_RANGES[kind].most:
-                yield (
-                    location,
-                    value,
-                    f"is out of range; expected {ASPERITY_RANGES[kind].expected}, or models: [boundary_elements]",
-                )
+            for k, state in enumerate(states):
+                kind, value = state.kind_and_value
+                yield (key, k, kind), kind, value
 
     def _path_problems(self, snapshots):
         """Report why the settings make no path."""

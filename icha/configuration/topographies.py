@@ -122,11 +122,8 @@ def read_scan(path: str | os.PathLike, *, confirmed: Collection[str] = (), **key
     try:
         measured = MeasuredSurface.model_validate(section)
     except ValidationError as error:
-        content = {"surfaces": {"scan": section}}
-        problems = [
-            problem_of({**details, "loc": ("surfaces", "scan", *details["loc"])}, content)
-            for details in error.errors(include_url=False)
-        ]
+        where = ("surfaces", "scan", "measured")
+        problems = [problem_of({**details, "loc": (*where, *details["loc"])}) for details in error.errors()]
         lines = [format_problem("read_scan", location[2:], value, reason) for location, value, reason in problems]
         raise ConfigurationError("\n".join(lines)) from None
     _refuse_unusual(unusual_values({"surfaces": {"scan": section}}), confirmed)

@@ -1,11 +1,10 @@
-"""Read and write YAML files of configurations, with overrides and defaults; every key may stand once."""
+"""Read and write YAML files of configurations, with overrides and defaults."""
 
-import codecs
 import re
 from collections.abc import Iterator, Mapping
-from copy import deepcopy
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import yaml
 
@@ -14,9 +13,8 @@ from icha.configuration.errors import ConfigurationError
 from icha.configuration.surfaces import SURFACE_KINDS
 from icha.support import formatting
 from icha.support.input_files import problem_with_path
-from icha.support.values import NOTHING, Problem
 
-# Bounds of a file: bytes; values, with aliases expanded; nested sections; characters of a number.
+# Limits of a file: bytes; values, with aliases expanded; nested sections; characters of a number.
 _MOST_BYTES, _MOST_VALUES, _DEEPEST, _LONGEST_NUMBER = 10**6, 10**6, 50, 100
 
 
@@ -28,24 +26,26 @@ def read_yaml(path: Path) -> dict:
     ConfigurationError
         If the file is missing, empty, not YAML, or holds anything else.
     """
-    text = _text_of(path)
+    text, line, problem = _read_text(path), 0, ""
     try:
         content = yaml.load(text, Loader=_Loader)
+        problem = excessive_size(content)
     except yaml.reader.ReaderError as error:
-        where, code = text[: error.position].count("\n") + 1, f"{error.character:#04x}"
-        raise ConfigurationError(f"{path}, line {where}: control character {code}; expected text") from None
-    except yaml.YAMLError as error:
-        mark = getattr(error, "problem_mark", None)
-        where = f", line {mark.line + 1}" if mark else ""
-        what = getattr(error, "problem", None) or "not YAML"
-        raise ConfigurationError(f"{path}{where}: {what}; expected a YAML mapping with every key once") from None
+        line, problem = text.count("\n", 0, error.position) + 1, f"control character {error.character:#04x}"
+    except yaml.MarkedYAMLError as error:
+        line, problem = error.problem_mark.line + 1, error.problem
+    except RecursionError:
+        problem = _TOO_DEEP
+    if problem:
+        where = f"{path}, line {line}" if line else path
+        raise ConfigurationError(f"{where}: {problem}; expected a YAML mapping with every key once")
     if not isinstance(content, dict):
         what = "empty" if content is None else f"a {type(content).__name__}"
         raise ConfigurationError(f"{path}: the file is {what}; expected a YAML mapping of keys to values")
     return content
 
 
-def _text_of(path: Path) -> str:
+def _read_text(path: Path) -> str:
     if problem := problem_with_path(path):
         raise ConfigurationError(f"{path}: {problem}; expected a YAML file")
     try:
@@ -55,57 +55,48 @@ def _text_of(path: Path) -> str:
         raise ConfigurationError(f"{path}: {error.strerror}; expected a readable YAML file") from None
     if len(content) > _MOST_BYTES:
         raise ConfigurationError(f"{path}: is longer than {formatting.size(_MOST_BYTES)}; expected a shorter YAML file")
-    if content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
-        raise ConfigurationError(f"{path}: is text in UTF-16; expected a YAML file saved in UTF-8")
-    if b"\0" in content:
-        raise ConfigurationError(f"{path}: is a binary file; expected a YAML file, which is text")
     try:
         return content.decode("utf-8")
     except UnicodeDecodeError as error:
-        where, byte = content[: error.start].count(b"\n") + 1, f"0x{content[error.start]:02x}"
+        line, byte = content.count(b"\n", 0, error.start) + 1, f"0x{content[error.start]:02x}"
         raise ConfigurationError(
-            f"{path}, line {where}: byte {byte} is not UTF-8, so the text is in another encoding, such as Latin-1; "
-            "expected a YAML file saved in UTF-8"
+            f"{path}, line {line}: byte {byte} is not UTF-8, so this is text in another encoding, such as Latin-1 or "
+            "UTF-16, or not a text; expected a YAML file saved in UTF-8"
         ) from None
 
 
-class _Loader(yaml.SafeLoader):
-    """A loader that refuses tags, repeated keys and excessive sizes.
+_TOO_DEEP = f"the file has more than {_DEEPEST} nested sections or lists"
 
-    Aliases count with all of their values, because a few lines of aliases of aliases can have billions.
+
+def excessive_size(content: Any) -> str:
+    """Describe why a configuration is too large to be checked; empty if it is not.
+
+    Aliases count with all of their values, because a few lines of aliases of aliases can have billions. So do defaults
+    that have been filled into all entries.
     """
+    for count, depth in enumerate(_depths(content)):
+        if depth > _DEEPEST:
+            return _TOO_DEEP
+        if count >= _MOST_VALUES:
+            return f"the file has more than {_MOST_VALUES} values, with aliases and defaults expanded"
+    return ""
 
-    def __init__(self, text):
-        super().__init__(text)
-        self._depth, self._values = 0, 0
-        # Number of values of a node, by the identity of the node.
-        self._sizes = {}
+
+def _depths(content: Any, depth: int = 1) -> Iterator[int]:
+    """Yield the number of nested sections and lists of every value."""
+    yield depth
+    for each in content.values() if isinstance(content, Mapping) else content if isinstance(content, list) else ():
+        yield from _depths(each, depth + 1)
+
+
+class _Loader(yaml.SafeLoader):
+    """A loader that refuses tags and repeated keys, and reads numbers as their authors mean them."""
 
     def compose_node(self, parent, index):
-        event, before = self.peek_event(), self._values
-        self._values += self._size_of_alias(event) or 1
-        self._depth += 1
-        self._refuse(event, getattr(event, "tag", None) is not None, "a tag")
-        self._refuse(event, self._depth > _DEEPEST, f"more than {_DEEPEST} nested sections or lists")
-        many = f"the file has more than {_MOST_VALUES} values, with aliases expanded"
-        self._refuse(event, self._values > _MOST_VALUES, many)
-        node = super().compose_node(parent, index)
-        self._depth -= 1
-        # An alias returns its node, whose size is known.
-        self._sizes.setdefault(id(node), self._values - before)
-        return node
-
-    def _size_of_alias(self, event):
-        if not isinstance(event, yaml.AliasEvent) or event.anchor not in self.anchors:
-            return 0
-        size = self._sizes.get(id(self.anchors[event.anchor]))
-        # The node is not composed yet, because the alias is within it.
-        self._refuse(event, size is None, "an alias of a section within that section")
-        return size
-
-    def _refuse(self, event, wrong, problem):
-        if wrong:
-            raise yaml.composer.ComposerError(None, None, problem, event.start_mark)
+        event = self.peek_event()
+        if getattr(event, "tag", None) is not None:
+            raise yaml.composer.ComposerError(None, None, "a tag", event.start_mark)
+        return super().compose_node(parent, index)
 
     def construct_unless_text(self, node, construct):
         """Construct the value of a scalar; return its text if that fails, which the section then checks.
@@ -156,22 +147,18 @@ def dump_yaml(content: Mapping, origin: str) -> str:
     return text
 
 
-# Largest number of values of defaults in all entries.
-_MOST_DEFAULTS = 500_000
-
-
 def merge(content: Mapping, overrides: Mapping) -> dict:
     """Return `content` with the values of `overrides`, which replace lists as a whole."""
-    result = deepcopy(dict(content))
+    result = dict(content)
     for key, value in overrides.items():
         inside = result.get(key)
         both = isinstance(inside, Mapping) and isinstance(value, Mapping)
-        result[key] = merge(inside, value) if both else deepcopy(value)
+        result[key] = merge(inside, value) if both else value
     return result
 
 
-def _find_defaults(content: Mapping) -> Iterator[tuple[str, Mapping, dict]]:
-    """Return sections with their defaults and entries, if both are mappings; the model refuses others."""
+def _find_defaults(content: Mapping) -> Iterator[tuple[str, Mapping, Mapping]]:
+    """Yield sections with their defaults and entries, if both are mappings; the model refuses others."""
     defaults = content.get("defaults")
     for section in Defaults.model_fields if isinstance(defaults, Mapping) else ():
         given, entries = defaults.get(section), content.get(section)
@@ -181,46 +168,31 @@ def _find_defaults(content: Mapping) -> Iterator[tuple[str, Mapping, dict]]:
 
 def apply_defaults(content: Mapping) -> dict:
     """Return `content` with its `defaults` filled into the entries; a surface gets only those that its kind has."""
-    result = deepcopy(dict(content))
-    for section, given, entries in _find_defaults(result):
-        for name, entry in entries.items():
-            if not isinstance(entry, Mapping | None):
-                continue
-            entry = dict(entry or {})
-            kind = entry.get("kind", given.get("kind"))
-            foreign = _keys_of_other_kinds(kind) if section == "surfaces" and isinstance(kind, str) else ()
-            entries[name] = {key: deepcopy(value) for key, value in given.items() if key not in foreign} | entry
-    return result
+    filled = {
+        section: {
+            name: _fill_in(entry or {}, given) if isinstance(entry, Mapping | None) else entry
+            for name, entry in entries.items()
+        }
+        for section, given, entries in _find_defaults(content)
+    }
+    return dict(content) | filled
 
 
-def excessive_defaults(written: Mapping) -> Iterator[Problem]:
-    """Report sections of defaults with too many values when repeated in all entries."""
-    for section, given, entries in _find_defaults(written):
-        count = _count_values(given) * len(entries)
-        if count > _MOST_DEFAULTS:
-            reason = f"has {count} values when repeated in all {section}; expected at most {_MOST_DEFAULTS}"
-            yield ("defaults", section), NOTHING, reason
-
-
-def _count_values(content) -> int:
-    inside = content.values() if isinstance(content, Mapping) else content if isinstance(content, list) else ()
-    return 1 + sum(map(_count_values, inside))
-
-
-def _keys_of_other_kinds(kind: str) -> set[str]:
-    """Return the keys that only surfaces of other kinds have; none for an unknown kind."""
-    if kind not in SURFACE_KINDS:
-        return set()
-    every = {key for other in SURFACE_KINDS.values() for key in other.model_fields}
-    return every - set(SURFACE_KINDS[kind].model_fields)
+def _fill_in(entry: Mapping, given: Mapping) -> dict:
+    """Return an entry with its defaults, except the keys that only surfaces of other kinds have."""
+    kind = entry.get("kind", given.get("kind"))
+    other_keys: set[str] = set()
+    if isinstance(kind, str) and kind in SURFACE_KINDS:
+        other_keys = {key for section in SURFACE_KINDS.values() for key in section.model_fields}
+        other_keys -= set(SURFACE_KINDS[kind].model_fields)
+    return {key: value for key, value in given.items() if key not in other_keys} | dict(entry)
 
 
 def location_in_defaults(location: tuple, written: Mapping) -> tuple:
     """Return where the value at `location` was written: in its entry, or in the defaults of its section."""
     for section, given, entries in _find_defaults(written):
         if len(location) > 2 and location[0] == section:
-            _, name, key = location[:3]
-            entry = entries.get(name) or {}
-            if key in given and isinstance(entry, Mapping) and key not in entry:
+            entry = entries.get(location[1]) or {}
+            if location[2] in given and isinstance(entry, Mapping) and location[2] not in entry:
                 return ("defaults", section, *location[2:])
     return location

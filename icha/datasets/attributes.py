@@ -1,8 +1,8 @@
-"""Global attributes of every file, by which it can be found and understood, and the status of runs in attributes.
+"""Global attributes that describe every file, and the reasons why a run is not a result.
 
-They are those of the CF conventions, section 2.6.2, and of the Attribute Convention for Data Discovery (ACDD 1.3) as
-far as they apply. Those of place and time do not; makers and date belong to a publication as a whole. Therefore files
-do not claim to follow ACDD.
+The attributes are those of the CF conventions (section 2.6.2), and those of the Attribute Convention for Data Discovery
+(ACDD 1.3) that apply. Attributes of places and times do not apply; authors and date belong to a publication as a whole.
+Therefore the files do not claim to follow ACDD.
 """
 
 from collections import Counter
@@ -28,7 +28,7 @@ def why_no_result(attrs: Mapping) -> str:
 
 
 def reasons_not_applicable(study: Mapping) -> Counter[str]:
-    """Count the runs of a study to which their model is not applicable, by reason; earlier versions have none."""
+    """Count the runs of a study to which their model is not applicable, by reason; none in earlier versions."""
     if "applicability" not in study:
         return Counter()
     return Counter(filter(None, study["applicability"].values.ravel().astype(str).tolist()))
@@ -50,8 +50,8 @@ def file_attributes(
     ----------
     title, summary : its content, in a line and in sentences.
     level : one of the processing levels of this module.
-    programs : names of the Python packages that computed it; their versions are added.
-    sources : programs with their versions, if others than the installed ones computed it.
+    programs : names of the Python packages that computed the content; their versions are added.
+    sources : programs with their versions, if other programs than the installed ones computed the content.
     references : publications of the methods.
     keywords : besides those of all files.
     """

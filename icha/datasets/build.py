@@ -1,4 +1,4 @@
-"""Building datasets from values by name, and a table of the vocabulary that describes them."""
+"""Build datasets from values, and from tables that describe their variables."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def build_dataset(table: Table, values: Mapping[str, Any], attrs: Mapping[str, str]) -> xr.Dataset:
-    """Build a dataset, in the order of the table, coordinates last.
+    """Build a dataset; its variables have the order of the table, with coordinates last.
 
     Parameters
     ----------
@@ -50,14 +50,14 @@ def make_variable(description: Variable, values: Any) -> xr.Variable:
 
 
 def get_values(thing: Any, *names: str) -> dict[str, Any]:
-    """Return the attributes of a surface, a material or a spectrum with these names, which are names of variables."""
+    """Return attributes of a surface, a material or a spectrum by their names, which are also names of variables."""
     return {name: getattr(thing, name) for name in names}
 
 
 def stack_rows(
     table: Table, rows: Sequence[Mapping[str, Any]], dim: str, sizes: Mapping[str, int] = {}
 ) -> dict[str, np.ndarray]:
-    """Stack rows of values, one for each position along a dimension, to arrays of the variables that begin with it.
+    """Stack rows of values to arrays of the variables whose first dimension is `dim`; each row is one position.
 
     `sizes` gives the sizes of further dimensions.
     """
@@ -70,7 +70,7 @@ def stack_rows(
 def concatenate_rows(table: Table, rows: Sequence[Mapping[str, Any]], dim: str, instance: str) -> dict[str, np.ndarray]:
     """Concatenate the variables of a table along a ragged dimension, along which rows have different lengths.
 
-    `<dim>_<instance>` is the row of each value.
+    The variable `<dim>_<instance>` gives the row of each value.
     """
     index = f"{dim}_{instance}"
     names = [name for name, described in table.items() if described.dims == (dim,) and name != index]

@@ -85,7 +85,7 @@ def select_run(tree: xr.DataTree, labels: RunLabels | tuple) -> xr.Dataset:
 
 
 def variables_of_run(tree: xr.DataTree, labels: RunLabels | tuple) -> tuple[dict[str, xr.Variable], dict]:
-    """Return variables and attributes as `select_run` does; for thousands of runs a dataset of each is too slow."""
+    """Return variables and attributes as `select_run` does, but faster, because no dataset is built."""
     labels = RunLabels(*labels)
     if labels.study not in tree.children:
         raise ValueError(f"no study {labels.study!r}; expected one of {', '.join(tree.children)}")
@@ -109,7 +109,7 @@ def variables_of_run(tree: xr.DataTree, labels: RunLabels | tuple) -> tuple[dict
             continue
         variable = of_study[tuple(index.get(dim, slice(None)) for dim in of_study.dims)].load()
         if incomplete and variable.ndim == 0 and variable.dtype.kind == "f" and np.isnan(variable.values):
-            continue  # not known of a run that ended early
+            continue  # a run that ended early has no such value
         if variable.dtype.kind == "f" and variable.encoding.get("dtype") == np.dtype("int32"):
             # Stored as a float because other runs lack it.
             variable = xr.Variable(variable.dims, variable.values.astype(np.int32), variable.attrs)
@@ -121,13 +121,13 @@ def variables_of_run(tree: xr.DataTree, labels: RunLabels | tuple) -> tuple[dict
     attrs = study.attrs | {"contact_model": labels.model}
     if int(status) in (INCOMPLETE, FAILED_CHECKS):
         attrs["incomplete" if incomplete else "failed_checks"] = failure.item()
-    if "applicability" in study.variables:  # which campaigns of earlier versions lack
+    if "applicability" in study.variables:  # campaigns of earlier versions do not have this variable
         attrs["applicability"] = study.variables["applicability"].transpose(*LABELS)[place].item()
     return variables, attrs
 
 
 def _ragged_slice(study: xr.Dataset, dim: str, place: tuple[int, ...]) -> slice:
-    """Locate the spots or events of a run; those of all runs stand in the order of the labels."""
+    """Return where the spots or events of a run are; the runs follow each other in the order of their labels."""
     begin, end = 0, study.sizes[dim]
     for label, k in zip(LABELS, place, strict=True):
         column = study.variables[f"{dim}_{label}"].values[begin:end]
@@ -136,10 +136,10 @@ def _ragged_slice(study: xr.Dataset, dim: str, place: tuple[int, ...]) -> slice:
 
 
 def reduced_gap(data: xr.Dataset) -> xr.DataArray:
-    """Mean gap over rms height, which figures show as the separation of a run or of all runs of a study.
+    """Return the mean gap over the rms height, which figures show as the separation.
 
-    For a periodic surface it is the mean separation over the rms height. For a free square, whose separation is that of
-    the half-space far away, it is the quantity that can be compared with other surfaces.
+    For a periodic surface it is the mean separation over the rms height. The mean separation of a free square is
+    measured to the half-space far away; only its mean gap can be compared with other surfaces.
     """
     gap = (data["mean_gap"] / data["rms_height"]).transpose(*data["reduced_separation"].dims)
     return data["reduced_separation"].where(data["boundary"] != "free", gap)

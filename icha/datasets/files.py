@@ -1,7 +1,7 @@
-"""Writing and reading datasets as netCDF-4 files, and the conventions that all files here share.
+"""Write and read datasets as netCDF-4 files, with the conventions that all files of ICHA share.
 
-A file appears whole or not at all, has the same bytes whenever it is written from the same values, and all its values
-are finite, except where a run is marked as missing or has no more steps.
+A file appears whole or not at all. The same values always give the same bytes. All values are finite, except those of
+missing runs and those beyond the last step of a run.
 
 Files of runs hold many small variables. ICHA defines all variables before it writes the first one. Each change between
 defining and writing takes the netCDF library time for all variables.
@@ -25,8 +25,8 @@ from icha.support.atomic_files import whole_file
 
 FLOAT_FILL = 9.969209968386869e36
 INTEGER_FILL = -(2**31) + 1
-# Attribute by which xarray recognises text that is stored as characters. Every netCDF tool reads those, and they
-# compress, unlike strings of variable length.
+# By this attribute xarray recognises text that is stored as characters. Every netCDF tool reads characters, and they
+# can be compressed, unlike strings of variable length.
 TEXT = {"_Encoding": "utf-8"}
 
 
@@ -77,7 +77,7 @@ def _define(group: netCDF4.Dataset, dataset: xr.Dataset) -> list[tuple[netCDF4.V
             values = np.where(np.isnan(values), fill, values)
             values = values.astype(np.int32) if is_integer else values
         if variable.dims[-2:] == CELLS:
-            # Maps are mostly zeros, and are read one by one.
+            # Each map is a chunk, because maps are read one by one. Most of their values are zero.
             storage |= COMPRESSION | {"chunksizes": (*[1] * (variable.ndim - 2), *variable.shape[-2:])}
         elif variable.size in COMPRESSED_SIZES:
             storage |= COMPRESSION
@@ -96,7 +96,7 @@ def _refuse_values_not_finite(dataset: xr.Dataset, where: str) -> None:
         if "missing" in variable.attrs:
             bad &= ~np.isnan(variable.values)
         if excused is not None and set(variable.dims) & set(excused.dims):
-            # A value that several runs share is missing where all of them are.
+            # A value that several runs share may be missing if all these runs are missing.
             may_lack = excused.all([dim for dim in excused.dims if dim not in variable.dims]).variable
             may_lack = may_lack.set_dims(dict(zip(variable.dims, variable.shape, strict=True))).values
             if "step" in variable.dims:
@@ -235,7 +235,7 @@ def coordinates_of(
     ----------
     variables : all variables of a group, by name. Bounds of coordinates have no coordinates.
     coordinates : names of the coordinates.
-    dims : dimensions of the variables that have others in the file.
+    dims : dimensions in the file, for variables that have other dimensions there.
     """
     dims = {name: variable.dims for name, variable in variables.items()} | dict(dims)
     without = {*coordinates, *(variable.attrs.get("bounds") for variable in variables.values())}

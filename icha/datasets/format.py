@@ -1,14 +1,11 @@
-"""The documented format of the files that users rely on, and checks of files against it.
+"""The kinds of files that ICHA writes, and checks of files against their documented format.
 
-Some names of the vocabulary are promised, with their dimensions and units. A file may have more variables, which also
-have units and a long name.
+The format of runs, surfaces and campaigns is described by the tables of `icha.datasets.variables`. A file may have more
+variables; they also have units and a long name.
 """
 
 import os
-import re
-from collections.abc import Iterable, Iterator, Mapping
-from pathlib import Path
-from typing import NamedTuple
+from collections.abc import Iterator
 
 import numpy as np
 import xarray as xr
@@ -16,6 +13,10 @@ import xarray as xr
 from icha.contact.models import MODELS
 from icha.datasets.files import has_groups, is_refused, read_campaign, read_dataset
 from icha.datasets.labels import LABELS
+from icha.datasets.variables import run as of_run
+from icha.datasets.variables.campaign import CAMPAIGN as CAMPAIGN_TABLE
+from icha.datasets.variables.surface import TABLES as SURFACE_TABLES
+from icha.datasets.variables.terms import Table
 from icha.support.input_files import bounded_memory, most_memory, problem_with_path, refuse_traps, require_room
 
 RUN, SURFACE, CAMPAIGN = "run dataset", "surface file", "campaign dataset"
@@ -39,37 +40,12 @@ class UnknownFile(ValueError):
     """A file that has no documented format, or is not a readable netCDF file."""
 
 
-class Promise(NamedTuple):
-    """A variable that files of a kind have.
-
-    Attributes
-    ----------
-    name, dims, units : of the variable.
-    condition : when a file has it; always if empty.
-    """
-
-    name: str
-    dims: tuple[str, ...]
-    units: str
-    condition: str
-
-
-def _promised() -> dict[str, list[Promise]]:
-    """Read the promised variables, by the kind of file, from `promised_variables.txt`."""
-    found: dict[str, list[Promise]] = {}
-    for line in Path(__file__).with_name("promised_variables.txt").read_text(encoding="utf-8").splitlines():
-        if line.startswith("["):
-            of_kind = found.setdefault(line.strip("[]"), [])
-        elif match := re.fullmatch(r"(\w+)\((.*?)\) ([^;]+)(?:; (.+))?", line):
-            name, dims, units, condition = match.groups()
-            of_kind.append(Promise(name, tuple(filter(None, dims.split(", "))), units, condition or ""))
-    return found
-
-
-PROMISED = _promised()
-_OF_STUDY = [Promise(name, LABELS, "1", "") for name in ("status", "step_count", "failure")] + [
-    each._replace(dims=(*LABELS, "step")) for each in PROMISED[RUN] if each.dims == ("step",) and not each.condition
-]
+# Variables of a study: those that list its runs, and the variables along the steps of every run.
+_STUDY = {name: CAMPAIGN_TABLE[name] for name in ("status", "step_count", "failure")} | {
+    name: each._replace(dims=(*LABELS, "step"))
+    for name, each in of_run.RUN.items()
+    if each.dims == ("step",) and name != "step"
+}
 
 
 def identify_file(path: str | os.PathLike) -> tuple[str, xr.Dataset | xr.DataTree]:
@@ -120,33 +96,24 @@ def problems_with_file(kind: str, data: xr.Dataset | xr.DataTree) -> list[str]:
     if kind == CAMPAIGN:
         studies = {name: node.to_dataset() for name, node in data.children.items()}
         return [
-            f"{name}: {each}"
-            for name, study in studies.items()
-            for each in _problems_with_variables(study, _OF_STUDY, {})
+            f"{name}: {each}" for name, study in studies.items() for each in _problems_with_variables(study, _STUDY)
         ]
-    return list(_problems_with_run(data) if kind == RUN else _problems_with_surface(data))
+    of_kind = _problems_with_run if kind == RUN else _problems_with_surface
+    return [*of_kind(data), *_problems_with_numbers(data)]
 
 
 def _problems_with_run(run: xr.Dataset) -> Iterator[str]:
-    model, snapshots = run.attrs.get("contact_model", ""), run.sizes.get("snapshot", 0)
+    model = run.attrs.get("contact_model")
     if model not in MODELS:
         yield f"attribute contact_model: {model!r}; expected {' or '.join(MODELS)}"
-    by_cells = model in MODELS and MODELS[model].by_cells
-    conditions = {
-        "snapshots": snapshots > 0,
-        "unloading to separation": "hysteresis_loss" in run,
-        "boundary elements": by_cells,
-        "snapshots of boundary elements": by_cells and snapshots > 0,
-    }
-    problems = list(_problems_with_variables(run, PROMISED[RUN], conditions))
-    yield from problems
-    yield from _problems_with_numbers(run)
-    if problems:
+    tables = [of_run.RUN | of_run.FURTHER.get(model, {}), of_run.CYCLE, of_run.LOOP]
+    if problems := list(_problems_with_variables(run, *tables)):
+        yield from problems
         return
     yield from _outside("contact_area_fraction", run["contact_area_fraction"].values, 0, 1)
-    if snapshots:
+    if "snapshot" in run.dims:
         yield from _outside("snapshot_step", run["snapshot_step"].values, 0, run.sizes["step"] - 1)
-        yield from _outside("spot_snapshot", run["spot_snapshot"].values, 0, snapshots - 1)
+        yield from _outside("spot_snapshot", run["spot_snapshot"].values, 0, run.sizes["snapshot"] - 1)
     unit = run["contact_modulus"] * run["rms_slope"]
     for name, expected, formula in (
         ("reduced_pressure", run["nominal_pressure"] / unit, "nominal_pressure over contact_modulus and rms_slope"),
@@ -158,27 +125,27 @@ def _problems_with_run(run: xr.Dataset) -> Iterator[str]:
 
 
 def _problems_with_surface(surface: xr.Dataset) -> Iterator[str]:
-    conditions = {"a spectrum": "hurst" in surface, "a measurement": "source_sha256" in surface.attrs}
-    problems = list(_problems_with_variables(surface, PROMISED[SURFACE], conditions))
+    problems = list(_problems_with_variables(surface, *SURFACE_TABLES))
     yield from problems
-    yield from _problems_with_numbers(surface)
     if not problems and surface["height"].shape != (grid := int(surface["grid"]), grid):
         yield f"height: has the shape {surface['height'].shape}; expected ({grid}, {grid}), as `grid` is {grid}"
 
 
-def _problems_with_variables(
-    data: xr.Dataset, promised: Iterable[Promise], conditions: Mapping[str, bool]
-) -> Iterator[str]:
-    """Check promised variables, and the attributes of all variables; `conditions` are those that the file meets."""
-    for name, dims, units, condition in promised:
+def _problems_with_variables(data: xr.Dataset, table: Table, *further: Table) -> Iterator[str]:
+    """Compare variables with their descriptions; a further table applies if the file has one of its variables."""
+    for each in further:
+        if each.keys() & data.variables.keys():
+            table = table | each
+    for name, described in table.items():
         if name not in data.variables:
-            if not condition or conditions[condition]:
-                yield f"{name} is missing" + (f" in a file with {condition}" if condition else "")
+            # A run without snapshots, for instance, has no variables along `snapshot`.
+            if set(described.dims) <= set(data.dims):
+                yield f"{name} is missing"
             continue
         variable = data[name]
-        if variable.dims != dims:
-            yield f"{name}: has the dimensions ({', '.join(variable.dims)}); expected ({', '.join(dims)})"
-        expected = _UNITS_OF_TARGETS.get(name, (units,))
+        if variable.dims != described.dims:
+            yield f"{name}: has the dimensions ({', '.join(variable.dims)}); expected ({', '.join(described.dims)})"
+        expected = _UNITS_OF_TARGETS.get(name, (described.units,))
         if variable.attrs.get("units") not in expected:
             yield f"{name}: has the units {variable.attrs.get('units')!r}; expected {' or '.join(map(repr, expected))}"
     for name, variable in data.variables.items():

@@ -1,14 +1,13 @@
 """Labels of the runs of a campaign and of references, and their positions in a dataset.
 
-The labels are dimensions, and their values coordinates. If all surfaces have the same rms slopes, `rms_slope` is one of
-the labels. Measured surfaces have different slopes, and an array of all surfaces and all slopes would be nearly empty.
-Then the coordinate `rms_slope(surface, rms_slope)` contains the slopes of every surface, with missing values after the
-last slope.
+Labels are the dimensions of a dataset, and their values are its coordinates. If all surfaces have the same rms slopes,
+`rms_slope` is one of the labels. Measured surfaces have different slopes, and an array of all surfaces and all slopes
+would be nearly empty. Then the coordinate `rms_slope(surface, rms_slope)` contains the slopes of every surface, with
+missing values after the last slope.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -140,12 +139,6 @@ def arrange_slopes(pairs: Iterable[tuple[str, float]]) -> np.ndarray:
     return np.array([sorted(slopes) + [np.nan] * (most - len(slopes)) for slopes in found.values()], float)
 
 
-def count_cells(runs: Sequence[RunLabels]) -> int:
-    """Count the combinations of labels that the dataset of a study with these runs has."""
-    others = (len({getattr(run, label) for run in runs}) for label in LABELS if label != "rms_slope")
-    return math.prod(others) * arrange_slopes((run.surface, run.rms_slope) for run in runs).shape[-1]
-
-
 def slope_dims(slopes: np.ndarray) -> tuple[str, ...]:
     """Return the dimensions of the coordinate `rms_slope` with values from `arrange_slopes`."""
     return ("surface", "rms_slope") if slopes.ndim == 2 else ("rms_slope",)
@@ -175,12 +168,12 @@ def labels_at(data: xr.Dataset, place: Sequence[int], labels: Sequence[str]) -> 
 
 
 def place_of(data: xr.Dataset, wanted: Mapping[str, Any]) -> dict[str, int]:
-    """Return the position along every label at which it has the value wanted; `surface` must be among them.
+    """Return the position of the wanted value along every label; the labels must include `surface`.
 
     Raises
     ------
     KeyError
-        With the name of a label that has no such value.
+        With the name of a label that does not have the wanted value.
     """
     at: dict[str, int] = {}
     # The slope comes last because it may depend on the surface.

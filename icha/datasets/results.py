@@ -23,10 +23,11 @@ EXPLORER = "explore.html"
 RUN_TIMES = "run_times.tsv"
 CONFIGURATION = "config.used.yaml"
 DEPOSIT = "publish/{campaign}-{version}"
-# Smaller arrays lose by chunks what compression gains, as measured (docs/reference/dataset.md, "How files are kept").
+# Smaller arrays are not compressed: their chunks would need the space that compression saves (measured in
+# docs/reference/dataset.md, "Compression").
 LEAST_COMPRESSED = 1024
-# Number of values of arrays that are compressed. Larger ones are heights, for which a fifth less space would take 13 s
-# at 8192 nodes a side.
+# Number of values of arrays that are compressed. Larger arrays are heights: compression would save a sixth of their
+# space, and take 13 s at 8192 x 8192 nodes.
 COMPRESSED_SIZES = range(LEAST_COMPRESSED, 2**22)
 COMPRESSION = {"zlib": True, "complevel": 4, "shuffle": True}
 # Largest array of a campaign dataset that is read as a whole, in bytes.

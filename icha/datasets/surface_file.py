@@ -11,7 +11,7 @@ from icha.datasets.build import build_dataset, get_values
 from icha.datasets.files import read_dataset, readable, write_dataset
 from icha.datasets.variables.surface import SURFACE
 from icha.datasets.variables.terms import ROUGHNESS
-from icha.surfaces.moments import SpectralMoments, radial_power_spectrum, ring_edges, spectral_moments
+from icha.surfaces.moments import SpectralMoments, radial_power_spectrum, spectral_moments
 from icha.surfaces.surface import PERIODIC, Surface
 
 
@@ -39,8 +39,7 @@ def write_surface(
     n = surface.grid
     nodes = np.arange(n) * surface.spacing
     moments = spectral_moments(surface)
-    wave_number, power = radial_power_spectrum(surface)
-    edges = ring_edges(surface)
+    wave_number, power, edges = radial_power_spectrum(surface)
     values = {
         "x": nodes,
         "y": nodes,

@@ -139,7 +139,7 @@ def _differences(deposit: Path, rerun: Path) -> Iterator[Difference]:
         with netCDF4.Dataset(deposit) as a, netCDF4.Dataset(rerun) as b:
             yield from _compare_groups(a, b, "")
     else:
-        yield Difference("", DIFFERENT, "other bytes")
+        yield Difference("", DIFFERENT, "the bytes differ")
 
 
 def _compare_groups(a: netCDF4.Dataset, b: netCDF4.Dataset, path: str) -> Iterator[Difference]:
@@ -152,9 +152,9 @@ def _compare_groups(a: netCDF4.Dataset, b: netCDF4.Dataset, path: str) -> Iterat
     for compare, members, kind in ((_compare_variables, "variables", ""), (_compare_groups, "groups", " (group)")):
         for name, one, other in _paired(getattr(a, members), getattr(b, members)):
             if one is None:
-                yield Difference(f"{path}/{name}{kind}", EXTRA, "the deposit has none")
+                yield Difference(f"{path}/{name}{kind}", EXTRA, "only in the rerun")
             elif other is None:
-                yield Difference(f"{path}/{name}{kind}", MISSING, "the rerun has none")
+                yield Difference(f"{path}/{name}{kind}", MISSING, "only in the deposit")
             else:
                 yield from compare(one, other, f"{path}/{name}")
 

@@ -44,7 +44,7 @@ class Job(NamedTuple):
     inputs, outputs : files read and written; at least one is written.
     parameters : names and values of its settings.
     description : what its script does.
-    script : the script that it ran.
+    script : the script that the job ran.
     """
 
     rule: str
@@ -251,7 +251,7 @@ def _add(crate: ROCrate, key: str, kind: str | list[str], **properties: Any) -> 
 
 
 def _set(entity: Entity, kind: list[str] | None = None, **properties: Any) -> None:
-    """Give an entity properties, but those that are empty, and other types, if there are any."""
+    """Set the properties of an entity, except empty ones, and its types if they are given."""
     if kind:
         entity.properties()["@type"] = kind
     for name, value in properties.items():

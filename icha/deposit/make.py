@@ -1,7 +1,7 @@
-"""Making a deposit, as a folder and a zip: results with all that others need to understand, verify and reproduce them.
+"""Make a deposit, as a folder and a zip: results, and what others need to understand, verify and reproduce them.
 
-The same results and the same revision always give exactly the same files. A deposit adds no times and no names of
-people, machines or folders to those in the results, the configuration and the source.
+The same results and the same revision of the program always give exactly the same files. A deposit contains no times
+and no names of people, machines or folders, except those that the results, the configuration and the source contain.
 """
 
 import json
@@ -31,7 +31,7 @@ from icha.support.checksums import is_whole, recorded_hash, sha256_of, stale
 _BLOCK = 2**20
 # The time of every file in a zip, the earliest possible one.
 _NO_TIME = (1980, 1, 1, 0, 0, 0)
-# Number of the system in a zip that has modes of files.
+# Number by which a zip states that its modes of files are those of Unix.
 _UNIX = 3
 
 
@@ -163,7 +163,7 @@ def _write(path: Path, text: str) -> None:
 
 
 def _remove(folder: Path) -> None:
-    """Remove a folder; at no moment does an incomplete one have its name."""
+    """Remove a folder. It is renamed first, so that no incomplete folder has its name at any time."""
     if folder.is_dir():
         old = folder.with_name(f".{folder.name}.old")
         shutil.rmtree(old, ignore_errors=True)
@@ -172,7 +172,7 @@ def _remove(folder: Path) -> None:
 
 
 def _write_zip(path: Path, folder: Path, name: str) -> None:
-    """Write a folder to a zip, under the given name; without compression, since versions of zlib differ."""
+    """Write a folder to a zip, under the given name; without compression, because versions of zlib differ."""
     with zipfile.ZipFile(path, "w", zipfile.ZIP_STORED) as archive:
         for file in files_of(folder):
             status = (folder / file).stat()

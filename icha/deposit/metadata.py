@@ -137,7 +137,7 @@ def citation_cff(publication: Publication, revision: str) -> str:
         "authors": [_cff_author(author) for author in publication.authors],
         "version": publication.version,
         "date-released": publication.date,
-        # The format accepts only the licences that SPDX had in 2021, but the address of any.
+        # The format knows only the SPDX licences of 2021. Any other licence is given by its address.
         "license": licence.identifier if licence.text else None,
         "license-url": None if licence.text else licence.address,
         "commit": revision,
@@ -202,7 +202,7 @@ def zenodo_metadata(publication: Publication) -> dict[str, Any]:
 
 
 def read_zenodo_metadata(folder: Path) -> dict[str, Any]:
-    """Read the metadata of a deposit from an unknown maker; ValueError if they are not a mapping."""
+    """Read the metadata of a deposit from an unknown maker; raise ValueError if they are not a mapping."""
     try:
         metadata = json.loads(read_text(folder, ZENODO))
     except (ValueError, RecursionError) as error:
@@ -227,8 +227,7 @@ def summary_of(metadata: dict[str, Any]) -> dict[str, str]:
 def datacite_metadata(publication: Publication) -> dict[str, Any]:
     """Return the metadata after DataCite's schema 4.5 (https://doi.org/10.14454/g8e5-6293), for JSON.
 
-    Without a DOI the publisher is unknown. Then its value is `:tba`, DataCite's word for values that will be known
-    later.
+    Without a DOI the publisher is unknown, and has the value `:tba`: DataCite's word for "to be announced".
     """
     licence = find_licence(publication.license)
     paper = RelatedIdentifier(identifier=f"arXiv:{MODEL_PAPER.arxiv}", relation="Cites", resource="Preprint")

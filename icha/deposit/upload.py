@@ -54,7 +54,8 @@ class Draft(NamedTuple):
     files: dict[str, tuple[str, str]]
 
 
-# Requests that can be repeated are, after 0, 2, 4, 8, 16 s, or after the time that the server asks for, at most 300 s.
+# Requests that can be repeated are repeated after 0, 2, 4, 8 and 16 s, or after the time that the server states, at
+# most 300 s.
 _PATIENCE = Retry(
     total=5, backoff_factor=1, status_forcelist=_FAILING, redirect=0, raise_on_status=False, retry_after_max=300
 )

@@ -32,9 +32,9 @@ COMPUTED = (
 LARGEST_TEXT = 64_000_000
 # Longest name and longest path that common file systems accept, in bytes.
 _LONGEST_NAME, _LONGEST_PATH = 255, 1000
-# Limits that the option `LARGE` of the commands lifts: number of files; factor by which a zip may grow when it is
-# extracted, and size in bytes that is accepted in any case. ICHA does not compress deposits; compression gains a factor
-# of about three.
+# Limits that do not apply with the option `LARGE`: the number of files; the factor by which a zip may grow when it is
+# extracted; the size, in bytes, that is accepted in any case. ICHA does not compress deposits. Compression by others
+# makes them about three times smaller.
 MOST_FILES, MOST_GROWTH, ALLOWANCE = 200_000, 50, 100_000_000
 LARGE = "--large"
 _LINE = re.compile(r"([0-9a-f]{64})  (.+)")
@@ -112,8 +112,8 @@ def problem_with_name(name: str) -> str:
 def _extract(path: Path, folder: Path, large: bool) -> Path:
     """Extract a zip into an empty folder and return the single folder in it.
 
-    Python's zipfile removes `..` and roots from names, makes plain files of links, and reads no more bytes of a file
-    than are declared.
+    Python's zipfile removes `..` and roots from names, turns links into plain files, and reads no more bytes of a file
+    than the zip declares.
     """
     name = printable(path.name)
     if not path.is_file():

@@ -128,12 +128,12 @@ def _cover(period, grid, centres, radii, rows, free_square=False):
     width = 2 ** np.ceil(np.log2(radii / spacing + 2)).astype(int)
     for cells in np.unique(width):
         same = np.flatnonzero((width == cells) & (radii > 0))
-        for window in windows(centres[same], (cells - 1) * spacing, grid, period, rows):
-            a = radii[same][window.spot][:, None]
-            left = np.concatenate([window.dx - 0.5 * spacing, window.dx[:, -1:] + 0.5 * spacing], axis=1)
-            below = [_disc_below(left, (window.dy + side * spacing)[:, None], a) for side in (-0.5, 0.5)]
-            np.add.at(cover, window.node.ravel(), np.diff(below[1] - below[0], axis=1).ravel() / spacing**2)
-            inside[window.node[np.hypot(window.dx, window.dy[:, None]) <= a]] = True
+        for spot, dy, dx, node in windows(centres[same], (cells - 1) * spacing, grid, period, rows):
+            a = radii[same][spot][:, None]
+            left = np.concatenate([dx - 0.5 * spacing, dx[:, -1:] + 0.5 * spacing], axis=1)
+            below = [_disc_below(left, (dy + side * spacing)[:, None], a) for side in (-0.5, 0.5)]
+            np.add.at(cover, node.ravel(), np.diff(below[1] - below[0], axis=1).ravel() / spacing**2)
+            inside[node[np.hypot(dx, dy[:, None]) <= a]] = True
     return cover.reshape(-1, grid), inside.reshape(-1, grid)
 
 

@@ -6,9 +6,9 @@ The unknowns are the local approaches delta_i of the spots in contact:
 
 with h_i the height of the asperity, u the mean separation and w_i the displacement of the half-space at spot i by all
 other spots and all images. On a free half-space there are no images, and u is the distance between the mean plane of
-the surface and the half-space far away. There u falls below zero as the loaded part sinks in; the mean gap is u plus
-the mean of w over the square. Below the jump-off approach a spot keeps its jump-off radius while the equations are
-solved (zero for Hertz's law), so that they are defined everywhere and, without adhesion, smooth.
+the surface and the half-space far away. This distance may be negative because the loaded part sinks in; the mean gap is
+u plus the mean of w over the square. While the equations are solved, a spot below its jump-off approach keeps its
+jump-off radius (zero for Hertz's law). So the equations are defined everywhere and, without adhesion, smooth.
 """
 
 from dataclasses import dataclass
@@ -23,10 +23,10 @@ from icha.half_space.interaction import Interaction
 
 # Largest relative error of a load or an area under control.
 TARGET_TOLERANCE = 1e-11
-# Weight of this error relative to the error of the equilibrium, which makes both tolerances equal.
+# Weight of the error of a load or area relative to the error of the equilibrium, so that one tolerance is enough.
 _TARGET_WEIGHT = RESIDUAL_TOLERANCE / TARGET_TOLERANCE
-# The interaction is set up for larger contact radii, so that it serves several evaluations: the radii at approaches
-# larger by _APPROACH_AHEAD h_rms, times _RADIUS_AHEAD.
+# The interaction is set up for larger contact radii than the present ones, so that several evaluations can use it: for
+# the radii at approaches larger by _APPROACH_AHEAD h_rms, times _RADIUS_AHEAD.
 _APPROACH_AHEAD = 0.02
 _RADIUS_AHEAD = 1.2
 
@@ -46,7 +46,7 @@ def nominal_derivative(contact: AsperityContact, quantity: str, a, R):
 
 
 def radius_slope(law: JKR, a, R, approach, jump_off_approach):
-    """Return da/d(delta): zero past jump-off; close to it the law returns a finite bound instead of infinity."""
+    """Return da/d(delta): zero past jump-off, and a finite bound close to jump-off, where it is infinite."""
     slope = np.zeros(len(a))
     touching = (a > 0) & (approach >= jump_off_approach)
     slope[touching] = law.radius_derivative(a[touching], R[touching])
@@ -87,7 +87,7 @@ class Equations:
     ----------
     contact : contact of the asperities.
     sites : table of n sites.
-    control : load or area to hold; the separation is one more unknown then.
+    control : load or area that is prescribed; the separation is then one more unknown.
     """
 
     contact: AsperityContact
@@ -97,7 +97,7 @@ class Equations:
     def evaluate(self, approach, separation: float, interaction: Interaction | None = None) -> Evaluation:
         """Evaluate the equations at approaches (n,) and a separation, m.
 
-        interaction : the one of the last evaluation, used again as long as it covers the contact radii.
+        interaction : interaction of the last evaluation, which is used again if it is set up for these contact radii.
         """
         contact, sites, law = self.contact, self.sites, self.contact.law
         present, R = sites.present, sites.radius_of_curvature
@@ -125,6 +125,6 @@ class Equations:
         size = float(np.max(np.abs(evaluation.error), initial=0.0)) / self.contact.rms_height
         if self.control is None:
             return size
-        # A load that is the small difference of attraction and repulsion is met as accurately as they are.
+        # If a load is the small difference of attraction and repulsion, its error is relative to the repulsion.
         unit = max(abs(self.control.target), SMALLEST_LOAD * evaluation.repulsion)
         return max(size, abs(evaluation.control_error) / unit * target_weight)

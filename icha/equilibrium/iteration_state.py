@@ -1,4 +1,4 @@
-"""State of the search for an equilibrium: the sites, what is known of the asperities, and the events so far."""
+"""State of the search for an equilibrium: the sites, the known values of the asperities, and the events so far."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from icha.equilibrium.sites import CONTACT, AsperityContact, ContactState, Sites
 
 @dataclass(frozen=True, eq=False)
 class IterationState:
-    """State of the search between two equilibria; immutable: events and Newton steps lead from one to the next.
+    """State of the search between two equilibria. It is immutable: events and Newton steps create a new one.
 
     Attributes
     ----------
     contact : contact of the asperities.
     start : equilibrium from which the search starts.
-    unloading : whether the given (or guessed) separation is larger than that of the start.
+    unloading : whether the separation, given or guessed, is larger than that of the start.
     sites : table of sites.
     site_of_asperity, last_approach, last_separation, barred_count : as in `ContactState`.
-    released_from : (asperities,) int, union that an asperity has just been released from; -1 for others.
-    was_released : (asperities,) bool, whether it has been released from a union during this search.
-    barred : (asperities,) bool, whether it has broken contact during this search and may not make it again.
-    new_unions : indices of the unions whose heights follow from the next evaluation of the equations.
+    released_from : (asperities,) int, union that has just released an asperity; -1 for others.
+    was_released : (asperities,) bool, whether a union has released an asperity during this search.
+    barred : (asperities,) bool, whether an asperity has broken contact during this search and may not make it again.
+    new_unions : indices of the unions whose heights are set at the next evaluation of the equations.
     log : events so far, as rows of kind, position, members, energy and asperity.
     """
 
@@ -69,7 +69,7 @@ class IterationState:
 
     @property
     def without_site(self) -> np.ndarray:
-        """True where an asperity is no site, not merged into one and not under one, (asperities,) bool."""
+        """True where an asperity is not a site, and no site contains or covers it, (asperities,) bool."""
         without_site = self.site_of_asperity < 0
         single = (self.sites.asperity >= 0) & self.sites.present
         without_site[self.sites.asperity[single]] = False
@@ -87,14 +87,14 @@ class IterationState:
     def with_events(self, kind, position, members, energy=0.0, asperity=-1) -> IterationState:
         """Return the state with k more events of one kind in its log.
 
-        position : (k, 2), m; all others: (k,) or one value for all events.
+        position : (k, 2) float, m. All other arguments are (k,), or one value for all events.
         """
         columns = (np.broadcast_to(each, len(position)) for each in (members, energy, asperity))
         rows = ((kind, *row) for row in zip(position, *columns, strict=True))
         return replace(self, log=(*self.log, *rows))
 
     def without_jumps_in(self, asperity) -> IterationState:
-        """Return the state; its log no longer holds the jump-ins of these asperities."""
+        """Return the state without the jump-ins of these asperities in its log."""
         dropped = set(asperity.tolist())
         return replace(self, log=tuple(row for row in self.log if row[0] != JUMP_IN or row[4] not in dropped))
 

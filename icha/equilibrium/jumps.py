@@ -1,9 +1,10 @@
 """Jumps of asperities into contact and out of it.
 
 Jump-in: asperities out of contact whose approach reaches the jump-in approach, eq. (3), become sites. Without adhesion
-contact forms at an approach of zero and without a jump: there all asperities that may come into contact are candidates,
-and the iteration decides which of them do. Jump-off: spots past the end of their stable branch break contact, and
-unions release their asperities. Those of them that have a stable state of the law stay in contact.
+contact forms at an approach of zero and without a jump. In that case all asperities that may come into contact are
+candidates, and the Newton iteration decides which of them come into contact. Jump-off: spots past the end of their
+stable branch break contact, and unions release their asperities. Released asperities stay in contact if they have a
+stable state.
 """
 
 from dataclasses import replace
@@ -17,14 +18,14 @@ from icha.equilibrium.iteration_state import IterationState
 from icha.equilibrium.sites import CANDIDATE, CONTACT
 from icha.half_space.interaction import displacement_at
 
-# Largest and probable growth of the approach of an asperity out of contact, relative to the fall of the separation.
+# Largest growth of the approach of an asperity out of contact, and its usual growth, over the fall of the separation.
 _FASTEST_APPROACH = 3.0
 _PROBABLE_APPROACH = 1.2
-# Allowance for sudden growth of the approach by jumps of other spots: x h_rms + y |delta_off| with the pairs x, y below
-# and the largest jump-off approach. The guess is used during the search, the bound at the equilibrium.
+# Jumps of other spots may increase an approach by up to x h_rms + y |delta_off|, where delta_off is the largest
+# jump-off approach. The pairs are x and y: the guess is used during the search, the bound at the equilibrium.
 _SUDDEN_GUESS = 0.02, 2.0
 _SUDDEN_BOUND = 1.0, 10.0
-# Relative difference of the distances from jump-off up to which spots break contact together.
+# Spots break contact together if their distances from jump-off differ by less than this fraction.
 _SAME_STRENGTH = 1e-3
 
 
@@ -33,7 +34,7 @@ def add_candidates(state: IterationState, separation: float) -> IterationState:
     fall = state.last_separation - separation
     growth = _PROBABLE_APPROACH * fall + _sudden_growth(state.contact, _SUDDEN_GUESS)
     candidates = np.flatnonzero((state.last_approach + growth > 0) & state.without_site)
-    # The approach of an asperity that has lost contact is not known, but small.
+    # The approach of an asperity that has broken contact is not known, but it is small.
     expected = np.where(np.isfinite(fall), state.last_approach + fall, 0.0)
     return _add_sites(state, candidates, CANDIDATE, expected[candidates])
 
@@ -41,8 +42,8 @@ def add_candidates(state: IterationState, separation: float) -> IterationState:
 def apply_jump_in(state: IterationState, evaluation: Evaluation, margin: float) -> tuple[IterationState, bool]:
     """Bring asperities into contact that are beyond their jump-in approach by more than a margin, m.
 
-    An asperity under a spot is taken into that spot. An asperity that has just been released from a union was in
-    contact, and stays in contact if it has a stable state; the released asperities that stay count as a split.
+    A spot absorbs the asperities under it. An asperity that a union has just released was in contact, and stays in
+    contact if it has a stable state. If some of the released asperities stay in contact, this counts as a split.
 
     Returns
     -------
@@ -74,7 +75,7 @@ def apply_jump_in(state: IterationState, evaluation: Evaluation, margin: float) 
     splits, jumping = np.unique(source[source >= 0]), ready[source < 0]
     state = state.with_events(SPLIT, state.sites.position[splits], state.sites.members[splits])
     if contact.adhesive:
-        # The energy is released at the jump-in approach; any further approach is work done on the spot.
+        # The jump releases energy at the jump-in approach; any further approach is work done on the spot.
         R = asperities.radius_of_curvature[jumping]
         energy = -law.energy(law.contact_radius(contact.jump_in_approach[jumping], R), R)
         state = state.with_events(JUMP_IN, asperities.position[jumping], 1, energy, jumping)
@@ -89,7 +90,7 @@ def _sudden_growth(contact, reach):
 
 
 def _evaluate_approaches(state, evaluation, spots, margin):
-    """Evaluate the approaches of asperities without a site that may have made contact; return their indices too."""
+    """Evaluate the approaches of asperities that may have made contact; return the state and their indices."""
     contact, asperities, sites = state.contact, state.contact.asperities, state.sites
     reach = state.last_approach + _FASTEST_APPROACH * np.abs(state.last_separation - evaluation.separation)
     reach += _sudden_growth(contact, _SUDDEN_GUESS if margin > 0 else _SUDDEN_BOUND)
@@ -110,7 +111,7 @@ def _evaluate_approaches(state, evaluation, spots, margin):
 
 
 def _largest_of_each_group(state, jumping):
-    """Return those asperities (k,) that would not lie inside the contact of a larger one of them."""
+    """Select the jumping asperities that would not lie inside the contact of a larger one of them."""
     asperities = state.contact.asperities
     if len(jumping) < 2:
         return jumping
@@ -146,8 +147,9 @@ def _add_sites(state, asperity, status, approach):
 def apply_jump_off(state: IterationState, evaluation: Evaluation, margin: float) -> IterationState:
     """Break the contact of all spots past jump-off by more than a margin, m.
 
-    Without adhesion only unions have to break contact: a single asperity out of contact does no harm. Spots that have
-    come into contact during this search break contact first. After that, the other spots may be stable again.
+    Without adhesion only unions break contact here, because a single asperity with a negative approach exerts no force.
+    Spots that have come into contact during this search break contact first. After that, the others may be stable
+    again.
     """
     sites = state.sites
     breaking = sites.status == CONTACT
@@ -164,7 +166,7 @@ def apply_jump_off(state: IterationState, evaluation: Evaluation, margin: float)
 def break_closest_to_jump_off(state: IterationState, separation: float, let_go: int) -> IterationState:
     """Break the contact of the `let_go` spots that would reach jump-off first, and of those equally close to it.
 
-    All approaches go back to those at the start of the search.
+    The approaches of all sites are set to those at the start of the search.
     """
     sites = state.sites
     approach = sites.approach - sites.response * (separation - state.start.separation)
@@ -177,9 +179,8 @@ def break_closest_to_jump_off(state: IterationState, separation: float, let_go: 
 def _break_contact(state, breaking):
     """Break the contact of spots, given by a mask (n,).
 
-    Asperities of unions are released, if they have not been released during this search; all others may not make
-    contact again at this separation. An asperity that jumped in during this search was never in contact: its jump is
-    removed from the log.
+    Unions release their asperities, each at most once during a search. All other asperities may not make contact again
+    at this separation. If an asperity jumped in during this search, its jump is removed from the log instead.
     """
     sites, law = state.sites, state.contact.law
     new = np.isin(sites.asperity, state.jumped_in) & breaking

@@ -1,7 +1,7 @@
 """Newton's method for the equations of equilibrium between events, with an inexact Krylov solver.
 
-The unknowns belong to sites: the spots and, without adhesion, the candidates for contact. A candidate with a negative
-approach carries no force, and the iteration decides which candidates come into contact.
+The unknowns are the approaches of the sites: the spots and, without adhesion, the candidates for contact. A candidate
+with a negative approach exerts no force, so the solution shows which candidates come into contact.
 """
 
 from dataclasses import replace
@@ -18,7 +18,7 @@ from icha.equilibrium.sites import CONTACT
 _MAX_HALVINGS = 8
 # Largest error of the response of the approaches to the separation.
 _RESPONSE_ERROR = MODELS[DEFAULT_MODEL].stiffness_error
-# Relative errors of most linear solves, and of those that are repeated with the exact matrix.
+# Relative errors of linear solves with the approximate matrix, and with the exact matrix.
 _LINEAR_TOLERANCE = 3e-3
 _EXACT_TOLERANCE = 1e-6
 # Number of solves for the response: first with the approximate matrix, then with the exact one.
@@ -27,9 +27,9 @@ _APPROXIMATE_SOLVES, _EXACT_SOLVES = 8, 4
 _KRYLOV = 50
 # Largest change of the separation in a step, in h_rms.
 _LARGEST_CHANGE = 0.2
-# Contact radius, in jump-off radii, below which a step towards jump-off is a step of the radius.
+# Contact radius, in jump-off radii, below which a step towards jump-off changes the radius instead of the approach.
 _NEAR_JUMP_OFF = 1.5
-# A spot past jump-off returns to contact only if reaching jump-off takes at most this fraction of the step.
+# A spot past jump-off returns to contact only if its distance from jump-off is at most this fraction of its step.
 _PAST_JUMP_OFF = 0.2
 
 
@@ -80,19 +80,19 @@ def _linearise(equations, evaluation):
 
     Returns
     -------
-    Indices of the present sites; da/d(delta) there; and two functions that multiply by W' da/d(delta), an exact and an
-    approximate one.
+    Indices of the present sites; da/d(delta) of these sites; and two functions that multiply by W' da/d(delta), an
+    exact and an approximate one.
     """
     sites = equations.sites
     present = np.flatnonzero(sites.present)
     a, R = evaluation.a[present], sites.radius_of_curvature[present]
     jump_off_approach, approach = sites.jump_off_approach[present], evaluation.approach[present]
-    # A spot that is about to return over jump-off behaves as on the stable branch.
+    # A spot that is about to return past jump-off is treated as if it were on the stable branch.
     approach = np.where(
         _returns_to_contact(sites, evaluation)[present] & equations.contact.adhesive, jump_off_approach, approach
     )
     slope = radius_slope(equations.contact.law, a, R, approach, jump_off_approach)
-    tangent = evaluation.interaction.tangent(evaluation.a)
+    tangent, approximate_tangent = evaluation.interaction.tangent(evaluation.a)
 
     def radius_change(x):
         change = np.zeros(len(sites))
@@ -103,7 +103,7 @@ def _linearise(equations, evaluation):
         return tangent(radius_change(x))[present]
 
     def approximate(x):
-        return tangent.approximate(radius_change(x))[present]
+        return approximate_tangent(radius_change(x))[present]
 
     return present, slope, exact, approximate
 
@@ -118,8 +118,8 @@ def _solve_step(equations, evaluation, exact):
     if control is None:
         step[present] = _solve_linear(lambda x: x + product(x), -evaluation.error[present], tolerance)
         return step, 0.0
-    # The separation is one more unknown. After the change of variables by the last response the bordered matrix is
-    # close to the identity matrix.
+    # The separation is one more unknown. The change of variables by the last response makes the bordered matrix nearly
+    # the identity matrix.
     last = sites.response[present]
     R = sites.radius_of_curvature[present]
     gradient = slope * nominal_derivative(contact, control.quantity, evaluation.a[present], R)
@@ -141,10 +141,10 @@ def _solve_step(equations, evaluation, exact):
 def _take_step(equations, evaluation, step):
     """Return the approaches (n,) after a step.
 
-    Close to jump-off the radius changes with the square root of the distance from it; in terms of the radius the
-    equations are smooth there. So a step towards jump-off is taken as a step of the radius. A spot far past jump-off
-    stops at jump-off. A spot a little past it solves a quadratic equation for the square root of its distance from
-    jump-off.
+    Close to jump-off the radius changes with the square root of the distance from jump-off, and the equations are
+    smooth functions of the radius. Therefore a step towards jump-off is taken as a step of the radius. A spot that
+    returns from far past jump-off stops at jump-off. For a spot a little past jump-off, a quadratic equation gives the
+    square root of its new distance from jump-off.
     """
     approach = evaluation.approach + step
     if not equations.contact.adhesive:
@@ -162,7 +162,7 @@ def _take_step(equations, evaluation, step):
     R, a = sites.radius_of_curvature[close], evaluation.a[close]
     stable = np.maximum(evaluation.approach, jump_off_approach)[close]
     change = radius_slope(law, a, R, stable, jump_off_approach[close]) * step[close]
-    # Where the radius has reached its lowest value, the approach alone removes the rest of the error.
+    # If the radius reaches its lowest value, the approach changes by the rest of the step.
     rest = 1 - np.minimum((lowest - a) / np.where(change < 0, change, -1.0), 1.0)
     reached = law.approach(np.maximum(a + change, lowest), R)
     approach[close] = reached + np.where(change < 0, rest * np.minimum(step, -evaluation.error)[close], 0.0)
@@ -175,13 +175,13 @@ def _take_step(equations, evaluation, step):
 
 
 def _returns_to_contact(sites, evaluation):
-    """Return whether a spot is a little past jump-off and its error drives it back, (n,) bool."""
+    """Return whether a spot is a little past jump-off and its error moves it back into contact, (n,) bool."""
     gap = sites.jump_off_approach - evaluation.approach
     return (sites.status == CONTACT) & (gap >= 0) & (gap < -_PAST_JUMP_OFF * evaluation.error)
 
 
 def _solve_linear(apply, b, tolerance):
-    """Solve apply(x) = b approximately; the error of the equations shows how well."""
+    """Solve apply(x) = b approximately with GMRES; the caller checks the error of the equations."""
     size = len(b)
     operator = LinearOperator((size, size), matvec=apply, dtype=float)
     x, _ = gmres(operator, b, rtol=tolerance, atol=0.0, restart=min(size, _KRYLOV), maxiter=2)

@@ -1,4 +1,4 @@
-"""Contact of asperities, sites where contact exists or may form, and equilibrium states; all of them immutable."""
+"""Immutable records of the asperity model: the contact, the sites where contact exists or may form, and equilibria."""
 
 from __future__ import annotations
 
@@ -44,18 +44,18 @@ class AsperityContact(MaterialUnits):
 
 # Status of a site: in contact; without adhesion, a candidate for contact; or removed.
 CONTACT, CANDIDATE, REMOVED = 1, 2, 3
-# The half-space is set up again when the number of sites has grown by this factor, or this fraction of them is removed.
+# The half-space is set up anew when the number of sites has grown by this factor, or this fraction of them is removed.
 _GROWTH = 1.5
 _REMOVED_FRACTION = 0.25
 
 
 @dataclass(frozen=True, eq=False)
 class MergeRecord:
-    """The two spots from which a union was made, as they were just before.
+    """The two spots of a union, as they were just before they united.
 
     Attributes
     ----------
-    union_radius : contact radius of the union when it was made, m.
+    union_radius : contact radius of the union when the spots united, m.
     touching_radius : contact radius of the union below which the two spots would no longer overlap, m.
     contact_radius : (2,) float, contact radii of the two spots, m.
     columns : the other properties of the two spots, by the names of `Sites.UNITED`.
@@ -67,7 +67,7 @@ class MergeRecord:
     columns: dict[str, np.ndarray]
 
     def asperities(self) -> list[list[int]]:
-        """Return two lists: the asperities of the first spot and of the second."""
+        """Return the asperities of the first spot and those of the second spot as two lists."""
         return [
             [index] if union is None else [each for spot in union.asperities() for each in spot]
             for index, union in zip(self.columns["asperity"].tolist(), self.columns["union"], strict=True)
@@ -120,9 +120,9 @@ class Sites:
     @classmethod
     def empty(cls, law: JKR, asperities: Asperities) -> Sites:
         """Return a table without sites."""
-        kinds = {"asperity": int, "members": int, "union": object, "split_number": int, "status": np.int8}
-        kinds |= {"was_in_contact": bool}
-        arrays: dict = {name: np.empty(0, kinds.get(name, float)) for name in _ARRAYS} | {"position": np.empty((0, 2))}
+        types = {"asperity": int, "members": int, "union": object, "split_number": int, "status": np.int8}
+        types |= {"was_in_contact": bool}
+        arrays: dict = {name: np.empty(0, types.get(name, float)) for name in _ARRAYS} | {"position": np.empty((0, 2))}
         modulus = law.material.contact_modulus
         half_space = PointHalfSpace.at(arrays["position"], asperities.period, modulus, asperities.free)
         return cls(**arrays, half_space=half_space, arranged=0)
@@ -157,11 +157,12 @@ class Sites:
         return replace(self, status=status)
 
     def compact(self) -> tuple[Sites, np.ndarray | None]:
-        """Return the table without its removed sites, and the new index of every site.
+        """Drop the removed sites if they are many, or if the table has grown by half since the half-space was set up.
 
-        This is done if many sites are removed, or if the table has grown by half since the half-space was set up.
-
-        The index is (n + 1,) int, -1 for removed sites and in the last place; None if the table is unchanged.
+        Returns
+        -------
+        The table, and the new index of every site, (n + 1,) int: -1 for removed sites and in the last place. The index
+        is None if the table is unchanged.
         """
         removed = self.status == REMOVED
         if len(self) <= _GROWTH * self.arranged and np.count_nonzero(removed) <= _REMOVED_FRACTION * len(self):
@@ -172,7 +173,7 @@ class Sites:
         return self._arrange({name: getattr(self, name)[present] for name in _ARRAYS}), index
 
     def _arrange(self, arrays):
-        """Return a table with these arrays and a new half-space, whose near field suits the number of sites."""
+        """Return a table of these arrays with a new half-space, whose near field suits the number of sites."""
         ewald = self.half_space.ewald
         half_space = PointHalfSpace.at(arrays["position"], ewald.side, ewald.contact_modulus, ewald.free)
         return Sites(**arrays, half_space=half_space, arranged=len(arrays["height"]))
@@ -213,12 +214,13 @@ class ContactState:
     separation : mean separation u, m.
     sites : table of sites, n of them.
     contact_radius : (n,) float, zero out of contact, m.
-    site_of_asperity : (asperities,) int, site that an asperity is, or was merged into, or lies under; -1 if none.
+    site_of_asperity : (asperities,) int, site to which an asperity belongs: the asperity itself, a union that contains
+        it, or a spot that covers it; -1 for an asperity out of contact.
     last_approach : (asperities,) float, approach of an asperity when it was evaluated last, m.
-    last_separation : (asperities,) float, mean separation at that time, m; inf if the approach is not known.
+    last_separation : (asperities,) float, mean separation at that evaluation, m; inf if the approach is not known.
     residual : largest error of the equilibrium, in h_rms.
-    barred_count : number of asperities out of contact beyond their jump-in approach; they have broken contact at this
-        separation, and may not make it again.
+    barred_count : number of asperities out of contact beyond their jump-in approach. They have broken contact at this
+        separation, and may not make contact again.
     history : events of every equilibrium of the path up to this state.
     """
 
@@ -246,7 +248,7 @@ class ContactState:
 
     @cached_property
     def spot_of_asperity(self) -> np.ndarray:
-        """Index of the spot that each asperity is, or was merged into, or lies under; -1 if none."""
+        """Index of the spot to which each asperity belongs; -1 for an asperity out of contact."""
         spot = np.full(len(self.sites) + 1, -1)
         spot[self.contact_index] = np.arange(len(self.contact_index))
         return spot[self.site_of_asperity]  # -1 takes the last entry

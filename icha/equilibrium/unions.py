@@ -1,8 +1,8 @@
 """Coalescence of spots, the splitting of unions on unloading, and new contacts that lie inside other spots.
 
-Overlapping spots become one spot, by the rule of the law (`icha.asperity.jkr.JKR.union`). The height of the union
-is the one with which it is in equilibrium when it is made. The equations are singular where the edge of one spot runs
-through the centre of another.
+Overlapping spots become one spot (`icha.asperity.jkr.JKR.union`). The height of the union is chosen so that it is in
+equilibrium at the moment of coalescence. The equations are singular where the edge of one spot passes through the
+centre of another.
 """
 
 from dataclasses import replace
@@ -22,13 +22,13 @@ def merge_overlapping(
 ) -> IterationState:
     """Replace overlapping spots by their unions.
 
-    Each spot merges with one other at most; the next round merges the rest.
+    Each spot merges with at most one other spot; the next round merges the rest.
 
     Parameters
     ----------
-    margin : error of the approaches, m; spots merge only if they overlap by more than it explains.
-    deep : whether only spots merge of which one covers the centre of the other; these merge even if they have just
-        split from one union.
+    margin : error of the approaches, m; spots merge only if this error cannot explain their overlap.
+    deep : True: two spots merge only if one covers the centre of the other, even if they have just split from one
+        union.
     """
     sites, law, period, a = state.sites, state.contact.law, state.contact.asperities.cell, evaluation.a
     pairs = _overlapping_pairs(state, evaluation, margin, deep)
@@ -65,7 +65,7 @@ def merge_overlapping(
 
 
 def set_union_heights(state: IterationState, evaluation: Evaluation) -> tuple[IterationState, Evaluation]:
-    """Set the heights of new unions to those with which they are in equilibrium."""
+    """Set the heights of new unions so that they are in equilibrium."""
     if not len(state.new_unions):
         return state, evaluation
     height = state.sites.height.copy()
@@ -83,7 +83,7 @@ def _overlapping_pairs(state, evaluation, margin, deep):
     present = (a > 0) & sites.present[: len(a)]
     overlap = (depth > 0) & present[first] & present[second]
     if state.unloading and not deep:
-        # Two spots that have just split would merge again and again during the iteration.
+        # Two spots that have just split would otherwise merge and split again and again during the iteration.
         overlap &= (sites.split_number[first] < 0) | (sites.split_number[first] != sites.split_number[second])
     overlap = np.flatnonzero(overlap)
     if margin > 0 and len(overlap):
@@ -98,7 +98,7 @@ def _overlapping_pairs(state, evaluation, margin, deep):
 
 
 def _record_unions(state, pairs, a, radius):
-    """Return a `MergeRecord` for every pair of spots, (k,) object; radius: contact radii of the unions, m."""
+    """Return a `MergeRecord` for every pair of spots, (k,) object, from the contact radii of spots and unions, m."""
     unions = np.full(len(pairs), None)
     sites, (i, j) = state.sites, pairs.T
     offset = periodic_difference(sites.position[j], sites.position[i], state.contact.asperities.cell)
@@ -111,7 +111,7 @@ def _record_unions(state, pairs, a, radius):
 
 
 def _admit_candidates(state, candidates):
-    """Record that candidates, which only exist without adhesion, have come into contact."""
+    """Record that candidates have come into contact; candidates exist only without adhesion."""
     sites, site_of_asperity = state.sites, state.site_of_asperity.copy()
     asperity = sites.asperity[candidates]
     site_of_asperity[asperity] = candidates
@@ -120,7 +120,7 @@ def _admit_candidates(state, candidates):
 
 
 def split_unions(state: IterationState, evaluation: Evaluation) -> IterationState:
-    """Split the unions that are so small that their two spots would no longer overlap."""
+    """Split the unions that have become so small that their two spots would no longer overlap."""
     a, sites = evaluation.a, state.sites
     touching = np.array([0.0 if union is None else union.touching_radius for union in sites.union[: len(a)]])
     split = np.flatnonzero((sites.status[: len(a)] == CONTACT) & (a < touching))
@@ -152,7 +152,7 @@ def _split(state, site, a):
 
 
 def absorb_covered(state: IterationState, evaluation: Evaluation) -> IterationState:
-    """Remove new contacts that lie inside another spot; their asperities then belong to that spot."""
+    """Remove new contacts whose centres another spot covers; their asperities then belong to that spot."""
     sites, a, interaction, old = state.sites, evaluation.a, evaluation.interaction, state.sites.was_in_contact
     i, j, r = interaction.target, interaction.source, interaction.r
     inside = np.flatnonzero((r < a[j]) & (a[i] > 0) & ~old[i])
@@ -164,8 +164,8 @@ def absorb_covered(state: IterationState, evaluation: Evaluation) -> IterationSt
     site_of_asperity = state.site_of_asperity.copy()
     site_of_asperity[sites.asperity[i]] = i
     index = np.append(np.arange(len(sites)), -1)
-    index[i] = j  # the spot that covers a site deepest comes last and remains
-    while np.any(index[index] != index):  # a covering spot may lie inside a larger one
+    index[i] = j  # the spot that covers a site deepest comes last and replaces the others
+    while np.any(index[index] != index):  # a covering spot may itself be covered by a larger spot
         index = index[index]
     state = state.without_jumps_in(sites.asperity[np.unique(i)])
     return replace(

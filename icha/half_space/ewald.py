@@ -237,9 +237,9 @@ class PointHalfSpace:
     ewald : split of the sum.
     points : (n, 2) float, m.
     pairs : near pairs as three arrays (later, earlier, distance), each pair once.
-    near : three (n, n) lower triangular matrices, the short-ranged displacement by the moments k = 0, 1, 2.
-    near_transposed : their transposes.
-    near_loose : matrix of the displacement by forces, accurate to a thousandth, and its transpose.
+    near : the short-ranged displacement by the moments k = 0, 1, 2; three pairs of an (n, n) lower triangular matrix
+        and its transpose.
+    near_loose : the same by forces, accurate to a thousandth, one such pair.
     bases : polynomials of the points for their images on a free half-space; None on a periodic surface.
     """
 
@@ -247,7 +247,6 @@ class PointHalfSpace:
     points: np.ndarray
     pairs: tuple
     near: tuple
-    near_transposed: tuple
     near_loose: tuple
     bases: tuple | None = None
 
@@ -285,30 +284,26 @@ class PointHalfSpace:
         later, earlier, r = np.repeat(np.arange(known, n), np.diff(rows.indptr)), rows.indices, rows.data
         start, kernels = rows.indptr, ewald.kernels(r)
         if before is not None:
-            old = before.near[0]
+            old = before.near[0][0]
             start = np.concatenate([old.indptr, old.nnz + start[1:]])
-            kernels = [np.concatenate([m.data, k]) for m, k in zip(before.near, kernels, strict=True)]
+            kernels = [np.concatenate([m.data, k]) for (m, _), k in zip(before.near, kernels, strict=True)]
             later, earlier, r = (np.concatenate(p) for p in zip(before.pairs, (later, earlier, r), strict=True))
-        near = tuple(scipy.sparse.csr_matrix((k, earlier, start), shape=(n, n)) for k in kernels)
+        near = [scipy.sparse.csr_matrix((kernel, earlier, start), shape=(n, n)) for kernel in kernels]
         counts = r <= ewald.loose_reach
         ends = np.append(0, np.cumsum(counts))[start]
         loose = scipy.sparse.csr_matrix((kernels[0][counts], earlier[counts], ends), shape=(n, n))
-        transposed = tuple(matrix.T for matrix in near)
-        bases = ewald.bases(points)
-        return cls(ewald, points, (later, earlier, r), near, transposed, (loose, loose.T), bases)
+        pairs, near = (later, earlier, r), tuple((matrix, matrix.T) for matrix in near)
+        return cls(ewald, points, pairs, near, (loose, loose.T), ewald.bases(points))
 
     def displacement(self, force, moment, fourth):
         """Return the displacement (n,), m, by forces (N), second (N m^2) and fourth moments (N m^4), each (n,)."""
         w = self.ewald.smooth(self.points, self.points, force, moment)
-        for lower, upper, strength in zip(self.near, self.near_transposed, (force, moment, fourth), strict=True):
-            w += lower @ strength
-            w += upper @ strength
+        for halves, strength in zip(self.near, (force, moment, fourth), strict=True):
+            for half in halves:
+                w += half @ strength
         by_force, by_moment = self.ewald.self_displacement
         w -= by_force * force + by_moment * moment
-        w -= self.ewald.mean * np.sum(force)
-        if self.bases is not None:
-            w -= self.ewald.image_displacement(self.bases, self.bases, (force, moment))
-        return w
+        return self._less_uniform_and_images(w, force, moment)
 
     def approximate_displacement(self, force):
         """Return the displacement by forces alone to a thousandth, which suffices for a linear solve."""
@@ -316,7 +311,11 @@ class PointHalfSpace:
         for half in self.near_loose:
             w += half @ force
         w -= self.ewald.self_displacement[0] * force
-        w -= self.ewald.mean * np.sum(force)
+        return self._less_uniform_and_images(w, force)
+
+    def _less_uniform_and_images(self, w, *moments):
+        """Subtract the mean of the short-ranged half and, on a free half-space, the displacement by images."""
+        w -= self.ewald.mean * np.sum(moments[0])
         if self.bases is not None:
-            w -= self.ewald.image_displacement(self.bases, self.bases, (force,))
+            w -= self.ewald.image_displacement(self.bases, self.bases, moments)
         return w

@@ -98,8 +98,8 @@ class DisplacementField:
         w = scipy.fft.irfft(half[nodes], n=finer * self._nodes, axis=1, norm="forward", workers=1)[:, ::finer]
         w = np.ascontiguousarray(w) - self._short_mean
         for group in self._groups:
-            for window in windows(self.centres[group.spots], group.reach, self._nodes, self._cell, rows):
-                np.add.at(w.reshape(-1), window.node.ravel(), self._short_half(group, window).ravel())
+            for spot, dy, dx, node in windows(self.centres[group.spots], group.reach, self._nodes, self._cell, rows):
+                np.add.at(w.reshape(-1), node.ravel(), self._short_half(group, spot, dy, dx).ravel())
         if self.free:
             w = w[:, : self.grid]
             by, bx, field = self._images
@@ -178,14 +178,13 @@ class DisplacementField:
         strength[highest, 0] = 0.0
         return strength
 
-    def _short_half(self, group, window):
+    def _short_half(self, group, of_group, dy, dx):
         """Return the exact displacement less the smooth half in the windows of spots, shaped as the windows."""
-        spot = group.spots[window.spot]
-        r2 = window.dy[:, None] ** 2 + window.dx**2
+        spot, r2 = group.spots[of_group], dy[:, None] ** 2 + dx**2
         a, R = self.contact_radius[spot][:, None], self.radius_of_curvature[spot][:, None]
         w = self.law.displacement(np.sqrt(r2), a, R)
         r2 *= group.alpha**2
-        smooth = smooth_half(r2, group.moments[window.spot])
+        smooth = smooth_half(r2, group.moments[of_group])
         smooth *= group.alpha / (np.pi * self.law.material.contact_modulus)
         w -= smooth
         return w
@@ -274,27 +273,15 @@ def _smooth_half_table():
 _SMOOTH_HALF = _smooth_half_table()
 
 
-@dataclass(frozen=True, eq=False)
-class Windows:
-    """Strips of nodes: parts of rows within reach of spots.
-
-    Attributes
-    ----------
-    spot : (m,) int, index of the spot.
-    dy : (m,) float, dx : (m, n) float, distance from the centre of the spot to the nodes, m.
-    node : (m, n) int, index of the nodes in the flattened block of rows.
-    """
-
-    spot: np.ndarray
-    dy: np.ndarray
-    dx: np.ndarray
-    node: np.ndarray
-
-
 def windows(centres, reach: float, grid: int, period: float, rows: slice):
     """Yield the nodes of a range of rows within `reach` (m) of each of the centres (m, 2), in x and in y.
 
     Some nodes are a little farther away; no node occurs twice for one centre.
+
+    Yields
+    ------
+    Strips of nodes, which are parts of rows: indices of their centres (k,); distances from these along y (k,) and
+    along x (k, n), m; and indices of the nodes (k, n) in the flattened block of rows.
     """
     spacing = period / grid
     ahead = int(reach / spacing) + 1
@@ -312,9 +299,6 @@ def windows(centres, reach: float, grid: int, period: float, rows: slice):
     for some in blocks(len(spot), max(_BATCH // width, 1)):
         at = spot[some]
         column = first[at, 0][:, None] + np.arange(width)
-        yield Windows(
-            spot=at,
-            dy=line[some] * spacing - centres[at, 1],
-            dx=column * spacing - centres[at, 0][:, None],
-            node=row[some][:, None] * grid + np.mod(column, grid),
-        )
+        dy = line[some] * spacing - centres[at, 1]
+        dx = column * spacing - centres[at, 0][:, None]
+        yield at, dy, dx, row[some][:, None] * grid + np.mod(column, grid)

@@ -9,6 +9,7 @@ everything. Only the pairs with exact displacement follow the radii.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -105,12 +106,15 @@ class Interaction:
             exact -= moment[j] * replaced
         return self.half_space.displacement(*moments) + np.bincount(self.target, exact, len(a))
 
-    def tangent(self, a) -> Tangent:
-        """Return the linear map from changes of the contact radii to changes of the displacement, at radii a (n,), m.
+    def tangent(self, a) -> tuple[Callable, Callable]:
+        """Linearise the displacement at contact radii a (n,), m; a change of a spot of radius zero does not count.
 
-        A change of a spot of radius zero does not count.
+        Returns
+        -------
+        Two functions from changes of the radii to changes of the displacement, both (n,), m. The second one is accurate
+        to a thousandth and several times faster.
         """
-        law, R = self.law, self.radius_of_curvature
+        law, R, half_space = self.law, self.radius_of_curvature, self.half_space
         present = a > 0
         safe = np.where(present, a, 1.0)
         moments = [
@@ -119,42 +123,20 @@ class Interaction:
         ]
         counts = np.flatnonzero(present[self.source])
         j, r, target = self.source[counts], self.r[counts], self.target[counts]
-        exact = law.displacement_derivative(r, a[j], R[j])
         fields = [moment[j] * replaced[counts] for moment, replaced in zip(moments, self.replaced, strict=True)]
-        by_forces = exact - fields[0]
-        by_moments = by_forces - fields[1] - fields[2]
-        return Tangent(self.half_space, tuple(moments), target, j, by_moments, by_forces)
+        # Exact derivatives at the pairs, less those of the fields that the half-space has there.
+        less_forces = law.displacement_derivative(r, a[j], R[j]) - fields[0]
+        less_moments = less_forces - fields[1] - fields[2]
 
+        def exact(da):
+            w = half_space.displacement(*(moment * da for moment in moments))
+            return w + np.bincount(target, less_moments * da[j], len(da))
 
-@dataclass(frozen=True, eq=False)
-class Tangent:
-    """Derivative of the displacement of an `Interaction` with respect to the contact radii, as a linear operator.
+        def approximate(da):
+            w = half_space.approximate_displacement(moments[0] * da)
+            return w + np.bincount(target, less_forces * da[j], len(da))
 
-    Attributes
-    ----------
-    half_space : half-space with n points.
-    moments : three (n,) arrays, derivatives of force, second and fourth moment.
-    target, source : (k,) int, pairs at which a correction is added.
-    by_moments : (k,) float, exact derivative less that of all three moments' fields.
-    by_forces : (k,) float, exact derivative less that of the forces' field.
-    """
-
-    half_space: PointHalfSpace
-    moments: tuple
-    target: np.ndarray
-    source: np.ndarray
-    by_moments: np.ndarray
-    by_forces: np.ndarray
-
-    def __call__(self, da):
-        """Return the change of the displacement for changes of the contact radii, both (n,), m."""
-        w = self.half_space.displacement(*(m * da for m in self.moments))
-        return w + np.bincount(self.target, self.by_moments * da[self.source], len(da))
-
-    def approximate(self, da):
-        """Return the same to a thousandth, several times faster."""
-        w = self.half_space.approximate_displacement(self.moments[0] * da)
-        return w + np.bincount(self.target, self.by_forces * da[self.source], len(da))
+        return exact, approximate
 
 
 def displacement_at(

@@ -8,16 +8,16 @@ from icha.contact.model import AREA_FRACTION as CONTROLLED_AREA
 from icha.contact.model import PRESSURE, ContactModel, Control, State
 from icha.support.rules import LENGTH, NUMBER, POSITIVE, FloatRange
 
-# Largest reduced pressure and area fraction of a target with the asperity model. Beyond them asperities lose their
-# identity, and soon after the mean planes of a surface without adhesion meet.
+# Largest reduced pressure and area fraction of a target with the asperity model. At larger ones spots are no longer
+# separate, and soon the mean planes of a surface without adhesion meet.
 MAX_REDUCED_PRESSURE = 0.15
 MAX_AREA_FRACTION = 0.25
-# Largest reduced pressure of any target: rough surfaces are in full contact at about 1.
+# Largest reduced pressure of any target. Rough surfaces are in full contact at about 1.
 LARGEST_REDUCED_PRESSURE = 100.0
-# Smallest reduced pressure (other than zero) and area fraction: smaller ones are less than the error of an equilibrium.
+# Smallest reduced pressure (other than zero) and area fraction. Smaller ones are less than the error of an equilibrium.
 LEAST_PRESSURE, LEAST_AREA = 1e-12, 1e-9
-# Limits of the longest step of the mean separation, in h_rms, and its default. With the smallest limit a path has some
-# ten thousand equilibria.
+# Limits of the longest step of the mean separation, in h_rms, and its default value. With the smallest step a path has
+# about ten thousand equilibria.
 MIN_STEP, MAX_STEP = 1e-4, 0.5
 DEFAULT_STEP = 0.15
 # Largest unknown work of one step, relative to the energy that jumps have released so far. The work is unknown because
@@ -35,9 +35,9 @@ class TargetQuantity:
     ----------
     name : name in targets and in files.
     rule : range of values that a target may have.
-    argument : argument of `Path` that lists such targets; or an empty text.
-    controlled : quantity that the solver holds instead of the separation; None if the separation is imposed.
-    pressure_unit : attribute of the contact with the pressure that makes the value dimensionless; empty if none.
+    argument : argument of `Path` that lists such targets; empty if there is none.
+    controlled : quantity that the solver keeps constant; None if the separation is prescribed.
+    pressure_unit : name of the attribute of the contact by which a pressure is divided; empty for other quantities.
     """
 
     name: str
@@ -47,7 +47,7 @@ class TargetQuantity:
     pressure_unit: str = ""
 
     def scale(self, contact: ContactModel) -> float:
-        """Return the factor from the value to the controlled quantity."""
+        """Return the controlled quantity divided by the value of the target."""
         return getattr(contact, self.pressure_unit) if self.pressure_unit else 1.0
 
     def evaluate(self, contact: ContactModel, state: State) -> float:
@@ -57,7 +57,7 @@ class TargetQuantity:
         return state.separation if self.controlled is None else contact.area_fraction(state)
 
     def control(self, contact: ContactModel, value: float) -> Control | None:
-        """Return what the solver holds at a value; None for a separation."""
+        """Return the load or area that the solver keeps constant at a value; None for a separation."""
         return None if self.controlled is None else Control(self.controlled, value * self.scale(contact))
 
 
@@ -80,7 +80,7 @@ QUANTITIES = {
     )
 }
 LOADS = (REDUCED_PRESSURE, RELATIVE_LOAD)
-# Kind of the waypoints between targets; their value is the mean separation.
+# Kind of waypoints between targets. Their value is the mean separation.
 BETWEEN = "path"
 # Kinds whose values are in m; all others have no unit.
 IN_METRES = (MEAN_SEPARATION, BETWEEN)
@@ -124,14 +124,15 @@ class Path:
     mean_separations : u in m, decreasing, in [1e-24, 1e9]. Exactly one of these three lists is given.
     snapshots : pairs (kind, value), in any order, of states whose fields and spots are stored. The kind is
         "reduced_pressure", "relative_load" (F/(E* A0)), "area_fraction" or "mean_separation" (m). A snapshot is an
-        additional target unless the list holds the same kind and value. The dataset has them in the order in which
-        the path reaches them. None: the last target of the list.
+        additional target unless the list contains the same kind and value. Snapshots are in the dataset in the order
+        in which the path reaches them. None: the last target of the list.
     turning_points : pairs (kind, value) at which the path turns after its last target: the first one ends unloading,
         the second one loading, and so on. Kinds as for snapshots; loads may be tensile (negative) or zero.
     unload : whether the path ends with complete separation. Unloading meets the targets once more, except those above
         first contact.
-    control : "separation": the mean separation is imposed. "load": the load is imposed; the state follows the same
-        curve and jumps, at constant load, where the curve turns back. Then all targets and turning points are loads.
+    control : "separation": the mean separation is prescribed. "load": the load is prescribed, and all targets and
+        turning points must be loads. The path follows the same curve of pressure against separation; where this curve
+        turns back, the state jumps at constant load.
     max_step : longest change of the mean separation between two equilibria, in units of h_rms, in [1e-4, 0.5].
 
     Raises
@@ -194,14 +195,9 @@ class Path:
 def _validate_list(kind, values):
     """Return the values of the list of targets, in strict order."""
     name, rule, falls = QUANTITIES[kind].argument, QUANTITIES[kind].rule, kind == MEAN_SEPARATION
-    try:
-        # Bytes would be a list of numbers.
-        listed = None if isinstance(values, str | bytes) else list(values)
-    except TypeError:
-        listed = None
-    if listed is None:
+    if isinstance(values, str | bytes) or not isinstance(values, Iterable):
         raise ValueError(f"{name}: expected a list of numbers, got {values!r}")
-    values = [rule.validate(f"{name}[{k}]", value) for k, value in enumerate(listed)]
+    values = [rule.validate(f"{name}[{k}]", value) for k, value in enumerate(values)]
     if not values:
         raise ValueError(f"{name}: the list is empty; expected at least one number")
     for k, (one, following) in enumerate(itertools.pairwise(values), start=1):
@@ -212,7 +208,7 @@ def _validate_list(kind, values):
 
 
 def _validate_snapshots(snapshots):
-    """Return kinds and values of the snapshots."""
+    """Return kind and value of every snapshot."""
     recorded = []
     for label, kind, value in _label_pairs("snapshots", snapshots):
         pair = kind, QUANTITIES[kind].rule.validate(label, value)
@@ -225,7 +221,8 @@ def _validate_snapshots(snapshots):
 def _validate_turning_points(turning_points, last):
     """Return the turning points.
 
-    Each must lie below the one before of its kind on unloading, above it on loading; separations the reverse.
+    On unloading a turning point must have a smaller load or area than the one before, and on loading a larger one. For
+    separations it is the reverse. Only turning points of the same kind are compared.
     """
     turns = []
     for k, (label, kind, value) in enumerate(_label_pairs("turning_points", turning_points)):

@@ -11,9 +11,8 @@ import math
 import statistics
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
-from icha.datasets.results import COMPRESSED_SIZES, LEFT_IN_FILE
+from icha.datasets.results import COMPRESSED_SIZES
 from icha.path.targets import DEFAULT_STEP
 from icha.support.parallel import LARGE_GRID
 
@@ -101,14 +100,6 @@ def _law(solver: str, *, adhesive: bool, cycle: bool = False) -> PowerLaw:
     return LAWS[", ".join([solver, *["adhesion"] * adhesive, *["cycle"] * cycle])]
 
 
-class Recorded(NamedTuple):
-    """Numbers of steps and snapshots of a run, and of spots in all its snapshots."""
-
-    steps: float
-    snapshots: int
-    spots: float
-
-
 @dataclass(frozen=True)
 class Cost:
     """Cost of a job.
@@ -118,13 +109,13 @@ class Cost:
     seconds : on the cores that it gets.
     memory : largest memory of the job itself, bytes.
     disk : bytes.
-    recorded : numbers that determine the size of a run in the campaign dataset.
+    values : part of `disk` that a run adds to the campaign dataset, bytes.
     """
 
     seconds: float
     memory: float
     disk: float
-    recorded: Recorded | None = None
+    values: float = 0.0
 
 
 def job_threads(grid: int) -> int:
@@ -218,94 +209,49 @@ def run_cost(
         steps = (1 + legs) / 2 * (120 * further + (40 if adhesive else 0.75) * most)
         seconds *= (1 + legs) / 2 * further
     snapshots += bool(legs)
-    disk = 60e3 + 57 * most * max(snapshots, 1) + 160 * steps + 20e3 * bool(legs)
     memory = _memory_before(grid) + 9 * MiB * (1 + bool(legs))
     memory += size.arrays * _DOUBLE * nodes + size.summit * summits
-    disk += size.maps * nodes * snapshots
-    return Cost(seconds, memory, disk, Recorded(steps, snapshots, most * snapshots))
+    values = 20e3 + 57 * most * max(snapshots, 1) + 160 * steps + 20e3 * bool(legs)
+    # The names and attributes of a file have 40 kB.
+    return Cost(seconds, memory, 40e3 + values + size.maps * nodes * snapshots, values)
 
 
-def solution_cost(nodes: int, reduced_pressure: float, *, adhesive: bool) -> Cost:
-    """Cost of boundary elements at a finite range at one load, on `nodes` a side."""
-    seconds = _law("finite range", adhesive=adhesive).seconds(nodes=nodes**2, load=reduced_pressure)
+def finite_range_cost(nodes: int, *, adhesive: bool, **quantity: float) -> Cost:
+    """Cost of boundary elements at a finite range, on `nodes` a side.
+
+    `quantity` is the `load` of a single solution, or the `step` of the mean gap of a loop.
+    """
+    seconds = _law("finite range", adhesive=adhesive, cycle="step" in quantity).seconds(nodes=nodes**2, **quantity)
     return Cost(seconds, WORKFLOW.forked + 20 * _DOUBLE * nodes**2, 40e3 + 0.04 * nodes**2)
 
 
-def loop_cost(nodes: int, separation_step: float, *, adhesive: bool) -> Cost:
-    """Cost of boundary elements at a finite range in loading and unloading, on `nodes` a side."""
-    law = _law("finite range", adhesive=adhesive, cycle=True)
-    seconds = law.seconds(nodes=nodes**2, step=separation_step)
-    return Cost(seconds, WORKFLOW.forked + 20 * _DOUBLE * nodes**2, 33e3)
-
-
-def theories_cost() -> Cost:
-    """Cost of the theories and published points of a surface."""
-    return Cost(LAWS["theories"].seconds(), WORKFLOW.forked, 35e3)
-
-
-# Numbers of bin edges in `icha.contact.model`, which takes long to import.
-GAP_EDGES, PRESSURE_EDGES = 112, 501
-# Numbers of arrays along the steps and the spots of runs; texts count for several.
-_STEP_ARRAYS, _SPOT_ARRAYS = 30, 11
-
-
-def dataset_memory(cells: int, runs: Sequence[Recorded]) -> float:
-    """Memory of the arrays of a study that are read as a whole from the campaign dataset, bytes.
-
-    Parameters
-    ----------
-    cells : number of combinations of the labels in the dataset, with and without runs.
-    runs : recorded numbers of each run.
-    """
-    steps, snapshots = cells * max(run.steps for run in runs), cells * max(run.snapshots for run in runs)
-    # Number of arrays and values per array of densities, edges and bounds of bins, steps, and spots.
-    arrays = [
-        (2, snapshots * PRESSURE_EDGES),
-        (1, snapshots * GAP_EDGES),
-        (2, cells * PRESSURE_EDGES),
-        (1, 2 * cells * PRESSURE_EDGES),
-        (4, cells * GAP_EDGES),
-        (_STEP_ARRAYS, steps),
-        (_SPOT_ARRAYS, sum(run.spots for run in runs)),
-    ]
-    return sum(count * _DOUBLE * values for count, values in arrays if _DOUBLE * values <= LEFT_IN_FILE)
-
-
-# Memory of reading and using the dataset, over that of its arrays: chunks, decoded values and selected runs.
-_COPIES = 2.7
-# Most memory of the values of runs in the job of the dataset, which writes block by block, bytes.
+# Memory of reading and using the campaign dataset, over the `values` of its runs. Arrays above
+# `icha.datasets.results.LEFT_IN_FILE` are not read as a whole, so no campaign needs more than the limit, bytes.
+_COPIES, _MOST_READ = 3.9, 1.9e9
+# Most memory of the values of runs in the job that writes the dataset block by block, bytes.
 _BLOCKS = 35 * MiB
-
-
-def table_cost(kind: str, runs: int, disk: float, dataset: float) -> Cost:
-    """Cost of the dataset, or of a table derived from it; the arrays of the dataset take `dataset` bytes."""
-    values = min(_COPIES * dataset, _BLOCKS) if kind == "dataset" else _COPIES * dataset
-    return Cost(LAWS[kind].seconds(runs=runs), WORKFLOW.forked + 4 * MiB + values, disk)
-
-
 # Arrays of a topography that a contact map holds at a time, by the number of models that it shows.
 MAP_ARRAYS = {1: 2, 2: 7}
+# Memory of the libraries and pages of a job, bytes.
+_LIBRARIES = {"figure": 85 * MiB, "report": 18 * MiB}
 
 
-def figure_cost(runs: int, nodes: int, models: int = 1, dataset: float = 0.0) -> Cost:
-    """Cost of a figure, as PNG and PDF.
+def derived_cost(kind: str, runs: int, disk: float, values: float = 0.0, *, nodes: int = 0, models: int = 1) -> Cost:
+    """Cost of a file that is computed from a surface or from runs.
 
     Parameters
     ----------
-    runs : number of runs that it shows.
-    nodes : number of nodes of the topography that it shows, 0 without one.
-    models : number of models whose contacts it shows.
-    dataset : memory of the arrays of the campaign dataset, bytes.
+    kind : name of its law in `LAWS`.
+    runs : number of runs that it contains or shows.
+    disk : size of the file, bytes.
+    values : sum of the `values` of all runs of the campaign, bytes.
+    nodes : nodes of the topography that a figure shows, 0 without one.
+    models : number of models whose contacts a figure shows.
     """
-    seconds = LAWS["figure"].seconds(runs=runs) + LAWS["map"].seconds(nodes=nodes)
-    memory = 85 * MiB + MAP_ARRAYS[models] * _DOUBLE * nodes + _COPIES * dataset
-    return Cost(seconds, WORKFLOW.forked + memory, 400e3)
-
-
-def report_cost(runs: int, figures: int, dataset: float = 0.0) -> Cost:
-    """Cost of the report with its figures; the arrays of the campaign dataset take `dataset` bytes."""
-    memory = WORKFLOW.forked + 18 * MiB + _COPIES * dataset
-    return Cost(LAWS["report"].seconds(runs=runs), memory, 700e3 + 250e3 * figures)
+    seconds = LAWS[kind].seconds(runs=runs) + LAWS["map"].seconds(nodes=nodes)
+    read = min(_COPIES * values, _BLOCKS if kind == "dataset" else _MOST_READ)
+    memory = _LIBRARIES.get(kind, 4 * MiB) + MAP_ARRAYS[models] * _DOUBLE * nodes + read
+    return Cost(seconds, WORKFLOW.forked + memory, disk)
 
 
 def correction(pairs: Sequence[tuple[float, float]]) -> float:

@@ -14,13 +14,12 @@ from icha.configuration.plausibility import energy_ratio
 from icha.contact.models import DEFAULT_MODEL, MODELS
 from icha.datasets import results as results_files
 from icha.datasets.attributes import why_no_result
-from icha.datasets.labels import count_cells
 from icha.datasets.results import ResultFiles, job_file
 from icha.figures.registry import DECLARATIONS
 from icha.planning import costs
 from icha.planning.costs import WORKFLOW
 from icha.planning.results import CampaignFiles, campaign_files
-from icha.planning.validity import expected_summits
+from icha.planning.validity import surface_facts
 from icha.support.checksums import is_whole
 from icha.support.input_files import text
 
@@ -100,7 +99,7 @@ def _state(results, path):
 
 def _computed_files(campaign, results, files) -> Iterator[Item]:
     """Yield surfaces, runs, theories and solutions at finite ranges."""
-    summits, run_cost = cache(lambda surface: expected_summits(campaign, surface)), cache(costs.run_cost)
+    summits, run_cost = cache(lambda surface: surface_facts(campaign, surface)["summits"]), cache(costs.run_cost)
     for path, (name, _) in files.surfaces.items():
         grid = campaign.grid(name)
         yield Item("surfaces", path, _state(results, path), costs.surface_cost(grid), costs.job_threads(grid))
@@ -115,62 +114,51 @@ def _computed_files(campaign, results, files) -> Iterator[Item]:
         part = f"study {case.study}" + (f", {MODELS[case.model].words}" if case.model != DEFAULT_MODEL else "")
         yield Item(part, path, state, cost, costs.job_threads(grid), reason)
     for path in files.theories:
-        yield Item("theories", path, _state(results, path), costs.theories_cost())
-    for path, case in {**files.solutions, **files.loops}.items():
-        is_loop = path in files.loops
-        entry = (campaign.boundary_element_loops if is_loop else campaign.finite_range)[case.entry]
-        nodes = campaign.grid(case.surface) * entry.refinement
-        adhesive = campaign.materials[case.material].surface_energy > 0
-        if is_loop:
-            cost = costs.loop_cost(nodes, entry.separation_step, adhesive=adhesive)
-        else:
-            cost = costs.solution_cost(nodes, case.reduced_pressure, adhesive=adhesive)
-        part = f"boundary elements{', cycle' if is_loop else ''} {case.entry}"
-        yield Item(part, path, _state(results, path), cost)
+        yield Item("theories", path, _state(results, path), costs.derived_cost("theories", 0, 35e3))
+    for path, solution in files.solutions.items():
+        load = {"load": solution.reduced_pressure}
+        yield _finite_range(campaign, results, path, campaign.finite_range[solution.entry], solution, load)
+    for path, loop in files.loops.items():
+        entry = campaign.boundary_element_loops[loop.entry]
+        yield _finite_range(campaign, results, path, entry, loop, {"step": entry.separation_step})
+
+
+def _finite_range(campaign, results, path, entry, case, quantity) -> Item:
+    """Return the file of a solution or a loop by boundary elements at a finite range."""
+    adhesive = campaign.materials[case.material].surface_energy > 0
+    cost = costs.finite_range_cost(campaign.grid(case.surface) * entry.refinement, adhesive=adhesive, **quantity)
+    part = f"boundary elements{', cycle' if 'step' in quantity else ''} {case.entry}"
+    return Item(part, path, _state(results, path), cost)
 
 
 def _derived_files(campaign, files: CampaignFiles, computed: list[Item]) -> Iterator[tuple]:
     """Yield part, path, stage, inputs and cost of the files that are derived from runs."""
-    runs, dataset = len(files.runs), _dataset_memory(files, computed)
-    size = sum(item.cost.disk for item in computed if item.is_run)
+    runs, cost = len(files.runs), costs.derived_cost
+    disk = sum(item.cost.disk for item in computed if item.is_run)
+    values = sum(item.cost.values for item in computed)
     beside = [*files.compared, *files.solutions]
     tables = [
-        ("dataset", [files.dataset], 1, files.runs, runs, 0.5 * size),
-        ("comparison", [files.comparison], 2, [files.dataset], runs, 0.03 * size + 90e3),
+        ("dataset", [files.dataset], 1, files.runs, runs, 0.5 * disk),
+        ("comparison", [files.comparison], 2, [files.dataset], runs, 0.03 * disk + 90e3),
         ("model error", files.model_error, 2, [files.dataset, *beside], len(beside), 150e3),
         ("checks", [files.checks], 2, [files.dataset, *files.solutions], runs, 5e3 * runs),
     ]
-    for kind, paths, stage, inputs, count, disk in tables:
+    for kind, paths, stage, inputs, count, disk_of_table in tables:
         for path in paths:
-            yield "dataset and checks", path, stage, inputs, costs.table_cost(kind, count, disk, dataset)
+            yield "dataset and checks", path, stage, inputs, cost(kind, count, disk_of_table, values)
     result_files = ResultFiles(campaign.name)
     for name in campaign.figures.by_name():
         path = result_files.path(results_files.FIGURE, name=name, ending="png")
         inputs = campaign.figures.inputs(name, campaign, result_files).values()
         shown = set(campaign.figures.studies_of(name, campaign))
+        count = sum(case.study in shown for case in files.runs.values())
         grids = [campaign.grid(surface) for study in shown for surface in campaign.studies[study].surfaces]
-        cost = costs.figure_cost(
-            sum(case.study in shown for case in files.runs.values()),
-            max(grids) ** 2 if DECLARATIONS[name].holds_topography else 0,
-            max((len(campaign.studies[study].models) for study in shown), default=1),
-            dataset,
-        )
+        nodes = max(grids) ** 2 if DECLARATIONS[name].holds_topography else 0
+        models = max((len(campaign.studies[study].models) for study in shown), default=1)
         flat = [path for each in inputs for path in ([each] if isinstance(each, str) else each)]
-        yield "figures", path, 3, flat, cost
-    yield "report", files.report, 4, files.computed, costs.report_cost(runs, len(files.figures) // 2, dataset)
-
-
-def _dataset_memory(files, computed):
-    """Memory of the arrays of the campaign dataset that are read as a whole, bytes."""
-    studies: dict[str, list] = {}
-    for item in computed:
-        if item.is_run:
-            case = files.runs[item.path]
-            studies.setdefault(case.study, []).append((case, item.cost.recorded))
-    return sum(
-        costs.dataset_memory(count_cells([case for case, _ in runs]), [recorded for _, recorded in runs])
-        for runs in studies.values()
-    )
+        yield "figures", path, 3, flat, cost("figure", count, 400e3, values, nodes=nodes, models=models)
+    disk_of_report = 700e3 + 250e3 * len(files.figures) // 2
+    yield "report", files.report, 4, files.computed, cost("report", runs, disk_of_report, values)
 
 
 def _cost_parameters(settings, rms_slope) -> dict:

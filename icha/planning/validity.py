@@ -61,65 +61,43 @@ def self_affine_moments(
     return SpectralMoments(moment(0), moment(2) / 2, 3 / 8 * moment(4))
 
 
-def _moments(section) -> SpectralMoments:
-    """Spectral moments of a surface; those of a random one up to a common factor."""
-    if isinstance(section, SelfAffineSurface):
-        return self_affine_moments(*section.lengths_and_hurst)
-    return spectral_moments(_read(section))
-
-
-def expected_summits(campaign: Campaign, name: str) -> float:
-    """Return number of summits of a surface: by the spectrum of a random one, counted on one from a file."""
-    section = campaign.surfaces[name]
-    if isinstance(section, SelfAffineSurface):
-        moments = _moments(section)
-        return section.period**2 * summit_density(moments.m2, moments.m4)
-    from icha.surfaces.summits import locate_summits
-
-    return len(locate_summits(_read(section)))
-
-
-def rms_curvature(campaign: Campaign, name: str) -> float:
-    """Rms curvature of the profiles of a surface at rms slope 1, 1/m."""
-    moments = _moments(campaign.surfaces[name])
-    return math.sqrt(moments.m4 / (2 * moments.m2))
-
-
-def complete_contact_pressure(campaign: Campaign, name: str) -> float:
-    """Pressure over E* for complete contact with a surface of rms slope 1; an estimate for a random one."""
-    section = campaign.surfaces[name]
-    if isinstance(section, SelfAffineSurface):
-        return gaussian_complete_pressure(section.period / section.lengths_and_hurst[2])
-    return campaign.topography(name).complete_contact_pressure
-
-
 def surface_facts(campaign: Campaign, name: str) -> dict[str, float]:
-    """Properties of a surface by the names of `icha.analysis.validity.VALIDATED`.
+    """Properties of a surface at rms slope 1: those of `icha.analysis.validity.VALIDATED`, and three more.
 
-    A random surface is Gaussian and isotropic; those of a surface from a file are computed from its heights.
+    A random surface is Gaussian and isotropic; the properties of a surface from a file are computed from its heights.
+
+    Returns
+    -------
+    The values by name. `summits` is the number of supported summits, `rms_curvature` that of the profiles (1/m), and
+    `complete_contact_pressure` the pressure over E* for complete contact, which is an estimate for a random surface.
     """
     section = campaign.surfaces[name]
     if isinstance(section, SelfAffineSurface):
-        moments, grid, unsupported = _moments(section), section.grid, 0
+        moments, grid, unsupported = self_affine_moments(*section.lengths_and_hurst), section.grid, 0
+        summits = section.period**2 * summit_density(moments.m2, moments.m4)
+        complete = gaussian_complete_pressure(section.period / section.short_wavelength)
         skewness, kurtosis, anisotropy, free = 0.0, 3.0, 1.0, False
-        summits = expected_summits(campaign, name)
     else:
         from icha.surfaces.summits import locate_summits
 
         surface = _read(section)
         moments, (skewness, kurtosis) = spectral_moments(surface), height_statistics(surface)
-        anisotropy, free = slope_anisotropy(surface), surface.free
-        found, grid = locate_summits(surface), surface.grid
-        unsupported = len(found.unsupported_height)
-        summits = len(found) + unsupported
+        anisotropy, free, grid = slope_anisotropy(surface), surface.free, surface.grid
+        found = locate_summits(surface)
+        summits, unsupported = len(found), len(found.unsupported_height)
+        complete = campaign.topography(name).complete_contact_pressure
+    every = summits + unsupported
     return {
         "slope_anisotropy": anisotropy,
         "height_skewness": skewness,
         "height_kurtosis": kurtosis,
         "nayak_parameter": moments.nayak_parameter,
-        "nodes_per_short_wave": cells_per_short_wave(grid, summits),
-        "unsupported_summits": unsupported / max(summits, 1),
+        "nodes_per_short_wave": cells_per_short_wave(grid, every),
+        "unsupported_summits": unsupported / max(every, 1),
         "free_edges": float(free),
+        "summits": summits,
+        "rms_curvature": math.sqrt(moments.m4 / (2 * moments.m2)),
+        COMPLETE: complete,
     }
 
 
@@ -137,32 +115,28 @@ def _read(section):
 
 def expected_validity(campaign: Campaign) -> list[Statement]:
     """State the expected validity, with the Tabor parameter of the mean summit of a Gaussian surface."""
-    facts = cache(lambda surface: surface_facts(campaign, surface))
-    curvature = cache(lambda surface: rms_curvature(campaign, surface))
-    complete = cache(lambda surface: complete_contact_pressure(campaign, surface))
+    facts_of = cache(lambda surface: surface_facts(campaign, surface))
     cases, tabor, sticky = [], {}, {}
     for case in run_cases(campaign):
-        section = campaign.materials[case.material]
-        material = Material(**section.model_dump(exclude_none=True))
-        ratio = energy_ratio(campaign, case)
+        facts, by_summits = facts_of(case.surface), MODELS[case.model].by_summits
+        material = Material(**campaign.materials[case.material].model_dump(exclude_none=True))
         # Only the asperity model depends on how close a surface is to those of the validation.
-        known = facts(case.surface) if MODELS[case.model].by_summits else {}
-        of_full_contact = {
-            "full_contact_energy_ratio": ratio,
-            COMPLETE: complete(case.surface) * case.rms_slope * section.contact_modulus,
+        known = (facts if by_summits else {}) | {
+            "full_contact_energy_ratio": energy_ratio(campaign, case),
+            COMPLETE: facts[COMPLETE] * case.rms_slope * material.contact_modulus,
             STRENGTH: material.interface_strength,
             THEORETICAL: material.theoretical_strength,
         }
         if MODELS[case.model].by_cells:
             spacing = campaign.period(case.surface) / campaign.grid(case.surface)
             tension = Front(material.adhesion_length / spacing).strength * material.contact_modulus
-            of_full_contact |= {RESOLVED: tension, SPACING: spacing}
-        cases.append(Case(case.model, case.surface, case.material, known | of_full_contact))
-        if MODELS[case.model].by_summits and section.surface_energy > 0:
-            curved = curvature(case.surface) * case.rms_slope
-            tabor_parameter = float(material.tabor_parameter(_SUMMIT_RADIUS / curved))
+            known |= {RESOLVED: tension, SPACING: spacing}
+        cases.append(Case(case.model, case.surface, case.material, known))
+        if by_summits and material.surface_energy > 0:
+            curvature = facts["rms_curvature"] * case.rms_slope
+            tabor_parameter = float(material.tabor_parameter(_SUMMIT_RADIUS / curvature))
             tabor.setdefault((case.material, case.surface), []).append(tabor_parameter)
-            value = stickiness(SpectralMoments(0.0, case.rms_slope**2 / 2, curved**2), material)
+            value = stickiness(SpectralMoments(0.0, case.rms_slope**2 / 2, curvature**2), material)
             key = case.surface, case.material
             sticky[key] = max(value, sticky.get(key, 0.0))
     models = {name: study.models for name, study in campaign.studies.items()}

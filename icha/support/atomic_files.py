@@ -57,7 +57,8 @@ def whole_file(path: str | os.PathLike, *, lasting: bool = True) -> Iterator[Pat
             raise OSError(reason.errno, reason.strerror, str(path.parent)) from error
         raise
     finally:
-        _remove(temporary)
+        with suppress(OSError):  # it may be missing, as in a read-only folder
+            temporary.unlink()
 
 
 def move_only_while_owned() -> None:
@@ -101,11 +102,12 @@ def probe_folder(folder: Path) -> OSError | None:
     probe = folder / f".{os.getpid()}.probe{_ENDING}"
     try:
         probe.write_bytes(bytes(_PROBE))
+        return None
     except OSError as error:
         return error
     finally:
-        _remove(probe)
-    return None
+        with suppress(OSError):
+            probe.unlink()
 
 
 def _sync(path: Path) -> None:
@@ -115,11 +117,6 @@ def _sync(path: Path) -> None:
         os.fsync(descriptor)
     finally:
         os.close(descriptor)
-
-
-def _remove(file: Path) -> None:
-    with suppress(OSError):  # it may be missing, as in a read-only folder
-        file.unlink()
 
 
 class Superseded(ValueError):

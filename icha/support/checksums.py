@@ -157,34 +157,30 @@ def with_sidecar(results: str | os.PathLike) -> Iterator[str]:
     top = os.path.join(results, FOLDER)
     for folder, folders, names in os.walk(top):
         folders.sort()
-        below = os.path.relpath(folder, top)
         for name in sorted(names):
             if name.endswith(".json") and not name.startswith("."):
-                yield os.path.normpath(os.path.join(below, name.removesuffix(".json")))
+                yield os.path.relpath(os.path.join(folder, name.removesuffix(".json")), top)
 
 
 def set_aside(results: str | os.PathLike, path: str) -> Path:
     """Rename a result to `<name>.damaged`, `.damaged2` and so on, so that it is made again; return the new path."""
     file = Path(results, path)
-    number = 1
-    while (aside := file.with_name(f"{file.name}.damaged{number if number > 1 else ''}")).exists():
-        number += 1
-    file.rename(aside)
-    return aside
+    names = (file.with_name(f"{file.name}.damaged{number}") for number in ("", *range(2, 10**6)))
+    return file.rename(next(name for name in names if not name.exists()))
 
 
 # Record of a result that is about to be written; no file has an empty digest.
 _BEGUN = Checksum("", 0, 0)
 
 
-def _sidecar(results, path) -> Path:
-    return Path(results, FOLDER, f"{path}.json")
+def _sidecar(results, path) -> str:
+    return os.path.join(results, FOLDER, f"{path}.json")
 
 
 def _read(results, path) -> Checksum | None:
     """Read the sidecar of a result, None without one; raise ValueError if it is not valid."""
     try:
-        with open(os.path.join(results, FOLDER, f"{path}.json"), "rb") as file:
+        with open(_sidecar(results, path), "rb") as file:
             return Checksum(**json.loads(file.read()))
     except FileNotFoundError:
         return None

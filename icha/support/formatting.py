@@ -8,7 +8,7 @@ direction could show `exe.txt` for `txt.exe`; line breaks could forge lines. The
 import math
 import re
 
-_PREFIXES = {-12: "p", -9: "n", -6: "u", -3: "m", 0: ""}
+_PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 _CONTROLS = r"\x00-\x08\x0b-\x1f\x7f-\x9f"
 # Invisible marks, overrides and isolates of direction, separators of lines, surrogates, and tags. The joiners U+200C
 # and U+200D are not among them, because Persian, Indian languages and emoji need them.
@@ -37,14 +37,11 @@ def size(count: float) -> str:
     return f"{count:.0f} B"
 
 
-_SI_PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
-
-
 def choose_unit(value: float, unit: str) -> tuple[float, str]:
     """Return factor and name of the prefixed unit in which `value` (SI) lies between 1 and 1000."""
-    exponent = 0 if value == 0 else math.floor(math.log10(abs(value)) / 3 + 1e-12) * 3
-    exponent = min(max(exponent, min(_SI_PREFIXES)), max(_SI_PREFIXES))
-    return 10.0**-exponent, f"{_SI_PREFIXES[exponent]}{unit}"
+    exponent = 0 if value == 0 else math.floor(math.log10(abs(value)) / 3 + 1e-9) * 3
+    exponent = min(max(exponent, min(_PREFIXES)), max(_PREFIXES))
+    return 10.0**-exponent, f"{_PREFIXES[exponent]}{unit}"
 
 
 def format_quantity(value: float, unit: str) -> str:
@@ -68,9 +65,8 @@ def _digits(value: float, digits: int) -> str:
 
 def length(metres: float) -> str:
     """Format metres with a unit as in configurations, such as `2.5 um`."""
-    power = 3 * math.floor(math.log10(abs(metres)) / 3 + 1e-9) if metres else 0
-    power = min(max(power, min(_PREFIXES)), max(_PREFIXES))
-    return f"{metres * 10.0**-power:.6g} {_PREFIXES[power]}m"
+    factor, unit = choose_unit(metres, "m")
+    return f"{metres * factor:.6g} {unit.replace('µ', 'u')}"
 
 
 def printable(text: object) -> str:

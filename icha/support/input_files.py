@@ -5,7 +5,6 @@ A small file can declare a very large array, or unpack to one. Readers compare d
 """
 
 import csv
-import math
 import os
 import re
 import stat
@@ -15,6 +14,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from icha.support import formatting
+from icha.support.rules import POSITIVE
 
 # Environment variable with the memory limit in MB, and the limit without it.
 VARIABLE = "ICHA_INPUT_MB"
@@ -139,37 +139,29 @@ def refuse_traps(path: str | os.PathLike) -> None:
         def trap(name, link):
             """Return a reason to refuse the file, or None; h5py stops visiting links at the first reason."""
             nonlocal count
-            count += 1
+            count, shown = count + 1, name.decode("utf-8", "replace")
             if count > _MOST_NAMES or name.count(b"/") >= _DEEPEST:
                 return f"it has more than {_MOST_NAMES:,} names, or {_DEEPEST} nested groups; expected fewer"
             if link.type == h5py.h5l.TYPE_EXTERNAL:
-                return f"{_shown(name)} is a link to another file; {_WHOLE}"
+                return f"{shown!r} is a link to another file; {_WHOLE}"
             try:
                 node = h5py.h5o.open(file.id, name)
             except (KeyError, RuntimeError, SystemError):  # a link to nothing, or to itself
                 return None
-            if isinstance(node, h5py.h5d.DatasetID) and _is_external(node.get_create_plist()):
-                return f"{_shown(name)} has its data in another file or dataset; {_WHOLE}"
+            if isinstance(node, h5py.h5d.DatasetID):
+                properties = node.get_create_plist()
+                layout = properties.get_layout()
+                outside = layout == h5py.h5d.CONTIGUOUS and properties.get_external_count() > 0
+                if outside or layout == h5py.h5d.VIRTUAL:
+                    return f"{shown!r} has its data in another file or dataset; {_WHOLE}"
             if isinstance(node, h5py.h5g.GroupID):
                 if (address := h5py.h5o.get_info(node).addr) in groups:
-                    return f"{_shown(name)} is a group with a second name; expected one name for each group"
+                    return f"{shown!r} is a group with a second name; expected one name for each group"
                 groups.add(address)
             return None
 
         if found := file.id.links.visit(trap, info=True):
             raise RefusedFile(found)
-
-
-def _is_external(properties):
-    import h5py
-
-    return properties.get_layout() == h5py.h5d.VIRTUAL or (
-        properties.get_layout() == h5py.h5d.CONTIGUOUS and properties.get_external_count() > 0
-    )
-
-
-def _shown(name):
-    return repr(name.decode("utf-8", "replace"))
 
 
 def read_columns(path: str | Path, columns: dict[str, float]) -> list:
@@ -201,16 +193,13 @@ def read_columns(path: str | Path, columns: dict[str, float]) -> list:
     for heading, factor in columns.items():
         if heading not in rows[0]:
             raise ValueError(f"has no column {heading!r}; expected one of {', '.join(map(str, rows[0]))}")
-        values = [_positive(row[heading], f"column {heading!r}, row {n}") for n, row in enumerate(rows, start=1)]
-        found.append(np.array(values) * factor)
+        numbers = []
+        for number, row in enumerate(rows, start=1):
+            try:
+                numbers.append(POSITIVE.validate("", float(row[heading])))
+            except (TypeError, ValueError):
+                raise ValueError(
+                    f"column {heading!r}, row {number}: {row[heading]!r}; expected a number greater than 0"
+                ) from None
+        found.append(np.array(numbers) * factor)
     return found
-
-
-def _positive(text, where: str) -> float:
-    try:
-        value = float(text)
-    except (TypeError, ValueError):
-        value = math.nan
-    if not 0 < value < math.inf:
-        raise ValueError(f"{where}: {text!r}; expected a number greater than 0")
-    return value

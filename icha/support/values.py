@@ -5,7 +5,6 @@ import operator
 import re
 import unicodedata
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 from decimal import Decimal
 from functools import cache, lru_cache
 from itertools import pairwise
@@ -137,11 +136,9 @@ def _by_pint(unit, si_unit):
 
 def to_si(value, si_unit: str) -> float:
     """Read a quantity with its unit, such as `25 MPa`, as a float in `si_unit`; raise ValueError if it is not one."""
-    if isinstance(value, bool) or not isinstance(value, str | int | float):
-        raise ValueError("is not a number with a unit")
-    if not isinstance(value, str):
+    if isinstance(value, int | float) and not isinstance(value, bool):
         raise ValueError("the unit is missing")
-    match = _QUANTITY.fullmatch(value) if len(value) <= _LONGEST else None
+    match = _QUANTITY.fullmatch(value) if isinstance(value, str) and len(value) <= _LONGEST else None
     if not match:
         raise ValueError("is not a number with a unit")
     magnitude, unit = match.groups()
@@ -183,14 +180,7 @@ def quantity(rule: FloatRange, example: str):
     bounds = f"in {rule.interval} {rule.unit}" if rule.most is not None else "0 or greater"
     expected = f"{PHYSICAL_NAMES[rule.unit]} with its unit, {bounds}, such as {example!r}"
     schema = {"type": "string", "pattern": PATTERN, "examples": [example]}
-    return _float(lambda value: to_si(value, rule.unit), rule, expected, schema, Unit(rule.unit))
-
-
-@dataclass(frozen=True)
-class Unit:
-    """Unit of a quantity, as metadata of its type."""
-
-    si: str
+    return _float(lambda value: to_si(value, rule.unit), rule, expected, schema, rule)
 
 
 def number(rule: FloatRange):
@@ -201,7 +191,7 @@ def number(rule: FloatRange):
 
 
 def _float(convert, rule, expected, schema, *metadata):
-    """Type of a float that `convert` reads and a rule checks; a message says what is expected."""
+    """Type of a float that `convert` reads and a rule checks; the message states what is expected."""
 
     def read(value: Any) -> float:
         try:

@@ -144,15 +144,22 @@ def slope_anisotropy(surface: Surface) -> float:
     return math.sqrt(most / least) if least > _NO_SLOPE * most else math.inf
 
 
-def radial_power_spectrum(surface: Surface) -> tuple[np.ndarray, np.ndarray]:
-    """Compute the isotropic power spectrum C(q) (m^4), the mean over the wave vectors of a ring, and q (rad/m).
+def radial_power_spectrum(surface: Surface) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Compute the isotropic power spectrum, the mean over the wave vectors of a ring.
 
     The integral of C over the plane of wave vectors is the mean square height. Rings are one wave number 2 pi/L wide,
     from the tenth on a tenth of their wave number; the last one is the largest circle in the grid of wave vectors. A
     free square is multiplied by Hann's window first, and C divided by its mean square, because the step from one edge
     to the other would add waves.
+
+    Returns
+    -------
+    mean wave numbers q of the rings (rad/m), C(q) (m^4), and the wave numbers between the rings, one more than rings.
     """
-    edges, periodic, scale = _ring_edges(surface), surface, 1.0
+    last, edges = (surface.grid - 1) // 2, [0.5]
+    while edges[-1] < last:
+        edges.append(min(max(edges[-1] + 1, math.floor(1.1 * edges[-1]) + 0.5), last + 0.5))
+    periodic, scale = surface, 1.0
     if surface.free:
         hann = np.sin(np.pi * (np.arange(surface.grid) + 0.5) / surface.grid) ** 2
         periodic = replace(surface, heights=surface.heights * (hann[:, None] * hann), boundary="periodic")
@@ -167,18 +174,4 @@ def radial_power_spectrum(surface: Surface) -> tuple[np.ndarray, np.ndarray]:
 
     count, wave_number, power = np.sum(periodic.by_wave_vector(rings), axis=0)[:, 1:-1]
     unit = 2 * np.pi / surface.period
-    return unit * wave_number / count, scale * power / count / unit**2
-
-
-def ring_edges(surface: Surface) -> np.ndarray:
-    """Return the wave numbers (rad/m) between the rings of `radial_power_spectrum`, one more than rings."""
-    return 2 * np.pi / surface.period * _ring_edges(surface)
-
-
-def _ring_edges(surface):
-    """Edges of the rings in 2 pi/L."""
-    last = (surface.grid - 1) // 2
-    edges = [0.5]
-    while edges[-1] < last:
-        edges.append(min(max(edges[-1] + 1, math.floor(1.1 * edges[-1]) + 0.5), last + 0.5))
-    return np.array(edges)
+    return unit * wave_number / count, scale * power / count / unit**2, unit * np.array(edges)

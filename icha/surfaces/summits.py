@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 import scipy.ndimage
@@ -24,19 +25,17 @@ _CURVATURE = np.array([1.0, 2.0, -6.0, 2.0, 1.0]) / 6
 
 # Quintic B-splines of the six nodes around a point, as polynomials of its distance t from the third node (rows: nodes;
 # columns: powers of t), and their first and second derivatives.
-_BASIS = (
-    np.array(
-        [
-            [1.0, -5.0, 10.0, -10.0, 5.0, -1.0],
-            [26.0, -50.0, 20.0, 20.0, -20.0, 5.0],
-            [66.0, 0.0, -60.0, 0.0, 30.0, -10.0],
-            [26.0, 50.0, 20.0, -20.0, -20.0, 10.0],
-            [1.0, 5.0, 10.0, 10.0, 5.0, -5.0],
-            [0.0, 0.0, 0.0, 0.0, 0.0, 1.0],
-        ]
-    )
-    / 120
+_BASIS = np.array(
+    [
+        [1.0, -5.0, 10.0, -10.0, 5.0, -1.0],
+        [26.0, -50.0, 20.0, 20.0, -20.0, 5.0],
+        [66.0, 0.0, -60.0, 0.0, 30.0, -10.0],
+        [26.0, 50.0, 20.0, -20.0, -20.0, 10.0],
+        [1.0, 5.0, 10.0, 10.0, 5.0, -5.0],
+        [0.0, 0.0, 0.0, 0.0, 0.0, 1.0],
+    ]
 )
+_BASIS /= 120
 _BASIS_SLOPE = _BASIS[:, 1:] * np.arange(1, 6)
 _BASIS_CURVATURE = _BASIS_SLOPE[:, 1:] * np.arange(1, 5)
 
@@ -61,9 +60,6 @@ _POINTS = 4096
 # Largest shares of the load without a summit, and of summits without support, with which asperities represent the
 # surface. Smooth random surfaces with at least 5 nodes per shortest wave stay below 0.1 (`tests/surfaces`).
 MAX_SHARE = 0.1
-# Rows and columns between a node and its summit: on a crest oblique to the grid two nodes beside one summit are higher
-# than their neighbours.
-_NEIGHBOURHOOD = range(-2, 3)
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,11 +172,8 @@ def _is_supported(heights, summit, height):
     (row, column), (y, x) = np.floor(summit).astype(int).T, np.mod(np.rint(summit).astype(int), grid).T
     rows, columns = np.mod([row, row + 1], grid), np.mod([column, column + 1], grid)
 
-    def bend(line, before, after):
-        return 2 * line - before - after
-
-    bend_x = bend(heights[y, columns], heights[y, columns - 1], heights[y, (columns + 1) % grid])
-    bend_y = bend(heights[rows, x], heights[rows - 1, x], heights[(rows + 1) % grid, x])
+    bend_x = 2 * heights[y, columns] - heights[y, columns - 1] - heights[y, (columns + 1) % grid]
+    bend_y = 2 * heights[rows, x] - heights[rows - 1, x] - heights[(rows + 1) % grid, x]
     rise = (np.maximum(bend_x.min(axis=0), 0.0) + np.maximum(bend_y.min(axis=0), 0.0)) / 8
     corners = heights[rows[:, None], columns[None, :]].max(axis=(0, 1))
     return height - corners <= _MAX_RISE * rise + _ROUNDING * np.ptp(heights)
@@ -189,20 +182,17 @@ def _is_supported(heights, summit, height):
 def _spline_coefficients(heights):
     """Compute the coefficients (n, n) of the periodic quintic spline through the heights."""
     coefficients = np.empty_like(heights)
+    transform = partial(scipy.ndimage.spline_filter1d, order=_DEGREE, axis=1, mode="grid-wrap")
 
     def along_x(rows):
-        _spline_filter(heights[rows], output=coefficients[rows])
+        transform(heights[rows], output=coefficients[rows])
 
     def along_y(columns):
-        coefficients[:, columns] = _spline_filter(np.ascontiguousarray(coefficients[:, columns].T)).T
+        coefficients[:, columns] = transform(np.ascontiguousarray(coefficients[:, columns].T)).T
 
     on_cores(along_x, blocks(len(heights), _LINES))
     on_cores(along_y, blocks(len(heights), _LINES))
     return coefficients
-
-
-def _spline_filter(lines, output=np.float64):
-    return scipy.ndimage.spline_filter1d(lines, order=_DEGREE, axis=1, output=output, mode="grid-wrap")
 
 
 def _climb(coefficients, node, flat):
@@ -362,16 +352,24 @@ class SummitCoverage:
 
     @classmethod
     def of(cls, surface: Surface, asperities: Asperities) -> SummitCoverage:
-        """Compare the nodes of a surface with its summits."""
-        grid = surface.grid
-        rows, columns = _peaks(surface)
+        """Compare the nodes of a surface with its summits; the edges of a free square have no peaks."""
+        heights, grid = surface.heights, surface.grid
+
+        def examine(rows):
+            block = heights[np.arange(rows.start - 1, rows.stop + 1) % grid]
+            row, column = np.nonzero(block[1:-1] >= scipy.ndimage.maximum_filter(block, 3, mode="wrap")[1:-1])
+            return np.array([row + rows.start, column])
+
+        row, column = np.concatenate(on_cores(examine, blocks(grid, _LINES)), axis=1)
+        if surface.free:
+            inside = (np.minimum(row, column) > 0) & (np.maximum(row, column) < grid - 1)
+            row, column = row[inside], column[inside]
         x, y = np.mod(np.rint(asperities.position / surface.spacing).astype(int), grid).T
         occupied = np.zeros((grid, grid), dtype=bool)
-        for down in _NEIGHBOURHOOD:
-            for across in _NEIGHBOURHOOD:
-                occupied[(y + down) % grid, (x + across) % grid] = True
-        peaks = surface.heights[rows, columns], occupied[rows, columns]
-        return cls(*peaks, asperities.height, asperities.unsupported_height)
+        # On a crest oblique to the grid two nodes beside one summit are higher than their neighbours.
+        for down, across in np.ndindex(5, 5):
+            occupied[(y + down - 2) % grid, (x + across - 2) % grid] = True
+        return cls(heights[row, column], occupied[row, column], asperities.height, asperities.unsupported_height)
 
     def uncovered_share(self, separation: float) -> float:
         """Share of the load, at a mean separation (m), on places without a summit.
@@ -391,34 +389,11 @@ class SummitCoverage:
 
     def reasons_against(self, separations: Iterable[float]) -> list[str]:
         """Return the reasons why asperities do not represent the surface at these mean separations (m)."""
-        separations, reasons = np.unique(list(separations)), []
+        separations = np.unique(list(separations))
         uncovered = max(map(self.uncovered_share, separations), default=0.0)
-        if uncovered > MAX_SHARE:
-            reasons.append(
-                f"no summit stands for {100 * uncovered:.0f} % of the highest places, by their share of the load"
-            )
         unsupported = max(map(self.unsupported_share, separations), default=0.0)
-        if unsupported > MAX_SHARE:
-            reasons.append(
-                f"{100 * unsupported:.0f} % of the summits within reach are not supported by the nodes around them"
-            )
-        return reasons
-
-
-def _peaks(surface: Surface) -> tuple[np.ndarray, np.ndarray]:
-    """Return rows and columns (k,) of the nodes not lower than their neighbours, without edges of a free square."""
-    heights, grid = surface.heights, surface.grid
-
-    def examine(rows):
-        block = heights[np.arange(rows.start - 1, rows.stop + 1) % grid]
-        # Maxima along y of three nodes, then along x.
-        highest = np.maximum(np.maximum(block[:-2], block[1:-1]), block[2:])
-        highest = np.maximum(np.maximum(np.roll(highest, 1, axis=1), highest), np.roll(highest, -1, axis=1))
-        row, column = np.nonzero(block[1:-1] >= highest)
-        return np.array([row + rows.start, column])
-
-    row, column = np.concatenate(on_cores(examine, blocks(grid, _LINES)), axis=1)
-    if surface.free:
-        inside = (np.minimum(row, column) > 0) & (np.maximum(row, column) < grid - 1)
-        row, column = row[inside], column[inside]
-    return row, column
+        shares = {
+            "no summit stands for {:.0f} % of the highest places, by their share of the load": uncovered,
+            "{:.0f} % of the summits within reach are not supported by the nodes around them": unsupported,
+        }
+        return [reason.format(100 * share) for reason, share in shares.items() if share > MAX_SHARE]

@@ -21,7 +21,6 @@ from icha.surfaces.square import problem_with_heights
 
 # A square that repeats, or a single one on a half-space.
 PERIODIC, FREE = "periodic", "free"
-BOUNDARIES = (PERIODIC, FREE)
 
 # Range of heights over the period.
 _STEEPNESS = FloatRange(least=1e-24, most=1e9)
@@ -86,8 +85,8 @@ class Surface:
         heights -= heights.mean()
         heights.flags.writeable = False
         object.__setattr__(self, "heights", heights)
-        if self.boundary not in BOUNDARIES:
-            raise ValueError(f"boundary: {self.boundary!r} must be one of {', '.join(BOUNDARIES)}")
+        if self.boundary not in (PERIODIC, FREE):
+            raise ValueError(f"boundary: {self.boundary!r} must be one of {PERIODIC}, {FREE}")
         # `icha describe` reports it for surfaces that this package makes.
         caller = sys._getframe(2).f_globals.get("__name__", "")
         if not self.free and not caller.startswith(("icha.", "dataclasses")) and not edges_fit(heights):
@@ -151,10 +150,8 @@ class Surface:
         if self.free:
             return _mean_squares(self.heights, self.spacing)
 
-        def sums(k2, _, power):
-            return [np.sum(power), np.sum(power * k2), np.sum(power * k2**2)]
-
-        moments = np.sum(self.by_wave_vector(sums), axis=0)
+        sums = self.by_wave_vector(lambda k2, _, power: [np.sum(power), np.sum(power * k2), np.sum(power * k2**2)])
+        moments = np.sum(sums, axis=0)
         q2 = (2 * np.pi / self.period) ** 2
         return float(moments[0]), float(moments[1] * q2), float(moments[2] * q2**2)
 
@@ -183,13 +180,14 @@ class Surface:
         In full contact the pressure q E* h_q/2 flattens a wave of amplitude h_q. A free square counts as a quarter of
         the periodic surface that it forms with its mirror images, which has no steps at the edges.
         """
-        if self.free:
-            return _mirrored_energy(self.heights, self.period)
-
-        def sums(k2, _, power):
-            return float(np.sum(np.sqrt(k2) * power))
-
-        return math.pi / (2 * self.period) * sum(self.by_wave_vector(sums))
+        if not self.free:
+            sums = self.by_wave_vector(lambda k2, _, power: float(np.sum(np.sqrt(k2) * power)))
+            return math.pi / (2 * self.period) * sum(sums)
+        # The cosine series of period 2 L; with orthonormal coefficients the mean square height is their sum of squares
+        # over the number of nodes (Parseval).
+        power = scipy.fft.dctn(self.heights, norm="ortho", workers=1) ** 2
+        k2 = np.arange(self.grid) ** 2.0
+        return math.pi / (4 * self.period) * float(np.sum(np.sqrt(k2[:, None] + k2) * power)) / power.size
 
     @property
     def complete_contact_pressure(self) -> float:
@@ -279,11 +277,3 @@ def _mean_squares(heights, spacing):
 
     slope2 = sum(sum(on_cores(along, blocks(n, _LINES))) for along in (along_x, along_y))
     return float(np.mean(heights**2)), float(slope2 / n**2), float(np.mean(laplacian**2))
-
-
-def _mirrored_energy(heights, period):
-    """Compute `Surface.full_contact_energy` of a square and its mirror images, by a cosine series of period 2 L."""
-    power = scipy.fft.dctn(heights, norm="ortho", workers=1) ** 2
-    k2 = np.arange(len(heights)) ** 2.0
-    # Parseval: with orthonormal coefficients the mean square height is their sum of squares over the nodes.
-    return math.pi / (4 * period) * float(np.sum(np.sqrt(k2[:, None] + k2) * power)) / heights.size

@@ -61,11 +61,10 @@ def told(*arguments):
 def test_each_kind_is_said_in_one_line():
     models = {"load": ["asperities", "boundary_elements"], "pull": ["asperities"]}
     found = told(models, [case(INSIDE), case(BARE, material="bare")], "")
-    assert list(found) == ["models", "adhesion", "jump-in", "surfaces", "accuracy"]
+    assert list(found) == ["models", "adhesion", "jump-in", "accuracy"]
     assert all(good for _, good in found.values())
     assert "asperities in load, pull" in found["models"][0] and "boundary elements in load" in found["models"][0]
     assert "8 to 25 %" in found["accuracy"][0] and "5 to 21 %" in found["accuracy"][0]
-    assert "rough: anisotropy of slopes 1, skewness of heights 0" in found["surfaces"][0]
     assert "8 to 25 %" not in told({}, [case(BARE)])["accuracy"][0]
     assert set(told({}, [case({"full_contact_energy_ratio": math.inf}, model="boundary_elements")])) == {"models"}
     assert join_first("abcdef") == "a, b, c, d and 2 more" and join_first("ab") == "a, b"
@@ -141,7 +140,6 @@ def test_the_data_say_where_spots_lay_outside():
     found = {each.about: each for each in statements_on_dataset(small.tree())}
     assert found["models"].text == "asperities in slopes, single"
     assert "nodes per shortest wave" in found["accuracy"].text and not found["accuracy"].good
-    assert found["surfaces"].text.startswith("rough: anisotropy of slopes 1, skewness of heights ")
     least = min(float(run["full_contact_energy_ratio"]) for _, run in small.runs())
     assert f"U_full/dgamma is about {least:.3g} or more (soft on rough)" in found["adhesion"].text
     assert found["jump-in"].good and found["jump-in"].text.endswith("; all cases inside")

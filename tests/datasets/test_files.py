@@ -432,9 +432,3 @@ def test_studies_and_runs_are_plotted_against_load_or_separation_by_xarray_alone
         np.testing.assert_array_equal(line.get_xdata(), one[name].values)
         plt.close()
         assert one.swap_dims(step=name).dims == (name,)
-
-
-def test_the_root_of_a_campaign_says_where_its_data_are(tmp_path):
-    write_campaign(small.runs(), tmp_path / "c.nc")
-    comment = xr.open_dataset(tmp_path / "c.nc").attrs["comment"]
-    assert "slopes, single" in comment and "xarray.open_datatree(FILE)['slopes']" in comment

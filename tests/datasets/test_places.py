@@ -112,19 +112,6 @@ def test_xarray_alone_selects_a_surface_and_its_slope(tmp_path):
         assert group["pressure_bin_edges"].dimensions[:3] == ("surface", "rms_slope", "material")
 
 
-def test_cells_grow_with_the_number_of_surfaces(tmp_path):
-    sizes = {}
-    for count in (5, 10, 20):
-        write_campaign(crops.many(count), tmp_path / "a.nc")
-        tree = read_campaign(tmp_path / "a.nc")
-        study = tree[crops.STUDY].to_dataset()
-        assert study["status"].size == 3 * count
-        sizes[count] = study.nbytes
-        (compared,) = compare_campaign(tree).children.values()
-        assert compared["contact_area_fraction"].size % (3 * count) == 0 and compared["status"].size == 3 * count
-    assert sizes[20] - sizes[10] == pytest.approx(2 * (sizes[10] - sizes[5]), rel=0.01)
-
-
 @pytest.mark.slow
 def test_figures_of_either_form_show_the_same():
     study, tree, other = crops.STUDY, crops.tree(), crops.square_tree()

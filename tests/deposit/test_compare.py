@@ -104,10 +104,10 @@ PLANTED = {
     "type of an attribute": (attribute("pressure", "factor", "2.5"), "/pressure", DIFFERENT, "attribute factor"),
     "more attributes": (attribute("pressure", "comment", "x"), "/pressure", DIFFERENT, "attribute comment: None"),
     "attribute of the file": (attribute("", "title", "Another"), "/ (attributes)", DIFFERENT, "attribute title"),
-    "missing variable": (rename("Variable", "count", "number"), "/count", MISSING, "the rerun has none"),
-    "extra variable": (rename("Variable", "count", "number"), "/number", EXTRA, "the deposit has none"),
-    "missing group": (rename("Group", "study", "other"), "/study (group)", MISSING, "the rerun has none"),
-    "extra group": (rename("Group", "study", "other"), "/other (group)", EXTRA, "the deposit has none"),
+    "missing variable": (rename("Variable", "count", "number"), "/count", MISSING, "only in the deposit"),
+    "extra variable": (rename("Variable", "count", "number"), "/number", EXTRA, "only in the rerun"),
+    "missing group": (rename("Group", "study", "other"), "/study (group)", MISSING, "only in the deposit"),
+    "extra group": (rename("Group", "study", "other"), "/other (group)", EXTRA, "only in the rerun"),
 }  # fmt: skip
 
 

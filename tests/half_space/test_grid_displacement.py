@@ -122,7 +122,7 @@ def test_windows_hold_every_node_within_reach_once(grid, reach):
     found = np.zeros((3, grid, grid), dtype=int)
     for rows in (slice(0, 6), slice(6, 7), slice(7, grid)):
         for window in windows(centres, reach, grid, 1.0, rows):
-            for spot, dy, dx, node in zip(window.spot, window.dy, window.dx, window.node, strict=True):
+            for spot, dy, dx, node in zip(*window, strict=True):
                 row, column = node // grid + rows.start, node % grid
                 assert np.all(row == row[0])
                 np.testing.assert_allclose(np.mod(centres[spot, 1] + dy - row[0] / grid + 0.5, 1), 0.5, atol=1e-12)

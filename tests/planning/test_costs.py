@@ -7,10 +7,9 @@ import numpy as np
 import own_slopes_campaign as crops
 import pytest
 
-from icha.contact.model import GAP_BINS, PRESSURE_BINS
 from icha.contact.models import DEFAULT_MODEL, MODELS, REFERENCE_MODEL
 from icha.datasets.campaign import campaign_tree
-from icha.datasets.labels import count_cells
+from icha.datasets.files import write_dataset
 from icha.planning import costs
 from icha.planning.validity import self_affine_moments
 from icha.surfaces.moments import summit_density
@@ -69,26 +68,23 @@ def test_costs_grow_with_what_is_asked_for(model):
 
 
 def test_maps_take_the_memory_of_their_topography():
-    assert costs.figure_cost(10, 10**8, models=2).memory > 3 * costs.figure_cost(10, 10**8).memory
+    one, two = (costs.derived_cost("figure", 10, 1.0, nodes=10**8, models=models).memory for models in (1, 2))
+    assert two > 3 * one
     big = costs.surface_cost(8192)
     assert big.disk == pytest.approx(8 * 8192**2, rel=0.01) and big.memory > big.disk
 
 
-def test_memory_of_a_dataset_is_that_of_its_arrays():
-    assert (costs.GAP_EDGES, costs.PRESSURE_EDGES) == (len(GAP_BINS), len(PRESSURE_BINS))
+def test_memory_of_a_dataset_is_estimated_from_the_files_of_its_runs(tmp_path):
     runs = list(crops.many(20))
-    study = campaign_tree(runs)[crops.STUDY].to_dataset()
-    sizes = runs[0][1].sizes
-    recorded = costs.Recorded(sizes["step"], sizes["snapshot"], sizes["spot"])
-    cells = count_cells([labels for labels, _ in runs])
-    assert cells == study["status"].size == 60
-    expected = costs.dataset_memory(cells, [recorded] * len(runs))
-    assert expected == pytest.approx(study.nbytes, rel=0.25)
-    # Large arrays stay in the file.
-    assert costs.dataset_memory(10**5, [recorded] * 10**5) < 0.5 * 10**5 / cells * expected
-    for job in (costs.table_cost("checks", 60, 1.0, 1e9), costs.figure_cost(60, 0, dataset=1e9)):
-        assert job.memory > 1e9
-    assert costs.table_cost("dataset", 60, 1.0, 1e9).memory < 1e9  # written block by block
+    arrays = campaign_tree(runs)[crops.STUDY].to_dataset().nbytes
+    write_dataset(runs[0][1], tmp_path / "run.nc")
+    values = len(runs) * ((tmp_path / "run.nc").stat().st_size - 40e3)
+    memory = costs.derived_cost("checks", 60, 1.0, values).memory - costs.derived_cost("checks", 60, 1.0).memory
+    # Reading and using a dataset takes 2.7 times its arrays.
+    assert memory == pytest.approx(2.7 * arrays, rel=0.5)
+    # Large arrays stay in the file, and the dataset is written block by block.
+    assert costs.derived_cost("checks", 10**5, 1.0, 1e12).memory < 2e9
+    assert costs.derived_cost("dataset", 60, 1.0, 1e9).memory < 1e8
 
 
 def test_what_jobs_took_corrects_what_is_expected_of_others():

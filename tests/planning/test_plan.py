@@ -10,7 +10,7 @@ from icha.planning import requirements
 from icha.planning.costs import WORKFLOW, Cost
 from icha.planning.plan import DONE, TO_DO, Item, memory_on, plan, start_up, time_on
 from icha.planning.results import campaign_files
-from icha.planning.validity import expected_summits
+from icha.planning.validity import surface_facts
 from icha.surfaces.measured.topography import prepared_topography
 from icha.surfaces.summits import find_summits
 
@@ -51,9 +51,9 @@ def campaign(tmp_path):
 def test_the_summits_of_a_measured_surface_are_counted_in_its_file(campaign):
     section = campaign.surfaces["scan"]
     surface = prepared_topography(section.path, section.preparation).surface
-    counted = expected_summits(campaign, "scan")
+    counted = surface_facts(campaign, "scan")["summits"]
     assert counted == len(find_summits(surface))
-    assert expected_summits(campaign, "map") != pytest.approx(counted, rel=0.1)
+    assert surface_facts(campaign, "map")["summits"] != pytest.approx(counted, rel=0.1)
 
 
 def test_every_file_that_costs_something_is_planned(campaign, tmp_path):

@@ -10,7 +10,7 @@ from icha.asperity.material import Material
 from icha.asperity.stickiness import stickiness
 from icha.configuration.load import load_configuration
 from icha.datasets.campaign_file import write_campaign
-from icha.planning.validity import expected_validity, found_validity, rms_curvature
+from icha.planning.validity import expected_validity, found_validity, surface_facts
 from icha.surfaces.measured.topography import prepared_topography
 from icha.surfaces.moments import spectral_moments
 
@@ -49,10 +49,12 @@ def campaign(tmp_path):
 
 def test_curvatures_are_those_of_the_surfaces(campaign):
     surface = small.surface()
-    assert rms_curvature(campaign, "rough") == pytest.approx(surface.rms_curvature / surface.rms_slope, rel=0.1)
+    assert surface_facts(campaign, "rough")["rms_curvature"] == pytest.approx(
+        surface.rms_curvature / surface.rms_slope, rel=0.1
+    )
     section = campaign.surfaces["scan"]
     scan = prepared_topography(section.path, section.preparation).surface
-    assert rms_curvature(campaign, "scan") == pytest.approx(scan.rms_curvature / scan.rms_slope)
+    assert surface_facts(campaign, "scan")["rms_curvature"] == pytest.approx(scan.rms_curvature / scan.rms_slope)
 
 
 def test_materials_and_surfaces_outside_are_named_before_the_run(campaign):

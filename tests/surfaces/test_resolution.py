@@ -32,7 +32,7 @@ def test_noise_of_each_pixel_is_found_with_its_height(boundary, noise):
 def test_the_slope_that_a_cut_off_leaves(examined):
     rough = SPECTRUM.realise(GRID, 1)
     for cutoff in (4e-6, 8e-6):
-        filtered = examined(rough, cutoff=cutoff).used
+        filtered = examined(rough, cutoff=cutoff).surface
         assert filtered_slope_share(rough, cutoff) == pytest.approx(filtered.rms_slope / rough.rms_slope, rel=0.05)
 
 
@@ -75,14 +75,14 @@ def test_above_the_noise_a_cutoff_is_advised_that_removes_it(examined):
     assert again.advice == {} and again.noise == scan.noise
     assert again.summits < 0.5 * scan.summits
     clean = examined(noisy(0.0), cutoff=scan.advice["cutoff"])
-    assert abs(again.used.rms_slope / clean.used.rms_slope - 1) < 0.05
+    assert abs(again.surface.rms_slope / clean.surface.rms_slope - 1) < 0.05
 
 
 def test_summits_are_those_of_the_surface_that_is_used(examined):
     for keys in ({"boundary": "free"}, {"boundary": "mirror"}, {"boundary": "window", "taper": 0.1, "grid": 96}):
         scan = examined(noisy(10e-9), **keys)
-        assert scan.summits == len(find_summits(scan.used)) + len(find_summits(scan.used).unsupported_height)
-        assert scan.cells_per_summit == pytest.approx(scan.used.grid**2 / scan.summits)
+        assert scan.summits == len(find_summits(scan.surface)) + len(find_summits(scan.surface).unsupported_height)
+        assert scan.cells_per_summit == pytest.approx(scan.surface.grid**2 / scan.summits)
         assert scan.measured.grid == GRID
 
 

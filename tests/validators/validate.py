@@ -291,31 +291,6 @@ def stay_off_the_network() -> None:
     sys.addaudithook(refuse)
 
 
-def check_units(folder: Path) -> Outcome:
-    """cf-units: every unit of every variable is one that UDUNITS knows."""
-    import netCDF4
-    from cf_units import Unit
-
-    where: dict[str, str] = {}
-    for path in sorted(folder.rglob("*.nc")):
-        with netCDF4.Dataset(path) as data:
-            pending = [data]
-            while pending:
-                group = pending.pop()
-                pending += group.groups.values()
-                for name, variable in group.variables.items():
-                    if "units" in variable.ncattrs():
-                        place = f"{path.relative_to(folder)}:{group.path.rstrip('/')}/{name}"
-                        where.setdefault(str(variable.units), place)
-    problems = []
-    for unit, place in where.items():
-        try:
-            Unit(unit)
-        except ValueError as error:
-            problems.append(f"{place}: {error}")
-    return Outcome(f"{len(where)} units", problems)
-
-
 VALIDATORS: dict[str, Callable[[Path], Outcome]] = {
     "sha256sum": check_checksums,
     "roc-validator": check_crate,
@@ -324,7 +299,6 @@ VALIDATORS: dict[str, Callable[[Path], Outcome]] = {
     "datacite": check_datacite,
     "zenodo": check_zenodo,
     "compliance-checker": check_conventions,
-    "cf-units": check_units,
 }
 
 

@@ -4,7 +4,7 @@ import numpy as np
 
 from icha.datasets.variables.terms import Variable, bin_table, read_tables
 
-# Only complete runs are results. A run with failed checks has all of its values, which are not to be used.
+# Only complete runs are results. A run with failed checks has all its values, but they must not be used.
 COMPLETE, INCOMPLETE, MISSING, NOT_IN_DESIGN, FAILED_CHECKS = range(5)
 STATUS_MEANINGS = ("complete", "incomplete", "missing", "not_in_design", "failed_checks")
 # Status of runs that have a file.
@@ -34,8 +34,8 @@ def index_variable(dim: str, label: str) -> Variable:
 
 
 _TOPOGRAPHY = ("surface", "seed", "rms_slope")
-# The labels with which a variable of the runs varies; all five where it is not listed. The snapshots' targets are those
-# of the study's path; the bins are fixed in units of h_rms and of E* h'_rms.
+# The labels on which a variable of the runs depends; a variable that is not listed depends on all five. Targets of
+# snapshots belong to the path of the study. Bins are fixed in units of h_rms (gap) and of E* h'_rms (pressure).
 VARIES_WITH = {
     **dict.fromkeys(("contact_modulus", "surface_energy", "interaction_range", "flaw_radius"), ("material",)),
     **dict.fromkeys(("theoretical_strength", "interface_strength"), ("material",)),

@@ -1,6 +1,7 @@
-"""Variables of the error of the model, without the labels of runs and the load along which all lie.
+"""Variables of the error of the asperity model, without the dimensions that all have: labels of runs, and the load.
 
-In the limit of a short range contact has an edge beyond which nothing acts: all areas of boundary elements are one.
+In the limit of a short range of attraction, contact has a sharp edge. There all areas of boundary elements (raw,
+corrected, energetic) are the same.
 """
 
 from icha.contact.models import MODELS, REFERENCE_MODEL
@@ -9,7 +10,7 @@ from icha.datasets.variables.terms import Variable, bin_table, read_tables
 # References with which the model is compared: the attribute `truth` of an entry.
 SHORT_RANGE, FINITE_RANGE = MODELS[REFERENCE_MODEL].words, "boundary elements at finite range"
 
-ASKED = Variable(("reduced_pressure",), "1", "reduced pressure asked for, p/(E* h'rms)", coordinate=True)
+ASKED = Variable(("reduced_pressure",), "1", "target of the reduced pressure, p/(E* h'rms)", coordinate=True)
 _OF_SNAPSHOTS = ("gap_distribution_distance", "pressure_distribution_distance", "gap_density", "pressure_density")
 _OF_SNAPSHOTS += ("jaccard", "shared_of_icha", "shared_of_boundary_elements")
 _MISSING = {name: {"missing": "where the runs keep no snapshot"} for name in _OF_SNAPSHOTS}

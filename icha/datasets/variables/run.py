@@ -14,8 +14,8 @@ CELLS = ("row", "column")
 def _index_of(dim: str) -> dict[str, str]:
     """Return the attributes of an index of CF's indexed ragged arrays (CF 1.11, section 9.3.4).
 
-    Spots and events stand one after the other; the index names the snapshot or step of each. CF's feature types, all of
-    a time or a place on earth, are not claimed.
+    Spots and events follow each other; the index gives the snapshot or step of each. The attribute `featureType` of CF
+    is left out, because it requires times and places on earth.
     """
     return {
         "instance_dimension": dim,

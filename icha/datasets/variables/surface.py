@@ -5,4 +5,6 @@ from icha.datasets.variables.terms import TERMS, read_tables
 _ATTRIBUTES = {
     "psd_wavevector": {"bounds": "psd_wavevector_bounds", "comment": "mean over the ring's wave vectors"},
 }
-SURFACE = read_tables("surface.txt", TERMS, _ATTRIBUTES)[""]
+# Variables of every surface, of random ones, and of measured ones.
+TABLES = list(read_tables("surface.txt", TERMS, _ATTRIBUTES).values())
+SURFACE = TABLES[0] | TABLES[1] | TABLES[2]

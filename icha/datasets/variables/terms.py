@@ -84,8 +84,8 @@ def bin_table(quantity: str, units: str, over: str = "") -> Table:
     """Describe the variables of the bins of a quantity.
 
     `<quantity>_bin_edges` are the edges; `<quantity>_bin_centre`, a coordinate, has `<quantity>_bin_bounds` as its
-    bounds (CF 1.11, section 7.1), with its units and its long name. In Pa it must not be a coordinate variable, along a
-    dimension of its own name, which CF would take for a height.
+    bounds (CF 1.11, section 7.1), with its units and its long name. In Pa it must not be a coordinate variable (a
+    variable along a dimension of its own name), because CF would read it as a height.
 
     Parameters
     ----------

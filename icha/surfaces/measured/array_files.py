@@ -28,8 +28,6 @@ _WITHOUT_SIGNATURE = ("hgt", "nms")
 # Formats that do not identify an instrument: SurfaceTopography finds them in any text with numbers, of which it
 # drops other fields, and in any file of a certain length.
 _OF_ANY_TEXT = ("asc", *_WITHOUT_SIGNATURE)
-# Attributes of packed numbers, and their values if they are left out.
-_PACKING = {"scale_factor": 1.0, "add_offset": 0.0}
 # Formats of arrays without a default one.
 _ARRAYS = ("mat", "npz")
 _UNKNOWN = (
@@ -68,44 +66,35 @@ def read_netcdf(source, settings: Preparation) -> FileContent:
     import netCDF4
 
     with netCDF4.Dataset(source.path) as file:
-        shapes = {name: variable.shape for name, variable in file.variables.items()}
-        plane = find_maps(shapes)
-        asked = (
-            settings.data
-            if settings.data in shapes
-            else choose_name(settings.data, plane, ("height", "heights", "z"), "variable")
-        )
-        chosen = file[asked]
+        maps = find_maps({name: variable.shape for name, variable in file.variables.items()})
+        asked = settings.data if settings.data in file.variables else None
+        name = asked or choose_name(settings.data, maps, ("height", "heights", "z"), "variable")
+        chosen = file[name]
         if not _is_map(chosen.shape):
             raise UnfitTopography(
-                "data", f"has {chosen.ndim} dimensions; expected two, as {', '.join(plane) or 'no variable has'}"
+                "data", f"has {chosen.ndim} dimensions; expected two, as {', '.join(maps) or 'no variable has'}"
             )
         heights = _read_variable(chosen)
         heights = heights.reshape(heights.shape[-2:])
-        dimensions = chosen.dimensions[-2:]
-        names = [name.lower() for name in dimensions]
-        turned = names[0] == "x" if set(names) == {"x", "y"} else settings.first_axis == "x"
-        sides = []
-        for axis, name in enumerate(dimensions):
-            side, backwards = _side(file.variables.get(name), heights.shape[axis])
+        dimensions, sides = chosen.dimensions[-2:], []
+        for axis, dimension in enumerate(dimensions):
+            side, falls = _side(file.variables.get(dimension), heights.shape[axis])
             sides.append(side)
-            if backwards:
-                heights = np.flip(heights, axis)
+            heights = np.flip(heights, axis) if falls else heights
         unit = _unit_of(chosen.__dict__)
-    along_y, along_x = sides[::-1] if turned else sides
-    size = (along_x, along_y) if along_x and along_y else None
-    return FileContent(heights.T if turned else heights, unit, size, data=asked if len(plane) > 1 else "")
+    axes = [dimension.lower() for dimension in dimensions]
+    x_first = axes[0] == "x" if set(axes) == {"x", "y"} else settings.first_axis == "x"
+    size = tuple(sides if x_first else sides[::-1]) if all(sides) else None
+    return FileContent(heights.T if x_first else heights, unit, size, data=name if len(maps) > 1 else "")
 
 
 def _side(coordinate, count):
     """Return the length of a side in m, None if the file does not give it, and whether its coordinate falls."""
     if coordinate is None or coordinate.ndim != 1:
         return None, False
-    attributes = coordinate.__dict__
-    unit = _unit_of(attributes)
-    values = _read_variable(coordinate)
-    if unit is not None and "length" in attributes:
-        return float(attributes["length"]) * unit, False
+    unit, values = _unit_of(coordinate.__dict__), _read_variable(coordinate)
+    if unit is not None and "length" in coordinate.__dict__:
+        return float(coordinate.length) * unit, False
     if count < 2:
         return None, False
     _, ticks, step = regular_ticks(values, coordinate.name)
@@ -130,16 +119,16 @@ def read_hdf5(source, settings: Preparation) -> FileContent:
                 shapes[name] = node.shape
 
         file.visititems(add)
-        plane = sorted(find_maps(shapes))
+        maps = sorted(find_maps(shapes))
         asked = settings.data.strip("/") if settings.data else None
-        name = str(asked) if asked in shapes else choose_name(asked, plane, (), "dataset")
+        name = asked if asked and asked in shapes else choose_name(asked, maps, (), "dataset")
         chosen = file[name]
         _require_room(chosen)
         heights = _unpack(chosen).reshape(chosen.shape[-2:])
         if source.path.suffix.lower() == ".mat" or "MATLAB_class" in chosen.attrs:
             heights = heights.T
-        unit = _unit_of(dict(chosen.attrs))
-        return FileContent(put_y_first(heights, settings), unit, data=name if len(plane) > 1 else "")
+        unit = _unit_of(chosen.attrs)
+    return FileContent(put_y_first(heights, settings), unit, data=name if len(maps) > 1 else "")
 
 
 def _unpack(dataset):
@@ -148,7 +137,7 @@ def _unpack(dataset):
     fills = [each for name in ("_FillValue", "missing_value") for each in np.ravel(attributes.get(name, []))]
     # HDF5 fills with zero by default.
     fills += [dataset.fillvalue] if dataset.fillvalue else []
-    scale, offset = (float(np.ravel(attributes.get(name, usual))[0]) for name, usual in _PACKING.items())
+    scale, offset = (float(np.ravel(attributes.get(*each))[0]) for each in (("scale_factor", 1.0), ("add_offset", 0.0)))
     if not fills and (scale, offset) == (1.0, 0.0):
         return stored
     missing = np.isin(stored, np.array(fills, dtype=float).astype(stored.dtype))
@@ -212,33 +201,32 @@ def is_instrument_text(file) -> bool:
 def read_instrument(file, settings: Preparation) -> FileContent:
     """Read a file with SurfaceTopography, whose arrays have x as first axis."""
     opened = file.instrument
-    endings = opened.file_extensions() if opened is not None else ()
     if opened is None or (
-        opened.format() in _WITHOUT_SIGNATURE and file.path.suffix.lower().removeprefix(".") not in endings
+        opened.format() in _WITHOUT_SIGNATURE and file.path.suffix.lower()[1:] not in opened.file_extensions()
     ):
         raise UnfitTopography("path", _UNKNOWN)
-    channel, data = _channel(opened, settings)
+    channel, data = _choose_channel(opened, settings)
     sized = channel.physical_sizes is not None
     topography = channel.topography(**({} if sized else {"physical_sizes": (1.0, 1.0)}))
     heights = np.ma.filled(np.ma.asarray(topography.heights()).astype(float), np.nan).T
     unit = None if topography.unit is None else metres_of(topography.unit)
     sides: Any = tuple(float(side) for side in topography.physical_sizes) if sized else None
-    lateral = settings.lateral_unit or unit
+    lateral, size = settings.lateral_unit or unit, None
     if sized and lateral is not None:
-        return FileContent(heights, unit, tuple(side * lateral for side in sides), format=opened.name(), data=data)
-    return FileContent(heights, unit, coordinates=sides, format=opened.name(), data=data)
+        size, sides = tuple(side * lateral for side in sides), None
+    return FileContent(heights, unit, size, sides, format=opened.name(), data=data)
 
 
-def _channel(opened, settings):
+def _choose_channel(opened, settings):
     """Return the channel that is asked for, or the default one, and its name, empty if it is the only map."""
     channels = opened.channels
     names = [channel.name for channel in channels]
-    maps = [channels[k] for k in find_maps({k: tuple(channel.nb_grid_pts) for k, channel in enumerate(channels)})]
+    maps = find_maps({k: tuple(channel.nb_grid_pts) for k, channel in enumerate(channels)})
     if settings.data is not None:
         channel = channels[names.index(choose_name(settings.data, names, (), "channel"))]
     elif opened.format() in _ARRAYS and maps:
         # Arrays of a workspace have no default; the first one could be anything.
-        channel = channels[names.index(choose_name(None, [each.name for each in maps], (), "array"))]
+        channel = channels[names.index(choose_name(None, [names[k] for k in maps], (), "array"))]
     else:
         channel = opened.default_channel
     if channel.dim != 2:
@@ -284,9 +272,9 @@ def read_height_map(path: str | Path, metres_per_unit: float) -> np.ndarray:
 def _read_array(path: Path) -> np.ndarray:
     if path.suffix == ".npy":
         return _read_npy_array(path)
-    if path.suffix == ".nc":
-        import netCDF4
+    if path.suffix != ".nc":
+        raise ValueError(f"unknown kind of file {path.suffix!r}")
+    import netCDF4
 
-        with netCDF4.Dataset(path) as data:
-            return _read_variable(data["height"])
-    raise ValueError(f"unknown kind of file {path.suffix!r}")
+    with netCDF4.Dataset(path) as data:
+        return _read_variable(data["height"])

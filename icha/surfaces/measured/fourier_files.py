@@ -58,24 +58,19 @@ def _wave_numbers(q, settings):
     if settings.size is not None and settings.size[0] != settings.size[1]:
         raise UnfitTopography("size", "has two sides that differ, for a Fourier series; expected one length")
     if np.all(q == np.rint(q)):
-        _require_few(largest)
         if settings.size is None:
             raise UnfitTopography(
                 "size",
                 "is missing, and the wave vectors are integers, multiples of 2 pi/L; expected L, such as '0.1 mm'",
             )
-        return q.astype(int)
-    unit = np.min(np.abs(q)[np.abs(q) > 1e-9 * largest])
-    highest = np.max(np.abs(np.rint(q / unit)))
-    # The longest wave fixes the unit only to the digits that it is written with; the shortest one is more accurate.
-    k = np.rint(q * (highest / largest))
-    if np.max(np.abs(q * (np.max(np.abs(k)) / largest) - k)) > 0.01:
-        raise WrongFormat("the wave vectors are not multiples of the smallest one")
-    _require_few(np.max(np.abs(k)))
-    return k.astype(int)
-
-
-def _require_few(highest):
-    """Raise WrongFormat for waves that no grid resolves."""
+        k = q
+    else:
+        unit = np.min(np.abs(q)[np.abs(q) > 1e-9 * largest])
+        # The longest wave fixes the unit only to the digits that it is written with; the shortest is more accurate.
+        k = np.rint(q * (np.max(np.abs(np.rint(q / unit))) / largest))
+        if np.max(np.abs(q * (np.max(np.abs(k)) / largest) - k)) > 0.01:
+            raise WrongFormat("the wave vectors are not multiples of the smallest one")
+    highest = np.max(np.abs(k))
     if highest > GRID.most / 2:
         raise WrongFormat(f"waves {highest:g} times as short as the period, but a grid has at most {GRID.most} nodes")
+    return k.astype(int)

@@ -16,7 +16,6 @@ from icha.surfaces.moments import (
     RESOLVED_CELLS,
     cells_per_short_wave,
     radial_power_spectrum,
-    ring_edges,
 )
 from icha.surfaces.summits import Asperities, SummitCoverage, locate_summits
 from icha.surfaces.surface import FREE, PERIODIC, Surface, edges_fit
@@ -62,19 +61,14 @@ class ScanResolution(PreparedTopography):
     cutoff: float | None
 
     @property
-    def used(self) -> Surface:
-        """The prepared surface."""
-        return self.surface
-
-    @property
     def edges_fit(self) -> bool:
         """Whether the prepared surface is free, or periodic without a step between cells."""
-        return self.used.free or edges_fit(self.used.heights)
+        return self.surface.free or edges_fit(self.surface.heights)
 
     @cached_property
     def asperities(self) -> Asperities:
         """Summits of the prepared surface, supported and unsupported."""
-        return locate_summits(self.used)
+        return locate_summits(self.surface)
 
     @property
     def summits(self) -> int:
@@ -84,18 +78,18 @@ class ScanResolution(PreparedTopography):
     @property
     def reasons_against_asperities(self) -> list[str]:
         """Reasons why asperities do not represent the surface 3 to 1 rms heights above its mean, where it touches."""
-        heights = np.linspace(3, 1, 5) * self.used.rms_height
-        return SummitCoverage.of(self.used, self.asperities).reasons_against(heights)
+        heights = np.linspace(3, 1, 5) * self.surface.rms_height
+        return SummitCoverage.of(self.surface, self.asperities).reasons_against(heights)
 
     @property
     def cells_per_summit(self) -> float:
         """Nodes of the prepared surface per summit."""
-        return self.used.grid**2 / max(self.summits, 1)
+        return self.surface.grid**2 / max(self.summits, 1)
 
     @property
     def cells_per_short_wave(self) -> float:
         """Nodes of the prepared surface along its shortest waves, estimated from the number of its summits."""
-        return cells_per_short_wave(self.used.grid, self.summits)
+        return cells_per_short_wave(self.surface.grid, self.summits)
 
     @cached_property
     def noise(self) -> NoiseFloor | None:
@@ -113,16 +107,16 @@ class ScanResolution(PreparedTopography):
             found["cutoff"] = _rounded_up(RESOLVED_CELLS * pixel)
         cutoff = found.get("cutoff", cutoff)
         if cutoff:
-            grid = scipy.fft.next_fast_len(math.ceil(RESOLVED_CELLS * self.used.period / cutoff), real=True)
-            if grid <= _WORTH * self.used.grid:
+            grid = scipy.fft.next_fast_len(math.ceil(RESOLVED_CELLS * self.surface.period / cutoff), real=True)
+            if grid <= _WORTH * self.surface.grid:
                 found["grid"] = grid
         return found if found.get("cutoff", 0.0) < self.measured.period / RESOLVED_CELLS else {}
 
 
 def filtered_slope_share(surface: Surface, cutoff: float) -> float:
     """Estimate the fraction of the rms slope that the Gaussian filter of a nesting index (m) leaves."""
-    q, power = radial_power_spectrum(surface)
-    slopes = _squared_slopes(surface, q, power)
+    q, power, edges = radial_power_spectrum(surface)
+    slopes = power * q**2 * np.diff(edges**2)
     transmission = 2.0 ** -((cutoff * q / (2 * np.pi)) ** 2)
     return math.sqrt(float(np.sum(slopes * transmission**2) / np.sum(slopes)))
 
@@ -144,7 +138,7 @@ def noise_floor(surface: Surface) -> NoiseFloor | None:
     The floor is the longest tail of the spectrum through which the best power law falls less steeply than 1/q. Its
     power is the geometric mean of the shorter half of its waves.
     """
-    q, power = radial_power_spectrum(surface)
+    q, power, edges = radial_power_spectrum(surface)
     log_q, log_power = np.log(q), np.log(np.maximum(power, np.finfo(float).tiny))
     tails = [k for k in range(len(q) - 2) if q[-1] >= _FLOOR_SPANS * q[k]]
     begins = next((k for k in tails if np.polyfit(log_q[k:], log_power[k:], 1)[0] > _FLOOR_FALLS), None)
@@ -160,18 +154,14 @@ def noise_floor(surface: Surface) -> NoiseFloor | None:
     if len(above) and k + 1 < len(q):
         fraction = np.log(power[k] / (2 * floor)) / np.log(power[k] / power[k + 1])
         limit = q[k] * (q[k + 1] / q[k]) ** min(max(fraction, 0.0), 1.0)
-    slopes = _squared_slopes(surface, q, power)
+    # Contributions of the rings to the mean square slope, but for a common factor.
+    slopes = power * q**2 * np.diff(edges**2)
     return NoiseFloor(
         power=floor,
         wavelength=float(2 * np.pi / limit),
         rms=math.sqrt(floor) * 2 * math.pi / surface.spacing,
         slope_share=float(np.sum(slopes[q > limit]) / np.sum(slopes)),
     )
-
-
-def _squared_slopes(surface, q, power):
-    """Return the contribution of each ring of wave numbers to the mean square slope, but for a common factor."""
-    return power * q**2 * np.diff(ring_edges(surface) ** 2)
 
 
 def _rounded_up(length: float) -> float:

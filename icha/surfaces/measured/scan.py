@@ -83,31 +83,29 @@ def load_scan(path: Path, settings: Preparation) -> Scan:
         size = tuple(each * coordinate_unit for each in found.coordinates)
     if size is None:
         raise UnfitTopography("size", "is missing, and the file does not give it; expected a length, such as '90 um'")
-    rows, columns = found.heights.shape
-    reading = f"{name}, {rows} rows x {columns} columns of points"
-    if found.data:
-        reading += f", data {printable(found.data)} of several"
-    sides = [formatting.length(float(side)) for side in size]
-    pixel = [formatting.length(size[0] / columns), formatting.length(size[1] / rows)]
-    reading += f"; pixels of {' x '.join(pixel)}, {' x '.join(sides)} in all; heights in {formatting.length(unit)}"
-    reading += "".join(f"; {remark}" for remark in (found.remark, _describe_replaced(settings, found)) if remark)
-    format_ = f"{name} ({found.format})" if name == "instrument" else name
-    scan = Scan(found.heights.astype(float) * unit, tuple(size), (reading,), coordinate_unit, format_, found.data)
-    if not all(np.isfinite(each) and LENGTH.contains(each) for each in size):
-        raise UnfitTopography(
-            "size", f"is {size[0]:g} m by {size[1]:g} m in the file{scan.remark_on_unit}; expected the size here"
-        )
-    return scan
-
-
-def _describe_replaced(settings, found):
-    """Describe the size and unit of the file that given ones replace; empty without them."""
     replaced = []
     if settings.size and found.size and not np.allclose(settings.size, found.size, rtol=1e-3, atol=0):
         replaced.append(f"its size {' x '.join(map(formatting.length, found.size))}")
     if settings.height_unit and found.unit and not np.isclose(settings.height_unit, found.unit, rtol=1e-3, atol=0):
         replaced.append(f"its unit of heights {formatting.length(found.unit)}")
-    return f"the file has, and you replace, {' and '.join(replaced)}" if replaced else ""
+    rows, columns = found.heights.shape
+    pixel = f"{formatting.length(size[0] / columns)} x {formatting.length(size[1] / rows)}"
+    reading = [
+        f"{name}, {rows} rows x {columns} columns of points"
+        + (f", data {printable(found.data)} of several" if found.data else ""),
+        f"pixels of {pixel}, {' x '.join(formatting.length(float(side)) for side in size)} in all",
+        f"heights in {formatting.length(unit)}",
+        found.remark,
+        f"the file has, and you replace, {' and '.join(replaced)}" if replaced else "",
+    ]
+    format_ = f"{name} ({found.format})" if name == "instrument" else name
+    steps = ("; ".join(filter(None, reading)),)
+    scan = Scan(found.heights.astype(float) * unit, tuple(size), steps, coordinate_unit, format_, found.data)
+    if not all(np.isfinite(each) and LENGTH.contains(each) for each in size):
+        raise UnfitTopography(
+            "size", f"is {size[0]:g} m by {size[1]:g} m in the file{scan.remark_on_unit}; expected the size here"
+        )
+    return scan
 
 
 def _read(path, settings):
@@ -145,12 +143,7 @@ def _read(path, settings):
         raise UnfitTopography(
             "data", f"is given, and a file that is read as {name} has one array without a name; leave it out"
         )
-    _check_heights(found.heights)
-    return name, found
-
-
-def _check_heights(heights):
-    """Raise UnfitTopography unless an array is a map of real numbers."""
+    heights = found.heights
     if heights.dtype.kind not in "iuf":
         raise UnfitTopography("path", f"holds {heights.dtype}, not real numbers; expected heights")
     if heights.ndim == 1 or (heights.ndim == 2 and 0 < min(heights.shape) <= 2 < max(heights.shape)):
@@ -161,6 +154,7 @@ def _check_heights(heights):
         raise UnfitTopography(
             "path", f"holds an array of shape {heights.shape}{nothing}; expected rows and columns of heights"
         )
+    return name, found
 
 
 def _guess_format(path: Path) -> str:

@@ -118,11 +118,10 @@ def fill_missing_points(scan: Scan, settings: Preparation) -> Scan:
 def _harmonic(heights, missing, *, periodic):
     """Solve Laplace's equation: each missing height (count,) is the mean of its four neighbours, fewer at edges."""
     row, column = np.nonzero(missing)
-    count = len(row)
+    count, pairs = len(row), []
     index = np.full(missing.shape, -1)
     index[missing] = np.arange(count)
     neighbours, right = np.zeros(count), np.zeros(count)
-    pairs = []
     for down, across in ((1, 0), (-1, 0), (0, 1), (0, -1)):
         y, x = row + down, column + across
         if periodic:
@@ -203,25 +202,25 @@ def treat_edges(scan: Scan, settings: Preparation) -> tuple[Surface, list[str]]:
         require_room(3 * 8 * nodes**2)
     except TooLarge as error:
         raise UnfitTopography("grid", f"gives a surface of {nodes} x {nodes} points, which {error}") from None
-    heights, side = scan.heights - np.mean(scan.heights), scan.size[0]
+    heights, side, free = scan.heights - np.mean(scan.heights), scan.size[0], settings.boundary == FREE
     steps = list(scan.steps)
     if settings.boundary == WINDOW:
-        across, along = (_taper(n, settings.taper) for n in heights.shape)
+        # Tukey's window, cell by cell: half a cosine wave at either edge and one in between.
+        centres = [(np.arange(n) + 0.5) / n for n in heights.shape]
+        edges = [np.minimum(np.minimum(x, 1 - x) / settings.taper, 1.0) for x in centres]
+        across, along = (np.sin(0.5 * np.pi * edge) ** 2 for edge in edges)
         heights = heights * across[:, None] * along
         steps.append(f"heights fall to their mean on {settings.taper:g} of the side at every edge")
     if settings.boundary == MIRROR:
-        heights = np.concatenate([heights, heights[:, ::-1]], axis=1)
-        heights = np.concatenate([heights, heights[::-1]], axis=0)
-        side = 2 * side
+        heights, side = np.pad(heights, [(0, n) for n in heights.shape], mode="symmetric"), 2 * side
         steps.append("joined by its mirror images")
     # Only periodic pixels can still be oblong.
     grid = settings.grid or max(heights.shape)
     if heights.shape != (grid, grid):
-        heights = _resampled(heights, grid, free=settings.boundary == FREE)
+        heights = _resampled(heights, grid, free=free)
         steps.append(f"resampled to {grid} x {grid} points")
     if problem := problem_with_heights(heights):
         raise UnfitTopography("path", f"holds {problem}; expected a rough surface")
-    free = settings.boundary == FREE
     steps.append("one square on a free half-space" if free else f"repeats after {side:.6g} m")
     try:
         return Surface(heights, side, FREE if free else PERIODIC), steps
@@ -229,13 +228,6 @@ def treat_edges(scan: Scan, settings: Preparation) -> tuple[Surface, list[str]]:
         raise UnfitTopography(
             "height_unit", f"gives a surface that cannot be pressed ({error}); expected another unit"
         ) from None
-
-
-def _taper(n, fraction):
-    """Tukey's window at n points, cell by cell: half a cosine wave at either edge and one in between."""
-    x = (np.arange(n) + 0.5) / n
-    edge = np.minimum(np.minimum(x, 1 - x) / fraction, 1.0)
-    return np.sin(0.5 * np.pi * edge) ** 2
 
 
 def _resampled(heights, grid, *, free):
