@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import itertools
 import tomllib
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from icha.contact.models import DEFAULT_MODEL, MODELS
 from icha.datasets.labels import LABELS
 
 if TYPE_CHECKING:
@@ -31,48 +29,26 @@ def caption_of(name: str) -> str:
 
 
 def count_runs(campaign: xr.DataTree, studies: Sequence[str]) -> str:
-    """Count the runs of some studies that a figure of their means lacks, and those that it marks as not applicable.
+    """Count the runs of some studies that a figure of means lacks, and those to which the model is not applicable.
 
     Returns
     -------
     Sentences for the end of a caption; "" if all runs are complete and the asperity model is applicable to them.
     """
+    from icha.datasets.variables.campaign import COMPLETE, COMPUTED_RUNS, FAILED_CHECKS, INCOMPLETE, MISSING
+
     found: list[str] = []
     for name in studies:
-        if name in campaign.children:
-            study, suffix = campaign[name].to_dataset(), f" of study {name}" if len(studies) > 1 else ""
-            found += [*_missing_runs(study, suffix), *_runs_not_applicable(study, suffix)]
+        if name not in campaign.children:
+            continue
+        study, suffix = campaign[name].to_dataset(), f" of study {name}" if len(studies) > 1 else ""
+        status = study["status"].transpose(*LABELS).values
+        asked = np.count_nonzero(np.isin(status, (*COMPUTED_RUNS, MISSING)))
+        for words, states in (("did not complete", (INCOMPLETE, MISSING)), ("failed their checks", (FAILED_CHECKS,))):
+            if count := np.count_nonzero(np.isin(status, states)):
+                found.append(f"{count} of {asked} runs{suffix} {words}: see Failed runs.")
+        if "applicability" in study:  # not in campaigns of earlier versions
+            reasons = study["applicability"].transpose(*LABELS).values[status == COMPLETE]
+            for reason, count in Counter(filter(None, map(str, reasons))).items():
+                found.append(f"{count} {'run is' if count == 1 else 'runs are'} marked{suffix}: {reason}.")
     return " ".join(found)
-
-
-def _missing_runs(study: xr.Dataset, suffix: str) -> Iterator[str]:
-    """Count by model and material the runs that did not complete or whose checks failed."""
-    from icha.datasets.variables.campaign import COMPUTED_RUNS, FAILED_CHECKS, INCOMPLETE, MISSING
-
-    status = study["status"].transpose("model", "material", ...)
-    unit = "seeds" if status.sizes["surface"] == status.sizes["rms_slope"] == 1 else "runs"
-    for model, material in itertools.product(study["model"].values.tolist(), study["material"].values.tolist()):
-        found = status.sel(model=model, material=material).values
-        asked = int(np.isin(found, (*COMPUTED_RUNS, MISSING)).sum())
-        counts = {"did not complete": (INCOMPLETE, MISSING), "failed their checks": (FAILED_CHECKS,)}
-        words = [
-            f"{count} of {asked} {unit} of material {material} {what}"
-            for what, states in counts.items()
-            if (count := int(np.isin(found, states).sum()))
-        ]
-        if words:
-            by = "" if model == DEFAULT_MODEL else f" by {MODELS[model].words}"
-            yield f"{' and '.join(words)}{suffix}{by}: see Failed runs."
-
-
-def _runs_not_applicable(study: xr.Dataset, suffix: str) -> Iterator[str]:
-    """Count by reason the complete runs to which the asperity model is not applicable."""
-    from icha.datasets.variables.campaign import COMPLETE
-
-    if "applicability" not in study:  # in campaigns of earlier versions
-        return
-    complete = study["status"].transpose(*LABELS).values == COMPLETE
-    reasons = study["applicability"].transpose(*LABELS).values[complete].tolist()
-    for reason, count in Counter(map(str, reasons)).items():
-        if reason:
-            yield f"{count} {'run is' if count == 1 else 'runs are'} marked{suffix}: {reason}."

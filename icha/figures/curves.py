@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from icha.contact.models import MODELS, REFERENCE_MODEL
+from icha.datasets.labels import slopes_of
 from icha.datasets.variables.model_error import SHORT_RANGE
+from icha.figures import select
 from icha.figures.ensembles import draw_members, lines_handles, mark_fewer
-from icha.figures.hysteresis import average_legs
 from icha.figures.looks import (
     ASPERITIES_NAME,
     BRANCH_DASHES,
@@ -22,20 +23,8 @@ from icha.figures.looks import (
     legend_below,
     model_handle,
     named_handles,
-    words_handle,
 )
-from icha.figures.select import (
-    ContactRuns,
-    Snapshots,
-    group_by_contact,
-    name_of_place,
-    path_steps,
-    select_runs,
-    shown_model,
-    snapshot_label,
-    unloading_legs,
-)
-from icha.figures.style import GREY, legend_handle, logarithmic_axes
+from icha.figures.style import GREY, legend_handle, logarithmic_axes, slope_label
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -59,13 +48,13 @@ def gap_label(data: xr.Dataset) -> str:
 class Curve(NamedTuple):
     """The runs of one contact, and the look of their markers, arguments of `Axes.plot`."""
 
-    runs: ContactRuns
+    runs: select.ContactRuns
     look: dict
 
     @property
     def stops(self) -> dict[int, xr.Dataset]:
         """Steps of the runs at the targets of their study, by seed."""
-        return {seed: path_steps(run) for seed, run in self.runs.by_seed.items()}
+        return {seed: select.path_steps(run) for seed, run in self.runs.by_seed.items()}
 
 
 class Curves(NamedTuple):
@@ -90,22 +79,22 @@ def study_curves(campaign: xr.DataTree, study: str, boundary_elements: str | Non
 
     `changed` overrides the look of all markers.
     """
-    groups = group_by_contact(campaign, select_runs(campaign, study, ragged=False))
+    groups = select.group_by_contact(campaign, select.select_runs(campaign, study, ragged=False))
     dataset = campaign[study].to_dataset()
     materials = dataset["material"].values.tolist()
     contacts = sorted((group.contact for group in groups), key=lambda contact: materials.index(contact[0]))
     looks = Looks(campaign, dataset, contacts)
     name, lines = model_name(dataset), []
     for group in groups:
-        look = looks.look(group.contact, applicable=group.applicable) | {"ls": "-" if looks.scale else "none"} | changed
+        look = looks.look(group.contact, applicable=group.applicable) | {"ls": "-" if looks.many else "none"} | changed
         if name != ASPERITIES_NAME:
             look |= {"marker": MODEL_MARKERS[name], "ms": look["ms"] + 2}
         lines.append(Curve(group, look))
     other = boundary_elements or (study if name == ASPERITIES_NAME else None)
-    truths = select_runs(campaign, other, ragged=False, model=REFERENCE_MODEL) if other else []
-    crosses = [Curve(truth, cross_look(looks, truth.contact)) for truth in group_by_contact(campaign, truths)]
-    changed |= {"ls": "-" if looks.scale or any(len(group.by_seed) > 1 for group in groups) else "none"}
-    changed |= {} if looks.many_places else {"marker": MODEL_MARKERS[name]}
+    truths = select.select_runs(campaign, other, ragged=False, model=REFERENCE_MODEL) if other else []
+    crosses = [Curve(truth, cross_look(looks, truth.contact)) for truth in select.group_by_contact(campaign, truths)]
+    changed |= {"ls": "-" if looks.many or any(len(group.by_seed) > 1 for group in groups) else "none"}
+    changed |= {} if looks.by_place else {"marker": MODEL_MARKERS[name]}
     handles = looks.handles(**changed) | {name: model_handle(name, mfc="white")}
     return Curves(lines, crosses, looks, handles | ({SHORT_RANGE: model_handle(SHORT_RANGE)} if crosses else {}))
 
@@ -121,10 +110,10 @@ def cross_look(looks: Looks, contact: Contact, model: str = SHORT_RANGE) -> dict
 
 def model_name(dataset: xr.Dataset) -> str:
     """Return the name of the model that the figures of a study show (`shown_model`), as written in legends."""
-    return MODELS[shown_model(dataset)].words
+    return MODELS[select.shown_model(dataset)].words
 
 
-def snapshot_looks(campaign: xr.DataTree, study: str, lines: Sequence[Snapshots]) -> tuple[list[dict], Looks]:
+def snapshot_looks(campaign: xr.DataTree, study: str, lines: Sequence[select.Snapshots]) -> tuple[list[dict], Looks]:
     """Return the looks of lines of snapshots, one for every material."""
     dataset = campaign[study].to_dataset()
     groups = [line.runs for line in lines]
@@ -134,25 +123,19 @@ def snapshot_looks(campaign: xr.DataTree, study: str, lines: Sequence[Snapshots]
 
 
 def add_snapshot_legend(
-    figure: Figure, panels: Sequence[Axes], dataset: xr.Dataset, lines: Sequence[Snapshots], looks: Looks
+    figure: Figure, panels: Sequence[Axes], dataset: xr.Dataset, lines: Sequence[select.Snapshots], looks: Looks
 ) -> None:
     """Add titles and legend of a figure of one snapshot of a study."""
     shown, model = lines[0].runs.labels, model_name(dataset)
-    titles = (snapshot_label(*lines[-1].members[0]), name_of_place(dataset, shown.surface, shown.rms_slope))
-    for axes, title in zip(panels, titles, strict=True):
-        axes.set_title(title, loc="right")
+    several = {shown.surface: dataset.sizes["surface"] > 1, slope_label(shown.rms_slope): len(slopes_of(dataset)) > 1}
+    panels[0].set_title(select.snapshot_label(*lines[-1].members[0]), loc="right")
+    panels[1].set_title(", ".join(words for words, needed in several.items() if needed), loc="right")
     handles = looks.handles(ls="-", marker=MODEL_MARKERS[model])
     handles |= {model: model_handle(model, ls="-", lw=0.8, mfc="white")}
     if any(line.truths for line in lines):
         handles[SHORT_RANGE] = model_handle(SHORT_RANGE, **TRUTH_LINE)
     handles |= lines_handles(len(line.members) for line in lines) | named_handles(panels[1:])
-    legend_below(figure, handles, scale=looks.scale, panels=panels)
-
-
-def theories_handle(dataset: xr.Dataset) -> dict[str, Line2D]:
-    """Return a legend entry with the surface of the theories, the first of a study, if the study has several."""
-    names = dataset["surface"].values.tolist()
-    return words_handle(f"theories: {names[0]}") if len(names) > 1 else {}
+    legend_below(figure, handles)
 
 
 # Return load and value of the steps of a run.
@@ -233,7 +216,7 @@ def _draw_unloading(panels, line):
     The axes keep their range.
     """
     runs = line.runs.by_seed.values()
-    for leg in average_legs([[("unloading", leg) for leg in unloading_legs(run)] for run in runs]):
+    for leg in select.average_legs([[("unloading", leg) for leg in select.unloading_legs(run)] for run in runs]):
         for axes, points in panels.items():
             load, values = points(leg.values)
             # Just before separation loads are arbitrarily small.
@@ -242,11 +225,11 @@ def _draw_unloading(panels, line):
             axes.plot([], [], color=GREY, label="unloading", **_UNLOADING)
 
 
-def add_legend(figure: Figure, panels: Sequence[Axes], curves: Curves, further: Mapping[str, object] = {}) -> None:
-    """Add a legend of the curves and of everything named in the panels, and their scale of colours, if any."""
+def add_legend(figure: Figure, panels: Sequence[Axes], curves: Curves) -> None:
+    """Add a legend of the curves and of everything named in the panels."""
     seeds = lines_handles(len(line.runs.by_seed) for line in curves.lines)
-    handles = curves.handles | dict(further) | seeds | named_handles(panels)
-    legend_below(figure, handles, scale=curves.looks.scale, panels=panels)
+    handles = curves.handles | seeds | named_handles(panels)
+    legend_below(figure, handles)
 
 
 def drop_rounding_errors(values: np.ndarray) -> np.ndarray:

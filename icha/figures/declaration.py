@@ -18,7 +18,7 @@ from typing import Any
 
 from pydantic import Field
 
-from icha.contact.models import MODELS, REFERENCE_MODEL, first_model
+from icha.contact.models import REFERENCE_MODEL, first_model
 from icha.datasets import results
 from icha.datasets.labels import RunLabels
 from icha.path.states import Snapshot
@@ -197,14 +197,9 @@ class ComparedFigure(StudyFigure):
         if campaign.compares_models(self.study) or is_solved_at_finite_range(campaign, self.study):
             return
         reason = (
-            "has no boundary elements beside it; expected a study with both `models` and reduced pressures as targets, "
-            "or one that an entry of finite_range names"
+            "has no boundary elements at the same loads; expected a study with both `models` and reduced_pressures as "
+            "targets, or a study that an entry of finite_range names"
         )
-        if set(study.models) == set(MODELS):
-            reason = (
-                f"has boundary elements, but its targets are {study.targets.last[0]}s, and errors are compared at the "
-                "same load; expected a study with both `models` and reduced_pressures as targets"
-            )
         yield ("study",), self.study, reason
 
 

@@ -31,31 +31,19 @@ _SHADE, _FEW_BANDS = 0.22, 3
 
 
 def draw_members(
-    axes: Axes,
-    x: np.ndarray,
-    members: np.ndarray,
-    look: dict,
-    *,
-    positive: bool,
-    lines: int = 1,
-    asked: int = 0,
-    **alone: object,
+    axes: Axes, x: np.ndarray, members: np.ndarray, look: dict, *, positive: bool, lines: int = 1, asked: int = 0
 ) -> None:
-    """Draw the mean of the members (members, k) of an ensemble with their scatter, or a single member by itself.
+    """Draw the mean of the members (members, k) of an ensemble as a line, with the scatter of several members.
 
     Parameters
     ----------
     positive : whether the axis is logarithmic, so that the band is positive and zeros are left out.
     lines : number of lines in the panel.
     asked : number of members requested; marks of means over fewer show it (`mark_fewer`).
-    alone : look of a single member, beside `look`.
     """
-    if len(members) == 1:
-        axes.plot(x, members[0], **alone, **look)
-        mark_fewer(axes, x, members[0], np.isfinite(members), look, asked, alone.get("markevery", 1))
-        return
     mean, known = ensemble(members).mean, np.isfinite(members)
-    draw_scatter(axes, x, members, look["color"], positive=positive, lines=lines)
+    if len(members) > 1:
+        draw_scatter(axes, x, members, look["color"], positive=positive, lines=lines)
     every, breaks = max(1, -(-len(x) // _MEAN_MARKERS)), _changes(known)
     marked = np.insert(np.arange(len(x)) % every == 0, breaks, False)
     axes.plot(*_break_lines(breaks, x, mean), **{"lw": 0.9} | look | {"ls": "-", "markevery": marked})
@@ -209,21 +197,20 @@ class Points:
 def lines_handles(counts: Iterable[int]) -> dict[str, Line2D]:
     """Return legend entries of lines that are means over these numbers of seeds."""
     band = {"alpha": 0.35, "lw": 6, "solid_capstyle": "butt"}
-    return _handles(counts, ("mean and 95 % band", band), ("single seeds beside their mean", _SEED_LINE))
+    return _handles(counts, {"mean and 95 % band": band, "single seeds beside their mean": _SEED_LINE})
 
 
 def points_handles(counts: Iterable[int]) -> dict[str, Line2D]:
     """Return legend entries of points that are means over these numbers of seeds."""
     bars = {"marker": "|", "ls": "none", "ms": 8}
-    return _handles(counts, ("means, bars 95 %", bars), ("single seeds beside their mean", _SEED_DOT))
+    return _handles(counts, {"means, bars 95 %": bars, "single seeds beside their mean": _SEED_DOT})
 
 
-def _handles(counts, enough, few):
-    """Return legend entries, in words and looks, of means over enough seeds and of means over few."""
-    sizes = {int(count) for count in counts if count > 1}
-    groups = ([size for size in sizes if size >= ENOUGH], [size for size in sizes if size < ENOUGH])
-    return {
-        f"{words}, n = {'–'.join(map(str, sorted({min(group), max(group)})))}": legend_handle(color=GREY, **look)
-        for (words, look), group in zip((enough, few), groups, strict=True)
-        if group
-    }
+def _handles(counts, looks):
+    """Return legend entries, with words and looks of means over enough seeds and of means over few."""
+    sizes, found = {int(count) for count in counts if count > 1}, {}
+    for enough, (words, look) in zip((True, False), looks.items(), strict=True):
+        if group := {size for size in sizes if (size >= ENOUGH) == enough}:
+            span = "–".join(map(str, sorted({min(group), max(group)})))
+            found[f"{words}, n = {span}"] = legend_handle(color=GREY, **look)
+    return found

@@ -10,7 +10,7 @@ import numpy as np
 from icha.datasets.variables.model_error import FINITE_RANGE
 from icha.figures.curves import PRESSURE_LABEL
 from icha.figures.ensembles import draw_points, points_handles
-from icha.figures.looks import Looks, legend_below, words_handle
+from icha.figures.looks import Looks, legend_below
 from icha.figures.select import NothingToDraw, asked_of_entry, select_errors
 from icha.figures.style import DASHES, in_style, logarithmic_axes, material_label, new_panels
 
@@ -34,17 +34,13 @@ class ErrorPanel(NamedTuple):
     name : name of the variable.
     label : label of the axis.
     factor : factor from values to the unit of the axis.
-    limits : limits of the axis; None where the data set them.
-    positive : whether values cannot be negative.
-    words : explanation in the legend.
+    positive : whether values cannot be negative, so that the axis begins at zero.
     """
 
     name: str
     label: str
     factor: float = 1.0
-    limits: tuple[float | None, float | None] = (None, None)
     positive: bool = False
-    words: str = ""
 
 
 class _Curve(NamedTuple):
@@ -53,20 +49,17 @@ class _Curve(NamedTuple):
     Attributes
     ----------
     name : name of the entry.
+    truth : name of the boundary elements that the model is compared with.
     errors : the errors along seeds and loads.
     contact : material, surface and rms slope.
     applicable : whether the asperity model is applicable.
     """
 
     name: str
+    truth: str
     errors: xr.Dataset
     contact: tuple[str, str, float]
     applicable: bool
-
-    @property
-    def truth(self) -> str:
-        """Name of the boundary elements that the model is compared with."""
-        return self.errors.attrs["truth"]
 
 
 @in_style
@@ -99,7 +92,7 @@ def draw_errors(
     for row, shown in zip(panels, rows, strict=True):
         shown_curves = [curve for curve in curves if curve.contact[0] in shown]
         for k, curve in enumerate(shown_curves):
-            same = [each for each in shown_curves if each[2:] == curve[2:]]
+            same = [each for each in shown_curves if each[3:] == curve[3:]]
             name, dashes = _words(curve, same, looks, own_rows=own_rows)
             look = looks.look(curve.contact, applicable=curve.applicable) | {"ls": dashes}
             handle = _draw_curve(row, curve, quantities, look, _APART ** (k - (len(shown_curves) - 1) / 2), counts)
@@ -108,12 +101,8 @@ def draw_errors(
         if own_rows:
             row[-1].set_title(material_label(interfaces, shown[0]), loc="right")
     _finish(panels, quantities)
-    if len(named) == 1 or looks.scale:
-        named.pop("", None)
-    named |= points_handles(counts)
-    for quantity in quantities:
-        named |= words_handle(quantity.words) if quantity.words else {}
-    legend_below(fig, named, scale=looks.scale, panels=panels.ravel())
+    named.pop("", None)
+    legend_below(fig, (looks.handles() if looks.many else named) | points_handles(counts))
     return fig
 
 
@@ -125,7 +114,7 @@ def _curves(model_error, study, quantities):
             runs = (errors["applicability"] == "") == applicable if "applicability" in errors else applicable
             shown = errors.assign({each.name: errors[each.name].where(runs) for each in quantities})
             if any(np.isfinite(shown[each.name].values).any() for each in quantities):
-                found.append(_Curve(name, shown, contact, applicable))
+                found.append(_Curve(name, errors.attrs["truth"], shown, contact, applicable))
     if not found:
         raise NothingToDraw(f"study {study}: no run beside boundary elements is complete")
     return found
@@ -138,7 +127,7 @@ def _words(curve, same, looks, *, own_rows):
     """
     repetition, truths = same.index(curve), [each.truth for each in same]
     name = looks.place_name(curve.contact[1:]) if own_rows else looks.name(curve.contact)
-    words = [] if looks.scale else [name] if name else []
+    words = [name] if name else []
     words += ["at finite range"] if len(set(truths)) > 1 and curve.truth == FINITE_RANGE else []
     words += [curve.name] if truths.index(curve.truth) < repetition else []
     return ", ".join(words), DASHES[repetition % len(DASHES)]
@@ -165,4 +154,5 @@ def _finish(panels, quantities):
         ax.set_ylabel(quantity.label)
     for ax, quantity in zip(panels[-1], quantities, strict=True):
         ax.set_xlabel(PRESSURE_LABEL)
-        ax.set_ylim(*quantity.limits)
+        if quantity.positive:
+            ax.set_ylim(bottom=0)

@@ -17,21 +17,9 @@ DECLARATION = Declaration(
 )
 
 QUANTITIES = (
-    ErrorPanel("pressure_distribution_distance", r"distance of $P(p)$,  $W_1/p$", limits=(0, None), positive=True),
-    ErrorPanel(
-        "gap_distribution_distance",
-        r"distance of $P(u)$,  $W_1/h_{\mathrm{rms}}$",
-        limits=(0, None),
-        positive=True,
-        words="$W_1$: area between the cumulative distributions",
-    ),
-    ErrorPanel(
-        "jaccard",
-        "overlap of the contact maps",
-        limits=(0, 1),
-        positive=True,
-        words="overlap: area in contact in both / in at least one",
-    ),
+    ErrorPanel("pressure_distribution_distance", r"distance of $P(p)$,  $W_1/p$", positive=True),
+    ErrorPanel("gap_distribution_distance", r"distance of $P(u)$,  $W_1/h_{\mathrm{rms}}$", positive=True),
+    ErrorPanel("jaccard", "overlap of the contact maps", positive=True),
 )
 
 figure = partial(draw_errors, quantities=QUANTITIES)

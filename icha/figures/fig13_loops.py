@@ -12,19 +12,11 @@ from icha.contact.models import REFERENCE_MODEL
 from icha.datasets import results
 from icha.datasets.labels import ContactLabels
 from icha.datasets.variables.model_error import FINITE_RANGE, SHORT_RANGE
+from icha.figures import select
 from icha.figures.curves import AREA_LABEL, PRESSURE_LABEL, SEPARATION_LABEL
 from icha.figures.declaration import Campaign, Declaration, Inputs, TruthFigure, unloading_problems
 from icha.figures.ensembles import draw_scatter, lines_handles, mark_fewer
-from icha.figures.hysteresis import ROUNDING, Leg, average_legs, pull_off_step, select_unloaded_runs
 from icha.figures.looks import BRANCH_DASHES, MODEL_MARKERS, UNLOADING_MARKERS, legend_below, looks_of_studies
-from icha.figures.select import (
-    ContactRuns,
-    branches,
-    group_by_contact,
-    pick,
-    select_runs,
-    unloading_legs,
-)
 from icha.figures.style import GREY, in_style, legend_handle, new_panels, slope_label
 from icha.support.values import Label, Problem, Seed
 
@@ -89,8 +81,8 @@ class _Loop(NamedTuple):
     look : look of the lines and marks, arguments of `Axes.plot`.
     """
 
-    runs: ContactRuns
-    legs: list[Leg]
+    runs: select.ContactRuns
+    legs: list[select.Leg]
     truths: list[xr.Dataset]
     look: dict
 
@@ -114,16 +106,16 @@ def figure(
         Only those of the surface and seed that are drawn are shown.
     seed : None for the first seed that has boundary elements or, if no seed has any, for the mean over all seeds.
     """
-    runs = select_unloaded_runs(campaign, study)
-    others = select_runs(campaign, boundary_elements or study, ragged=False, model=REFERENCE_MODEL)
-    truths = _truths(study, runs, [*(run for _, run in others if unloading_legs(run)), *(loops or ())])
-    surface = pick("surface", surface, [labels.surface for labels, _ in runs])
+    runs = select.select_unloaded_runs(campaign, study)
+    others = select.select_runs(campaign, boundary_elements or study, ragged=False, model=REFERENCE_MODEL)
+    truths = _truths(study, runs, [*(run for _, run in others if select.unloading_legs(run)), *(loops or ())])
+    surface = select.pick("surface", surface, [labels.surface for labels, _ in runs])
     runs = [(labels, run) for labels, run in runs if labels.surface == surface]
     if seed is None:
         seed = next((labels.seed for labels, _ in runs if labels in truths), None)
     else:
-        pick("seed", seed, [labels.seed for labels, _ in runs])
-    groups = group_by_contact(campaign, [each for each in runs if seed in (None, each[0].seed)])
+        select.pick("seed", seed, [labels.seed for labels, _ in runs])
+    groups = select.group_by_contact(campaign, [each for each in runs if seed in (None, each[0].seed)])
     if seed is not None:
         groups = [group._replace(asked=1) for group in groups]
     slopes = sorted({group.labels.rms_slope for group in groups}, reverse=True)
@@ -134,7 +126,7 @@ def figure(
     looks = looks_of_studies(campaign, [study], contacts)
     drawn = []
     for group, contact in zip(groups, contacts, strict=True):
-        legs = average_legs([list(branches(run)) for run in group.by_seed.values()])
+        legs = select.average_legs([list(select.branches(run)) for run in group.by_seed.values()])
         look = looks.look(contact, applicable=group.applicable)
         drawn.append(_Loop(group, legs, truths.get(group.labels, []), look))
 
@@ -155,7 +147,7 @@ def figure(
     title = f"surface {surface}" + ("" if seed is None else f", seed {seed}")
     panels[0, 0].set_title(title, loc="right", parse_math=False)
     handles = _handles(looks, drawn, marked=len(rows[0]) > 1)
-    legend_below(fig, handles, scale=looks.scale, panels=panels.ravel())
+    legend_below(fig, handles)
     return fig
 
 
@@ -174,7 +166,7 @@ def _draw(ax, loop, names, *, turn, lines):
     if turn or len(runs) < loop.runs.asked:
         ends = [run.isel(step=int(np.flatnonzero(run["leg"].values == 0)[-1])) for run in runs]
         marked.append((ends, loop.look | {"ls": "none", "zorder": 5}))
-    pulls = [run.isel(step=at) for run in runs if (at := pull_off_step(run)) is not None]
+    pulls = [run.isel(step=at) for run in runs if (at := select.pull_off_step(run)) is not None]
     if pulls:
         marked.append((pulls, loop.look | _PULL_OFF))
     for states, mark in marked:
@@ -197,7 +189,7 @@ def _enlarge(ax, loops):
         for name in (*_LOADS, "contact_area_fraction")
     )
     tension = -pressures.min()
-    if not ROUNDING * pressures.max() < tension < _SMALL_TENSION * pressures.max():
+    if not select.ROUNDING * pressures.max() < tension < _SMALL_TENSION * pressures.max():
         return
     shown = separations[(np.abs(pressures) <= _REACH * tension) & (areas > 0)]
     room = 0.06 * np.ptp(shown)
@@ -218,7 +210,7 @@ def _handles(looks, loops, *, marked):
     for branch, dashes in BRANCH_DASHES.items():
         handles[branch] = legend_handle(color=GREY, ls=dashes, **_LOOP)
     handles |= lines_handles(len(loop.runs.by_seed) for loop in loops)
-    if any(pull_off_step(run) is not None for loop in loops for run in loop.runs.by_seed.values()):
+    if any(select.pull_off_step(run) is not None for loop in loops for run in loop.runs.by_seed.values()):
         handles["pull-off"] = legend_handle(marker="o", mfc=GREY, **_PULL_OFF)
     for name in dict.fromkeys(_truth_name(truth) for loop in loops for truth in loop.truths):
         for branch, markers in _TRUTH_MARKERS.items():

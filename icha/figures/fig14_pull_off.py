@@ -12,18 +12,10 @@ from pydantic import Field
 from icha.figures.curves import drop_rounding_errors
 from icha.figures.declaration import Campaign, Declaration, StudyFigure, studies_problems, unloading_problems
 from icha.figures.ensembles import Points, points_handles
-from icha.figures.hysteresis import name_model, select_detached_lines
 from icha.figures.looks import legend_below, looks_of_studies
-from icha.figures.style import (
-    GREY,
-    ONE_COLUMN,
-    TWO_COLUMNS,
-    choose_unit,
-    in_style,
-    logarithmic_axes,
-    new_panels,
-    slope_label,
-)
+from icha.figures.select import name_model, select_detached_lines
+from icha.figures.style import GREY, ONE_COLUMN, TWO_COLUMNS, in_style, logarithmic_axes, new_panels, slope_label
+from icha.support.formatting import choose_unit
 from icha.support.values import Problem, list_of_names
 
 if TYPE_CHECKING:
@@ -93,7 +85,7 @@ def figure(campaign: xr.DataTree, *, study: str, load_studies: Sequence[str] = (
         if len(loaded_slopes) == 1:
             panels[1].set_title(slope_label(*loaded_slopes), loc="right")
     name_model(panels[0], campaign, [study, *load_studies])
-    legend_below(fig, looks.handles(**_LINE) | points_handles(counts), scale=looks.scale, panels=panels)
+    legend_below(fig, looks.handles(**_LINE) | points_handles(counts))
     return fig
 
 

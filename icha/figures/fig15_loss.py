@@ -9,9 +9,8 @@ import numpy as np
 
 from icha.figures.declaration import Campaign, Declaration, FigureOptions, studies_problems
 from icha.figures.ensembles import Points, points_handles
-from icha.figures.hysteresis import name_model, select_detached_lines
 from icha.figures.looks import legend_below, looks_of_studies
-from icha.figures.select import ContactRuns, NothingToDraw
+from icha.figures.select import ContactRuns, NothingToDraw, name_model, select_detached_lines
 from icha.figures.style import GREY, in_style, logarithmic_axes, new_panels
 from icha.support.values import Problem, list_of_names
 
@@ -74,14 +73,14 @@ def figure(campaign: xr.DataTree, *, studies: Sequence[str]) -> Figure:
     name_model(loss, campaign, studies)
     shown = _draw_parts(parts, sticky, looks)
     handles |= {PARTS[name][0]: Patch(ec="black", lw=0.5, **PARTS[name][1]) for name in shown}
-    legend_below(fig, handles | points_handles(counts), scale=looks.scale, panels=[loss])
+    legend_below(fig, handles | points_handles(counts))
     return fig
 
 
 def _draw_losses(ax, runs, looks):
     """Draw the losses of all lines with their fits; return what the legend shows, and numbers of seeds."""
     drawn = {key: Points(line, *_QUANTITIES) for key, line in runs.items()}
-    handles = looks.handles(ls="none") if looks.scale else {}
+    handles = looks.handles(ls="none") if looks.many else {}
     for (contact, applicable), line in drawn.items():
         handle = line.draw(ax, looks.look(contact, applicable=applicable) | {"ls": "none"})
         if not applicable:
@@ -92,7 +91,7 @@ def _draw_losses(ax, runs, looks):
             values, r_squared, exponent = fit_line(x, y, along)
             words = f": $r^2$ = {r_squared:.4f}, exponent {exponent:.2f}"
             ax.plot(along, values, color=looks.colour(contact), lw=0.9, zorder=2)
-        if not looks.scale:
+        if not looks.many:
             handles[looks.name(contact) + words] = handle
     means = np.concatenate([line.means for line in drawn.values()], axis=1)
     if all(values.min() > 0 and values.max() > _SPAN * values.min() for values in means):

@@ -11,19 +11,10 @@ from icha.datasets import results
 from icha.datasets.labels import RunLabels
 from icha.figures.curves import SEPARATION_LABEL
 from icha.figures.declaration import Campaign, Declaration, Inputs, RunFigure, unloading_problems
-from icha.figures.looks import BRANCH_DASHES, NOT_APPLICABLE_ALONE, legend_below, words_handle
+from icha.figures.looks import BRANCH_DASHES, NOT_APPLICABLE_ALONE, legend_below
 from icha.figures.maps import topography_of
 from icha.figures.select import is_applicable, select_complete_run, unloading_legs
-from icha.figures.style import (
-    BLACK,
-    GREY,
-    in_style,
-    legend_handle,
-    logarithmic_axes,
-    material_label,
-    new_panels,
-    slope_label,
-)
+from icha.figures.style import BLACK, GREY, in_style, legend_handle, material_label, new_panels, slope_label
 from icha.support.values import Problem
 
 if TYPE_CHECKING:
@@ -87,7 +78,7 @@ def figure(campaign: xr.DataTree, surface: xr.Dataset, *, run: Sequence) -> Figu
     title = f"{material_label(campaign[labels.study].to_dataset(), labels.material)}, {slope_label(labels.rms_slope)}"
     when.set_title(title, loc="right", fontsize="small")
     handles |= {name: legend_handle(color=GREY, ls=dashes, lw=1.1) for name, dashes in BRANCH_DASHES.items()}
-    legend_below(fig, handles if is_applicable(data) else handles | words_handle(NOT_APPLICABLE_ALONE))
+    legend_below(fig, handles if is_applicable(data) else handles | {NOT_APPLICABLE_ALONE: legend_handle(ls="none")})
     return fig
 
 
@@ -125,13 +116,8 @@ def _draw_counts(ax, events):
             if len(separation):
                 steps, counts = np.append(separation[0], separation), np.arange(len(separation) + 1)
                 ax.plot(steps, counts, color=look["mec"], ls=dashes, lw=width, drawstyle="steps-post")
-    most = max((line.get_ydata()[-1] for line in ax.get_lines()), default=1)
-    if most > _FEW:
-        logarithmic_axes(ax, "y")
-        ax.set_ylim(bottom=0.8)
-    else:
-        ax.set_ylim(0, 1.06 * most)
-        ax.yaxis.set_major_locator(MaxNLocator(integer=True))
+    ax.set_ylim(bottom=0)
+    ax.yaxis.set_major_locator(MaxNLocator(integer=True))
     ax.set(xlabel=SEPARATION_LABEL, ylabel="events so far")
 
 

@@ -8,19 +8,7 @@ import numpy as np
 
 from icha.datasets import results
 from icha.datasets.variables.model_error import FINITE_RANGE
-from icha.figures.curves import (
-    AREA_LABEL,
-    PRESSURE_LABEL,
-    add_legend,
-    area_points,
-    cross_look,
-    draw_curves,
-    drop_rounding_errors,
-    gap_label,
-    gap_points,
-    study_curves,
-    theories_handle,
-)
+from icha.figures import curves
 from icha.figures.declaration import (
     Campaign,
     Declaration,
@@ -59,6 +47,8 @@ _LOWER = 0.42
 _SAME_LOAD = 1e-6
 # Labels of the axis of separations if it is short.
 _SEPARATIONS = (0.05, 0.1, 0.2, 0.3, 0.5, 0.7, 1, 1.5, 2, 3, 5)
+# Points of a run, their error in a model error, and their symbol.
+_QUANTITIES = ((curves.area_points, "area_error", "A"), (curves.gap_points, "separation_error", r"\bar{u}"))
 
 
 @in_style
@@ -73,47 +63,50 @@ def figure(
     references : theories and points for the study's first surface (`icha.references.theories`), if any.
     model_error : boundary elements at a finite range (`icha.analysis.model_error.model_error`), if any.
     """
-    curves, dataset = study_curves(campaign, study), campaign[study].to_dataset()
+    shown, dataset = curves.study_curves(campaign, study), campaign[study].to_dataset()
     solutions = [
         (contact, errors)
         for _, contact, errors in select_errors(model_error, study)
         if errors.attrs["truth"] == FINITE_RANGE
         and np.isfinite(errors["contact_area_fraction_boundary_elements"].values).any()
     ]
-    differences = _differences(curves, solutions, references)
+    differences = _differences(shown, solutions, references)
     fig = new_figure(TWO_COLUMNS, 4.5)
     mosaic = "ab;cd" if len(differences) == 2 else "ab;cb"
     axes = fig.subplot_mosaic(mosaic, height_ratios=(1, _LOWER))
     left, right = axes["a"], axes["b"]
-    (p, areas), (_, gaps) = draw_curves(curves, {left: area_points, right: gap_points}, unloading=True)
-    states = [(p, areas, gaps), *_draw_solutions([left, right], curves.looks, solutions)]
-    pressures, areas, gaps = (drop_rounding_errors(np.concatenate(values)) for values in zip(*states, strict=True))
+    panels = {left: curves.area_points, right: curves.gap_points}
+    (p, areas), (_, gaps) = curves.draw_curves(shown, panels, unloading=True)
+    states = [(p, areas, gaps), *_draw_solutions([left, right], shown.looks, solutions)]
+    pressures, areas, gaps = (
+        curves.drop_rounding_errors(np.concatenate(values)) for values in zip(*states, strict=True)
+    )
     x = (pressures.min() / 1.6, pressures.max() * 1.6)
     if references is not None:
         if "gfmd_reduced_pressure" in references:
             x = (x[0], max(x[1], 1.2 * float(references["gfmd_reduced_pressure"].max())))
         _draw_references(left, right, references, x)
-        _draw_separate_summits(left, right, references, dataset, curves.looks.colours)
-    left.set(ylabel=AREA_LABEL, ylim=(min(areas.min(), 1.6 * x[0]) / 1.5, min(1, 3 * areas.max())))
+        _draw_separate_summits(left, right, references, dataset, shown.looks)
+    left.set(ylabel=curves.AREA_LABEL, ylim=(min(areas.min(), 1.6 * x[0]) / 1.5, min(1, 3 * areas.max())))
     low, high = gaps.min() / 1.4, gaps.max() * 1.4
-    right.set(ylabel=gap_label(dataset), ylim=(low, high))
+    right.set(ylabel=curves.gap_label(dataset), ylim=(low, high))
     right.yaxis.set_major_formatter("{x:g}")
     right.yaxis.set_minor_formatter("")
     if high < 60 * low:
         right.set_yticks([tick for tick in _SEPARATIONS if low < tick < high])
     for letter, (label, drawn) in zip("cd", differences, strict=False):
-        _draw_differences(axes[letter], drawn, len(curves.lines))
+        _draw_differences(axes[letter], drawn, len(shown.lines))
         axes[letter].set_ylabel(label)
     for letter, ax in axes.items():
         panel_label(ax, letter)
         lowest = letter in mosaic.split(";")[1]
-        ax.set(xlim=x, xlabel=PRESSURE_LABEL if lowest else "")
-        ax.tick_params(labelbottom=lowest)
-    add_legend(fig, [left, right], curves, theories_handle(dataset) if references is not None else {})
+        ax.set(xlim=x, xlabel=curves.PRESSURE_LABEL if lowest else "")
+        ax.tick_params(which="both", labelbottom=lowest)
+    curves.add_legend(fig, [left, right], shown)
     return fig
 
 
-def _differences(curves, solutions, references):
+def _differences(shown, solutions, references):
     """Return the differences of area and separation from boundary elements, or else from theories, in per cent.
 
     Returns
@@ -123,16 +116,16 @@ def _differences(curves, solutions, references):
     """
     from icha.references.persson import persson_area
 
-    theories = {area_points: persson_area, gap_points: None}
+    theories = {curves.area_points: persson_area, curves.gap_points: None}
     if references is not None and "persson_reduced_separation" in references:
         known = (np.log(references["reduced_pressure"].values), references["persson_reduced_separation"].values)
-        theories[gap_points] = lambda p: np.interp(np.log(p), *known)
+        theories[curves.gap_points] = lambda p: np.interp(np.log(p), *known)
     # The limit of a short range comes first: with adhesion, finite ranges only bound it.
-    truths, solved = {truth.runs.contact: truth for truth in curves.crosses}, dict(reversed(solutions))
+    truths, solved = {truth.runs.contact: truth for truth in shown.crosses}, dict(reversed(solutions))
     found = []
-    for points, error, symbol in ((area_points, "area_error", "A"), (gap_points, "separation_error", r"\bar{u}")):
+    for points, error, symbol in _QUANTITIES:
         drawn, name = [], "BEM"
-        for line in curves.lines:
+        for line in shown.lines:
             if truth := truths.get(line.runs.contact):
                 drawn.append((line, *_from_runs(line, truth, points), min(line.runs.asked, truth.runs.asked)))
             elif (errors := solved.get(line.runs.contact)) is not None:
@@ -141,7 +134,7 @@ def _differences(curves, solutions, references):
                 drawn.append((line, own["reduced_pressure"].values, 100 * own.values, asked_of_entry(errors)))
         if not drawn and theories[points]:
             name = "Persson"
-            drawn = [(line, *_from_theory(line, points, theories[points]), line.runs.asked) for line in curves.lines]
+            drawn = [(line, *_from_theory(line, points, theories[points]), line.runs.asked) for line in shown.lines]
         if drawn:
             found.append((rf"${symbol}/{symbol}_{{\mathrm{{{name}}}}}-1$  (%)", drawn))
     return found
@@ -162,7 +155,7 @@ def _from_runs(line, truth, points):
             true_load, true_values = true_load[pressed], true_values[pressed]
             at = np.clip(load, true_load.min(), true_load.max())
             reached = np.isclose(at, load, rtol=_SAME_LOAD, atol=0)
-            logarithmic = points is area_points
+            logarithmic = points is curves.area_points
             true_values = interpolate(true_load, true_values, at[reached], logarithmic=logarithmic)
             members.append((load[reached], 100 * (values[reached] / true_values - 1)))
     return at_common_loads(members, logarithmic=False) if members else (np.empty(0), np.empty((0, 0)))
@@ -197,7 +190,7 @@ def _draw_solutions(panels, looks, solutions):
         solved = errors.dropna("reduced_pressure", how="all", subset=names[:1])
         members, p = [solved[name].values for name in names], solved["reduced_pressure"].values
         states.append((p, *(ensemble(values).mean for values in members)))
-        look = cross_look(looks, contact, FINITE_RANGE)
+        look = curves.cross_look(looks, contact, FINITE_RANGE)
         for ax, values in zip(panels, states[-1][1:], strict=True):
             ax.plot(p, values, **look)
             mark_fewer(ax, p, values, np.isfinite(members[0]), look, asked_of_entry(errors))
@@ -223,17 +216,17 @@ def _draw_references(left, right, references, limits):
         right.plot(p[shown], references["persson_reduced_separation"].values[shown], label="Yang & Persson", **black)
 
 
-def _draw_separate_summits(left, right, references, dataset, colours):
+def _draw_separate_summits(left, right, references, dataset, looks):
     """Draw theories of separate summits as thin lines, if the references have them; Fuller & Tabor by material."""
-    curves = []
+    theories = []
     if "greenwood_williamson_reduced_pressure" in references:
-        curves.append(("Greenwood & Williamson", (0, (5, 2, 1, 2)), GREY, "greenwood_williamson", references))
+        theories.append(("Greenwood & Williamson", (0, (5, 2, 1, 2)), GREY, "greenwood_williamson", references))
     for k in range(references.sizes.get("fuller_tabor_curve", 0)):
         theory = references.isel(fuller_tabor_curve=k)
         material, slope = str(theory["fuller_tabor_material"].values), float(theory["fuller_tabor_rms_slope"])
-        if material in colours and np.isclose(slope, dataset["rms_slope"].values, rtol=1e-9).any():
-            curves.append(("Fuller & Tabor", (0, (1, 1.5)), colours[material], "fuller_tabor", theory))
-    for label, dashes, colour, name, theory in curves:
+        if material in looks.materials and np.isclose(slope, dataset["rms_slope"].values, rtol=1e-9).any():
+            theories.append(("Fuller & Tabor", (0, (1, 1.5)), looks.material_colour(material), "fuller_tabor", theory))
+    for label, dashes, colour, name, theory in theories:
         p, separation = (theory[f"{name}_reduced_{quantity}"].values for quantity in ("pressure", "separation"))
         look = {"ls": dashes, "lw": 0.8, "zorder": 1.8}
         for ax, values in ((left, theory["summit_area_fraction"].values), (right, separation)):

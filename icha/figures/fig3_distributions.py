@@ -29,7 +29,8 @@ DECLARATION = Declaration(
 _LEAST_CELLS = 100
 # The same for nodes in contact, which are few.
 _LEAST_NODES = 25
-_MOST_MARKERS, _BESIDE_MARKERS = 40, 14
+# Largest number of markers of boundary elements.
+_BESIDE_MARKERS = 14
 
 
 @in_style
@@ -44,10 +45,10 @@ def figure(campaign: xr.DataTree, *, study: str, kind: str | None = None, target
     for line, look in zip(lines, each_look, strict=True):
         u, densities = gap_densities(line.members)
         drawn = {"positive": True, "lines": len(lines), "asked": line.runs.asked}
-        draw_members(left, u, densities, look, **drawn, markevery=1 + len(u) // _MOST_MARKERS)
+        draw_members(left, u, densities, look, **drawn)
         floor.append(drop_rounding_errors(densities.mean(axis=0)).min())
         p, densities = pressure_densities(line.members)
-        draw_members(right, p, densities, look, **drawn, markevery=3)
+        draw_members(right, p, densities, look, **drawn)
         density = densities.mean(axis=0)
         shown = p[density > 1e-3 * density.max(initial=0)]
         lowest, highest = shown.min(initial=lowest), shown.max(initial=highest)

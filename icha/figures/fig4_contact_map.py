@@ -46,11 +46,6 @@ _WIDEST_IN_RADII = 40
 _LEAST_CELLS = 64
 # More spots than this are drawn as an image in PDF files as well.
 _MANY_SPOTS = 2000
-# Outlines in the map, as fractions of the radius, so that they do not hide small spots, and at most, in points; and
-# about the width of the map, in points.
-_OUTLINE = 0.25
-_WIDEST_OUTLINE = 0.35
-_PANEL = 190
 _RED = (0.9, 0.0, 0.05)
 # Names and colours of nodes in contact with no model, asperities, boundary elements, and both.
 _STATES = (("", "white"), ("asperities only", _RED), ("boundary elements only", "black"), ("both", "0.72"))
@@ -92,9 +87,7 @@ def figure(
     whole, enlarged = panels[0, 0], panels[0, 1] if beside is None else panels[1, 0]
     heights = {"cmap": "cividis", "vmin": -topography.highest, "vmax": topography.highest}
     image = topography.draw(whole, **heights)
-    outlines = np.minimum(_OUTLINE * _PANEL / topography.side * view.circles[:, 2], _WIDEST_OUTLINE)
-    look = {"facecolor": (*_RED, 0.85), "edgecolor": "black", "rasterized": len(view.circles) > _MANY_SPOTS}
-    draw_spots(whole, view.circles, lw=outlines, **look)
+    draw_spots(whole, view.circles, facecolor=(*_RED, 0.85), lw=0, rasterized=len(view.circles) > _MANY_SPOTS)
     nodes, borders = _window(topography.heights, topography.side, view)
     enlarged.imshow(nodes * topography.scale, extent=borders, origin="lower", interpolation="nearest", **heights)
     draw_spots(enlarged, view.circles, facecolor=(*_RED, 0.4), edgecolor=(0.75, 0, 0), lw=1.0)

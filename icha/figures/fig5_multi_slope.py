@@ -7,16 +7,9 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from icha.datasets import results
-from icha.figures.curves import (
-    AREA_LABEL,
-    PRESSURE_LABEL,
-    add_legend,
-    area_points,
-    draw_curves,
-    study_curves,
-)
+from icha.figures.curves import AREA_LABEL, PRESSURE_LABEL, add_legend, area_points, draw_curves, study_curves
 from icha.figures.declaration import Campaign, Declaration, Inputs, TruthFigure
-from icha.figures.style import BLACK, DASHES, in_style, new_panels
+from icha.figures.style import DASHES, in_style, new_panels
 from icha.support.input_files import read_columns
 
 if TYPE_CHECKING:
@@ -30,13 +23,8 @@ class SlopesAndMaterialsFigure(TruthFigure):
     def arguments(self, campaign: Campaign) -> dict[str, Any]:
         """Return the arguments, and what the figure needs to know about each table of measurements."""
         known = [
-            {
-                "label": measurement.label,
-                "columns": measurement.columns,
-                "load_unit": _load_unit(campaign, measurement),
-                "material": measurement.material,
-                "rms_slope": measurement.rms_slope,
-            }
+            {name: getattr(measurement, name) for name in ("label", "columns", "material", "rms_slope")}
+            | {"load_unit": _load_unit(campaign, measurement)}
             for measurement in self.measurements(campaign)
         ]
         return super().arguments(campaign) | ({"measurements": known} if known else {})
@@ -89,7 +77,7 @@ def figure(
     fig, [(left, right)] = new_panels(3.5, sharey=True)
     draw_curves(curves, {left: area_points, right: _points_at_load}, unloading=True)
     for k, (table, known) in enumerate(zip(tables, measurements, strict=True)):
-        colour = curves.looks.colours.get(known["material"], BLACK)
+        colour = curves.looks.material_colour(known["material"])
         _draw_measured(left, right, table, known, colour, DASHES[k % len(DASHES)])
     left.set(xlabel=PRESSURE_LABEL, ylabel=AREA_LABEL)
     right.set_xlabel(r"relative load  $F/(E^{\ast}A_0)$")

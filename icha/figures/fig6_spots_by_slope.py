@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from pydantic import Field
 
 from icha.figures.declaration import Campaign, Declaration, StudyFigure
-from icha.figures.looks import NOT_APPLICABLE_ALONE, Scale, legend_below
+from icha.figures.looks import NOT_APPLICABLE_ALONE, graded_colours, legend_below
 from icha.figures.maps import draw_spots, wrap_circles
 from icha.figures.select import is_applicable, pick, select_runs, snapshot_label
 from icha.figures.style import in_style, new_panels, slope_label
@@ -67,7 +67,7 @@ def figure(
     by_slope = {labels.rms_slope: run for labels, run in runs if labels.material == material}
     slopes = sorted(by_slope, reverse=True)
     # From dark to bright; the colours of the palette are those of materials.
-    colours = dict(zip(slopes, Scale([f"{slope:g}" for slope in slopes]).colours, strict=True))
+    colours = dict(zip(slopes, graded_colours(len(slopes)), strict=True))
 
     fig, [panels] = new_panels(3.8, sharey=True)
     length, unit = choose_unit(float(by_slope[slopes[0]]["period"]), "m")

@@ -6,14 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from icha.figures.curves import (
-    PRESSURE_LABEL,
-    add_legend,
-    draw_curves,
-    drop_rounding_errors,
-    study_curves,
-    theories_handle,
-)
+from icha.figures.curves import PRESSURE_LABEL, add_legend, draw_curves, drop_rounding_errors, study_curves
 from icha.figures.declaration import Declaration, StudyFigure, dataset_and_theories
 from icha.figures.select import NothingToDraw
 from icha.figures.style import BLACK, in_style, new_panels
@@ -51,8 +44,7 @@ def figure(campaign: xr.DataTree, references: xr.Dataset | None = None, *, study
     y = (drop_rounding_errors(stiffnesses).min() / 2, stiffnesses.max() * 2)
     left.set(xlim=x, xlabel=PRESSURE_LABEL, ylim=y, ylabel=stiffness_label)
     right.set(xlim=x, xlabel=PRESSURE_LABEL, ylim=(0, 1.15 * ratio.max()), ylabel=r"$K h_{\mathrm{rms}}/p$")
-    further = theories_handle(campaign[study].to_dataset()) if references is not None else {}
-    add_legend(fig, [left, right], curves, further)
+    add_legend(fig, [left, right], curves)
     return fig
 
 

@@ -12,7 +12,7 @@ from icha.figures.declaration import Campaign, Declaration, SnapshotFigure
 from icha.figures.ensembles import Points, points_handles
 from icha.figures.looks import Looks, legend_below, named_handles
 from icha.figures.select import ContactRuns, NothingToDraw, group_by_contact, select_runs, snapshot_label
-from icha.figures.style import GREY, in_style, material_label, new_panels
+from icha.figures.style import GREY, in_style, new_panels
 from icha.support.values import Problem
 
 if TYPE_CHECKING:
@@ -76,10 +76,9 @@ def figure(campaign: xr.DataTree, *, study: str, kind: str | None = None, target
     fig, [panels] = new_panels(3.1)
     counts, drawn = [], []
     for (contact, applicable), line in curves.items():
-        name = material_label(interfaces, contact[0]) if looks.scale else looks.name(contact)
         points = Points(line, "tabor_parameter", *_STATE)
         for quantity, ax in enumerate(panels, 1):
-            points.draw(ax, {"label": name} | looks.look(contact, applicable=applicable), quantity)
+            points.draw(ax, looks.look(contact, applicable=applicable), quantity)
         counts += points.counts
         drawn += points.means[0].tolist()
     for k, (contact, line) in enumerate(bare.items()):
@@ -91,7 +90,7 @@ def figure(campaign: xr.DataTree, *, study: str, kind: str | None = None, target
         _finish(ax, min(drawn))
         ax.set_ylabel(label)
     panels[0].set_title(shown, loc="right")
-    legend_below(fig, named_handles(panels) | points_handles(counts), scale=looks.scale, panels=panels)
+    legend_below(fig, looks.handles() | named_handles(panels) | points_handles(counts))
     return fig
 
 

@@ -2,14 +2,13 @@
 
 A colour stands for a material, a marker for a model. Closed markers are asperities with adhesion, open markers
 asperities without adhesion, crosses boundary elements. If a figure has several surfaces and slopes, the shapes of the
-closed markers distinguish them. If there are many materials, or many surfaces and slopes, the colours of a scale
-distinguish them instead.
+closed markers distinguish them. If there are many materials, or many surfaces and slopes, graded colours from dark to
+bright distinguish them instead, and the legend names some of them.
 """
 
 from __future__ import annotations
 
 import itertools
-import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
@@ -17,15 +16,7 @@ import numpy as np
 
 from icha.contact.models import MODELS
 from icha.datasets.variables.model_error import FINITE_RANGE, SHORT_RANGE
-from icha.figures.style import (
-    BLACK,
-    COLOURS,
-    GREY,
-    INTERFACE,
-    legend_handle,
-    material_label,
-    slope_label,
-)
+from icha.figures.style import BLACK, COLOURS, GREY, INTERFACE, legend_handle, material_label, slope_label
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -38,7 +29,7 @@ Contact = tuple[str, str, float | None]
 
 # Okabe and Ito's colours without black, which is for theories, and darker ones of the same hues.
 MATERIAL_COLOURS = (*COLOURS[:-1], "#004166", "#803800", "#005A42", "#80436A", "#805800", "#2B6C94")
-PLACE_MARKERS = ("o", "s", "^", "D", "v", "p", "*")
+MARKERS = ("o", "s", "^", "D", "v", "p", "*")
 
 ASPERITIES_NAME = MODELS["asperities"].words
 # By the names of models in legends.
@@ -48,7 +39,7 @@ BRANCH_DASHES = {"loading": "-", "unloading": (0, (4, 2))}
 # Lines of boundary elements, which are drawn beside those of asperities.
 TRUTH_LINE = {"ls": (0, (3, 2)), "lw": 0.8, "ms": 5, "mew": 0.8, "zorder": 5}
 
-# Largest number of materials, or of surfaces and slopes, with a colour in the legend; more have a scale.
+# Largest number of materials, or of surfaces and slopes, with distinct colours; more have graded colours.
 MOST_COLOURS = len(COLOURS)
 # Largest number of lines that are not drawn thin.
 FEW_LINES = 6
@@ -56,6 +47,10 @@ FEW_LINES = 6
 # narrower than the one before. Sizes of markers in points, width of lines in sizes of markers.
 _BARE_SIZE, _ADHESIVE_SIZE, _LEAST_SIZE, _NARROWER = 6.0, 4.6, 1.8, 0.75
 _LINE_WIDTH = 0.22
+# Largest fraction of the graded colours; brighter colours are invisible on white.
+_BRIGHTEST = 0.9
+# Largest number of names of graded colours in a legend.
+_MOST_NAMED = 9
 # Fraction of a colour that is left in its pale one.
 _PALENESS = 0.4
 
@@ -83,23 +78,17 @@ class Looks:
         self.interfaces = interfaces
         self.materials = list(dict.fromkeys(material for material, *_ in self.contacts))
         self.places = list(dict.fromkeys(tuple(place) for _, *place in self.contacts))
-        self.many_places = len(self.places) > MOST_COLOURS
-        self.by_place = self.many_places or (by_place and len(self.places) > 1)
-        self.scale: Scale | None = None
-        palette = material_colours(campaign)
-        self.colours = {material: BLACK if self.many_places else palette[material] for material in self.materials}
-        self._place_colours = {}
-        if self.by_place:
-            scale = Scale([self.place_name(place) for place in self.places])
-            self._place_colours = dict(zip(self.places, scale.colours, strict=True))
-            self.scale = scale if self.many_places else None
-        elif len(self.materials) > MOST_COLOURS:
-            self.scale = Scale(self.materials)
-            self.colours = dict(zip(self.materials, self.scale.colours, strict=True))
+        self.by_place = len(self.places) > MOST_COLOURS or (by_place and len(self.places) > 1)
+        coloured = self.places if self.by_place else self.materials
+        self.many = len(coloured) > MOST_COLOURS
+        graded = self.many or self.by_place
+        palette = graded_colours(len(coloured)) if graded else map(material_colours(campaign).get, coloured)
+        self._colours = dict(zip(coloured, palette, strict=True))
         # The steepest slope of a surface has the first marker.
         surfaces = list(dict.fromkeys(surface for surface, _ in self.places))
         ordered = sorted(self.places, key=lambda place: (surfaces.index(place[0]), -(place[1] or 0)))
-        self._markers = dict(zip(ordered, itertools.cycle(PLACE_MARKERS)))
+        shaped = self.materials if self.by_place else ordered
+        self._markers = dict(zip(shaped, itertools.cycle(MARKERS)))
         self._sizes = {}
         for adhesive, largest in ((False, _BARE_SIZE), (True, _ADHESIVE_SIZE)):
             alike = [material for material in self.materials if self.adhesive(material) == adhesive]
@@ -110,15 +99,18 @@ class Looks:
         return float(self.interfaces["surface_energy"].sel(material=material)) > 0
 
     def colour(self, contact: Contact) -> str:
-        """Return the colour of a line; of a contact without a line that of its material, or grey."""
+        """Return the colour of a line; grey for a contact without a line."""
         material, *place = contact
-        return self._place_colours.get(tuple(place)) or self.colours.get(material, GREY)
+        return self._colours.get(tuple(place) if self.by_place else material, GREY)
+
+    def material_colour(self, material: str | None) -> str:
+        """Return the colour of a material; black if the figure has no such material, or if places have the colours."""
+        return self._colours.get(material, BLACK)
 
     def look(self, contact: Contact, *, applicable: bool = True) -> dict:
         """Return arguments of `Axes.plot` for a line; pale if the asperity model is not applicable."""
         material, *place = contact
         colour, size, adhesive = self.colour(contact), self._sizes[material], self.adhesive(material)
-        rank = self.materials.index(material)
         look = {
             "color": colour,
             "mec": colour,
@@ -126,34 +118,32 @@ class Looks:
             "mew": 0.9,
             "ms": size,
             "lw": _LINE_WIDTH * size,
-            "zorder": 3 + adhesive + 0.01 * rank,
-            # If surfaces and slopes have the colours of a scale, materials have the shapes.
-            "marker": PLACE_MARKERS[rank % len(PLACE_MARKERS)] if self.many_places else self._markers[tuple(place)],
+            "zorder": 3 + adhesive + 0.01 * self.materials.index(material),
+            "marker": self._markers[material if self.by_place else tuple(place)],
         }
-        if self.scale:
-            look |= {"lw": 0.6, "ms": 0.6 * size, "mew": 0.6}
-        elif len(self.contacts) > FEW_LINES:
-            look |= {"lw": 0.6, "ms": 0.8 * size}
+        if len(self.contacts) > FEW_LINES:
+            look |= {"lw": 0.6, "ms": (0.6 if self.many else 0.8) * size}
         return look if applicable else _pale(look)
 
     def handles(self, **changed: object) -> dict[str, Line2D]:
-        """Return the handles of all names that are not on the scale; `changed` overrides their looks."""
-        first = self.places[0]
-        if self.by_place and not self.many_places:
-            return {self.name(each): legend_handle(**self.look(each) | changed) for each in self.contacts}
-        found = {}
-        if not self.scale or (self.many_places and 1 < len(self.materials) <= MOST_COLOURS):
-            marker = self._markers[first] if not self.place_name(first) else MODEL_MARKERS[ASPERITIES_NAME]
-            grey = {"color": GREY, "mec": GREY} if self.many_places else {"marker": marker}
-            for material in self.materials:
-                look = self.look((material, *first)) | grey | changed
-                found[material_label(self.interfaces, material)] = legend_handle(**look)
-        if len(self.places) > 1 and not self.many_places:
+        """Return the handles of the names, of many names of some; `changed` overrides the looks of the lines."""
+        material, place = self.materials[0], self.places[0]
+        if self.by_place:
+            found = {self.place_name(each): self.look((material, *each)) | changed for each in some_of(self.places)}
+            shapes = self.materials if len(self.materials) > 1 else []
+            grey = {"color": GREY, "mec": GREY}
+            found |= {self.material_name(each): self.look((each, *place)) | changed | grey for each in some_of(shapes)}
+        else:
+            changed = ({"marker": MODEL_MARKERS[ASPERITIES_NAME]} if self.place_name(place) else {}) | changed
+            found = {self.material_name(each): self.look((each, *place)) | changed for each in some_of(self.materials)}
             grey = {"ls": "none", "color": GREY, "mfc": "white", "mew": 0.9, "ms": 5}
-            for place, marker in self._markers.items():
-                if name := self.place_name(place):  # empty if slopes are not distinguished
-                    found[name] = legend_handle(**grey | {"marker": marker})
-        return found
+            found |= {self.place_name(each): grey | {"marker": marker} for each, marker in self._markers.items()}
+            found.pop("", None)  # surface and slope of figures that have a single one
+        return {name: legend_handle(**look) for name, look in found.items()}
+
+    def material_name(self, material: str) -> str:
+        """Return modulus and surface energy of a material in words."""
+        return material_label(self.interfaces, material)
 
     def place_name(self, place: tuple[str, float | None]) -> str:
         """Return surface and rms slope of a line in words, as far as the figure has several."""
@@ -169,31 +159,23 @@ class Looks:
         # A single material is not named if surfaces and slopes have the colours.
         if place and self.by_place and len(self.materials) == 1:
             return place
-        return ", ".join(filter(None, [material_label(self.interfaces, material), place]))
+        return ", ".join(filter(None, [self.material_name(material), place]))
 
 
 def looks_of_studies(campaign: xr.DataTree, studies: Sequence[str], contacts: Iterable[Contact]) -> Looks:
     """Return looks of lines of some studies; lines of a single material have the colours of surfaces and slopes."""
+    import xarray as xr
+
     contacts = list(contacts)
-    interfaces = collect_interfaces(campaign[study].to_dataset() for study in studies)
-    return Looks(campaign, interfaces, contacts, by_place=len({material for material, *_ in contacts}) == 1)
+    interfaces = xr.concat([campaign[study].to_dataset()[INTERFACE] for study in studies], "material")
+    by_place = len({material for material, *_ in contacts}) == 1
+    return Looks(campaign, interfaces.drop_duplicates("material"), contacts, by_place=by_place)
 
 
 def material_colours(campaign: xr.DataTree) -> dict[str, str]:
     """Return a colour for every material of a campaign dataset, in the order in which its studies name them."""
     materials = (name for study in campaign.children.values() for name in study["material"].values.tolist())
     return dict(zip(dict.fromkeys(materials), itertools.cycle(MATERIAL_COLOURS)))
-
-
-def collect_interfaces(datasets: Iterable[xr.Dataset]) -> xr.Dataset:
-    """Return modulus, surface energy and range of the materials of several datasets."""
-    import xarray as xr
-
-    found = {}
-    for dataset in datasets:
-        for material in dataset["material"].values.tolist():
-            found.setdefault(material, dataset[INTERFACE].sel(material=material))
-    return xr.concat(found.values(), "material", coords="minimal", compat="override")
 
 
 def _pale(look):
@@ -204,47 +186,18 @@ def _pale(look):
     return look | {"color": colour, "mec": colour, "mfc": "white", "label": NOT_APPLICABLE}
 
 
-# --- colours of many names, such as the surfaces of a study that varies a parameter ---
+def graded_colours(count: int) -> list[str]:
+    """Return colours from dark to bright."""
+    import matplotlib as mpl
+    from matplotlib.colors import to_hex
 
-_MOST_TICKS = 9
-# Largest fraction of the colour map; brighter colours are invisible on white.
-_BRIGHTEST = 0.9
+    return [to_hex(colour) for colour in mpl.colormaps["viridis"](np.linspace(0, _BRIGHTEST, count))]
 
 
-class Scale:
-    """A colour for each of many names, and the bar that shows them.
-
-    The title of the bar is the common beginning of the names, which the labels of the bar then lack.
-
-    Parameters
-    ----------
-    names : the names in the order of their colours.
-    """
-
-    def __init__(self, names: Sequence[str]):
-        """Distribute the colours."""
-        import matplotlib as mpl
-        from matplotlib.colors import to_hex
-
-        alike = itertools.takewhile(lambda letters: len(set(letters)) == 1, zip(*names, strict=False))
-        # Digits that all names share belong to their numbers.
-        common = re.sub(r"[-+.\d]*$", "", "".join(letters[0] for letters in alike))
-        self.names = [name.removeprefix(common) for name in names]
-        self.title = common.rstrip("-_= ")
-        self.colours = [to_hex(colour) for colour in mpl.colormaps["viridis"](np.linspace(0, _BRIGHTEST, len(names)))]
-
-    def draw(self, figure: Figure, axes: Sequence[Axes]) -> None:
-        """Draw the colour bar beside the panels, with at most `_MOST_TICKS` names."""
-        from matplotlib.cm import ScalarMappable
-        from matplotlib.colors import BoundaryNorm, ListedColormap
-
-        count = len(self.names)
-        mappable = ScalarMappable(BoundaryNorm(np.arange(count + 1) - 0.5, count), ListedColormap(self.colours))
-        bar = figure.colorbar(mappable, ax=axes, pad=0.015, aspect=28)
-        shown = np.unique(np.rint(np.linspace(0, count - 1, min(count, _MOST_TICKS))).astype(int))
-        bar.set_ticks(shown, labels=[self.names[k] for k in shown])
-        bar.ax.tick_params(which="both", length=0, labelsize=7)
-        bar.set_label(self.title)
+def some_of(names: Sequence) -> list:
+    """Return all of a few names, or evenly spaced ones of many, including the first and the last."""
+    at = np.unique(np.rint(np.linspace(0, len(names) - 1, min(len(names), _MOST_NAMED))).astype(int))
+    return [names[k] for k in at]
 
 
 # --- legends ---
@@ -253,23 +206,17 @@ FEWER_SEEDS = "crossed: mean over fewer seeds than requested"
 # Largest number of names in the larger font.
 _MANY_NAMES = 12
 _MOST_COLUMNS = 4
-_PALE_GREY = "0.72"
+# Labels of marks that a legend names if a panel has some.
+_MARKS = (FEWER_SEEDS, NOT_APPLICABLE)
 
 
-def legend_below(
-    figure: Figure, handles: Mapping[str, object], *, scale: Scale | None = None, panels: Sequence[Axes] = ()
-) -> None:
-    """Add a legend below the panels, in as many columns as have room; the figure grows by its height.
+def legend_below(figure: Figure, handles: Mapping[str, object]) -> None:
+    """Add a legend of handles by name below the panels, in as many columns as have room.
 
-    Parameters
-    ----------
-    figure : the figure, in which all else is drawn.
-    handles : handles of the legend, by name.
-    scale : scale of colours that is added beside the `panels`, if any.
+    The figure, in which all else is drawn, grows by the height of the legend.
     """
-    if scale:
-        scale.draw(figure, list(panels))
-    handles = dict(handles) | _marks(figure)
+    marks = {name: handle for name, handle in named_handles(figure.axes).items() if name in _MARKS}
+    handles = dict(handles) | marks
     look = {"loc": "outside lower center", "fontsize": 8 if len(handles) <= _MANY_NAMES else 7}
     for columns in range(_MOST_COLUMNS if handles else 0, 0, -1):
         legend = figure.legend(handles.values(), handles.keys(), ncols=columns, **look)
@@ -278,18 +225,6 @@ def legend_below(
             figure.set_figheight(figure.get_figheight() + size[1])
             break
         legend.remove()
-
-
-def _marks(figure):
-    """Return handles of crossed and pale marks, if a panel has some."""
-    shown = named_handles(figure.axes)
-    ring = {"ls": "none", "marker": "o", "ms": 5, "mew": 0.9, "mfc": "white"}
-    cross = ring | {"marker": "x", "mew": 0.7}
-    looks = {
-        FEWER_SEEDS: (legend_handle(color=GREY, **ring), legend_handle(color=GREY, **cross)),
-        NOT_APPLICABLE: legend_handle(color=_PALE_GREY, **ring | {"ls": "-", "lw": 0.9}),
-    }
-    return {name: look for name, look in looks.items() if name in shown}
 
 
 def named_handles(panels: Iterable[Axes]) -> dict[str, object]:
@@ -304,8 +239,3 @@ def named_handles(panels: Iterable[Axes]) -> dict[str, object]:
 def model_handle(name: str, **look: object) -> Line2D:
     """Return the handle of a model."""
     return legend_handle(**{"ls": "none", "marker": MODEL_MARKERS[name], "color": GREY, "mec": GREY, "ms": 6} | look)
-
-
-def words_handle(text: str) -> dict[str, object]:
-    """Return an entry of a legend without a mark."""
-    return {text: legend_handle(color=GREY, ls="none")}

@@ -32,8 +32,6 @@ ORANGE, SKY, PURPLE, BLACK = "#E69F00", "#56B4E9", "#CC79A7", "#000000"
 COLOURS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY, BLACK)
 DASHES = ("-", (0, (5, 2)), (0, (1, 1.5)), (0, (5, 2, 1, 2)), (0, (3, 1, 1, 1, 1, 1)))
 GREY = "0.45"
-# Ratio of the ends of a logarithmic axis below which ticks between powers of ten have labels.
-_SHORT_AXIS = 100
 
 RC = {
     "font.family": "STIXGeneral",
@@ -113,7 +111,7 @@ def save(figure: Figure, png: str | os.PathLike, pdf: str | os.PathLike) -> None
 
 
 def logarithmic_axes(axes: Axes, directions: str = "xy") -> None:
-    """Make axes logarithmic; between powers of ten, short axes have labels at twos and fives."""
+    """Make axes logarithmic; axes with fewer than two powers of ten have labels at twos and fives as well."""
     for direction in directions:
         axes.set(**{f"{direction}scale": "log"})
         axis = getattr(axes, f"{direction}axis")
@@ -125,7 +123,8 @@ def _minor_label(axis, value, _):
     low, high = sorted(axis.get_view_interval())
     exponent = np.floor(np.log10(value))
     digit = value / 10.0**exponent
-    shown = high < _SHORT_AXIS * low and np.isclose(digit, (2, 5)).any()
+    powers = np.floor(np.log10(high)) - np.ceil(np.log10(low)) + 1
+    shown = powers < 2 and np.isclose(digit, (2, 5)).any()
     return rf"${digit:g}\times10^{{{exponent:g}}}$" if shown else ""
 
 

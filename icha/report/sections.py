@@ -14,7 +14,7 @@ from icha.analysis.model_error import SUMMARISED
 from icha.datasets.labels import place_of, slopes_of, surfaces_and_slopes
 from icha.datasets.surface_file import measured_scale
 from icha.datasets.variables.model_error import SHORT_RANGE
-from icha.figures.looks import MOST_COLOURS, Scale, legend_below, named_handles
+from icha.figures.looks import MOST_COLOURS, graded_colours, legend_below, named_handles, some_of
 from icha.figures.style import COLOURS, TWO_COLUMNS, in_style, logarithmic_axes, new_figure
 from icha.support.formatting import format_quantity
 from icha.support.statistics import ENOUGH, ensemble
@@ -68,18 +68,19 @@ def draw_spectra(surfaces) -> str | None:
 
 @in_style
 def _draw_spectra(members):
-    """Draw a curve for each surface; many surfaces have a colour scale instead of a legend."""
-    scale = Scale(list(members)) if len(members) > MOST_COLOURS else None
+    """Draw a curve for each surface; many surfaces have graded colours, and the legend names some of them."""
+    colours = graded_colours(len(members)) if len(members) > MOST_COLOURS else COLOURS
+    named = some_of(list(members))
     figure = new_figure(TWO_COLUMNS, 3.4)
     axes = figure.subplots()
-    for (name, seeds), colour in zip(members.items(), scale.colours if scale else COLOURS, strict=False):
+    for (name, seeds), colour in zip(members.items(), colours, strict=False):
         q = seeds[0]["psd_wavevector"].values
         power = np.mean([seed["power_spectrum"].values for seed in seeds if seed["psd_wavevector"].shape == q.shape], 0)
         visible = (q > 0) & (power > power.max() * LEAST_POWER)
-        axes.plot(q[visible], power[visible], color=colour, label=None if scale else name)
+        axes.plot(q[visible], power[visible], color=colour, label=name if name in named else None)
     logarithmic_axes(axes)
     axes.set(xlabel="wave number  $q$ (rad/m)", ylabel="power spectrum  $C(q)$ (m$^4$)")
-    legend_below(figure, named_handles([axes]), scale=scale, panels=[axes])
+    legend_below(figure, named_handles([axes]))
     return figure
 
 

@@ -26,12 +26,10 @@ def test_a_map_shows_the_first_run_with_the_requested_labels(load):
     assert arguments["kind"] == "area_fraction" and set(arguments) == {"run", "kind", "target"}
 
 
-def test_a_study_of_areas_is_not_said_to_lack_boundary_elements(refused):
+def test_models_are_compared_at_the_same_loads(refused):
     areas = {
         "studies.one.models": ["asperities", "boundary_elements"],
         "studies.one.targets": {"area_fractions": [0.01, 0.02]},
         "figures": {"fig10_model_error": {"study": "one"}},
     }
-    refused(
-        "", areas, "'one' has boundary elements, but its targets are area_fractions, and errors are compared at the"
-    )
+    refused("", areas, "'one' has no boundary elements at the same loads")

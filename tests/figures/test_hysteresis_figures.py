@@ -13,8 +13,7 @@ from icha.datasets.labels import RunLabels
 from icha.figures import fig13_loops, fig14_pull_off, fig15_loss, fig16_snap_map
 from icha.figures.ensembles import Points
 from icha.figures.fig15_loss import PARTS, fit_line, shares
-from icha.figures.hysteresis import select_unloaded_runs
-from icha.figures.select import ContactRuns
+from icha.figures.select import ContactRuns, select_unloaded_runs
 
 MODULES = (fig13_loops, fig14_pull_off, fig15_loss)
 NAMES = (("reduced_separation", "reduced_pressure"), ("reduced_pressure", "contact_area_fraction"))

@@ -116,6 +116,6 @@ def test_captions_count_what_is_missing():
     assert count_runs(campaign(), ["five"]) == ""
     tree = campaign(lacking=(2,), failed={3: 2}, checks=(4,), pale=(1, 5))
     assert count_runs(tree, ["five"]) == (
-        "2 of 5 seeds of material soft did not complete and 1 of 5 seeds of material soft failed their checks: "
-        f"see Failed runs. 2 runs are marked: {REASON}."
+        "2 of 10 runs did not complete: see Failed runs. 1 of 10 runs failed their checks: see Failed runs. "
+        f"2 runs are marked: {REASON}."
     )
