@@ -144,7 +144,7 @@ def _compute(solver, surface, material, path, model, seed, progress, kept):
             contact = solver.resumable(contact, kept)
         reachable = path
         if MODELS[model].by_summits:
-            reachable = path.up_to(lambda target: _is_within_asperity_range(target, surface.rms_slope))
+            reachable = path.up_to(_is_within_asperity_range)
         record = _record_path(contact, observables, path, reachable, progress)
         loading = [step["mean_separation"] for step in record.steps if step["leg"] == 0]
         reasons = observables.reasons_against(loading, record.pressed)
@@ -245,7 +245,7 @@ def _check_arguments(surface, material, path, by_summits):
                     f"{load} is too small a load; expected a reduced pressure of at least {LEAST_PRESSURE} in "
                     "absolute value, or 0 at a turning point that ends unloading"
                 )
-            if target in limited and target.value > MAX_REDUCED_PRESSURE * surface.rms_slope:
+            if by_summits and target.value > MAX_REDUCED_PRESSURE * surface.rms_slope:
                 raise ValueError(
                     f"{load} is beyond the range of the asperity model; expected a reduced pressure of at most "
                     f"{MAX_REDUCED_PRESSURE}"
@@ -257,10 +257,8 @@ def _check_arguments(surface, material, path, by_summits):
             )
 
 
-def _is_within_asperity_range(target, rms_slope):
+def _is_within_asperity_range(target):
     """Return whether a target is within the range of the asperity model."""
-    if target.kind == RELATIVE_LOAD:
-        return target.value <= MAX_REDUCED_PRESSURE * rms_slope
     return target.kind not in ASPERITY_RANGES or target.value <= ASPERITY_RANGES[target.kind].most
 
 

@@ -246,7 +246,7 @@ class Study(Section):
         alone = self.models == [DEFAULT_MODEL]
         # The smallest slope makes the largest reduced pressure.
         slope = min((slope for slope in self.rms_slopes if slope != MEASURED), default=math.inf)
-        most = (MAX_REDUCED_PRESSURE if alone else LARGEST_REDUCED_PRESSURE) * slope
+        most = (MAX_REDUCED_PRESSURE if DEFAULT_MODEL in self.models else LARGEST_REDUCED_PRESSURE) * slope
         for location, kind, value in self._states():
             # Beside another model asperities end loading at the limit of their range, but they must begin it.
             needed = alone or (DEFAULT_MODEL in self.models and (location[-1] == 0 or location[0] == "turning_points"))

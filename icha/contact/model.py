@@ -36,7 +36,7 @@ class NotConverged(Exception):
 
 
 class BeyondModel(NotConverged):
-    """The path leaves the range of the model, which is a result and not a failure of the solver."""
+    """Error: the next target is beyond the range of the model; the path up to there is a result."""
 
 
 class FullContact(NotConverged):

@@ -8,7 +8,7 @@ from operator import itemgetter
 
 import numpy as np
 
-from icha.contact.model import BeyondModel, ContactModel, NotConverged, State
+from icha.contact.model import ContactModel, NotConverged, State
 from icha.path.energy_balance import Waypoint
 from icha.path.stops import (
     SAME_EXCESS,
@@ -92,10 +92,10 @@ class PathProgress:
         area = contact.area_fraction(after)
         if area > contact.largest_area_fraction:
             reason = f"the contact area grows to {area:.2f} of the nominal area, outside the range of the model,"
-            raise self.path_error(before, loading, BeyondModel(f"{reason} before {name}"))
+            raise self.path_error(before, loading, NotConverged(f"{reason} before {name}"))
         if target is None and contact.largest_area_fraction < 1 and contact.mean_gap(after) <= 0:
             reason = f"the mean planes meet before {name}, outside the range of the model"
-            raise self.path_error(after, loading, BeyondModel(reason))
+            raise self.path_error(after, loading, NotConverged(reason))
 
     def halve(self, step: float, failure: NotConverged, state: State, loading: bool) -> float:
         """Return half the step after a failed solve; raise the error of the path if the step is the shortest."""
@@ -112,8 +112,7 @@ class PathProgress:
         if contact.adhesive and loading and (contact.pressure(state) < 0 or no_equilibrium):
             reason = "there is no equilibrium after first contact" if no_equilibrium else "the load is still tensile"
             sticky = f"; {reason}: the surface is sticky, adhesion pulls it towards full contact"
-        error = BeyondModel if isinstance(failures[-1], BeyondModel) else NotConverged
-        return error(
+        return NotConverged(
             f"at a mean separation of {state.separation / contact.rms_height:.4f} h_rms, "
             f"A/A0 = {contact.area_fraction(state):.3g}, after {self.reached} of {self.total} stops: "
             f"{'; '.join(map(str, failures))}{sticky}"

@@ -181,7 +181,7 @@ def contact_state(
 def refine(
     surface: Surface, material: Material, refinement: int, progress: Callable[[str], None] | None = None
 ) -> Surface:
-    """Return the surface on the grid of the solution; raise `ValueError` if this grid does not resolve the attraction."""
+    """Return the surface on the grid of the solution; raise `ValueError` if it does not resolve the attraction."""
     surface.require_periodic("the solution by boundary elements")
     fine = surface.refined(REFINEMENT.validate("refinement", refinement))
     numbers = f"{fine.grid} nodes a side, spacing {fine.spacing:.4g} m"
