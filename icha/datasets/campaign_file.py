@@ -212,9 +212,9 @@ def write_campaign(
     of boundary elements stay in the files of the runs. Beyond the `step_count` steps of a run, numbers are missing and
     texts empty. Spots and events of all runs stand one after the other along `spot` and `event`; `spot_snapshot`,
     `spot_model`, `event_model` and so on are positions along these dimensions, from 0. For every combination of labels,
-    `status` is complete, incomplete, missing, not in the design or failed checks; `failure` is why a run is incomplete
-    or which checks failed, `applicability` why its model is not applicable. Values that an incomplete run, a missing
-    run or a run of another model does not have are missing.
+    `status` is complete, incomplete, missing, not in the design, failed checks or beyond the model; `failure` is why a
+    run is incomplete or beyond its model, or which checks failed, `applicability` why its model is not
+    applicable. Values that an incomplete run, a missing run or a run of another model does not have are missing.
 
     Parameters
     ----------
