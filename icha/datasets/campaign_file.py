@@ -102,6 +102,17 @@ class Group(NamedTuple):
     known: list[tuple[netCDF4.Variable, np.ndarray]]
 
 
+def _group_attributes(study: Arrangement, attrs: Mapping[str, str]) -> dict:
+    """Return the attributes of a study's group; `attrs` are those of the file."""
+    # The checksum is that of the campaign, and not that of one of the runs.
+    shared = {"license": study.origins[0].get("license"), "config_sha256": attrs.get("config_sha256")}
+    return (
+        combine_attributes(f"Study {study.name}", _LAYOUT, COLLECTED, study.origins)
+        | {"study": study.name}
+        | {name: value for name, value in shared.items() if value is not None}
+    )
+
+
 def define_group(group: netCDF4.Dataset, study: Arrangement, attrs: Mapping[str, str]) -> Group:
     """Define dimensions, variables and attributes of a study's group; `attrs` are those of the file."""
     counts = {
@@ -111,13 +122,7 @@ def define_group(group: netCDF4.Dataset, study: Arrangement, attrs: Mapping[str,
     }
     sizes = dict(zip(LABELS, study.known["status"].shape, strict=True)) | study.sizes | counts
     define_dimensions(group, sizes)
-    # The checksum is that of the campaign, and not that of one of the runs.
-    shared = {"license": study.origins[0].get("license"), "config_sha256": attrs.get("config_sha256")}
-    group.setncatts(
-        combine_attributes(f"Study {study.name}", _LAYOUT, COLLECTED, study.origins)
-        | {"study": study.name}
-        | {name: value for name, value in shared.items() if value is not None}
-    )
+    group.setncatts(_group_attributes(study, attrs))
     dims_in_file = {name: sum(study.dims_of(name), ()) for name in study.variables}
     dims_in_file |= {name: described.dims for name, described in CAMPAIGN.items()} | {"rms_slope": study.slope_dims}
     coordinates = coordinates_of(study.variables, study.coordinates, dims_in_file)

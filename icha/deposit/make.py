@@ -35,6 +35,16 @@ _NO_TIME = (1980, 1, 1, 0, 0, 0)
 _UNIX = 3
 
 
+def _refuse_changed(results: Path, files: list[str]) -> None:
+    """Raise `ValueError` if results are not what their jobs wrote; the message lists them."""
+    if changed := [f"  {results / file}" for file in files if not is_whole(results, file, thorough=True)]:
+        listed = "\n".join(changed)
+        raise ValueError(
+            "not published, because these files are not what their jobs wrote. Remove them, and run the campaign "
+            f"again:\n{listed}"
+        )
+
+
 def make_deposit(
     folder: str | os.PathLike,
     archive: str | os.PathLike,
@@ -68,12 +78,7 @@ def make_deposit(
     folder, archive, results = Path(folder), Path(archive), Path(results)
     files, publication = sorted(files), campaign.deposit_metadata()
     refuse_unknown_failures(read_checks(results / "checks.json"), [each.run for each in publication.known_failures])
-    if changed := [f"  {results / file}" for file in files if not is_whole(results, file, thorough=True)]:
-        listed = "\n".join(changed)
-        raise ValueError(
-            "not published, because these files are not what their jobs wrote. Remove them, and run the campaign "
-            f"again:\n{listed}"
-        )
+    _refuse_changed(results, files)
     staging = folder.with_name(f".{folder.name}.part")
     shutil.rmtree(staging, ignore_errors=True)
     try:

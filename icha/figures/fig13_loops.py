@@ -146,8 +146,7 @@ def figure(
     panels[-1, 1].set_xlabel(PRESSURE_LABEL)
     title = f"surface {surface}" + ("" if seed is None else f", seed {seed}")
     panels[0, 0].set_title(title, loc="right", parse_math=False)
-    handles = _handles(looks, drawn, marked=len(rows[0]) > 1)
-    legend_below(fig, handles)
+    legend_below(fig, _handles(looks, drawn, marked=len(rows[0]) > 1))
     return fig
 
 

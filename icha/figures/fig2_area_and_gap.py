@@ -83,11 +83,9 @@ def figure(
     )
     x = (pressures.min() / 1.6, pressures.max() * 1.6)
     if references is not None:
-        if "gfmd_reduced_pressure" in references:
-            x = (x[0], max(x[1], 1.2 * float(references["gfmd_reduced_pressure"].max())))
         _draw_references(left, right, references, x)
         _draw_separate_summits(left, right, references, dataset, shown.looks)
-    left.set(ylabel=curves.AREA_LABEL, ylim=(min(areas.min(), 1.6 * x[0]) / 1.5, min(1, 3 * areas.max())))
+    left.set(ylabel=curves.AREA_LABEL, ylim=(min(areas.min(), 1.6 * x[0]) / 1.5, min(1.3, 3 * areas.max())))
     low, high = gaps.min() / 1.4, gaps.max() * 1.4
     right.set(ylabel=curves.gap_label(dataset), ylim=(low, high))
     right.yaxis.set_major_formatter("{x:g}")
@@ -205,13 +203,16 @@ def _draw_references(left, right, references, limits):
     p, black = references["reduced_pressure"].values, {"color": BLACK, "lw": 1, "zorder": 2}
     shown = (p >= limits[0] / 1.5) & (p <= limits[1] * 1.5)
     left.plot(p[shown], references["persson_area_fraction"].values[shown], label="Persson", **black)
+    corrected = references["xu_area_fraction"].values[shown]
+    left.plot(p[shown], corrected, label="Persson, corrected by Xu et al.", **black | {"ls": (0, (1, 1))})
     linear = references["linear_pressure"].values
     touching = linear >= limits[0] / 1.5
     area = references["bush_gibson_thomas_area_fraction"].values[touching]
     left.plot(linear[touching], area, label="Bush, Gibson & Thomas", **black | {"ls": "--", "color": GREY})
     if "gfmd_reduced_pressure" in references:
-        points = (references["gfmd_reduced_pressure"].values, references["gfmd_area_fraction"].values)
-        left.plot(*points, "x", color=BLACK, ms=6, mew=1.2, label="GFMD, no adhesion", zorder=5)
+        gfmd = references[["gfmd_reduced_pressure", "gfmd_area_fraction", "gfmd_area_scatter"]].values()
+        points = {"fmt": "x", "color": BLACK, "ms": 6, "mew": 1.2, "lw": 1.2, "zorder": 5}
+        left.errorbar(*(values.values for values in gfmd), label="GFMD, no adhesion", **points)
     if "persson_reduced_separation" in references:
         right.plot(p[shown], references["persson_reduced_separation"].values[shown], label="Yang & Persson", **black)
 
