@@ -21,7 +21,7 @@ CAMPAIGN += "confirmed: [studies.load.models]\n"
 # At the start of `run_sweep`: a bug in the program.
 CRASH = '    if material["surface_energy"] == 0:\n        raise RuntimeError("a bug in the program")\n'
 # Enough runs that a call has not ended when it is stopped.
-MANY = ("runs", "--", "--forceall", "--config", "studies={load: {seeds: 1..60}}")
+MANY = ("runs", "--", "--forceall", "--config", "studies={load: {seeds: 1..200}}")
 
 
 def start(project, *arguments, campaign="tiny", **settings):
