@@ -223,6 +223,10 @@ def _log_file(folder: Path, campaign: str) -> Path:
     return Path(name)
 
 
+# Seconds after which a signal to stop is repeated.
+_REPEAT_STOP = 15.0
+
+
 def _run_snakemake(command: list[str], workflow: Path, log: Path, progress, view) -> tuple[int, bool]:
     """Run Snakemake with its events passed to `progress` and `view`; return its status, and whether it was stopped."""
     stopped = []
@@ -258,7 +262,13 @@ def _run_snakemake(command: list[str], workflow: Path, log: Path, progress, view
         try:
             listener = threading.Thread(target=_listen, args=(reading, progress, view, stopped), daemon=True)
             listener.start()
-            status = process.wait()
+            status = None
+            while status is None:
+                with contextlib.suppress(subprocess.TimeoutExpired):
+                    status = process.wait(timeout=_REPEAT_STOP)
+                if status is None and stopped:
+                    # Snakemake can miss a signal that arrives while it starts a job.
+                    os.killpg(process.pid, stopped[-1])
             # A process that a job left running may hold the pipe open.
             listener.join(timeout=2)
         finally:
