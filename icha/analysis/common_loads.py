@@ -77,7 +77,7 @@ def compare_runs(study: xr.Dataset, *, attrs: Mapping[str, str] = {}) -> xr.Data
     Returns
     -------
     Dataset on two grids of loads, `reduced_pressure` and `relative_load`. Each spans the range between targets of the
-    first loading that all complete runs cover, and is empty if there is no such range. On each grid, with the suffix
+    first loading that all runs cover, and is empty if there is no such range. On each grid, with the suffix
     `_at_load` on the second:
 
     - `contact_area_fraction` and `reduced_separation` along the labels of the runs;
@@ -85,12 +85,12 @@ def compare_runs(study: xr.Dataset, *, attrs: Mapping[str, str] = {}) -> xr.Data
       (`area_mean`, `area_deviation`, `area_confidence`, `separation_mean`, …; `icha.support.statistics`);
     - `material_spread` and `slope_spread`: the largest over the smallest area of all materials (slopes), minus one.
 
-    Incomplete runs (`status`) have no values and do not count. Runs to which the asperity model is not applicable are
-    in no mean. `seed_count` is the number of seeds in the means, `asked_seed_count` the number of seeds asked for. One
-    seed alone has no deviation and no confidence interval.
+    Incomplete runs (`status`) have no values and do not count; runs beyond the model count up to its limit. Runs to
+    which the asperity model is not applicable are in no mean. `seed_count` is the number of seeds in the means,
+    `asked_seed_count` the number of requested seeds. One seed alone has no deviation and no confidence interval.
     """
-    complete = np.isin(study["status"].transpose(*LABELS).values, LOADED_RUNS)
-    averaged = complete & (study["applicability"].transpose(*LABELS).values == "")
+    loaded = np.isin(study["status"].transpose(*LABELS).values, LOADED_RUNS)
+    averaged = loaded & (study["applicability"].transpose(*LABELS).values == "")
     asked = np.isin(study["status"].transpose(*LABELS).values, (*COMPUTED_RUNS, MISSING))
     variables = {"status": study["status"]}
     for name, description, counted in (
@@ -101,7 +101,7 @@ def compare_runs(study: xr.Dataset, *, attrs: Mapping[str, str] = {}) -> xr.Data
     coords = {label: study[label] for label in LABELS}
     for axis, load in _loads(study).items():
         suffix = "" if axis == "reduced_pressure" else "_at_load"
-        at, on_grid = _on_common_grid(study, load, complete)
+        at, on_grid = _on_common_grid(study, load, loaded)
         coords[axis] = make_variable(TERMS[axis]._replace(dims=(axis,)), at)
         curves = {name: (Variable(LABELS, "1", study[name].attrs["long_name"]), on_grid[name]) for name in on_grid}
         for name, (description, values) in (curves | _spreads(on_grid, averaged)).items():
@@ -128,16 +128,16 @@ def _loads(study):
     return {axis: np.where(shown, load, np.nan) for axis, load in loads.items()}
 
 
-def _on_common_grid(study, load, complete):
-    """Return loads that all complete runs cover, and the curves of all runs at these loads, by name."""
+def _on_common_grid(study, load, loaded):
+    """Return loads that all loaded runs cover, and the curves of all runs at these loads, by name."""
     curves = {
         "contact_area_fraction": study["contact_area_fraction"].transpose(*LABELS, "step").values,
         "reduced_separation": reduced_gap(study).transpose(*LABELS, "step").values,
     }
-    runs = [tuple(index) for index in np.argwhere(complete)]
+    runs = [tuple(index) for index in np.argwhere(loaded)]
     shown = ~np.isnan(load)
     at = _common_grid([load[run][shown[run]] for run in runs])
-    on_grid = {name: np.full((*complete.shape, len(at)), np.nan) for name in curves}
+    on_grid = {name: np.full((*loaded.shape, len(at)), np.nan) for name in curves}
     for name, values in curves.items():
         logarithmic = name == "contact_area_fraction"
         for run in runs if len(at) else ():

@@ -117,7 +117,8 @@ class Case(NamedTuple):
     Attributes
     ----------
     model, surface, material : names.
-    facts : values by the names of `VALIDATED`, with the ratio of energies; `COMPLETE` and `STRENGTH` where known.
+    facts : values by the names of `VALIDATED`, with the ratio of energies; values of full contact and the spacing of
+        the grid where they are known.
     """
 
     model: str
@@ -213,7 +214,10 @@ def _resolution(cases):
 
 
 def _accuracy(cases, measured):
-    """State the error of the asperity model, which is known for surfaces and materials within the validation."""
+    """State the error of the asperity model, which is known for surfaces and materials within the validation.
+
+    cases : the runs of asperities; measured : whether the campaign also has runs of boundary elements.
+    """
     unknown, adhesive = {}, set()
     for case in cases:
         of_surface = outside_validation({name: case.facts[name] for name in case.facts if name != _RATIO})
@@ -227,7 +231,9 @@ def _accuracy(cases, measured):
     if not unknown:
         return Statement("accuracy", known)
     reasons = join_first((f"{name}: {'; '.join(found)}" for name, found in unknown.items()), ". ")
-    advice = "figures 2 and 10 show it" if measured else "`models: [asperities, boundary_elements]` measures it"
+    advice = "`models: [asperities, boundary_elements]` measures it"
+    if measured:
+        advice = "its runs with boundary elements show it"
     text = f"the accuracy {'of the others' if adhesive else 'of this campaign'} is unknown ({reasons}); {advice}"
     return Statement("accuracy", f"{known}; {text}" if known else text, False)
 

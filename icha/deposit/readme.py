@@ -24,7 +24,14 @@ from icha.contact.models import MODEL_PAPER
 from icha.datasets.campaign import run_place, runs_of_status
 from icha.datasets.labels import LABELS, slopes_of
 from icha.datasets.results import LOOP, RUN, SOLUTION, SURFACE, THEORIES
-from icha.datasets.variables.campaign import COMPLETE, FAILED_CHECKS, INCOMPLETE, NOT_IN_DESIGN, STATUS_MEANINGS
+from icha.datasets.variables.campaign import (
+    BEYOND_MODEL,
+    FAILED_CHECKS,
+    INCOMPLETE,
+    LOADED_RUNS,
+    NOT_IN_DESIGN,
+    STATUS_MEANINGS,
+)
 from icha.deposit.metadata import TABLES, acknowledgement, find_licence, paragraphs, web_address
 from icha.deposit.verify import COMPUTED
 from icha.planning.costs import Cost
@@ -218,7 +225,7 @@ def _outcome(publication: Publication, dataset: xr.DataTree, checks: Sequence[Ch
         axes = {each: slopes_of(study) if each == "rms_slope" else study[each].values.tolist() for each in LABELS}
         status = {text: counts[k] for k, text in enumerate(STATUS_MEANINGS)}
         designs.append({"name": name, "status": status, "runs": counts.total() - counts[NOT_IN_DESIGN], **axes})
-        complete += runs_of_status(study, name, (COMPLETE,))
+        complete += runs_of_status(study, name, LOADED_RUNS)
         for labels in runs_of_status(study, name, (INCOMPLETE, FAILED_CHECKS)):
             run = study[["step_count", "failure"]].isel(run_place(study, labels))
             facts = {"steps": int(run["step_count"]), "failure": run["failure"].item()}
@@ -230,6 +237,7 @@ def _outcome(publication: Publication, dataset: xr.DataTree, checks: Sequence[Ch
         "designs": designs,
         "partial": [study["name"] for study in designs if study["status"][STATUS_MEANINGS[NOT_IN_DESIGN]]],
         "incomplete": incomplete,
+        "beyond_model": sum(study["status"][STATUS_MEANINGS[BEYOND_MODEL]] for study in designs),
         "example": example,
         # Slopes that differ between surfaces have no index by which to select.
         "slope_place": run_place(study, example)["rms_slope"] if study["rms_slope"].ndim == 2 else None,

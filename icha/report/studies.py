@@ -223,7 +223,8 @@ def _loops(campaign: xr.DataTree, dataset: xr.Dataset, complete: list[RunLabels]
     if "hysteresis_loss" not in dataset:
         return {"rows": [], "parts": {}, "count": 0}
     runs = {labels: select_run(campaign, labels) for labels in complete}
-    groups = _ensembles(dataset, [labels for labels, run in runs.items() if np.isfinite(run["hysteresis_loss"])])
+    # The path of a run beyond its model ends before it unloads.
+    groups = _ensembles(dataset, [labels for labels, run in runs.items() if "hysteresis_loss" in run])
     rows = [
         _ensemble_row(dataset, *key, members) | _loop([runs[labels] for labels in members])
         for key, members in list(groups.items())[:MOST_ROWS]

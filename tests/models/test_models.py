@@ -24,6 +24,7 @@ from icha.datasets.variables.run import FURTHER, OF_MODELS
 from icha.figures.looks import MODEL_MARKERS
 from icha.figures.select import select_runs
 from icha.planning.costs import LAWS, RUN_SIZES
+from icha.report.report import write_report
 
 PATH = icha.Path(reduced_pressures=[1e-3, 1e-2], snapshots=[("reduced_pressure", 1e-3), ("reduced_pressure", 1e-2)])
 BACK = icha.Path(reduced_pressures=[1e-3], unload=True)
@@ -165,6 +166,10 @@ def test_asperities_end_at_the_limit_of_their_range_beside_boundary_elements(tmp
     known = np.isfinite(errors["contact_area_fraction"].values.ravel())
     assert known.tolist() == [True, True, False]
     write_dataset(xr.DataTree.from_dict({"/one": errors.to_dataset()}), tmp_path / "model_error.nc")
+    # The loops of the report are those of the runs that were unloaded.
+    write_report(tmp_path / "report.html", campaign=tree, figures=[], checks=check_campaign(tree))
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "<b>1</b> of them up to the limit of its model" in page and "Failed runs" not in page
 
 
 def test_fronts_are_checked(runs):
