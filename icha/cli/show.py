@@ -107,6 +107,7 @@ def _print_surface(surface, file: Path) -> None:
 def _print_campaign(tree, file: Path) -> None:
     """Print sizes, models, ranges of results and failures of every study."""
     from icha.datasets.labels import LABELS, labels_at
+    from icha.datasets.variables.campaign import BEYOND_MODEL
 
     echo(f"{file}: {printable(tree.attrs.get('title', 'campaign'))}")
     echo(printable(" ".join(str(tree.attrs.get("summary", "")).split())))
@@ -127,9 +128,12 @@ def _print_campaign(tree, file: Path) -> None:
             first = printable(". ".join(list(reasons)[:3]))
             echo(f"  model not applicable to {format_count(reasons.total(), 'run')}: {first}", fg="red")
         if "failure" in study:
-            for index in zip(*(study["failure"] != "").values.nonzero(), strict=True):
-                labels = ", ".join(map(str, labels_at(study, index, study["failure"].dims)))
-                echo(f"  failed: {printable(labels)}: {printable(study['failure'].values[index])}", fg="red")
+            failure = study["failure"].transpose(*LABELS).values
+            # The loading of a run beyond its model is a result up to there.
+            failed = study["status"].transpose(*LABELS).values != BEYOND_MODEL
+            for index in zip(*((failure != "") & failed).nonzero(), strict=True):
+                labels = ", ".join(map(str, labels_at(study, index, LABELS)))
+                echo(f"  failed: {printable(labels)}: {printable(failure[index])}", fg="red")
 
 
 def sparkline(values) -> str:

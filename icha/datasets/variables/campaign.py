@@ -4,7 +4,7 @@ import numpy as np
 
 from icha.datasets.variables.terms import Variable, bin_table, read_tables
 
-# Only complete runs are results. A run with failed checks has all its values, but they must not be used.
+# Complete runs are results. A run with failed checks has all its values, but they must not be used.
 COMPLETE, INCOMPLETE, MISSING, NOT_IN_DESIGN, FAILED_CHECKS, BEYOND_MODEL = range(6)
 STATUS_MEANINGS = ("complete", "incomplete", "missing", "not_in_design", "failed_checks", "beyond_the_model")
 # Status of runs that have a file.
