@@ -235,9 +235,8 @@ def write_campaign(
     Raises
     ------
     ValueError
-        Naming the run: if it is given twice, is not in the design, has other labels than its dataset, was computed with
-        other settings than it should, holds a value that is not finite, or does not fit its study's other runs; if a
-        study has no run; if a file cannot be read.
+        Naming the run: if it is given twice, is not in the design, was computed with other settings than it should, or
+        if a value that it shares with other runs differs from theirs; if a file cannot be read.
     """
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -258,8 +257,8 @@ def _write(group: Group, spool: BinaryIO) -> None:
     """Write all values of a group; the values of the runs are read from the temporary file, block by block."""
     for variable, values in group.known:
         variable[...] = values
-    ragged = [_RaggedVariables(dim, variables) for dim, variables in group.ragged.items()]
     along_ragged = {name for variables in group.ragged.values() for name in variables}
+    written = dict.fromkeys(group.ragged, 0)
     shared = {
         name: _SharedVariable(name, column)
         for name, column in group.columns.items()
@@ -288,14 +287,36 @@ def _write(group: Group, spool: BinaryIO) -> None:
                     block[name][*(position - start), ...][slots] = v
                 elif name in shared:
                     shared[name].put(entry.labels, position, slots, v)
-            for each in ragged:
-                each.add(position, values, snapshots)
+            for dim, variables in group.ragged.items():
+                written[dim] += _write_ragged(dim, variables, written[dim], position, values, snapshots)
         for name, values in block.items():
             group.columns[name].variable[box] = values
-    for each in ragged:
-        each.flush()
     for each in shared.values():
         each.column.variable[...] = each.values
+
+
+def _write_ragged(
+    dim: str,
+    variables: Mapping[str, netCDF4.Variable],
+    begin: int,
+    position: np.ndarray,
+    values: Mapping[str, np.ndarray],
+    snapshots: list[int],
+) -> int:
+    """Write the values of a run along a ragged dimension, from index `begin` on; return their number.
+
+    Spots are sorted by the positions of their snapshots.
+    """
+    found = {name: values[name] for name in variables if name in values}
+    count = len(next(iter(found.values()), ()))
+    found |= {f"{dim}_{label}": np.full(count, k) for label, k in zip(LABELS, position, strict=True)}
+    if "spot_snapshot" in found and count:
+        found["spot_snapshot"] = np.asarray(snapshots, np.int32)[found["spot_snapshot"]]
+        order = np.argsort(found["spot_snapshot"], kind="stable")
+        found = {name: v[order] for name, v in found.items()}
+    for name, v in found.items():
+        variables[name][begin : begin + count] = v
+    return count
 
 
 class _SharedVariable:
@@ -328,42 +349,3 @@ class _SharedVariable:
         if not np.all(known):
             self.values[index] = values
             self.known[index[: self.known.ndim]] = True
-
-
-class _RaggedVariables:
-    """The variables along one ragged dimension, to which the values of the runs are appended.
-
-    Attributes
-    ----------
-    dim, variables : the dimension and its variables, by name.
-    runs, pending : values of the runs that are not yet written, and their number.
-    written : number of values along the dimension that are written.
-    """
-
-    def __init__(self, dim: str, variables: Mapping[str, netCDF4.Variable]):
-        """Begin with nothing written."""
-        self.dim, self.variables = dim, variables
-        self.runs, self.pending, self.written = [], 0, 0
-
-    def add(self, position: np.ndarray, values: Mapping[str, np.ndarray], snapshots: list[int]) -> None:
-        """Store the values of a run at a position; its spots are sorted by the positions of their snapshots."""
-        found = {name: values[name] for name in self.variables if name in values}
-        count = len(next(iter(found.values()), ()))
-        if "spot_snapshot" in found and count:
-            found["spot_snapshot"] = np.asarray(snapshots, np.int32)[found["spot_snapshot"]]
-            order = np.argsort(found["spot_snapshot"], kind="stable")
-            found = {name: v[order] for name, v in found.items()}
-        found |= {f"{self.dim}_{label}": np.full(count, k) for label, k in zip(LABELS, position, strict=True)}
-        self.runs.append(found)
-        self.pending += len(found) * count
-        if self.pending > VALUES_IN_BLOCK:
-            self.flush()
-
-    def flush(self) -> None:
-        """Write the values that were added since the last call."""
-        begin = self.written
-        for name, variable in self.variables.items():
-            values = np.concatenate([np.empty(0, variable.dtype), *(run[name] for run in self.runs if name in run)])
-            variable[begin : begin + len(values)] = values
-            self.written = begin + len(values)
-        self.runs, self.pending = [], 0

@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 import os
 import pickle
-import re
 from collections.abc import Hashable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, BinaryIO, NamedTuple
@@ -13,7 +12,7 @@ from typing import Any, BinaryIO, NamedTuple
 import numpy as np
 import xarray as xr
 
-from icha.datasets.files import characters, check_is_run, is_refused, is_text, not_finite, read_run, readable
+from icha.datasets.files import characters, check_is_run, is_text, read_run, readable
 from icha.datasets.labels import LABELS, RunLabels, arrange_slopes, slope_dims
 from icha.datasets.variables.campaign import (
     BEYOND_MODEL,
@@ -23,6 +22,7 @@ from icha.datasets.variables.campaign import (
     MISSING,
     NOT_IN_DESIGN,
     RAGGED,
+    STATUS_ATTRIBUTES,
     VARIES_WITH,
 )
 from icha.datasets.variables.run import CELLS, CYCLE, LOOP, OF_MODELS, RUN
@@ -34,10 +34,8 @@ Values = dict[str, tuple[tuple[str, ...], np.ndarray]]
 LabelledRun = tuple[RunLabels | tuple, xr.Dataset | str | os.PathLike]
 
 _DIMS = {name: description.dims for name, description in (RUN | OF_MODELS | CYCLE | LOOP).items()}
-# HDF5 lists dimensions among the variables. The name of a dimension of texts contains the number of characters.
-_DIMENSION = re.compile("|".join([*sorted({dim for dims in _DIMS.values() for dim in dims}), r"string\d+"]))
 _ENDED_EARLY = (INCOMPLETE, BEYOND_MODEL)
-_ATTRIBUTES = ("contact_model", "config_sha256", "incomplete", "failed_checks", "beyond_model", "applicability")
+_ATTRIBUTES = ("contact_model", "config_sha256", "applicability", *STATUS_ATTRIBUTES.values())
 
 
 def read_run_values(path: str | os.PathLike) -> tuple[Values, dict[str, str]]:
@@ -52,24 +50,15 @@ def read_run_values(path: str | os.PathLike) -> tuple[Values, dict[str, str]]:
     from h5py import h5d, h5s
 
     with readable(path), h5py.File(path) as file:
-        names = [name for name in file if name in _DIMS or not _DIMENSION.fullmatch(name)]
-        check_is_run(names, path)
-        if unknown := set(names) - set(_DIMS):
-            raise ValueError(f"{path}: not a run dataset, it has a variable {min(unknown)!r}")
+        check_is_run(file, path)
         values: Values = {}
-        for name in names:
-            if not set(CELLS) & set(_DIMS[name]):
+        for name, dims in _DIMS.items():
+            if name in file and not set(CELLS) & set(dims):
                 # The low-level interface of h5py takes less than half the time.
                 variable = h5d.open(file.id, name.encode())
-                values[name] = _DIMS[name], np.empty(variable.shape, variable.dtype)
+                values[name] = dims, np.empty(variable.shape, variable.dtype)
                 variable.read(h5s.ALL, h5s.ALL, values[name][1])
-        attrs = {name: text(file.attrs[name]) for name in _ATTRIBUTES if name in file.attrs}
-    sizes: dict[str, int] = {}
-    for name, (dims, v) in values.items():
-        shape = v.shape[:-1] if v.dtype.kind == "S" else v.shape
-        if len(shape) != len(dims) or any(sizes.setdefault(dim, n) != n for dim, n in zip(dims, shape, strict=True)):
-            raise ValueError(f"{path}: not a run dataset, {name!r} does not have the dimensions ({', '.join(dims)})")
-    return values, attrs
+        return values, {name: text(file.attrs[name]) for name in _ATTRIBUTES if name in file.attrs}
 
 
 class Entry(NamedTuple):
@@ -126,8 +115,7 @@ def spool_runs(
     Raises
     ------
     ValueError
-        Naming the run: if it is given twice, has other labels than its dataset, was computed with other settings than
-        expected, or holds a value that is not finite; if no run is given.
+        Naming the run: if it is given twice, or was computed with other settings than expected.
     """
     studies: dict[str, Members] = {}
     # Most runs have the same variables, sizes and snapshots. Each combination is stored only once.
@@ -144,7 +132,6 @@ def spool_runs(
                 f"{file}: this run was computed with other settings than the configuration's. Remove it and repeat the "
                 "command, which computes it"
             )
-        _refuse_wrong_values(labels, values, attrs)
         sizes = {dim: n for dims, v in values.values() for dim, n in zip(dims, v.shape, strict=False)}
         names, snapshots = frozenset(values), _snapshots_of(values)
         members.entries[labels] = Entry(
@@ -153,7 +140,7 @@ def spool_runs(
             stored.setdefault(names, names),
             stored.setdefault(tuple(sorted(sizes.items())), sizes),
             stored.setdefault(snapshots, snapshots),
-            *_status_and_failure(values, attrs),
+            *_status_and_failure(attrs),
             str(attrs.get("applicability", "")),
         )
         pickle.dump(values, spool, protocol=5)
@@ -164,8 +151,6 @@ def spool_runs(
         rank = (not {"incomplete", "beyond_model"} & set(attrs), sizes.get("step", 0))
         if labels.model not in members.samples or rank > members.samples[labels.model][0]:
             members.samples[labels.model] = rank, source
-    if not studies:
-        raise ValueError("a campaign dataset needs at least one run")
     return studies
 
 
@@ -190,30 +175,10 @@ def _values_of(run: xr.Dataset) -> tuple[Values, dict]:
     return values, run.attrs
 
 
-def _status_and_failure(values: Values, attrs: Mapping) -> tuple[int, str]:
+def _status_and_failure(attrs: Mapping) -> tuple[int, str]:
     """Return the status of a run, and why it is not complete; an empty text if it is."""
-    by_attribute = {"incomplete": INCOMPLETE, "beyond_model": BEYOND_MODEL, "failed_checks": FAILED_CHECKS}
-    for name, status in by_attribute.items():
-        if name in attrs:
-            return status, str(attrs[name])
-    failed = int(np.sum(values["converged"][1] != 1)) if "converged" in values else 0
-    return (INCOMPLETE, f"{failed} of its steps did not converge") if failed else (COMPLETE, "")
-
-
-def _refuse_wrong_values(labels: RunLabels, values: Values, attrs: Mapping) -> None:
-    """Refuse a dataset of another run, and values that are not finite."""
-    if attrs.get("contact_model", labels.model) != labels.model:
-        raise ValueError(f"{labels}: the dataset's model is {attrs['contact_model']}")
-    for label, tolerance in (("rms_slope", 1e-6), ("seed", 0)):
-        if label in values:
-            value, expected = float(values[label][1]), float(getattr(labels, label))
-            if abs(value - expected) > tolerance * abs(expected):
-                raise ValueError(f"{labels}: the dataset's {label} is {value:g}")
-    for name, (dims, v) in values.items():
-        if v.dtype.kind == "f" and not np.isfinite(v).all():
-            bad = is_refused(v, RUN[name].further if name in RUN else {})
-            if bad.any():
-                raise ValueError(f"{labels}: variable {not_finite(name, dims, bad)}")
+    found = [(status, str(attrs[name])) for status, name in STATUS_ATTRIBUTES.items() if name in attrs]
+    return (*found, (COMPLETE, ""))[0]
 
 
 def _snapshots_of(values: Values) -> tuple[tuple[bytes, float], ...]:
@@ -286,7 +251,7 @@ def arrange_runs(studies: dict[str, Members], design: Iterable[RunLabels | tuple
     Raises
     ------
     ValueError
-        Naming the run: if it is not in the design, or does not fit its study's other runs; if a study has no run.
+        Naming the run: if it is not in the design.
     """
     given = [labels for members in studies.values() for labels in members.entries]
     asked: dict[str, dict[RunLabels, None]] = {}
@@ -295,9 +260,6 @@ def arrange_runs(studies: dict[str, Members], design: Iterable[RunLabels | tuple
     for labels in given:
         if labels not in asked.get(labels.study, ()):
             raise ValueError(f"{labels}: this run is not in the design")
-    for name in asked:
-        if name not in studies:
-            raise ValueError(f"study {name}: it has no run")
     return [_arrange_study(name, studies[name], list(labels)) for name, labels in asked.items()]
 
 
@@ -316,7 +278,6 @@ def _arrange_study(name: str, members: Members, design: list[RunLabels]) -> Arra
     sizes = {dim: n for v in variables.values() for dim, n in v.sizes.items() if dim not in RAGGED}
     longest = {"snapshot": len(snapshots), "step": int(_sizes(entries, "step").max())}
     sizes |= {dim: size for dim, size in longest.items() if dim in sizes}
-    _refuse_unequal(entries, samples, sizes)
 
     entries = sorted(entries, key=lambda entry: position[entry.labels])
     positions = np.array([position[entry.labels] for entry in entries])
@@ -389,17 +350,3 @@ def _snapshots(entries: list[Entry]) -> dict[tuple[bytes, float], int]:
     longest = max(entries, key=lambda entry: (entry.status not in _ENDED_EARLY, entry.sizes.get("step", 0)))
     known = dict.fromkeys(itertools.chain(longest.snapshots, *(entry.snapshots for entry in entries)))
     return {each: k for k, each in enumerate(known)}
-
-
-def _refuse_unequal(entries: list[Entry], samples: Mapping[str, xr.Dataset], sizes: Mapping[str, int]) -> None:
-    """Refuse runs with other variables than their model's, or of other size along a common dimension."""
-    ragged = {n for each in samples.values() for n, v in each.variables.items() if set(RAGGED) & set(v.dims)}
-    names = {model: ragged | set(sample.variables) for model, sample in samples.items()}
-    for entry in entries:
-        expected = names[entry.labels.model]
-        if unequal := (entry.names - expected) | ((ragged if entry.status in _ENDED_EARLY else expected) - entry.names):
-            listed = ", ".join(sorted(unequal))
-            raise ValueError(f"{entry.labels}: variables differ from those of the study's other runs: {listed}")
-        for dim, size in sizes.items():
-            if dim not in ("step", "snapshot") and (own := entry.sizes.get(dim, 0)) != size:
-                raise ValueError(f"{entry.labels}: {own} along {dim}, {size} of the study's other runs")

@@ -170,12 +170,21 @@ def _compare_variables(a: netCDF4.Variable, b: netCDF4.Variable, name: str) -> I
         if one != other:
             yield Difference(name, DIFFERENT, f"{quantity}: {_shown(one)} and {_shown(other)}")
             return
-    for variable in (a, b):
-        variable.set_auto_scale(False)
-    found = compare_values(np.ma.asarray(a[...]), np.ma.asarray(b[...]), noise=NOISE.get(name.rpartition("/")[2], 0.0))
+    noise = NOISE.get(name.rpartition("/")[2], 0.0)
+    found = compare_values(_values(a), _values(b), noise=noise)
     if found:
         yield found._replace(name=name)
     yield from _compare_attributes(a, b, name)
+
+
+def _values(variable: netCDF4.Variable) -> np.ndarray:
+    """Return the values of a variable; missing numbers are NaN."""
+    variable.set_auto_maskandscale(False)
+    values = np.asarray(variable[...])
+    if values.dtype.kind == "f":
+        fill = getattr(variable, "_FillValue", netCDF4.default_fillvals[values.dtype.str[1:]])
+        values = np.where(values == fill, np.nan, values)
+    return values
 
 
 def _compare_attributes(a, b, name: str) -> Iterator[Difference]:
@@ -189,14 +198,12 @@ def compare_values(a: np.ndarray, b: np.ndarray, *, noise: float = 0.0) -> Diffe
 
     Parameters
     ----------
-    a, b : values of the deposit and of the rerun; masked values and NaN are missing.
+    a, b : values of the deposit and of the rerun; NaN is a missing value.
     noise : a difference that is allowed in any case.
     """
     if a.dtype.kind != "f":
-        a, b = np.ma.getdata(a), np.ma.getdata(b)
         unequal = np.asarray(a != b)
         return Difference("", DIFFERENT, f"not equal: {_places(a, b, unequal)}") if unequal.any() else None
-    a, b = (np.ma.filled(np.ma.asarray(each, float), np.nan) for each in (a, b))
     missing = np.isnan(a)
     if (missing != np.isnan(b)).any():
         return Difference("", DIFFERENT, f"missing in other places: {_places(a, b, missing != np.isnan(b))}")
