@@ -24,8 +24,7 @@ from icha.datasets.files import (
     characters,
     coordinates_of,
     define_dimensions,
-    define_numbers,
-    define_text,
+    define_variable,
     is_text,
 )
 from icha.datasets.labels import LABELS, RunLabels
@@ -38,6 +37,8 @@ from icha.support.atomic_files import whole_file
 _RUNS_IN_BLOCK = 256
 VALUES_IN_BLOCK = 2**18
 _VALUES_IN_CHUNK = 2**16
+# Relative difference below which values that runs share are the same.
+_SAME = 1e-9
 
 _LAYOUT = (
     "Variables of the runs along model, surface, seed, rms_slope and material. Spots and events of all runs, in this "
@@ -133,10 +134,8 @@ def define_group(group: netCDF4.Dataset, study: Arrangement, attrs: Mapping[str,
         """Define a variable along labels and its own dimensions; one of texts has a width, in bytes."""
         options = _storage(sizes, block, along, dims, width or 1)
         attributes = {**attributes, **({"coordinates": coordinates[name]} if name in coordinates else {})}
-        if width:
-            return define_text(group, name, along + dims, width, attributes, **options)
-        options |= {} if fill is None else {"fill_value": fill}
-        return define_numbers(group, name, along + dims, dtype, attributes, **options)
+        options |= {} if width or fill is None else {"fill_value": fill}
+        return define_variable(group, name, along + dims, dtype, attributes, width, **options)
 
     columns, known = {}, []
     for name in (name for name in study.variables if name not in sizes):
@@ -145,7 +144,7 @@ def define_group(group: netCDF4.Dataset, study: Arrangement, attrs: Mapping[str,
         lacks, width = study.lacks(name), 0
         fill: float | int | bytes = FLOAT_FILL if dtype.kind == "f" else INTEGER_FILL if lacks else 0
         if is_text(dtype):
-            width, fill = study.widths[name], b""
+            dtype, width, fill = np.dtype("S1"), study.widths[name], b""
         elif dtype.kind != "f":
             # 32 bits, which every netCDF tool reads, or flags.
             dtype = np.dtype(np.int8 if dtype == np.int8 and not lacks else np.int32)
@@ -260,7 +259,7 @@ def _write(group: Group, spool: BinaryIO) -> None:
     along_ragged = {name for variables in group.ragged.values() for name in variables}
     written = dict.fromkeys(group.ragged, 0)
     shared = {
-        name: _SharedVariable(name, column)
+        name: np.full(column.variable.shape, column.fill, column.variable.dtype)
         for name, column in group.columns.items()
         if column.along != LABELS and name not in along_ragged
     }
@@ -282,17 +281,19 @@ def _write(group: Group, spool: BinaryIO) -> None:
                 if name in group.columns
             }
             for name, v in values.items():
-                slots = group.columns[name].slots(snapshots, v)
+                column = group.columns[name]
+                slots = column.slots(snapshots, v)
                 if name in block:
                     block[name][*(position - start), ...][slots] = v
                 elif name in shared:
-                    shared[name].put(entry.labels, position, slots, v)
+                    index = (*(position[LABELS.index(label)] for label in column.along), *slots)
+                    _put_shared(name, column, shared[name], index, v, entry.labels)
             for dim, variables in group.ragged.items():
                 written[dim] += _write_ragged(dim, variables, written[dim], position, values, snapshots)
         for name, values in block.items():
             group.columns[name].variable[box] = values
-    for each in shared.values():
-        each.column.variable[...] = each.values
+    for name, values in shared.items():
+        group.columns[name].variable[...] = values
 
 
 def _write_ragged(
@@ -319,33 +320,14 @@ def _write_ragged(
     return count
 
 
-class _SharedVariable:
-    """A variable that several runs share: the first of them gives its values, the others must have the same.
-
-    Attributes
-    ----------
-    name, column : the variable.
-    values : its values for all runs; few enough to stay in memory.
-    known : True where labels, and snapshots, have values.
-    """
-
-    def __init__(self, name: str, column: Column):
-        """Begin without values."""
-        self.name, self.column = name, column
-        shape, snapshot = column.variable.shape, column.dims[:1] == ("snapshot",)
-        self.values = np.full(shape, column.fill, column.variable.dtype)
-        self.known = np.zeros(shape[: len(column.along) + snapshot], bool)
-
-    def put(self, labels: RunLabels, position: np.ndarray, slots: tuple, values: np.ndarray) -> None:
-        """Store the values of a run; if other runs gave these values already, check that both are equal."""
-        index = (*(position[LABELS.index(label)] for label in self.column.along), *slots)
-        known, present = self.known[index[: self.known.ndim]], self.values[index]
-        if np.all(known) and np.array_equal(present, values):
-            return
-        same = present == values if values.dtype.kind == "S" else np.isclose(present, values, rtol=1e-9, atol=0)
-        if np.any(known & ~np.reshape(same, (*np.shape(known), -1)).all(axis=-1)):
-            shared = ", ".join(self.column.along) or "the study"
-            raise ValueError(f"{labels}: {self.name} differs between runs that share {shared}")
-        if not np.all(known):
-            self.values[index] = values
-            self.known[index[: self.known.ndim]] = True
+def _put_shared(
+    name: str, column: Column, stored: np.ndarray, index: tuple, values: np.ndarray, run: RunLabels
+) -> None:
+    """Store a run's values of a variable that several runs share; values of earlier runs stay, and must be the same."""
+    present = stored[index]
+    unknown = present == column.fill
+    equal = present == values if values.dtype.kind == "S" else abs(present - values) <= _SAME * abs(values)
+    if not np.all(unknown | equal):
+        shared = ", ".join(column.along) or "the study"
+        raise ValueError(f"{run}: {name} differs between runs that share {shared}")
+    stored[index] = np.where(unknown, values, present)

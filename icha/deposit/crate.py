@@ -118,31 +118,22 @@ def _describe(crate: ROCrate, publication: Publication, campaign: str) -> None:
         conformsTo=[_add(crate, address, "CreativeWork", **known) for address, known in TABLES["profiles"].items()],
         keywords=publication.keywords,
         identifier=publication.doi and web_address(publication.doi),
-        citation=_add_paper(crate),
+        citation=_add(crate, MODEL_PAPER.address, "ScholarlyArticle", name=MODEL_PAPER.line),
     )
 
 
 def _add_author(crate: ROCrate, author: Author) -> Entity:
     if not author.is_person:
         return _add_organisation(crate, author.name, author.ror)
-    person = _add_person(crate, author.given_names, author.family_names, author.orcid_address)
-    if author.affiliation:
-        _set(person, affiliation=_add_organisation(crate, author.affiliation, author.ror))
-    return person
-
-
-def _add_person(crate: ROCrate, given: str, family: str, address: str | None = None) -> Entity:
-    """Return a person, who may be an author of the data and of the paper."""
-    name = f"{given} {family}"
-    key = address or f"#person/{quote(name)}"
-    return crate.dereference(key) or _add(crate, key, "Person", name=name, givenName=given, familyName=family)
-
-
-def _add_paper(crate: ROCrate) -> Entity:
-    """Add the paper of the model."""
-    people = [_add_person(crate, *names) for names in MODEL_PAPER.authors]
-    described = {"name": MODEL_PAPER.title, "author": people, "datePublished": str(MODEL_PAPER.year)}
-    return _add(crate, MODEL_PAPER.address, "ScholarlyArticle", **described)
+    return _add(
+        crate,
+        author.orcid_address or f"#person/{quote(author.full_name)}",
+        "Person",
+        name=author.full_name,
+        givenName=author.given_names,
+        familyName=author.family_names,
+        affiliation=author.affiliation and _add_organisation(crate, author.affiliation, author.ror),
+    )
 
 
 def _add_organisation(crate: ROCrate, name: str, address: str | None) -> Entity:

@@ -35,16 +35,6 @@ _NO_TIME = (1980, 1, 1, 0, 0, 0)
 _UNIX = 3
 
 
-def _refuse_changed(results: Path, files: list[str]) -> None:
-    """Raise `ValueError` if results are not what their jobs wrote; the message lists them."""
-    if changed := [f"  {results / file}" for file in files if not is_whole(results, file, thorough=True)]:
-        listed = "\n".join(changed)
-        raise ValueError(
-            "not published, because these files are not what their jobs wrote. Remove them, and run the campaign "
-            f"again:\n{listed}"
-        )
-
-
 def make_deposit(
     folder: str | os.PathLike,
     archive: str | os.PathLike,
@@ -78,7 +68,12 @@ def make_deposit(
     folder, archive, results = Path(folder), Path(archive), Path(results)
     files, publication = sorted(files), campaign.deposit_metadata()
     refuse_unknown_failures(read_checks(results / "checks.json"), [each.run for each in publication.known_failures])
-    _refuse_changed(results, files)
+    if changed := [f"  {results / file}" for file in files if not is_whole(results, file, thorough=True)]:
+        listed = "\n".join(changed)
+        raise ValueError(
+            "not published, because these files are not what their jobs wrote. Remove them, and run the campaign "
+            f"again:\n{listed}"
+        )
     staging = folder.with_name(f".{folder.name}.part")
     shutil.rmtree(staging, ignore_errors=True)
     try:
@@ -99,9 +94,8 @@ def make_deposit(
             _write_zip(temporary, staging, folder.name)
             sync_folder(staging)
             with moving():
-                # Remove an earlier deposit at once, with its checksums.
                 archive.unlink(missing_ok=True)
-                _remove(folder)
+                shutil.rmtree(folder, ignore_errors=True)
                 staging.rename(folder)
     finally:
         shutil.rmtree(staging, ignore_errors=True)
@@ -163,15 +157,6 @@ def _describe(staging: Path, campaign: Campaign, revision: str, cost: Cost) -> N
 def _write(path: Path, text: str) -> None:
     path.write_text(text, encoding="utf-8", newline="\n")
     path.chmod(0o644)
-
-
-def _remove(folder: Path) -> None:
-    """Remove a folder. It is renamed first, so that no incomplete folder has its name at any time."""
-    if folder.is_dir():
-        old = folder.with_name(f".{folder.name}.old")
-        shutil.rmtree(old, ignore_errors=True)
-        folder.rename(old)
-        shutil.rmtree(old)
 
 
 def _write_zip(path: Path, folder: Path, name: str) -> None:

@@ -150,8 +150,7 @@ def _outcome(publication: Publication, dataset: xr.DataTree, checks: Sequence[Ch
         "incomplete": incomplete,
         "beyond_model": sum(study["status"][STATUS_MEANINGS[BEYOND_MODEL]] for study in designs),
         "example": example,
-        # Slopes that differ between surfaces have no index by which to select.
-        "slope_place": run_place(study, example)["rms_slope"] if study["rms_slope"].ndim == 2 else None,
+        "slope_place": run_place(study, example)["rms_slope"],
         "checks": [replace(each, description=meaning) if each.name == COMPLETED else each for each in worst(checks)],
         "failed": [check for check in checks if not check.passed and check.name != COMPLETED],
         "known": known,

@@ -18,7 +18,7 @@ from icha.configuration.yaml_files import read_yaml
 from icha.datasets.attributes import why_no_result
 from icha.datasets.results import CONFIGURATION
 from icha.deposit.program import PROGRAM, program_files, version_differences
-from icha.deposit.verify import CHECKSUMS, COMPUTED, SOURCE, files_of, read_text
+from icha.deposit.verify import CHECKSUMS, SOURCE, files_of, read_text
 from icha.support.checksums import sha256_of
 from icha.support.formatting import format_count
 from icha.support.input_files import refuse_traps
@@ -42,8 +42,6 @@ def campaign_name(deposit: Path) -> str:
     for file in (CONFIGURATION, _PYPROJECT, _LOCK):
         if not (deposit / file).is_file():
             raise RerunError(f"the deposit has no {file}, so it cannot be computed again")
-    if not any((deposit / name).exists() for name in COMPUTED):
-        raise RerunError("the deposit has no results to compare with")
     try:
         read_text(deposit, CONFIGURATION)  # refuses a file that is too large
         name = read_yaml(deposit / CONFIGURATION).get("name")
@@ -58,12 +56,11 @@ def other_versions(deposit: Path) -> list[str]:
     """List the versions of ICHA and of packages that differ between the deposit and what is installed."""
     try:
         made_by = tomllib.loads(read_text(deposit, _PYPROJECT))["project"]["version"]
-    except (ValueError, KeyError, TypeError, RecursionError):
-        raise RerunError(f"{_PYPROJECT}: has no version of the program") from None
-    try:
         wrong = version_differences(read_text(deposit, _LOCK))
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
-        raise RerunError(f"{_LOCK}: is not a lock file of uv") from None
+        raise RerunError(
+            f"{_PYPROJECT} or {_LOCK} cannot be read; expected the version of the program, and a lock file of uv"
+        ) from None
     installed = version("icha")
     if made_by != installed:
         wrong.insert(0, f"  icha: {installed} is installed, {made_by} made the deposit")

@@ -159,7 +159,7 @@ def test_the_example_selects_a_run_of_surfaces_with_slopes_of_their_own(tmp_path
     page = page_of(tree, check_campaign(tree), load_configuration(REPOSITORY / "config/campaigns/smoke.yaml").campaign)
     write_campaign(runs, tmp_path / "dataset/smoke.nc")
     monkeypatch.chdir(tmp_path)
-    example = re.search(r"^study = .*\nruns = .*$", page, re.MULTILINE)[0]
+    example = re.search(r"^study = .*\nruns = .*\nruns = .*$", page, re.MULTILINE)[0]
     namespace = {"xr": xr}
     exec(example, namespace)
     assert namespace["runs"].sizes["material"] == 2 and float(namespace["runs"]["rms_slope"]) == 0.5
