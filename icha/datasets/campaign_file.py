@@ -144,7 +144,7 @@ def define_group(group: netCDF4.Dataset, study: Arrangement, attrs: Mapping[str,
         lacks, width = study.lacks(name), 0
         fill: float | int | bytes = FLOAT_FILL if dtype.kind == "f" else INTEGER_FILL if lacks else 0
         if is_text(dtype):
-            dtype, width, fill = np.dtype("S1"), study.widths[name], b""
+            dtype, width, fill = np.dtype("S1"), max(entry.widths.get(name, 1) for entry in study.entries), b""
         elif dtype.kind != "f":
             # 32 bits, which every netCDF tool reads, or flags.
             dtype = np.dtype(np.int8 if dtype == np.int8 and not lacks else np.int32)
@@ -210,25 +210,19 @@ def write_campaign(
     settings: Mapping[RunLabels | tuple, str] = {},
     attrs: Mapping[str, str] = {},
 ) -> None:
-    """Write all runs of a campaign to one netCDF-4 file: a group per study, full arrays along the labels of the runs.
+    """Write all runs of a campaign to one netCDF-4 file: one group for each study, arrays along the labels of the runs.
 
-    The groups have the dimensions model, surface, seed, rms_slope and material, and those of the run dataset; the maps
-    of boundary elements stay in the files of the runs. Beyond the `step_count` steps of a run, numbers are missing and
-    texts empty. Spots and events of all runs stand one after the other along `spot` and `event`; `spot_snapshot`,
-    `spot_model`, `event_model` and so on are positions along these dimensions, from 0. For every combination of labels,
-    `status` is complete, incomplete, missing, not in the design, failed checks or beyond the model; `failure` is why a
-    run is incomplete or beyond its model, or which checks failed, `applicability` why its model is not
-    applicable. Values that an incomplete run, a missing run or a run of another model does not have are missing.
+    `docs/howto/dataset.md` describes the file. The maps of boundary elements stay in the files of the runs.
 
     Parameters
     ----------
     runs : pairs of labels (study, model, surface, seed, rms_slope, material) and run dataset, or its file. Names keep
-        the order in which they appear in the design, seeds and slopes are sorted. A run is incomplete if it has an
-        attribute `incomplete`, with the reason, if it did not converge, or if it lacks snapshots of its study.
-    path : the file, which appears whole or not at all. The same runs give the same bytes.
-    design : labels of the runs of the campaign; those of `runs` if left out. Other combinations of their labels are not
-        in the design.
-    settings : expected checksums of the settings of runs (their attribute `config_sha256`), by their labels.
+        the order of the design; seeds and slopes are sorted. A run is incomplete if its attribute `incomplete` states
+        the reason, or if it lacks snapshots of its study.
+    path : the file, which is complete or does not exist. The same runs give the same bytes.
+    design : labels of the runs of the campaign; without `design`, those of `runs`. Other combinations of these labels
+        are not in the design.
+    settings : expected checksums of the settings of runs (their attribute `config_sha256`), by the labels of the runs.
     attrs : global attributes of the file (title, summary, campaign, license, …).
 
     Raises

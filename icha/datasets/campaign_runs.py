@@ -6,7 +6,7 @@ import itertools
 import os
 import pickle
 from collections.abc import Hashable, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, BinaryIO, NamedTuple
 
 import numpy as np
@@ -67,9 +67,11 @@ class Entry(NamedTuple):
     Attributes
     ----------
     labels : the labels of the run.
+    source : its dataset, or the file of its dataset.
     place : where its values begin in the temporary file, in bytes.
     names : names of its variables.
     sizes : sizes of its dimensions, by name.
+    widths : bytes of the longest text of each variable of texts.
     snapshots : kind and target of its snapshots.
     status : its status, if it has all snapshots of its study.
     failure : why it is not complete; an empty text if it is.
@@ -77,35 +79,26 @@ class Entry(NamedTuple):
     """
 
     labels: RunLabels
+    source: xr.Dataset | str | os.PathLike
     place: int
     names: frozenset[str]
     sizes: dict[str, int]
+    widths: dict[str, int]
     snapshots: tuple[tuple[bytes, float], ...]
     status: int
     failure: str
     applicability: str
 
-
-@dataclass
-class Members:
-    """The runs of a study that were read so far.
-
-    Attributes
-    ----------
-    entries : one for each run, by its labels.
-    widths : bytes of the longest text of each variable.
-    samples : for every model, the run with the most variables and steps, after the rank by which it was chosen.
-    """
-
-    entries: dict[RunLabels, Entry] = field(default_factory=dict)
-    widths: dict[str, int] = field(default_factory=dict)
-    samples: dict[str, tuple[tuple[bool, int], xr.Dataset | str | os.PathLike]] = field(default_factory=dict)
+    @property
+    def extent(self) -> tuple[bool, int]:
+        """Whether the run did not end early, and its number of steps; a run with the largest has all variables."""
+        return self.status not in _ENDED_EARLY, self.sizes.get("step", 0)
 
 
 def spool_runs(
     runs: Iterable[LabelledRun], spool: BinaryIO, settings: Mapping[RunLabels | tuple, str] = {}
-) -> dict[str, Members]:
-    """Append the values of every run to a temporary file; return the facts of all runs, by study.
+) -> dict[str, dict[RunLabels, Entry]]:
+    """Append the values of every run to a temporary file; return the facts of all runs, by study and labels.
 
     Parameters
     ----------
@@ -117,13 +110,13 @@ def spool_runs(
     ValueError
         Naming the run: if it is given twice, or was computed with other settings than expected.
     """
-    studies: dict[str, Members] = {}
-    # Most runs have the same variables, sizes and snapshots. Each combination is stored only once.
+    studies: dict[str, dict[RunLabels, Entry]] = {}
+    # Most runs have the same variables and snapshots. Each combination is stored only once.
     stored: dict[Hashable, Any] = {}
     for labels, source in runs:
         labels = plain_labels(labels)
-        members = studies.setdefault(labels.study, Members())
-        if labels in members.entries:
+        entries = studies.setdefault(labels.study, {})
+        if labels in entries:
             raise ValueError(f"{labels}: this run is given twice")
         values, attrs = _values_of(source) if isinstance(source, xr.Dataset) else read_run_values(source)
         if attrs.get("config_sha256") != settings.get(labels, attrs.get("config_sha256")):
@@ -132,25 +125,19 @@ def spool_runs(
                 f"{file}: this run was computed with other settings than the configuration's. Remove it and repeat the "
                 "command, which computes it"
             )
-        sizes = {dim: n for dims, v in values.values() for dim, n in zip(dims, v.shape, strict=False)}
         names, snapshots = frozenset(values), _snapshots_of(values)
-        members.entries[labels] = Entry(
+        entries[labels] = Entry(
             labels,
+            source,
             spool.tell(),
             stored.setdefault(names, names),
-            stored.setdefault(tuple(sorted(sizes.items())), sizes),
+            {dim: n for dims, v in values.values() for dim, n in zip(dims, v.shape, strict=False)},
+            {name: v.shape[-1] for name, (_, v) in values.items() if is_text(v.dtype)},
             stored.setdefault(snapshots, snapshots),
             *_status_and_failure(attrs),
             str(attrs.get("applicability", "")),
         )
         pickle.dump(values, spool, protocol=5)
-        for name, (_, v) in values.items():
-            if is_text(v.dtype):
-                members.widths[name] = max(members.widths.get(name, 1), v.shape[-1])
-        # A run that ended early may lack the variables that describe the end of its path.
-        rank = (not {"incomplete", "beyond_model"} & set(attrs), sizes.get("step", 0))
-        if labels.model not in members.samples or rank > members.samples[labels.model][0]:
-            members.samples[labels.model] = rank, source
     return studies
 
 
@@ -200,7 +187,6 @@ class Arrangement:
     variables : the variables of all models, each from one run.
     coordinates : names of those that are coordinates.
     origins : global attributes of a run of every model.
-    widths : bytes of the longest text of each variable.
     sizes : sizes of the dimensions that runs have in common.
     snapshots : position of every snapshot, by kind and target.
     entries : the computed runs, in the order of the axes.
@@ -212,7 +198,6 @@ class Arrangement:
     variables: dict[str, xr.Variable]
     coordinates: set[str]
     origins: list[dict]
-    widths: dict[str, int]
     sizes: dict[str, int]
     snapshots: dict[tuple[bytes, float], int]
     entries: list[Entry]
@@ -245,7 +230,9 @@ class Arrangement:
         return not filled.all() or any((_sizes(self.entries, dim)[having] != self.sizes[dim]).any() for dim in dims)
 
 
-def arrange_runs(studies: dict[str, Members], design: Iterable[RunLabels | tuple] | None) -> list[Arrangement]:
+def arrange_runs(
+    studies: dict[str, dict[RunLabels, Entry]], design: Iterable[RunLabels | tuple] | None
+) -> list[Arrangement]:
     """Arrange the runs of every study, in the order of the design.
 
     Raises
@@ -253,7 +240,7 @@ def arrange_runs(studies: dict[str, Members], design: Iterable[RunLabels | tuple
     ValueError
         Naming the run: if it is not in the design.
     """
-    given = [labels for members in studies.values() for labels in members.entries]
+    given = [labels for entries in studies.values() for labels in entries]
     asked: dict[str, dict[RunLabels, None]] = {}
     for labels in given if design is None else map(plain_labels, design):
         asked.setdefault(labels.study, {})[labels] = None
@@ -263,22 +250,26 @@ def arrange_runs(studies: dict[str, Members], design: Iterable[RunLabels | tuple
     return [_arrange_study(name, studies[name], list(labels)) for name, labels in asked.items()]
 
 
-def _arrange_study(name: str, members: Members, design: list[RunLabels]) -> Arrangement:
+def _arrange_study(name: str, found: dict[RunLabels, Entry], design: list[RunLabels]) -> Arrangement:
     axes: dict[str, Any] = {label: list(dict.fromkeys(getattr(each, label) for each in design)) for label in LABELS}
     axes["seed"].sort()
     axes["rms_slope"] = arrange_slopes((labels.surface, labels.rms_slope) for labels in design)
     position = _positions(axes, design)
-    samples = {model: _sample(members.samples[model][1]) for model in axes["model"] if model in members.samples}
-    variables: dict[str, xr.Variable] = {}
-    for sample in samples.values():
-        variables = {**variables, **{key: v for key, v in sample.variables.items() if key not in variables}}
     # In the order of the design, whatever the order in which they were given.
-    entries = [members.entries[labels] for labels in position if labels in members.entries]
+    entries = [found[labels] for labels in position if labels in found]
+    # For every model, a run that has all its variables.
+    samples = [
+        _sample(max(of_model, key=lambda entry: entry.extent).source)
+        for model in axes["model"]
+        if (of_model := [entry for entry in entries if entry.labels.model == model])
+    ]
+    variables: dict[str, xr.Variable] = {}
+    for sample in samples:
+        variables |= {key: variable for key, variable in sample.variables.items() if key not in variables}
     snapshots = _snapshots(entries)
     sizes = {dim: n for v in variables.values() for dim, n in v.sizes.items() if dim not in RAGGED}
     longest = {"snapshot": len(snapshots), "step": int(_sizes(entries, "step").max())}
     sizes |= {dim: size for dim, size in longest.items() if dim in sizes}
-
     entries = sorted(entries, key=lambda entry: position[entry.labels])
     positions = np.array([position[entry.labels] for entry in entries])
     shape = tuple(len(axes[label]) if label != "rms_slope" else axes[label].shape[-1] for label in LABELS)
@@ -288,13 +279,13 @@ def _arrange_study(name: str, members: Members, design: list[RunLabels]) -> Arra
         array[tuple(positions.T)] = list(values)
         return array
 
-    found = [
+    outcomes = [
         (INCOMPLETE, f"{len(entry.snapshots)} of {len(snapshots)} snapshots")
         if entry.status in (COMPLETE, FAILED_CHECKS) and len(entry.snapshots) != len(snapshots)
         else (entry.status, entry.failure)
         for entry in entries
     ]
-    status = spread((status for status, _ in found), NOT_IN_DESIGN, np.int8)
+    status = spread((status for status, _ in outcomes), NOT_IN_DESIGN, np.int8)
     asked = np.zeros(shape, bool)
     asked[tuple(np.transpose(list(position.values())))] = True
     status[asked & (status == NOT_IN_DESIGN)] = MISSING
@@ -304,13 +295,12 @@ def _arrange_study(name: str, members: Members, design: list[RunLabels]) -> Arra
         | {
             "status": status,
             "step_count": spread(_sizes(entries, "step"), 0, np.int32),
-            "failure": spread((failure for _, failure in found), "", object),
+            "failure": spread((failure for _, failure in outcomes), "", object),
             "applicability": spread((entry.applicability for entry in entries), "", object),
         },
         variables={key: variable for key, variable in variables.items() if key not in LABELS},
-        coordinates={*next(iter(samples.values())).coords, *LABELS},
-        origins=[each.attrs for each in samples.values()],
-        widths=members.widths,
+        coordinates={*samples[0].coords, *LABELS},
+        origins=[sample.attrs for sample in samples],
         sizes=sizes,
         snapshots=snapshots,
         entries=entries,
@@ -347,6 +337,6 @@ def _snapshots(entries: list[Entry]) -> dict[tuple[bytes, float], int]:
 
     Runs may meet their stops, and take their snapshots, in different orders (a load and an area, for instance).
     """
-    longest = max(entries, key=lambda entry: (entry.status not in _ENDED_EARLY, entry.sizes.get("step", 0)))
+    longest = max(entries, key=lambda entry: entry.extent)
     known = dict.fromkeys(itertools.chain(longest.snapshots, *(entry.snapshots for entry in entries)))
     return {each: k for k, each in enumerate(known)}

@@ -99,11 +99,9 @@ def _refuse_values_not_finite(dataset: xr.Dataset, where: str) -> None:
         if excused is not None and set(variable.dims) & set(excused.dims):
             # A value that several runs share may be missing if all these runs are missing.
             may_lack = excused.all([dim for dim in excused.dims if dim not in variable.dims]).variable
-            may_lack = may_lack.set_dims(dict(zip(variable.dims, variable.shape, strict=True))).values
             if "step" in variable.dims:
-                padding = dataset["step"] >= dataset["step_count"]
-                may_lack = may_lack | padding.transpose(*variable.dims).values
-            bad &= ~(may_lack & np.isnan(variable.values))
+                may_lack = may_lack | (dataset["step"] >= dataset["step_count"]).variable
+            bad &= ~(may_lack & np.isnan(variable)).transpose(*variable.dims).values
         if bad.any():
             raise ValueError(f"{where}: variable {not_finite(name, variable.dims, bad)}")
 

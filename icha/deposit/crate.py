@@ -26,21 +26,21 @@ from icha.deposit.verify import CRATE, README, SOURCE
 _PROGRAM = f"{SOURCE}/"
 _WORKFLOW = f"{_PROGRAM}Snakefile"
 _LICENCE = f"{_PROGRAM}LICENSE"
-# Files of the source that the crate shows, besides the scripts of the jobs.
+# Files of the source that the crate lists, besides the scripts of the jobs.
 _SHOWN = {_WORKFLOW, f"{_PROGRAM}uv.lock", _LICENCE}
 
 _WORKFLOW_PROFILE = "https://w3id.org/workflowhub/workflow-ro-crate/1.0"
-# The term of run crates that is used here (https://w3id.org/ro/terms/workflow-run/context).
+# Term of run crates for a checksum (https://w3id.org/ro/terms/workflow-run/context).
 _TERMS = {"sha256": "https://w3id.org/ro/terms/workflow-run#sha256"}
 
 
 class Job(NamedTuple):
-    """One job of the workflow; files are named as they lie in the deposit.
+    """One job of the workflow; paths of files are those in the deposit.
 
     Attributes
     ----------
     rule : name of the rule of the workflow.
-    inputs, outputs : files read and written; at least one is written.
+    inputs, outputs : files that the job read and wrote; it wrote at least one file.
     parameters : names and values of its settings.
     description : what its script does.
     script : the script that the job ran.
@@ -67,11 +67,11 @@ def write_crate(
 
     Parameters
     ----------
-    folder : the deposit; all files of `checksums` are there.
+    folder : the deposit, which contains all files of `checksums`.
     publication : metadata of the deposit; complete.
-    jobs : those that made the results, in any order; all files that they name are in the deposit.
-    campaign : its name.
-    revision : the state of the program, the source of which is in `source/`.
+    jobs : the jobs that made the results, in any order; the deposit contains all their files.
+    campaign : name of the campaign.
+    revision : revision of the program whose source is in `source/`.
     checksums : sha256 of every file, hexadecimal, by its path in the deposit.
     """
     jobs = sorted(jobs, key=lambda job: job.outputs)

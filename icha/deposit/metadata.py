@@ -89,7 +89,8 @@ def acknowledgement(funding: Funding) -> str:
 def discovery_attributes(publication: Publication) -> dict[str, str]:
     """Return the attributes of the Attribute Convention for Data Discovery (ACDD 1.3) for a dataset.
 
-    Several creators are separated by semicolons, because names contain commas, in the same order in every attribute.
+    Semicolons separate several creators, because names contain commas. Every attribute lists the creators in the same
+    order.
     """
     authors = publication.authors
     values = {
@@ -118,7 +119,7 @@ def citation_cff(publication: Publication, revision: str) -> str:
     Parameters
     ----------
     publication : complete metadata (`icha.configuration.publication.missing_metadata`).
-    revision : that of the program that made the data.
+    revision : revision of the program that made the data.
     """
     licence = find_licence(publication.license)
     paper = {
@@ -202,7 +203,7 @@ def zenodo_metadata(publication: Publication) -> dict[str, Any]:
 
 
 def read_zenodo_metadata(folder: Path) -> dict[str, Any]:
-    """Read the metadata of a deposit from an unknown maker; raise ValueError if they are not a mapping."""
+    """Read the metadata for Zenodo of a deposit from an unknown maker; raise ValueError if they are not a mapping."""
     try:
         metadata = json.loads(read_text(folder, ZENODO))
     except (ValueError, RecursionError) as error:
@@ -213,7 +214,7 @@ def read_zenodo_metadata(folder: Path) -> dict[str, Any]:
 
 
 def summary_of(metadata: dict[str, Any]) -> dict[str, str]:
-    """Return title, version, authors, licence and communities of Zenodo metadata, of any types, as text."""
+    """Return title, version, authors, licence and communities of Zenodo metadata, whose values may have any type."""
 
     def join(entries: Any, key: str) -> str:
         entries = entries if isinstance(entries, list) else ()

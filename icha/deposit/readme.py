@@ -39,7 +39,7 @@ _MOST_NAMES = 12
 _METADATA = "citation, licence and provenance for people and machines"
 # A web address within a text, without punctuation after it.
 _ADDRESS = re.compile(r"(https?://[^\s<>|`\\]*[^\s<>|`\\.,;:!?()\[\]*_~'\"])")
-# Characters with a meaning in Markdown: anywhere, or at the beginning of an entity; and at the beginning of a line.
+# Characters with a meaning in Markdown: anywhere in a line, and at its beginning.
 _SPECIAL = re.compile(r"[\\`*\[\]<>|~$#]|(?<![^\W_])_|_(?![^\W_])|&(?=[#\w])")
 _SPECIAL_FIRST = re.compile(r"^(\d*)((?<!\d)[-+]|(?<=\d)[.)])(?!\w)")
 
@@ -54,12 +54,12 @@ def readme(
     sizes: Mapping[str, int],
     cost: Cost,
 ) -> str:
-    """Write the page, in Markdown.
+    """Write README.md of a deposit.
 
     Parameters
     ----------
     campaign : the configuration, with complete metadata.
-    revision : that of the source.
+    revision : revision of the source.
     dataset, checks, model_error : the results of the campaign.
     sizes : bytes of every file, by its path in the deposit.
     cost : expected cost of computing the whole campaign.
@@ -127,7 +127,7 @@ def _settings(campaign: Campaign) -> dict:
 
 
 def _outcome(publication: Publication, dataset: xr.DataTree, checks: Sequence[Check]) -> dict:
-    """Return complete and incomplete runs, and their checks."""
+    """Return the facts of the results: complete and incomplete runs, and their checks."""
     known = {failure.run: failure.reason for failure in publication.known_failures}
     designs, incomplete, complete = [], [], []
     for name, node in dataset.children.items():
@@ -189,13 +189,13 @@ def _parts(sizes: Mapping[str, int]) -> list[dict]:
 
 
 def _few(values: Sequence) -> str:
-    """Write a list, or its beginning and its length."""
+    """Write a list, or the beginning of a long list and its length."""
     shown = [markdown(value) for value in values]
     return ", ".join(shown) if len(shown) <= _MOST_NAMES else f"{', '.join(shown[:_MOST_NAMES])}, … ({len(shown)})"
 
 
 def markdown(text) -> str:
-    """Escape plain text for a line of Markdown, also in a table; addresses become links."""
+    """Write plain text as one line of Markdown, also for a table; web addresses become links."""
     line = " ".join(str(text).split())
     # Every second part is an address.
     parts = [

@@ -28,7 +28,7 @@ from icha.support.values import NAME_PATTERN
 SMALLEST = "smallest"
 # In the source of a deposit: the version of the program, and the versions of all packages.
 _PYPROJECT, _LOCK = f"{SOURCE}/pyproject.toml", f"{SOURCE}/uv.lock"
-# In the folder of a rerun: the checksum of the deposit's list of checksums; configuration, inputs and results.
+# In the folder of a rerun: file with the checksum of the deposit's SHA256SUMS; folder of configuration and results.
 _BEGUN, _PROJECT = "rerun-of.sha256", "data"
 _RUN = re.compile(r"runs(/[^/]+){4}/[^/]+\.nc")
 
@@ -38,7 +38,7 @@ class RerunError(ValueError):
 
 
 def campaign_name(deposit: Path) -> str:
-    """Return the name of the campaign in a deposit; `RerunError` if it lacks what a rerun needs."""
+    """Return the name of the campaign in a deposit; raise `RerunError` if the deposit lacks what a rerun needs."""
     for file in (CONFIGURATION, _PYPROJECT, _LOCK):
         if not (deposit / file).is_file():
             raise RerunError(f"the deposit has no {file}, so it cannot be computed again")
@@ -107,7 +107,7 @@ def find_runs(only: Iterable[str], deposit: Path) -> list[str]:
 
 
 def _smallest(deposit: Path, runs: list[str]) -> str:
-    """Return the complete run that, together with its surface, has the fewest bytes."""
+    """Return the complete run whose file and surface together have the fewest bytes."""
     sizes = {run: sum((deposit / path).stat().st_size for path in add_surfaces([run], deposit)) for run in runs}
     for run in sorted(runs, key=lambda run: sizes[run]):
         if _is_complete(deposit, run):
@@ -131,7 +131,7 @@ def add_surfaces(runs: Iterable[str], deposit: Path) -> list[str]:
 
 
 def prepare_rerun(folder: Path, deposit: Path) -> Path:
-    """Copy configuration and inputs of a deposit to the folder of a rerun, unless it has them; return the copy.
+    """Copy configuration and inputs of a deposit to the folder of a rerun, unless they are there.
 
     Raises
     ------

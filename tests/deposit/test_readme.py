@@ -150,7 +150,7 @@ def test_the_page_counts_runs_that_end_at_the_limit_of_their_model():
     runs[first] = runs[first].assign_attrs(beyond_model="the path ends before its last target")
     tree = small.campaign_tree(runs.items(), attrs={"campaign": "small"})
     page = page_of(tree, check_campaign(tree), load_configuration(REPOSITORY / "config/campaigns/smoke.yaml").campaign)
-    assert "Of 1 of them the path leads beyond the range of the model" in page and "and complete.\n" not in page
+    assert "The path of 1 of them leads beyond the range of the model" in page and "and complete.\n" not in page
 
 
 def test_the_example_selects_a_run_of_surfaces_with_slopes_of_their_own(tmp_path, monkeypatch):
