@@ -24,7 +24,7 @@ def show(file: Annotated[Path, typer.Argument(help="A run, surface or campaign d
         kind, data = identify_file(file)
     except UnknownFile as error:
         raise UserError(str(error)) from None
-    printers = {RUN: print_run, SURFACE: _print_surface, CAMPAIGN: _print_campaign}
+    printers = {RUN: _print_run, SURFACE: _print_surface, CAMPAIGN: _print_campaign}
     if kind not in printers:
         raise UserError(f"{file}: {kind}; expected a run, a surface or a campaign dataset. Try `ncdump -h`")
     try:
@@ -33,7 +33,7 @@ def show(file: Annotated[Path, typer.Argument(help="A run, surface or campaign d
         raise UserError(f"{file}: {kind} of another format ({error!r}); `icha check` lists the problems") from None
 
 
-def print_run(run, file: Path) -> None:
+def _print_run(run, file: Path) -> None:
     """Print the model, material and surface of a run, and its results."""
     import numpy as np
 

@@ -12,6 +12,7 @@ import netCDF4
 import numpy as np
 import pytest
 import small_campaign as small
+import typer
 import yaml
 from conftest import REPOSITORY
 from tiny_campaign import CAMPAIGN as TINY
@@ -20,7 +21,7 @@ from typer.testing import CliRunner
 from icha.analysis.checks import check_campaign, write_checks
 from icha.cli import app
 from icha.cli.live import Progress, View, read_error, read_last_line
-from icha.cli.project import list_campaigns
+from icha.cli.project import list_campaigns, reports_errors
 from icha.configuration.cases import run_cases, run_sha256
 from icha.configuration.errors import ConfigurationError
 from icha.configuration.load import load_configuration
@@ -465,31 +466,27 @@ def test_a_campaign_too_large_for_the_machine_is_refused_without_a_terminal(tiny
         output("run", "tiny.yaml", *arguments, status=STARTED)
 
 
-def test_memory_that_the_system_refuses_is_a_message(project, monkeypatch):
-    def fail(*_, **__):
+def test_memory_that_the_system_refuses_is_a_message():
+    @reports_errors
+    def command():
         raise MemoryError("Unable to allocate 80 GiB for an array")
 
-    monkeypatch.setattr("icha.simulation.simulate", fail)
-    refused = printed("simulate", "run.nc", "--grid", "64", status=1)
-    assert "not enough memory: Unable to allocate 80 GiB" in refused
+    with pytest.raises(typer.Exit) as end:
+        command()
+    assert end.value.exit_code == 1
 
 
-def test_one_run_without_the_workflow(empty_folder):
-    options = ["--grid", "32", "--rolloff", "50 um", "--short", "20 um"]
-    assert "2 steps" in output("simulate", "run.nc", *options, "--pressures", "1e-3,1e-2")
+def test_all_files_are_checked_and_runs_are_shown(empty_folder):
+    run = small.run()
+    write_dataset(run, "run.nc")
+    write_dataset(run.assign_attrs(incomplete="the path ends early"), "failed.nc")
+    Path("bad.npy").write_bytes(b"")
     assert "run dataset, no problems" in output("check", "run.nc")
     assert "1.0000e-02" in output("show", "run.nc")
-    assert "--force" in output("simulate", "run.nc", *options, status=2)
-    sticky = ["--modulus", "0.5 kPa", "--energy", "0.5 J/m^2"]
-    failed = printed("simulate", "sticky.nc", *options, *sticky, status=1)
-    assert "Warning: --modulus: '0.5 kPa' is unusual; usual values: 1 kPa to 2000 GPa" in failed
-    assert "failed:" in failed and "--energy" not in failed
-    checked = output("check", "run.nc", "sticky.nc", status=1)
-    assert "sticky.nc: run dataset, 1 problem" in checked and "the run failed: the path ends" in checked
-    # Every file is checked.
-    Path("bad.npy").write_bytes(b"")
-    checked = output("check", "bad.npy", "none.nc", "sticky.nc", "run.nc", status=2)
-    for words in ("bad.npy: the file is empty", "none.nc: no such file", "sticky.nc: run", "run.nc: run dataset, no"):
+    assert "failed:   the path ends early" in output("show", "failed.nc")
+    assert "failed.nc: run dataset, 1 problem" in output("check", "run.nc", "failed.nc", status=1)
+    checked = output("check", "bad.npy", "none.nc", "failed.nc", "run.nc", status=2)
+    for words in ("bad.npy: the file is empty", "none.nc: no such file", "the run failed: the path", "run.nc: run dataset, no"):
         assert words in checked
 
 
