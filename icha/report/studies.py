@@ -11,7 +11,6 @@ from icha.datasets.campaign import loading_stops, reduced_gap, run_place, runs_o
 from icha.datasets.labels import LABELS, RunLabels, slopes_of
 from icha.datasets.variables.campaign import (
     BEYOND_MODEL,
-    COMPLETE,
     COMPUTED_RUNS,
     FAILED_CHECKS,
     INCOMPLETE,
@@ -49,7 +48,7 @@ EVENT_NAMES = {
 }
 
 
-def summarise_study(campaign: xr.DataTree, name: str, comparison: xr.DataTree | None) -> dict:
+def summarise_study(campaign: xr.DataTree, name: str) -> dict:
     """Return what the page prints about one study."""
     dataset = campaign[name].to_dataset()
     status = dataset["status"].values
@@ -81,7 +80,6 @@ def summarise_study(campaign: xr.DataTree, name: str, comparison: xr.DataTree | 
         "table": _table(runs),
         "means": _means(dataset, complete),
         "loops": _loops(small, dataset, complete),
-        "spread": _spread(comparison[name].to_dataset()) if comparison and name in comparison else None,
     }
 
 
@@ -273,21 +271,3 @@ def _with_unit(values: np.ndarray, unit: str = "") -> Markup:
     mean = format_scientific(float(np.mean(values)) * factor) + (f" {unit}" if unit else "")
     text = _range(values * factor, format_scientific)
     return (mean + (Markup("<br>") + text if text else "")).replace("-", "−")
-
-
-def _spread(comparison: xr.Dataset) -> dict[str, float | None]:
-    """Return the largest differences of the area between materials and slopes, at equal pressure and at equal load.
-
-    None if no two complete runs differ in this label only, or share a load.
-    """
-    complete = comparison["status"] == COMPLETE
-
-    def largest(name, label):
-        values = comparison[name].where(complete.sum(label) > 1).values
-        return float(np.nanmax(values)) if np.isfinite(values).any() else None
-
-    return {
-        f"{short}_spread{suffix}": largest(f"{short}_spread{suffix}", label)
-        for label, short in (("material", "material"), ("rms_slope", "slope"))
-        for suffix in ("", "_at_load")
-    }

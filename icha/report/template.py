@@ -9,7 +9,6 @@ import jinja2
 import numpy as np
 from markupsafe import Markup, escape
 
-from icha.support import formatting
 from icha.support.atomic_files import whole_file
 from icha.support.formatting import printable_lines
 
@@ -66,7 +65,6 @@ def template(name: str) -> jinja2.Template:
         "scientific": format_scientific,
         "per_cent": _per_cent,
         "number": "{:g}".format,
-        "duration": formatting.duration,
     }
     return environment.get_template(name)
 
