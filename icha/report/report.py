@@ -88,10 +88,17 @@ def write_report(
     studies = [summarise_study(campaign, name) for name in campaign.children]
     errors = list(model_error.children.values()) if model_error is not None else []
     texts = ";".join(node.attrs.get("references", "") for node in [*campaign.children.values(), *errors])
+    counted = ("asked", "complete", "beyond_model", "failed", "missing")
+    totals = {name: sum(study[name] for study in studies) for name in counted}
     write_page(
         path,
         "report.html",
-        **_campaign_values(campaign, studies),
+        title=campaign.attrs.get("title", "Rough contact campaign"),
+        summary=campaign.attrs.get("summary", ""),
+        attributes=campaign.attrs,
+        studies=studies,
+        totals=totals | {"not_applicable": sum(len(study["not_applicable"]) for study in studies)},
+        validity=statements_on_dataset(campaign),
         most_rows=MOST_ROWS,
         folded=FOLDED_ROWS,
         paper=MODEL_PAPER.line,
@@ -113,20 +120,6 @@ def write_report(
         citations=citations,
         software={name: version(name) for name in (*SOFTWARE, *further_software)},
     )
-
-
-def _campaign_values(campaign: xr.DataTree, studies: list[dict]) -> dict:
-    """Return what the page prints about the campaign as a whole."""
-    counted = ("asked", "complete", "beyond_model", "failed", "missing")
-    totals = {name: sum(study[name] for study in studies) for name in counted}
-    return {
-        "title": campaign.attrs.get("title", "Rough contact campaign"),
-        "summary": campaign.attrs.get("summary", ""),
-        "attributes": campaign.attrs,
-        "studies": studies,
-        "totals": totals | {"not_applicable": sum(len(study["not_applicable"]) for study in studies)},
-        "validity": statements_on_dataset(campaign),
-    }
 
 
 def _link(folder: Path, target: str | os.PathLike | None) -> str | None:

@@ -42,10 +42,6 @@ LOSS_NAMES = {
     "loss_by_load_jump": "at fixed load",
     "loss_unattributed": "no event",
 }
-EVENT_NAMES = {
-    "Contacts formed, broken": ("jump_in_count", "jump_off_count"),
-    "Unions, undone": ("coalescence_count", "split_count"),
-}
 
 
 def summarise_study(campaign: xr.DataTree, name: str) -> dict:
@@ -152,23 +148,23 @@ def _table(runs) -> dict:
     return table | {"rows": [(labels, [cell(stops, target) for target in table["stops"]]) for labels, stops in states]}
 
 
-def _ensembles(dataset: xr.Dataset, runs: list[RunLabels]) -> dict[tuple[RunLabels, bool], list[RunLabels]]:
-    """Group runs that differ only in their seed, by their labels with seed 0 and whether the model is applicable."""
+def _ensembles(dataset: xr.Dataset, runs: list[RunLabels]) -> list[tuple[dict, list[RunLabels]]]:
+    """Group runs that differ only in their seed; runs to which the model is not applicable are apart.
+
+    Each group comes with what identifies its row in a table, and with its number of seeds and that of requested ones.
+    """
     groups: dict[tuple[RunLabels, bool], list[RunLabels]] = {}
     for run in runs:
         groups.setdefault((run._replace(seed=0), not _reason(dataset, "applicability", run)), []).append(run)
-    return groups
-
-
-def _ensemble_row(dataset: xr.Dataset, labels: RunLabels, applicable: bool, runs: list[RunLabels]) -> dict:
-    """Return what identifies a row of means, with the numbers of its seeds and of all requested seeds."""
-    return {"labels": labels, "applicable": applicable, "count": len(runs), "asked": asked_seeds(dataset, labels)}
+    return [
+        ({"labels": labels, "applicable": fit, "count": len(group), "asked": asked_seeds(dataset, labels)}, group)
+        for (labels, fit), group in groups.items()
+    ]
 
 
 def _means(dataset: xr.Dataset, complete: list[RunLabels]) -> dict:
     """Return rows with means over seeds and their accuracy."""
-    groups = [(_ensemble_row(dataset, *key, runs), runs) for key, runs in _ensembles(dataset, complete).items()]
-    groups = [(row, runs) for row, runs in groups if row["asked"] > 1]
+    groups = [(row, runs) for row, runs in _ensembles(dataset, complete) if row["asked"] > 1]
     variables = ["reduced_pressure", "contact_area_fraction", "reduced_separation", "leg", "step_kind", "step_target"]
     steps = dataset[[*variables, "step_count", "mean_gap", "rms_height", "boundary"]]
     members = []
@@ -223,10 +219,7 @@ def _loops(campaign: xr.DataTree, dataset: xr.Dataset, complete: list[RunLabels]
     runs = {labels: select_run(campaign, labels) for labels in complete}
     # The path of a run beyond its model ends before it unloads.
     groups = _ensembles(dataset, [labels for labels, run in runs.items() if "hysteresis_loss" in run])
-    rows = [
-        _ensemble_row(dataset, *key, members) | _loop([runs[labels] for labels in members])
-        for key, members in list(groups.items())[:MOST_ROWS]
-    ]
+    rows = [row | _loop([runs[labels] for labels in members]) for row, members in groups[:MOST_ROWS]]
     shown = {name for row in rows for name, share in row["shares"].items() if share}
     parts = {name: text for name, text in LOSS_NAMES.items() if name in shown}
     return {"rows": rows, "parts": parts, "count": len(groups)}
@@ -258,10 +251,6 @@ def _loop(runs: list[xr.Dataset]) -> dict:
         }
     return cells | {
         "shares": {name: values(name).sum() / loss.sum() if lost.any() else None for name in LOSS_NAMES},
-        "events": {
-            text: [np.mean([float(run[name][-1]) for run in runs]) for name in names]
-            for text, names in EVENT_NAMES.items()
-        },
     }
 
 
