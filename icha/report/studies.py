@@ -19,9 +19,8 @@ from icha.datasets.variables.campaign import (
     RAGGED,
 )
 from icha.figures.select import asked_seeds, path_steps
-from icha.report.template import MOST_ROWS, format_scientific
+from icha.report.template import MOST_ROWS, format_mean, format_range, format_scientific
 from icha.support.formatting import choose_unit, format_quantity
-from icha.support.statistics import ENOUGH, ensemble
 
 # Quantities in a table by the kind of its stops: two of pressure, contact area and mean gap.
 SHOWN_AT = {
@@ -178,35 +177,11 @@ def _means(dataset: xr.Dataset, complete: list[RunLabels]) -> dict:
         if len(at_stop) < len(states):
             return None
         return Markup("<br>").join(
-            _mean(np.array([state[name] for state in at_stop]), FORMATS[name]) for name in table["shown"]
+            format_mean(np.array([state[name] for state in at_stop]), FORMATS[name]) for name in table["shown"]
         )
 
     rows = [row | {"cells": [cell(states, target) for target in table["stops"]]} for row, states in members]
     return table | {"count": len(groups), "rows": rows}
-
-
-def _mean(values: np.ndarray, form) -> Markup:
-    """Format a mean and its accuracy."""
-    mean = Markup(form(float(np.mean(values))))
-    return mean + (Markup(" ") + text if (text := _range(values, form)) else "")
-
-
-def _range(values: np.ndarray, form) -> Markup | str:
-    """Format the 95 % interval of a mean, or the extremes of fewer than five values; empty if all values are equal.
-
-    If the interval of positive values would reach below zero, the interval of the logarithm is used.
-    """
-    over = ensemble(values)
-    # Loads are met exactly, but for rounding errors.
-    if len(values) < 2 or np.ptp(values) <= 1e-6 * abs(over.mean):
-        return ""
-    if len(values) < ENOUGH:
-        low, high = np.min(values), np.max(values)
-    elif np.all(values > 0) and over.confidence >= over.mean:
-        low, high = over.band(positive=True)
-    else:
-        return Markup("±&thinsp;") + form(float(over.confidence))
-    return Markup("({} … {})").format(form(float(low)), form(float(high)))
 
 
 # --- tables of pull-off and loss ---
@@ -258,5 +233,5 @@ def _with_unit(values: np.ndarray, unit: str = "") -> Markup:
     """Format a mean with its unit, and its accuracy below it."""
     factor, unit = choose_unit(float(np.mean(values)), unit) if unit else (1.0, "")
     mean = format_scientific(float(np.mean(values)) * factor) + (f" {unit}" if unit else "")
-    text = _range(values * factor, format_scientific)
+    text = format_range(values * factor, format_scientific)
     return (mean + (Markup("<br>") + text if text else "")).replace("-", "−")

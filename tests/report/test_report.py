@@ -26,8 +26,8 @@ from icha.report import report, studies
 from icha.report.report import ReportFigure, write_report
 from icha.report.run_times import write_times
 from icha.report.sections import _draw_spectra, read_surface_statistics
-from icha.report.studies import _range, collect_states
-from icha.report.template import format_scientific
+from icha.report.studies import collect_states
+from icha.report.template import format_range, format_scientific
 from icha.support.formatting import format_quantity
 
 FIGURES = tuple(f"figures/fig1_jkr.{ending}" for ending in ("png", "pdf"))
@@ -272,7 +272,7 @@ def test_means_over_remaining_seeds_have_their_number_and_no_confidence(write, p
     ("values", "expected"), [([1.0] + [1e-3] * 4, r"\(0\.0.*"), ([1.0, 1e-3], r"\(0\.001 … 1\.000\)"), ([2.0, 2.0], "")]
 )
 def test_no_interval_of_areas_reaches_below_zero(values, expected):
-    assert re.fullmatch(expected, _range(np.array(values), "{:.3f}".format))
+    assert re.fullmatch(expected, format_range(np.array(values), "{:.3f}".format))
 
 
 def test_figures_are_in_the_section_of_their_study_with_the_numbers_of_their_files(write, picture):
