@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import base64
 import io
+import itertools
 import json
 import os
-from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -130,15 +130,11 @@ def _contacts(labels: list[RunLabels], only: Mapping[str, Collection]) -> list[l
     for run in labels:
         if all(getattr(run, name) in values for name, values in only.items()):
             contacts.setdefault(run._replace(model=""), []).append(run)
-    seeds: Counter = Counter()
-    ranks = {}
-    for contact in contacts:
-        ranks[contact] = seeds[contact._replace(seed=0)]
-        seeds[contact._replace(seed=0)] += 1
-    return [
-        sorted(contacts[contact], key=lambda run: list(MODELS).index(run.model))
-        for contact in sorted(contacts, key=ranks.get)
-    ]
+    seeds: dict[RunLabels, list] = {}
+    for contact, runs in contacts.items():
+        runs.sort(key=lambda run: list(MODELS).index(run.model))
+        seeds.setdefault(contact._replace(seed=0), []).append(runs)
+    return [runs for each in itertools.zip_longest(*seeds.values()) for runs in each if runs]
 
 
 def _contact(campaign: xr.DataTree, folder: Path, labels: list[RunLabels]) -> dict | None:
