@@ -7,7 +7,6 @@ results and choices always give exactly the same file.
 from __future__ import annotations
 
 import base64
-import contextlib
 import io
 import itertools
 import json
@@ -25,7 +24,7 @@ from icha.datasets.attributes import why_no_result
 from icha.datasets.campaign import find_snapshot, reduced_gap, run_labels, select_run, spots_of
 from icha.datasets.files import read_campaign, read_dataset, readable
 from icha.datasets.labels import RunLabels, path_fields
-from icha.figures.fig3_distributions import gap_densities, joined_pressure_densities, pressure_densities
+from icha.figures.fig3_distributions import gap_densities, pressure_densities
 from icha.figures.fig8_patch_sizes import patch_areas, patch_density, patches_above
 from icha.figures.maps import average_blocks
 from icha.path.targets import BETWEEN
@@ -249,8 +248,7 @@ def _snapshot(run: xr.Dataset, snapshot: int, maps: Sequence[str] | None) -> dic
     by_cells = model_of(run.attrs).by_cells
     cell = float(run["period"]) ** 2
     areas = [patch_areas(run, snapshot)]
-    densities = joined_pressure_densities if by_cells else pressure_densities
-    pressure, (density,) = densities([(run, snapshot)])
+    pressure, (density,) = pressure_densities([(run, snapshot)], joined=by_cells)
     visible = density > LEAST_DENSITY * density.max(initial=0)
     data = {
         "step": int(run["snapshot_step"].values[snapshot]),
@@ -259,8 +257,9 @@ def _snapshot(run: xr.Dataset, snapshot: int, maps: Sequence[str] | None) -> dic
         "sizes": _points(patch_density(areas, cell)),
         "larger": _points(patches_above(areas, cell)),
     }
-    with contextlib.suppress(ValueError):  # near full contact there are too few gaps for a distribution
-        data["gap"] = _points(gap_densities([(run, snapshot)]))
+    gap, densities = gap_densities([(run, snapshot)])
+    if len(gap):  # near full contact there is no distribution of gaps
+        data["gap"] = _points((gap, densities))
     if maps is not None:
         data["map"] = maps[snapshot]
     elif not by_cells:
