@@ -44,14 +44,14 @@ class BesideStudy(Section):
     rms_slopes: Annotated[list[Positive], Field(min_length=1), AfterValidator(distinct)] | None = None
     """Rms slopes of the study. Default: all."""
     materials: _Labels | None = None
-    """Materials of the study. Default: all. With adhesion the grid must resolve their `interaction_range`."""
+    """Materials of the study. Default: all. With adhesion, the grid must resolve their `interaction_range`."""
     tolerance: number(TOLERANCE) = 1e-8
-    """Relative error at which the solver stops."""
+    """Relative error at which the solver has converged."""
     refinement: integer(REFINEMENT) = 1
     """Number of cells of the solver per cell of the surface's grid, along a side. The heights are interpolated."""
 
     def problems(self, campaign: Any) -> Iterator[Problem]:
-        """Report entries that its `icha.configuration.campaign.Campaign` does not have or that cannot be solved."""
+        """Report entries that the `icha.configuration.campaign.Campaign` does not have, or that cannot be solved."""
         yield from unknown(("study",), self.study, campaign.studies)
         if self.study in campaign.studies:
             yield from self._study_problems(campaign, campaign.studies[self.study])
@@ -103,11 +103,11 @@ class BoundaryElementLoops(BesideStudy):
     """Change of the mean gap from one solution to the next, in units of h_rms."""
 
     def _study_problems(self, campaign, study):
-        """Report also why a study does not suit unloading."""
+        """Report also a study that does not unload, or not from a reduced pressure."""
         if not study.unload or study.turning_points:
             reason = "does not unload after its targets; expected a study with `unload: true` and no turning points"
             yield ("study",), self.study, reason
         if study.targets.last[0] != "reduced_pressure":
-            reason = "has no reduced pressures as targets; expected them, since unloading begins at the last one"
+            reason = "has other targets; expected reduced pressures, because unloading begins at the last one"
             yield ("study",), self.study, reason
         yield from super()._study_problems(campaign, study)

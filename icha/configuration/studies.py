@@ -47,7 +47,7 @@ from icha.support.values import (
     to_number,
 )
 
-# Word for the measured slope of a topography.
+# Word that stands for the measured slope of a topography.
 MEASURED = "measured"
 
 
@@ -76,7 +76,7 @@ SCALAR_SCHEMA = {"type": ["string", "number", "boolean"]}
 
 
 def scalar(value: Any) -> Any:
-    """Refuse lists and mappings."""
+    """Refuse a value that is a list or a mapping."""
     if not isinstance(value, str | int | float):
         raise ValueError("is not a single value; expected a number, a text, true or false")
     return value
@@ -123,22 +123,22 @@ EVERY_STOP = "every_stop"
 
 
 def _list_or_word(value: Any, read_list: Callable[[Any], Any]) -> Any:
-    """Read a list of snapshots, or the word for all targets."""
+    """Read a list of snapshots, or the word that stands for all targets."""
     if isinstance(value, str) and value != EVERY_STOP:
         raise ValueError(f"is not a choice; expected a list of snapshots, or {EVERY_STOP!r}")
     return value if value == EVERY_STOP else read_list(value)
 
 
 class _OrEveryStop:
-    """Annotation for the JSON schema of a list that the word may replace."""
+    """Annotation for the JSON schema of a list, instead of which the word `every_stop` may stand."""
 
     def __get_pydantic_json_schema__(self, core_schema: Any, handler: Callable[[Any], dict]) -> dict:
-        """Return the schema of list or word."""
+        """Return the schema of the list or the word."""
         return {"anyOf": [handler(core_schema), {"const": EVERY_STOP}]}
 
 
 class TurningPoint(Snapshot):
-    """A state at which the path turns: exactly one of the four keys. Loads may be tensile (negative) or zero."""
+    """A state at which the path turns: exactly one of the keys. Loads may be tensile (negative) or zero."""
 
     reduced_pressure: number(FloatRange(most=LARGEST_REDUCED_PRESSURE)) | None = None
     """At this p/(E* h'rms)."""
@@ -146,7 +146,7 @@ class TurningPoint(Snapshot):
     """At this p/E* = F/(E* A0)."""
 
 
-# Names and descriptions of the parameters that a study may vary: all but files and sections.
+# Names and descriptions of the parameters that a study may vary: all except files and sections.
 SCALARS: dict[str, str] = {}
 for _section in (*SURFACE_KINDS.values(), MaterialSection):
     for _name, _field in _section.model_fields.items():
@@ -155,7 +155,7 @@ for _section in (*SURFACE_KINDS.values(), MaterialSection):
 
 
 def _section_of_scalars(name, kind, doc, fields=None):
-    """Make a section with a key of type `kind` for every parameter that can be varied."""
+    """Make a section with a key, of type `kind`, for every parameter that can be varied."""
     scalars = {key: (kind | None, Field(default=None, description=text)) for key, text in SCALARS.items()}
     return create_model(name, __base__=Section, __doc__=doc, __module__=__name__, **(fields or {}), **scalars)
 
@@ -186,36 +186,36 @@ class Study(Section):
     """Seeds of the random phases: a list, or a range such as `1..50`. Surfaces from a file have no seeds and are used
     once."""
     rms_slopes: Slopes = []
-    """Rms slopes h'rms to which the heights of each topography are scaled. `measured` stands for the slope that the
-    topography has in its file."""
+    """Rms slopes h'rms to which the heights of each topography are scaled. `measured` stands for the slope of the
+    topography in its file."""
     materials: list_of_names() = []
     """Names of materials."""
     vary: Vary | None = None
-    """Other values of parameters of the surfaces and materials in this study, in all combinations."""
+    """Values of parameters that replace those of the surfaces and materials in this study, in all combinations."""
     zip: list[Annotated[list[Text], Field(min_length=2)]] = []
-    """Groups of lists that are combined one by one (the first entry with the first, the second with the second) instead
-    of in all combinations: `[[rms_slopes, surface_energy]]`."""
+    """Groups of lists whose entries are combined one by one (first with first, second with second) instead of in all
+    combinations, such as `[[rms_slopes, surface_energy]]`."""
     cases: Annotated[list[Case], Field(min_length=1)] | None = None
     """An explicit list of runs instead of all combinations. Parameters that a case does not give take all values of the
     lists of the study."""
     models: Annotated[list[Literal[tuple(MODELS)]], Field(min_length=1), AfterValidator(distinct)] = [DEFAULT_MODEL]
-    """Contact models of every run: `asperities`, which are fast, and `boundary_elements` in the limit of a short range
-    of attraction, which need a periodic surface and a grid of at least 4 cells (better 8) per shortest wavelength."""
+    """Contact models of every run: `asperities` is fast; `boundary_elements`, in the limit of a short range of
+    attraction, needs a periodic surface and a grid of at least 4 cells (better 8) per shortest wavelength."""
     targets: Targets
     """Targets of the loading path."""
     snapshots: (
         Annotated[list[Snapshot], AfterValidator(distinct), WrapValidator(_list_or_word), _OrEveryStop()] | None
     ) = None
     """States at which the run saves its spots and distributions. The path reaches each of these states exactly.
-    `every_stop`: all targets. Default: the last target."""
+    `every_stop` stands for all targets. Default: the last target."""
     unload: Flag = False
     """Whether to unload after loading, until the surfaces no longer touch."""
     turning_points: list[TurningPoint] = []
-    """States at which the path turns after its last target: the first ends unloading, the second ends the next loading,
-    and so on."""
+    """States at which the path turns after its last target: at the first one unloading ends, at the second one the next
+    loading ends, and so on."""
     control: Literal["separation", "load"] = "separation"
     """Quantity that is imposed: the mean separation or the load. Under load control the state jumps where the curve of
-    load against separation turns back; all targets and turning points must then be loads."""
+    load against separation turns back, and all targets and turning points must be loads."""
     max_step: number(STEP) = DEFAULT_STEP
     """Largest change of mean separation between two equilibria, in units of h_rms."""
 
@@ -248,7 +248,7 @@ class Study(Section):
         slope = min((slope for slope in self.rms_slopes if slope != MEASURED), default=math.inf)
         most = (MAX_REDUCED_PRESSURE if DEFAULT_MODEL in self.models else LARGEST_REDUCED_PRESSURE) * slope
         for location, kind, value in self._states():
-            # Beside another model asperities end loading at the limit of their range, but they must begin it.
+            # Beside another model, asperities end loading at the limit of their range, but must begin within it.
             needed = alone or (DEFAULT_MODEL in self.models and (location[-1] == 0 or location[0] == "turning_points"))
             if needed and kind in ASPERITY_RANGES and value > ASPERITY_RANGES[kind].most:
                 reason = f"is out of range; expected {ASPERITY_RANGES[kind].expected}, or models: [boundary_elements]"
@@ -270,7 +270,7 @@ class Study(Section):
                 yield (key, k, kind), kind, value
 
     def _path_problems(self, snapshots):
-        """Report why the settings make no path."""
+        """Report the reason why `icha.Path` refuses the settings."""
         try:
             Path(**self.path_settings(snapshots))
         except ValueError as error:

@@ -243,7 +243,7 @@ def test_messages_have_units_of_people(prepared):
     crop = {"x": 7 * UM, "y": 0.0, "side": 2.5 * UM}
     with pytest.raises(UnfitTopography, match=r"ends at x = 9.5 um, y = 2.5 um, .* at most x = 4 um, y = 3 um"):
         prepared(np.eye(12, 16), size=(4e-6, 3e-6), crop=crop)
-    with pytest.raises(UnfitTopography, match=r"needs a square, and the scan is 4 um x 3 um"):
+    with pytest.raises(UnfitTopography, match=r"needs the whole scan to be a square, and it is 4 um x 3 um"):
         prepared(np.eye(12, 16), size=(4e-6, 3e-6), boundary="periodic")
 
 

@@ -1,22 +1,23 @@
 """Detect rows and columns of a table that contain coordinates or numbers of points instead of heights.
 
-Heights of a rough surface do not rise in equal steps along a line. If they do so in all lines, the surface is a plane.
+Along a row or column of heights of a rough surface, the heights do not rise in equal steps. If they do so in all rows,
+the surface is a plane.
 """
 
 import numpy as np
 
 from icha.surfaces.measured.settings import UnfitTopography
 
-# Largest difference of two steps of a scale, as a fraction of a step, where digits do not limit it.
+# Largest difference of two steps that count as equal, as a fraction of a step, if digits do not limit it.
 _EQUAL_STEPS = 1e-2
-# Smallest length of a scale in units of its last digit.
+# Smallest range of coordinates in units of their last digit.
 _FEWEST_UNITS = 4
-# Limits with which a line of heights resembles its neighbours, the second and the third line. The first and second line
-# differ by at most `_DIFFERENCE` times the difference of second and third. Besides, the fraction `_SAME_SIGN` of the
-# steps of first and second line has the same sign, or second and third differ by at most `_SMOOTH` times their heights.
+# Limits with which a first line of heights resembles the second and the third line. The first and second line differ by
+# at most `_DIFFERENCE` times the difference of second and third. Besides, the fraction `_SAME_SIGN` of the steps in the
+# first and second line has the same sign, or second and third differ by at most `_SMOOTH` times their heights.
 _DIFFERENCE, _SAME_SIGN, _SMOOTH = 3, 0.8, 0.2
-# Fewest numbers of a line that can be a scale.
-_SHORTEST_SCALE = 8
+# Fewest numbers of a line that can be coordinates.
+_FEWEST_COORDINATES = 8
 
 
 def drop_coordinates(values: np.ndarray) -> tuple[np.ndarray, tuple[float, float] | None, str]:
@@ -29,7 +30,7 @@ def drop_coordinates(values: np.ndarray) -> tuple[np.ndarray, tuple[float, float
     Raises
     ------
     UnfitTopography
-        If a first row or column seems to contain coordinates in unequal steps, or a last one contains equal steps.
+        If the first row or column seems to contain coordinates in unequal steps, or the last one in equal steps.
     """
     heights, steps = values, {}
     for name in ("row", "column"):
@@ -57,15 +58,10 @@ def drop_coordinates(values: np.ndarray) -> tuple[np.ndarray, tuple[float, float
     return heights, (steps["row"], steps["column"]) if len(steps) == 2 else None, remark
 
 
-def is_scale(numbers: list[float | None]) -> bool:
-    """Return whether numbers rise or fall in equal steps; the first one, in the corner of a table, may differ."""
-    return len(numbers) >= _SHORTEST_SCALE and None not in numbers and _equal_step(np.array(numbers)) is not None
-
-
 def _coordinate_step(table):
-    """Return the step of coordinates in the first line of a table, nan if it varies; None if the line has heights."""
+    """Return the step of coordinates in the first line of a table: nan if it varies, None if the line has heights."""
     line, others = table[0], table[1:3]
-    if len(table) < 3 or len(line) < _SHORTEST_SCALE or any(_equal_step(each) is not None for each in others):
+    if len(table) < 3 or len(line) < _FEWEST_COORDINATES or any(_equal_step(each) is not None for each in others):
         return None
     step = _equal_step(line, rounded=False)
     if step is None and not _resembles(line[1:], others[:, 1:]):
@@ -77,7 +73,7 @@ def _coordinate_step(table):
 
 
 def _resembles(line, others):
-    """Return whether a line can be the neighbour of two other lines of heights."""
+    """Return whether the heights in a line resemble those of the next two lines."""
     known = np.isfinite(line) & np.all(np.isfinite(others), axis=0)
     if np.count_nonzero(known) < 3:
         return False
@@ -89,9 +85,9 @@ def _resembles(line, others):
 
 
 def _equal_step(line: np.ndarray, *, rounded: bool = True) -> float | None:
-    """Return the step of a line of numbers; None if the steps are not equal. The first number may be any number.
+    """Return the step from number to number in a line; None if the steps are not equal. The first number may be any.
 
-    rounded : whether steps may differ by rounding to the digits of the file.
+    rounded : whether steps may differ because the file has few digits.
     """
     for numbers in (line, line[1:]):
         steps = np.diff(numbers)
@@ -102,7 +98,7 @@ def _equal_step(line: np.ndarray, *, rounded: bool = True) -> float | None:
             return mean
         if not rounded:
             continue
-        # Rounding shifts every number, and the ends, by half a unit of the last digit.
+        # Rounding shifts every number by up to half a unit of the last digit.
         unit = _last_digit(numbers)
         error = np.max(np.abs(numbers - numbers[0] - mean * np.arange(len(numbers))))
         if np.all(steps * mean >= 0) and error <= 1.001 * unit and np.ptp(numbers) >= _FEWEST_UNITS * unit:

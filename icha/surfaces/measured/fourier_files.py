@@ -7,7 +7,7 @@ import scipy.fft
 
 from icha.support.input_files import require_room
 from icha.support.rules import GRID
-from icha.surfaces.measured.settings import FileContent, Preparation, UnfitTopography, WrongFormat
+from icha.surfaces.measured.settings import FileContent, Preparation, UnfitTopography
 from icha.surfaces.measured.text_tables import SourceFile
 
 # The spectrum, its conjugate, their difference, the heights, and the masks of waves.
@@ -17,17 +17,15 @@ _CONJUGATE = 1e-4
 
 
 def read_fourier(file: SourceFile, settings: Preparation) -> FileContent:
-    """Sum h = sum h_q exp(i q.r) over all waves; opposite ones that are left out are the conjugates."""
+    """Sum h = sum h_q exp(i q.r) over all waves; a wave without its opposite stands for both of them."""
     table = file.values
-    if table.shape[1] != 4:
-        raise WrongFormat(f"{table.shape[1]} numbers in a line, not qx qy Re Im")
+    if table.shape[1] != 4 or not np.all(np.isfinite(table)):
+        raise _not_waves("expected four numbers in each line: qx qy Re Im")
     k = _wave_numbers(table[:, :2], settings)
     period = 2 * np.pi * np.max(np.abs(k)) / np.max(np.abs(table[:, :2]))
     modes = table[:, 2] + 1j * table[:, 3]
-    if not np.all(np.isfinite(modes)):
-        raise WrongFormat("some amplitudes are not finite")
     if len(np.unique(k, axis=0)) < len(k):
-        raise WrongFormat("a wave vector is given twice")
+        raise _not_waves("a wave vector is given twice; expected every wave vector once")
     highest = int(np.max(np.abs(k)))
     n = settings.grid or 2 ** math.ceil(math.log2(max(4 * highest, 8)))
     if 2 * highest >= n:
@@ -44,17 +42,19 @@ def read_fourier(file: SourceFile, settings: Preparation) -> FileContent:
     conjugate, opposite_present = np.conj(spectrum[opposite]), present[opposite]
     differences = np.abs(spectrum - conjugate)[present & opposite_present]
     if np.max(differences, initial=0.0) > _CONJUGATE * np.max(np.abs(modes)):
-        raise WrongFormat("opposite wave vectors have amplitudes that are not conjugate: the heights would be complex")
+        raise _not_waves("the heights would be complex; expected conjugate amplitudes of opposite wave vectors")
     spectrum = np.where(opposite_present & ~present, conjugate, spectrum)
     heights = scipy.fft.ifft2(spectrum, norm="forward", workers=1).real
     return FileContent(heights, coordinates=(period, period))
 
 
+def _not_waves(problem):
+    return UnfitTopography("path", f"cannot be read as fourier: {problem}")
+
+
 def _wave_numbers(q, settings):
-    """Wave vectors (n, 2) as multiples of 2 pi over the period: as they are written if they are integers."""
+    """Return the wave vectors (n, 2) as multiples of 2 pi over the period; integers are such multiples already."""
     largest = np.max(np.abs(q))
-    if not largest > 0 or not np.all(np.isfinite(q)):
-        raise WrongFormat("no wave vectors, or some that are not finite")
     if settings.size is not None and settings.size[0] != settings.size[1]:
         raise UnfitTopography("size", "has two sides that differ, for a Fourier series; expected one length")
     if np.all(q == np.rint(q)):
@@ -69,8 +69,7 @@ def _wave_numbers(q, settings):
         # The longest wave fixes the unit only to the digits that it is written with; the shortest is more accurate.
         k = np.rint(q * (np.max(np.abs(np.rint(q / unit))) / largest))
         if np.max(np.abs(q * (np.max(np.abs(k)) / largest) - k)) > 0.01:
-            raise WrongFormat("the wave vectors are not multiples of the smallest one")
-    highest = np.max(np.abs(k))
-    if highest > GRID.most / 2:
-        raise WrongFormat(f"waves {highest:g} times as short as the period, but a grid has at most {GRID.most} nodes")
+            raise _not_waves("expected wave vectors that are multiples of the smallest one")
+    if not 0 < np.max(np.abs(k)) <= GRID.most / 2:
+        raise _not_waves(f"expected waves up to {GRID.most // 2} times as short as the period")
     return k.astype(int)

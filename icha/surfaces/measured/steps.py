@@ -19,20 +19,20 @@ from icha.surfaces.surface import FREE, PERIODIC, Surface
 
 # Relative rounding of the quotient of two lengths.
 _ROUNDING = 1e-9
-# Range of heights without their trend, relative to the largest height, below which it is rounding.
+# Range of heights without their trend, relative to the largest height, below which the heights are rounding.
 _FLAT = 1e-13
 # Largest relative difference of the two sides of a square pixel.
 SQUARE = 1e-3
 # Standard deviation of the weights over the nesting index: alpha/sqrt(2 pi), alpha = sqrt(ln 2/pi) (ISO 16610-61).
 DEVIATION = math.sqrt(math.log(2) / 2) / math.pi
-# Smallest nesting index in pixels at which the weights have the transmission of the standard.
+# Smallest nesting index, in pixels, at which the filter has the transmission of the standard.
 LEAST_PIXELS = 4
-# Standard deviations after which the weights end; the fraction 2e-9 is cut off.
+# Standard deviations at which the weights end; this omits 2e-9 of them.
 _REACH = 6
 
 
 def crop_square(scan: Scan, settings: Preparation) -> Scan:
-    """Cut out a square of whole pixels; if pixels are not square, its sides may differ by less than a pixel."""
+    """Cut out a square of whole pixels. If pixels are not square, its sides may differ by less than a pixel."""
     rows, columns = scan.heights.shape
     dx, dy = scan.pixel
     width, height = map(formatting.length, scan.size)
@@ -60,7 +60,7 @@ def crop_square(scan: Scan, settings: Preparation) -> Scan:
     if settings.boundary == PERIODIC and ((nx, ny) != (columns, rows) or abs(nx * dx / (ny * dy) - 1) > SQUARE):
         raise UnfitTopography(
             "boundary",
-            f"needs a square, and the scan is {width} x {height}; expected a square one, or another boundary",
+            f"needs the whole scan to be a square, and it is {width} x {height}; expected another boundary, or no crop",
         )
     square = scan.heights[first_y : first_y + ny, first_x : first_x + nx]
     step = [] if square.shape == scan.heights.shape else [f"cut to {nx} x {ny} points from ({first_x}, {first_y})"]
@@ -68,7 +68,7 @@ def crop_square(scan: Scan, settings: Preparation) -> Scan:
 
 
 def remove_trend(scan: Scan, settings: Preparation) -> Scan:
-    """Remove the plane or paraboloid that fits the known heights best."""
+    """Remove the plane or the paraboloid that fits the known heights best."""
     known = np.isfinite(scan.heights)
     if not known.any():
         raise UnfitTopography("path", "holds no height within the square that is used; expected another crop or file")
@@ -78,7 +78,7 @@ def remove_trend(scan: Scan, settings: Preparation) -> Scan:
     rows, columns = scan.heights.shape
     powers = [(i, j) for i in range(degree + 1) for j in range(degree + 1 - i)]
     y, x = (np.vander(np.linspace(-1, 1, n), 2 * degree + 1, increasing=True) for n in (rows, columns))
-    # Sums over the known points of all products of powers, without a table of all points.
+    # Sum all products of powers over the known points, without a table of all points.
     moments = y.T @ known.astype(float) @ x
     weighted = y.T @ np.where(known, scan.heights, 0.0) @ x
     matrix = np.array([[moments[i + k, j + m] for k, m in powers] for i, j in powers])
@@ -90,15 +90,15 @@ def remove_trend(scan: Scan, settings: Preparation) -> Scan:
 
 
 def refuse_flat(prepared: Scan, square: Scan, settings: Preparation) -> None:
-    """Raise UnfitTopography if the prepared heights are only rounding errors of the original heights."""
+    """Raise UnfitTopography if the prepared heights are no more than rounding errors of the original heights."""
     known = np.isfinite(square.heights)
     if np.ptp(prepared.heights) <= _FLAT * np.nanmax(np.abs(square.heights), where=known, initial=0.0):
-        without = "" if settings.detrend == "none" else " but for the trend that is removed"
-        raise UnfitTopography("path", f"holds heights that are all the same{without}; expected a rough surface")
+        apart = "" if settings.detrend == "none" else ", apart from the trend that is removed"
+        raise UnfitTopography("path", f"holds heights that are all the same{apart}; expected a rough surface")
 
 
 def fill_missing_points(scan: Scan, settings: Preparation) -> Scan:
-    """Fill missing points."""
+    """Fill missing points with the solution of Laplace's equation, if the settings allow this."""
     missing = ~np.isfinite(scan.heights)
     count = int(np.count_nonzero(missing))
     if not count:
@@ -116,7 +116,7 @@ def fill_missing_points(scan: Scan, settings: Preparation) -> Scan:
 
 
 def _harmonic(heights, missing, *, periodic):
-    """Solve Laplace's equation: each missing height (count,) is the mean of its four neighbours, fewer at edges."""
+    """Solve Laplace's equation: each missing height (count,) is the mean of its four neighbours, at edges of three."""
     row, column = np.nonzero(missing)
     count, pairs = len(row), []
     index = np.full(missing.shape, -1)
@@ -195,10 +195,10 @@ def filter_short_waves(scan: Scan, settings: Preparation) -> Scan:
 
 
 def treat_edges(scan: Scan, settings: Preparation) -> tuple[Surface, list[str]]:
-    """Make the surface with the edges of its boundary, on the grid that is asked for; return it and all steps."""
+    """Make the surface: treat the edges as the boundary requires, and change the grid. Return also all steps."""
     nodes = settings.grid or (2 if settings.boundary == MIRROR else 1) * max(scan.heights.shape)
     try:
-        # Heights are copied when they are resampled.
+        # Resampling copies the heights.
         require_room(3 * 8 * nodes**2)
     except TooLarge as error:
         raise UnfitTopography("grid", f"gives a surface of {nodes} x {nodes} points, which {error}") from None
@@ -220,7 +220,7 @@ def treat_edges(scan: Scan, settings: Preparation) -> tuple[Surface, list[str]]:
         heights = _resampled(heights, grid, free=free)
         steps.append(f"resampled to {grid} x {grid} points")
     if problem := problem_with_heights(heights):
-        raise UnfitTopography("path", f"holds {problem}; expected a rough surface")
+        raise UnfitTopography("path", f"holds {problem}")
     steps.append("one square on a free half-space" if free else f"repeats after {side:.6g} m")
     try:
         return Surface(heights, side, FREE if free else PERIODIC), steps
@@ -231,7 +231,7 @@ def treat_edges(scan: Scan, settings: Preparation) -> tuple[Surface, list[str]]:
 
 
 def _resampled(heights, grid, *, free):
-    """Resample to grid x grid points by the Fourier series, or for a free square by the cosine series."""
+    """Resample to grid x grid points by the Fourier series; a free square, by the cosine series."""
     # Slow to import, and rarely needed.
     from scipy.signal import resample
 

@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 
 from icha.surfaces.measured.array_files import open_instrument
-from icha.surfaces.measured.coordinate_lines import is_scale
 from icha.surfaces.measured.settings import UnfitTopography
 from icha.surfaces.measured.text_lines import (
     AMBIGUOUS_COMMA,
@@ -20,9 +19,9 @@ from icha.surfaces.measured.text_lines import (
     strip_remark,
 )
 
-# Characters in which the first line of numbers is searched, and the largest number of lines of a heading.
+# Characters and lines at the beginning of a file in which the first line of numbers must be.
 _BEGINNING, _LONGEST_HEADING = 2**20, 1000
-# Fewest fields with which a line of mostly numbers counts as a damaged row, not as names of columns.
+# Fewest fields of a line that counts as a damaged row if most of its fields are numbers, not as titles of columns.
 _FEWEST_FIELDS = 8
 
 
@@ -33,7 +32,7 @@ class Layout:
     Attributes
     ----------
     heading : lines above the numbers, remarks included.
-    words : whether the heading contains lines other than remarks (#).
+    words : whether the heading contains lines that are not remarks (#).
     notation : delimiter and decimal sign.
     columns : numbers in the first line of numbers.
     """
@@ -76,17 +75,13 @@ class SourceFile:
     def values(self) -> np.ndarray:
         """Numbers (rows, columns) of a text, nan where one is missing.
 
-        Raises
-        ------
-        UnfitTopography
-            If the file has no numbers, a field that is not a number, or a row of another length; with the line's
-            number.
+        Raises UnfitTopography if the file has no numbers, a field that is not a number, or rows of different lengths.
         """
         return self._table[0]
 
     @cached_property
     def _table(self):
-        """Numbers (rows, columns), and the number of the line of each row, counted from 1."""
+        """Numbers (rows, columns), and the line in the file, from 1, of each row."""
         notation, columns = self.table_layout.notation, self.table_layout.columns
         rows, lines = [], []
         with open_text(self.path) as file:
@@ -94,8 +89,6 @@ class SourceFile:
                 if not text or line <= len(self.table_layout.heading):
                     continue
                 row = notation.numbers(text)
-                if not rows and row[0] is None and is_scale(row[1:]):
-                    row[0] = np.nan
                 if None in row:
                     raise _not_a_number(notation.fields(text), row.index(None), line)
                 rows.append(np.array(row))
@@ -105,9 +98,6 @@ class SourceFile:
         if usual == columns + 1 and all(np.isnan(row[-1]) for row in rows if len(row) == usual):
             rows = [row[:columns] if len(row) == usual else row for row in rows]
             usual = columns
-        # With blanks between fields an empty corner has no field.
-        if notation.delimiter is None and len(rows[0]) == usual - 1 and is_scale(list(rows[0])):
-            rows[0] = np.array([np.nan, *rows[0]])
         for line, row in zip(lines, rows, strict=True):
             if len(row) != usual:
                 raise UnfitTopography(
@@ -120,7 +110,7 @@ class SourceFile:
     def refuse_blocks(self) -> None:
         """Raise UnfitTopography if empty lines or remarks divide the rows into blocks, as in files of several images.
 
-        An empty line or a remark after every row is accepted.
+        Empty lines or remarks between all rows are accepted.
         """
         values, lines = self._table
         begins = np.flatnonzero(np.diff(lines) > 1) + 1
@@ -160,8 +150,7 @@ def _count_columns(fields):
 def _find_layout(path: Path) -> Layout | None:
     """Find the first line of numbers and how numbers are written; None if the file is not a text with numbers.
 
-    Raises UnfitTopography if it is not clear whether commas are decimal, or if the line above the numbers is a damaged
-    row.
+    Raises UnfitTopography if commas may or may not be decimal, or if the line above the numbers is a damaged row.
     """
     lines, words = _first_lines(path), False
     for number, line in enumerate(lines):
@@ -176,8 +165,7 @@ def _find_layout(path: Path) -> Layout | None:
             )
         fields = notation.fields(text)
         numbers = [notation.number(field) for field in fields]
-        corner = numbers[0] is None and is_scale(numbers[1:])
-        if corner or (None not in numbers and not np.isnan(np.array(numbers, dtype=float)).all()):
+        if None not in numbers and not np.isnan(np.array(numbers, dtype=float)).all():
             if number and (damage := _find_damage(strip_remark(lines[number - 1]), number, notation)):
                 raise damage
             notation = _decide_on_commas(notation, lines[number:], len(fields))
@@ -187,7 +175,7 @@ def _find_layout(path: Path) -> Layout | None:
 
 
 def _find_damage(text, number, notation):
-    """Return the error for a line if it resembles a row of numbers and has other fields; None for other lines."""
+    """Return the error for a line that resembles a row of numbers but has other fields, too; None for other lines."""
     fields = notation.fields(text)
     wrong = [k for k, field in enumerate(fields) if notation.number(field) is None]
     words = [k for k in wrong if not LIKE_A_NUMBER.match(fields[k])]
@@ -197,7 +185,10 @@ def _find_damage(text, number, notation):
 
 
 def _decide_on_commas(notation, lines, count):
-    """Decide from all known lines with `count` fields whether commas are decimal; if unclear, raise UnfitTopography."""
+    """Return the notation after deciding, from all lines with `count` fields, whether their commas are decimal.
+
+    Raises UnfitTopography if this is not clear.
+    """
     rows = [notation.fields(text) for line in lines if (text := strip_remark(line))]
     rows = [row[: _count_columns(row)] for row in rows if len(row) == count]
     fields = [field for row in rows for field in row]
@@ -218,7 +209,7 @@ def _decide_on_commas(notation, lines, count):
 
 
 def first_damaged_line(path: Path) -> UnfitTopography | None:
-    """Return the error for the first line that resembles a row of numbers, but has other fields; None without one."""
+    """Return the error for the first line that resembles a row of numbers but has other fields, too, or None."""
     texts = map(strip_remark, _first_lines(path))
     damages = (_find_damage(text, number, Notation.of_line(text)) for number, text in enumerate(texts, 1))
     return next(filter(None, damages), None)

@@ -1,7 +1,7 @@
 """Measured topographies: from a file to a surface.
 
 A measurement becomes a surface in this order: read heights and lengths in metres (`scan`), turn the side that touches
-first upwards, then apply the steps of `steps`: cut out a square, remove the trend, fill missing points, make pixels
+first upwards, then apply the functions in `steps`: cut out a square, remove the trend, fill missing points, make pixels
 square, filter short waves, treat the edges as the boundary requires, change the grid.
 
 SurfaceTopography reads the files of instruments. It could also remove trends and fill holes, but its import takes
@@ -16,9 +16,8 @@ from pathlib import Path
 import numpy as np
 
 from icha.support.checksums import sha256_of
-from icha.support.input_files import problem_with_path
 from icha.surfaces.measured.scan import load_scan
-from icha.surfaces.measured.settings import Preparation, UnfitTopography
+from icha.surfaces.measured.settings import Preparation
 from icha.surfaces.measured.steps import (
     crop_square,
     fill_missing_points,
@@ -33,7 +32,7 @@ from icha.surfaces.surface import Surface
 
 @dataclass(frozen=True, eq=False)
 class PreparedTopography:
-    """A surface at its own heights, and how it was made from a file.
+    """A surface at its own heights, and the record of its preparation from a file.
 
     Attributes
     ----------
@@ -41,7 +40,7 @@ class PreparedTopography:
     description : all steps from the file to the surface, for readers.
     format : format as which the file was read.
     data : name of the array or channel that was read; empty if the file has only one.
-    reading : points, pixels and units of the file and what was left out of it, for readers.
+    reading : points, pixels and units of the file, and parts of the file that were left out, for readers.
     filled : number of points that had no height.
     points : number of points that were used.
     """
@@ -63,7 +62,7 @@ class PreparedTopography:
 
 
 def prepared_topography(path: str | os.PathLike, preparation: Mapping) -> PreparedTopography:
-    """Read a topography and make the surface that the settings describe.
+    """Read a topography and prepare the surface that the settings describe.
 
     Parameters
     ----------
@@ -73,11 +72,9 @@ def prepared_topography(path: str | os.PathLike, preparation: Mapping) -> Prepar
     Raises
     ------
     UnfitTopography
-        A ValueError with the setting (`key`) that does not fit the file, the reason, and what is expected.
+        A ValueError with the setting that does not fit the file (its attribute `key`), the reason, and the expectation.
     """
     file, settings = Path(path), Preparation(**preparation)
-    if problem := problem_with_path(file):
-        raise UnfitTopography("path", f"{problem}; expected a file of heights")
     scan = load_scan(file, settings)
     touching = scan.heights if settings.touches_first == "high" else -scan.heights
     square = crop_square(scan.after(touching, f"{settings.touches_first} numbers touch first"), settings)
