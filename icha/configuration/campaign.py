@@ -13,12 +13,12 @@ from typing import Annotated, Any, NamedTuple
 
 from pydantic import AfterValidator, Field, PrivateAttr
 
-from icha.configuration.boundary_elements import BesideStudy, BoundaryElementLoops, BoundaryElements
 from icha.configuration.figures import Figures, Measurement
 from icha.configuration.publication import Line, Prose, Publication
-from icha.configuration.studies import MEASURED, Study
+from icha.configuration.studies import MEASURED, BesideStudy, BoundaryElementLoops, BoundaryElements, Study
 from icha.configuration.surfaces import AnySurface, MaterialSection
 from icha.contact.models import MODELS
+from icha.support.input_files import read_columns
 from icha.support.values import ROUNDING, Name, Problem, Section, Text, distinct
 
 # Sections with entries that belong to a study.
@@ -224,7 +224,10 @@ class Campaign(Section):
     def measurement_problems(self) -> Iterator[Problem]:
         """Report tables of measurements that cannot be read."""
         for label, entry in self.measurements.items():
-            yield from _within(("measurements", label), entry.table_problems())
+            try:
+                read_columns(entry.path, entry.columns)
+            except ValueError as error:
+                yield ("measurements", label, "path"), entry.path, str(error)
 
     def _model_problems(self, study: Study) -> Iterator[Problem]:
         """Report surfaces of a study that its models do not support."""
@@ -232,41 +235,33 @@ class Campaign(Section):
             surface, model = self.surfaces[name], MODELS[label]
             least = model.least_cells
             if model.periodic_only and self.is_free(name):
-                yield (
-                    ("models", index),
-                    label,
-                    f"need a periodic surface, and {name!r} is a square with free edges; expected asperities, or "
-                    "another `boundary`, which makes the surface periodic",
-                )
+                reason = f"need a periodic surface, and {name!r} is a square with free edges; expected asperities, or "
+                yield ("models", index), label, f"{reason}another `boundary`, which makes the surface periodic"
             if surface.cells_per_short_wave < least * (1 - ROUNDING):
+                enough, better = surface.grid_of_cells(least), surface.grid_of_cells(_ADVISABLE_CELLS)
                 yield (
                     ("models", index),
                     label,
                     f"need at least {least} grid cells per shortest wavelength, and {name!r} has "
-                    f"{surface.cells_per_short_wave:.3g}; expected asperities, or a `grid` of "
-                    f"{surface.grid_of_cells(least)} or more for {name!r} (better "
-                    f"{surface.grid_of_cells(_ADVISABLE_CELLS)})",
+                    f"{surface.cells_per_short_wave:.3g}; expected asperities, or a `grid` of {enough} or more for "
+                    f"{name!r} (better {better})",
                 )
 
     def warnings(self) -> list[str]:
-        """Return warnings about valid but coarse grids."""
-        found, studies = [], self.studies.values()
-        models = [(name, MODELS[model]) for each in studies for name in each.surfaces for model in each.models]
-        by_cells = {name for name, model in models if model.by_cells}
-        for name in dict.fromkeys(name for name, _ in models if self.surfaces[name].random):
+        """Return warnings about valid but coarse grids of random surfaces."""
+        expected: dict[str, int] = {}
+        for study in self.studies.values():
+            least = _ADVISABLE_CELLS if any(MODELS[model].by_cells for model in study.models) else _LEAST_CELLS
+            expected |= {name: max(least, expected.get(name, 0)) for name in study.surfaces}
+        found = []
+        for name, least in expected.items():
             surface, origin = self.surfaces[name], self.origin("surfaces", name)
-            cells, variant = surface.cells_per_short_wave, "" if origin == name else f" (variant {name})"
-            start = f"surfaces.{origin}.grid: {surface.grid!r} gives"
-            if cells < _LEAST_CELLS * (1 - ROUNDING):
+            if surface.random and surface.cells_per_short_wave < least * (1 - ROUNDING):
+                variant = "" if origin == name else f" (variant {name})"
                 found.append(
-                    f"{start} {cells:.3g} grid cells per shortest wavelength{variant}; expected at least "
-                    f"{_LEAST_CELLS}, better {_ADVISABLE_CELLS}"
-                )
-            elif cells < _ADVISABLE_CELLS * (1 - ROUNDING) and name in by_cells:
-                found.append(
-                    f"{start} boundary elements {cells:.3g} cells per shortest wavelength{variant}, with which areas "
-                    f"have errors of a few per cent; expected a grid of at least "
-                    f"{surface.grid_of_cells(_ADVISABLE_CELLS)}"
+                    f"surfaces.{origin}.grid: {surface.grid!r} gives {surface.cells_per_short_wave:.3g} grid cells per "
+                    f"shortest wavelength{variant}, so areas have errors of some per cent; expected a grid of at least "
+                    f"{surface.grid_of_cells(least)}, better {surface.grid_of_cells(_ADVISABLE_CELLS)}"
                 )
         return found
 

@@ -6,8 +6,8 @@ import json
 from collections.abc import Callable
 from functools import partial
 
-from icha.configuration.boundary_elements import BesideStudy
 from icha.configuration.campaign import Campaign
+from icha.configuration.studies import BesideStudy
 from icha.configuration.surfaces import MeasuredSurface
 from icha.contact.models import DEFAULT_MODEL
 from icha.datasets.labels import ContactLabels, RunLabels, SolutionLabels

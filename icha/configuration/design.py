@@ -67,7 +67,6 @@ def expand_design(campaign: Campaign, content: Mapping) -> tuple[Campaign, list[
     sections = {name: getattr(campaign, name) | derived for name, derived in variants.derived.items()}
     expanded = campaign.model_copy(update=sections).with_contacts(contacts)
     expanded._origins = variants.origin
-    expanded = _replace_varied_names(expanded)
     return expanded, list(_too_many_solutions(expanded))
 
 
@@ -133,7 +132,7 @@ def _too_many_solutions(campaign: Campaign) -> Iterator[Problem]:
 
 def _excess(section: str, count: int, what: str, most: int) -> Iterator[Problem]:
     if count > most:
-        yield (section,), NOTHING, f"the entries ask for {count} {what}; expected at most {most}"
+        yield (section,), NOTHING, f"asks for {count} {what}; expected at most {most}"
 
 
 def _run_count(label: str, study: Study) -> int:
@@ -268,28 +267,3 @@ def value_label(section, name: str) -> str:
     power = min(max(power, min(_PREFIXES)), max(_PREFIXES))
     digits = format(exact.scaleb(-power).normalize(), "f")
     return f"{digits}{_PREFIXES[power]}{_SYMBOLS[unit]}"
-
-
-def _replace_varied_names(campaign: Campaign) -> Campaign:
-    """Replace the names of varied surfaces and materials by those of their variants, outside the section studies."""
-
-    def variants(section, study, name):
-        names = getattr(campaign.studies[study], section) if study in campaign.studies else []
-        return [name] if name in names else [each for each in names if campaign.origin(section, each) == name] or [name]
-
-    def with_variants(entry):
-        update = {}
-        for section in ("surfaces", "materials"):
-            one = section.removesuffix("s")  # a figure shows one surface or material
-            if names := getattr(entry, section, None):
-                update[section] = [each for name in names for each in variants(section, entry.study, name)]
-            elif name := getattr(entry, one, None):
-                update[one] = variants(section, entry.study, name)[0]
-        return entry.model_copy(update=update)
-
-    update: dict[str, Any] = {
-        section: {label: with_variants(entry) for label, entry in getattr(campaign, section).items()}
-        for section in BESIDE_STUDIES
-    }
-    figures = {name: with_variants(figure) for name, figure in campaign.figures.by_name().items()}
-    return campaign.model_copy(update=update | {"figures": campaign.figures.model_copy(update=figures)})

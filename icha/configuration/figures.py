@@ -8,7 +8,6 @@ from pydantic import Field, create_model, model_validator
 from icha.datasets.results import ResultFiles
 from icha.figures.declaration import Campaign, FigureOptions, Inputs
 from icha.figures.registry import DECLARATIONS
-from icha.support.input_files import read_columns
 from icha.support.values import File, Name, Positive, Problem, Section, Text, conversion_factor, unknown
 
 
@@ -80,30 +79,15 @@ class Measurement(Section):
         if self.material is not None:
             yield from unknown(("material",), self.material, campaign.materials)
 
-    def table_problems(self) -> Iterator[Problem]:
-        """Report a table that cannot be read."""
-        try:
-            read_columns(self.path, self.columns)
-        except ValueError as error:
-            yield ("path",), self.path, str(error)
-
 
 class _Drawn(Section):
     def by_name(self) -> dict[str, FigureOptions]:
-        """Return the figures to draw, by name."""
+        """Return the options of the figures to draw, by name."""
         return {name: getattr(self, name) for name in type(self).model_fields if getattr(self, name) is not None}
 
     def inputs(self, name: str, campaign: Campaign, files: ResultFiles) -> Inputs:
         """Return the input files of a figure, by the arguments of the function that draws it."""
         return DECLARATIONS[name].inputs(campaign, getattr(self, name), files)
-
-    def arguments(self, name: str, campaign: Campaign) -> dict[str, Any]:
-        """Return the other arguments of the function that draws a figure."""
-        return getattr(self, name).arguments(campaign)
-
-    def studies_of(self, name: str, campaign: Campaign) -> tuple[str, ...]:
-        """Return the studies whose runs a figure shows."""
-        return getattr(self, name).studies_of(campaign)
 
 
 Figures = create_model(

@@ -107,7 +107,7 @@ def unusual_topography(location: tuple, section: Any, period: float, rms_slope: 
     ----------
     location, section : location and section of the surface in the configuration.
     period : side of the square, m.
-    rms_slope : measured slope; None if no study asks for it.
+    rms_slope : measured slope; None if no study uses it.
     """
     if getattr(section, "size", section) is None and not _SIDE.contains(f"{period!r} m"):
         yield Unusual((*location, "size"), formatting.length(period), _SIDE, " in the file")
@@ -116,12 +116,14 @@ def unusual_topography(location: tuple, section: Any, period: float, rms_slope: 
         yield Unusual((*location, "height_unit"), f"rms slope {rms_slope:.3g}", _SLOPE, source)
 
 
-def plausibility_problems(unusual: Collection[Unusual], confirmed: Any) -> Iterator[Problem]:
-    """Report unusual values that are not confirmed; `confirmed` is the list as it was written."""
+def plausibility_problems(
+    unusual: Collection[Unusual], confirmed: Any, addition: str = f"`{CONFIRMED}: [{{}}]` at the top level"
+) -> Iterator[Problem]:
+    """Report unusual values that are not in the list `confirmed`; `addition` is the text that confirms a key {}."""
     for each in unusual:
         if not (isinstance(confirmed, list) and each.key in confirmed):
-            reason = f"is unusual{each.source}; expected {each.usual}. Correct it, or add `{CONFIRMED}: [{each.key}]`"
-            yield each.location, each.value, f"{reason} at the top level if it is intended"
+            reason = f"is unusual{each.source}; expected {each.usual}. Correct it, or add {addition.format(each.key)}"
+            yield each.location, each.value, f"{reason} if it is intended"
 
 
 _RATIO = Usual(
@@ -133,18 +135,14 @@ _RATIO = Usual(
 )
 
 
-def full_contact_energy(campaign: Campaign, surface: str) -> float:
-    """Return U_full/E* of a surface at rms slope 1, m."""
-    section = campaign.surfaces[surface]
-    if isinstance(section, SelfAffineSurface):
-        return self_affine_full_contact_energy(*section.lengths_and_hurst)
-    return campaign.topography(surface).full_contact_energy
-
-
 def energy_ratio(campaign: Campaign, contact) -> float:
     """Return U_full/dgamma of a contact, which has a surface, an rms slope and a material."""
-    material = campaign.materials[contact.material]
-    energy = full_contact_energy(campaign, contact.surface) * contact.rms_slope**2
+    surface, material = campaign.surfaces[contact.surface], campaign.materials[contact.material]
+    if isinstance(surface, SelfAffineSurface):
+        energy = self_affine_full_contact_energy(*surface.lengths_and_hurst)
+    else:
+        energy = campaign.topography(contact.surface).full_contact_energy
+    energy *= contact.rms_slope**2
     return full_contact_energy_ratio(energy, material.contact_modulus, material.surface_energy)
 
 

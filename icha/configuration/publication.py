@@ -244,13 +244,5 @@ class Publication(Section):
 
 def missing_metadata(publication: Publication) -> list[str]:
     """Return a line for each key that a deposit needs and that is missing in the section."""
-    needed = {
-        "version": "the version of the data, such as '1.0.0'",
-        "date": "the day of publication, such as 2026-01-31",
-        "authors": "at least one, with family_names and given_names, or name",
-    }
-    return [
-        f"publication.{key}: is missing; expected {what}"
-        for key, what in needed.items()
-        if not getattr(publication, key)
-    ]
+    missing = [key for key in ("version", "date", "authors") if not getattr(publication, key)]
+    return [f"publication.{key}: is missing; expected: {Publication.model_fields[key].description}" for key in missing]

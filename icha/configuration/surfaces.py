@@ -87,12 +87,14 @@ class Crop(Section):
     """Side of the square."""
 
 
-class MeasuredSurface(Section):
-    """A measured topography and its preparation. The mean height is always removed."""
-
+class _SurfaceFromFile(Section):
     random: ClassVar[bool] = False
     # The waves of a file are not known.
     cells_per_short_wave: ClassVar[float] = math.inf
+
+
+class MeasuredSurface(_SurfaceFromFile):
+    """A measured topography and its preparation. The mean height is always removed."""
 
     kind: Literal["measured"]
     """A topography from a measurement."""
@@ -227,12 +229,8 @@ class SelfAffineSurface(Section):
         return value
 
 
-class FileSurface(Section):
+class FileSurface(_SurfaceFromFile):
     """A periodic height map from a file, for example a published surface."""
-
-    random: ClassVar[bool] = False
-    # The waves of a file are not known.
-    cells_per_short_wave: ClassVar[float] = math.inf
 
     kind: Literal["file"]
     """A height map from a file."""

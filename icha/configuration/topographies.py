@@ -30,12 +30,10 @@ def inspect_topographies(campaign: Campaign) -> tuple[dict[str, Topography], lis
         surface = campaign.surfaces[name]
         try:
             facts[name] = inspect_file(surface)
-        except (ValueError, MemoryError) as error:
+        except ValueError as error:
             key, origin = getattr(error, "key", "path"), campaign.origin("surfaces", name)
             key = key if hasattr(surface, key) else "path"  # surfaces of kind `file` have fewer keys
             variant = "" if origin == name else f"of variant {name!r}: "
-            if isinstance(error, MemoryError):
-                error = f"does not fit into the memory of this machine ({error}); expected a smaller topography"
             problems.append((("surfaces", origin, key), getattr(surface, key, NOTHING), f"{variant}{error}"))
             continue
         if name not in of_measured_slope:
@@ -100,32 +98,26 @@ def read_scan(path: str | os.PathLike, *, confirmed: Collection[str] = (), **key
         A ValueError, if a key is missing or wrong, if the file cannot be read or prepared with these keys, or if a
         size or slope is unusual and not confirmed.
     """
-    from icha.configuration.plausibility import unusual_topography, unusual_values
+    from icha.configuration.plausibility import plausibility_problems, unusual_topography, unusual_values
     from icha.surfaces.measured.settings import UnfitTopography
     from icha.surfaces.surface import MISFIT_OF_EDGES, EdgeWarning, edges_fit
 
+    def unconfirmed(unusual):
+        unusual = [each._replace(location=each.location[2:]) for each in unusual]
+        return plausibility_problems(unusual, list(confirmed), "`confirmed=[{!r}]`")
+
     section = {"kind": "measured", "path": os.fspath(path), **keywords}
-    where = ("surfaces", "scan")
-    unusual = unusual_values({"surfaces": {"scan": section}})
     try:
         measured = MeasuredSurface.model_validate(section)
-        refuse("read_scan", _unconfirmed(unusual, confirmed))
+        refuse("read_scan", unconfirmed(unusual_values({"surfaces": {"scan": section}})))
         surface = read_surface(measured)
     except ValidationError as error:
-        problems = [problem_of({**details, "loc": (*where, "measured", *details["loc"])}) for details in error.errors()]
-        refuse("read_scan", [(location[2:], value, reason) for location, value, reason in problems])
+        problems = [{**details, "loc": ("surfaces", "scan", "measured", *details["loc"])} for details in error.errors()]
+        refuse("read_scan", [(location[2:], value, reason) for location, value, reason in map(problem_of, problems)])
     except UnfitTopography as error:
         refuse("read_scan", [((error.key,), section.get(error.key, NOTHING), str(error))])
-    refuse("read_scan", _unconfirmed(unusual_topography(where, measured, surface.period, surface.rms_slope), confirmed))
+    unusual = unusual_topography(("surfaces", "scan"), measured, surface.period, surface.rms_slope)
+    refuse("read_scan", unconfirmed(unusual))
     if not surface.free and not edges_fit(surface.heights):
         warnings.warn(MISFIT_OF_EDGES, EdgeWarning, stacklevel=2)
     return surface
-
-
-def _unconfirmed(unusual, confirmed) -> list[Problem]:
-    """Return the problems with unusual values of a scan that are not confirmed."""
-    reason = "is unusual{}; expected {}. Correct it, or add `confirmed=[{!r}]` if it is intended"
-    found = [(each.location[2], each) for each in unusual]
-    return [
-        ((key,), each.value, reason.format(each.source, each.usual, key)) for key, each in found if key not in confirmed
-    ]

@@ -113,10 +113,6 @@ class SelfAffineSpectrum:
         q = 2 * np.pi / self.period
         return math.sqrt(2 * self.plateau * float(np.sum(self._shape(k))) * q**2)
 
-    def cells_per_short_wave(self, grid: int) -> float:
-        """Grid cells per shortest wavelength on a grid of `grid` nodes a side."""
-        return grid * self.short_wavelength / self.period
-
     def realise(self, grid: int, seed: int, amplitudes: str = "fixed") -> Surface:
         """Draw a periodic surface by spectral synthesis with random phases.
 
@@ -139,7 +135,7 @@ class SelfAffineSpectrum:
         seed = SEED.validate("seed", seed)
         if amplitudes not in ("fixed", "gaussian"):
             raise ValueError(f"amplitudes: {amplitudes!r} must be one of fixed, gaussian")
-        cells = self.cells_per_short_wave(grid)
+        cells = grid * self.short_wavelength / self.period
         if cells < 2 * (1 - _ROUNDING):
             raise ValueError(
                 f"grid: {grid} nodes give {cells:.3g} cells per shortest wavelength; "

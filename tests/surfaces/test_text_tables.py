@@ -160,7 +160,7 @@ def test_a_corner_without_a_number_is_refused(tmp_path):
 @pytest.mark.parametrize("place", [(1, 0), (0, 1)])
 def test_unequal_coordinates_are_asked_about(tmp_path, place):
     along = [f"{k**1.2:.3f}" for k in range(GRID)]
-    with refused("path", r"unequal steps.*Remove the"):
+    with refused("path", r"as coordinates do; expected.*Remove the"):
         read(written(tmp_path, text(with_coordinates(along, *place, ""))))
 
 

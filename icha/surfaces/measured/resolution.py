@@ -9,8 +9,7 @@ from functools import cached_property
 import numpy as np
 import scipy.fft
 
-from icha.surfaces.measured.steps import LEAST_PIXELS
-from icha.surfaces.measured.topography import PreparedTopography, prepared_topography
+from icha.surfaces.measured.topography import LEAST_PIXELS, PreparedTopography, prepared_topography
 from icha.surfaces.moments import (
     LEAST_CELLS_OF_SUMMIT,
     RESOLVED_CELLS,
@@ -35,13 +34,11 @@ class NoiseFloor:
 
     Attributes
     ----------
-    power : power of the noise, m^4.
     wavelength : wavelength at which surface and noise have equal power, m; shorter waves are mostly noise.
     rms : rms height of the noise, m.
     slope_share : share of the shorter waves in the mean square slope.
     """
 
-    power: float
     wavelength: float
     rms: float
     slope_share: float
@@ -157,7 +154,6 @@ def noise_floor(surface: Surface) -> NoiseFloor | None:
     # Contributions of the rings to the mean square slope, up to a common factor.
     slopes = power * q**2 * np.diff(edges**2)
     return NoiseFloor(
-        power=floor,
         wavelength=float(2 * np.pi / limit),
         rms=math.sqrt(floor) * 2 * math.pi / surface.spacing,
         slope_share=float(np.sum(slopes[q > limit]) / np.sum(slopes)),

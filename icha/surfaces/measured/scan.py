@@ -11,9 +11,8 @@ from icha.support.formatting import printable
 from icha.support.input_files import RefusedFile, bounded_memory, problem_with_path, refuse_traps
 from icha.support.rules import LENGTH
 from icha.surfaces.measured.array_files import format_of_hdf5, read_hdf5, read_instrument, read_netcdf, read_npy
-from icha.surfaces.measured.fourier_files import read_fourier
 from icha.surfaces.measured.settings import LINE_SCAN, Preparation, UnfitTopography
-from icha.surfaces.measured.text_files import format_of_text, read_matrix, read_xyz
+from icha.surfaces.measured.text_files import format_of_text, read_fourier, read_matrix, read_xyz
 from icha.surfaces.measured.text_tables import SourceFile, first_damaged_line
 
 READERS = {

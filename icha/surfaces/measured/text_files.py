@@ -1,12 +1,14 @@
-"""Readers of text files with a row of heights per line or with x y z per line; choice between the two."""
+"""Readers of text files with a row of heights, x y z, or a wave in every line; choice between the first two."""
 
+import math
 import re
 
 import numpy as np
+import scipy.fft
 
 from icha.support.input_files import require_room
+from icha.support.rules import GRID
 from icha.surfaces.measured.array_files import is_instrument_text, read_instrument
-from icha.surfaces.measured.coordinate_lines import drop_coordinates
 from icha.surfaces.measured.settings import (
     LINE_SCAN,
     FileContent,
@@ -17,7 +19,8 @@ from icha.surfaces.measured.settings import (
     put_y_first,
 )
 from icha.surfaces.measured.text_headings import check_counts, image_sides, read_heading
-from icha.surfaces.measured.text_tables import SourceFile
+from icha.surfaces.measured.text_lines import strip_remark
+from icha.surfaces.measured.text_tables import SourceFile, drop_coordinates
 
 # Fewest columns of a table of heights.
 _FEWEST_COLUMNS = 8
@@ -26,6 +29,10 @@ _TITLE = re.compile(r"([a-z]+)\s*(?:[\[(]\s*([^\])]+?)\s*[\])])?", re.IGNORECASE
 _NAMES_OF_Z = ("z", "h", "height")
 # Relative error of numbers that are written with seven digits, or that were of single precision.
 _FEW_DIGITS = 1e-6
+# The spectrum, its conjugate, their difference, the heights, and the masks of waves.
+_BYTES_OF_NODE = 64
+# Largest difference of conjugate amplitudes, relative to the largest amplitude.
+_CONJUGATE = 1e-4
 
 
 def format_of_text(file: SourceFile) -> str:
@@ -33,7 +40,8 @@ def format_of_text(file: SourceFile) -> str:
     layout = file.layout
     if layout is not None and _titles(layout):
         return "xyz"
-    if layout is None or (layout.words and is_instrument_text(file)):
+    # Headings of instruments have lines that are not remarks.
+    if layout is None or (any(map(strip_remark, layout.heading)) and is_instrument_text(file)):
         return "instrument"
     return "xyz" if 3 <= layout.columns < _FEWEST_COLUMNS and not image_sides(layout.heading) else "matrix"
 
@@ -142,3 +150,62 @@ def _mark_missing(heights, heading):
     for number in heading.missing:
         heights = np.where(np.isclose(heights, number, rtol=_FEW_DIGITS, atol=0), np.nan, heights)
     return heights
+
+
+def read_fourier(file: SourceFile, settings: Preparation) -> FileContent:
+    """Sum h = sum h_q exp(i q.r) over all waves; a wave without its opposite stands for both of them."""
+    table = file.values
+    if table.shape[1] != 4 or not np.all(np.isfinite(table)):
+        raise _not_waves("expected four numbers in each line: qx qy Re Im")
+    k = _wave_numbers(table[:, :2], settings)
+    period = 2 * np.pi * np.max(np.abs(k)) / np.max(np.abs(table[:, :2]))
+    modes = table[:, 2] + 1j * table[:, 3]
+    if len(np.unique(k, axis=0)) < len(k):
+        raise _not_waves("a wave vector is given twice; expected every wave vector once")
+    highest = int(np.max(np.abs(k)))
+    n = settings.grid or 2 ** math.ceil(math.log2(max(4 * highest, 8)))
+    if 2 * highest >= n:
+        raise UnfitTopography(
+            "grid",
+            f"is too coarse for waves {highest} times as short as the period; expected at least {2 * highest + 2}, "
+            f"better {4 * highest} or more",
+        )
+    require_room(_BYTES_OF_NODE * n**2)
+    spectrum, present = np.zeros((n, n), dtype=complex), np.zeros((n, n), dtype=bool)
+    spectrum[k[:, 1], k[:, 0]] = modes
+    present[k[:, 1], k[:, 0]] = True
+    opposite = np.ix_(-np.arange(n) % n, -np.arange(n) % n)
+    conjugate, opposite_present = np.conj(spectrum[opposite]), present[opposite]
+    differences = np.abs(spectrum - conjugate)[present & opposite_present]
+    if np.max(differences, initial=0.0) > _CONJUGATE * np.max(np.abs(modes)):
+        raise _not_waves("the heights would be complex; expected conjugate amplitudes of opposite wave vectors")
+    spectrum = np.where(opposite_present & ~present, conjugate, spectrum)
+    heights = scipy.fft.ifft2(spectrum, norm="forward", workers=1).real
+    return FileContent(heights, coordinates=(period, period))
+
+
+def _not_waves(problem):
+    return UnfitTopography("path", f"cannot be read as fourier: {problem}")
+
+
+def _wave_numbers(q, settings):
+    """Return the wave vectors (n, 2) as multiples of 2 pi over the period; integers are such multiples already."""
+    largest = np.max(np.abs(q))
+    if settings.size is not None and settings.size[0] != settings.size[1]:
+        raise UnfitTopography("size", "has two sides that differ, for a Fourier series; expected one length")
+    if np.all(q == np.rint(q)):
+        if settings.size is None:
+            raise UnfitTopography(
+                "size",
+                "is missing, and the wave vectors are integers, multiples of 2 pi/L; expected L, such as '0.1 mm'",
+            )
+        k = q
+    else:
+        unit = np.min(np.abs(q)[np.abs(q) > 1e-9 * largest])
+        # The longest wave fixes the unit only to the digits that it is written with; the shortest is more accurate.
+        k = np.rint(q * (np.max(np.abs(np.rint(q / unit))) / largest))
+        if np.max(np.abs(q * (np.max(np.abs(k)) / largest) - k)) > 0.01:
+            raise _not_waves("expected wave vectors that are multiples of the smallest one")
+    if not 0 < np.max(np.abs(k)) <= GRID.most / 2:
+        raise _not_waves(f"expected waves up to {GRID.most // 2} times as short as the period")
+    return k.astype(int)

@@ -67,7 +67,7 @@ def read_heading(lines: Sequence[str], shape: tuple[int, int], decimal_comma: bo
             "size",
             f"is {commas[0]!r} in the file; the comma may be decimal or separate thousands; expected the size here",
         )
-    size, coordinates = _sizes(sides, sizes, pixels, shape)
+    size, coordinates = _size([*([" x ".join(sides)] if sides else []), *sizes], pixels, shape)
     return Heading(
         height_unit=next(filter(None, map(metres_of, values(_UNITS))), None),
         lateral_unit=metres_of(entries.get("lateral units", "")),
@@ -107,14 +107,11 @@ def _entries(lines):
     return entries
 
 
-def _sizes(image_sides, sizes, pixels, shape):
-    """Return the size (x, y) in m and the size in an unknown unit; a size that the heading does not contain is None."""
-    sides = [_lengths(text) for text in image_sides]
-    if sides and all(side and side[1] for side in sides):
-        return tuple(lengths[0] for lengths, _ in sides), None
+def _size(sizes, pixels, shape):
+    """Return the size (x, y) in m, and the size in an unknown unit; each is None if the heading does not contain it."""
     rows, columns = shape
     for texts, (nx, ny) in ((sizes, (1, 1)), (pixels, (columns, rows))):
-        for (x, y), in_metres in filter(None, map(_lengths, texts)):
+        for x, y, in_metres in filter(None, map(_lengths, texts)):
             if in_metres:
                 return (x * nx, y * ny), None
             if texts is pixels:
@@ -123,14 +120,14 @@ def _sizes(image_sides, sizes, pixels, shape):
 
 
 def _lengths(text):
-    """Return the lengths (x, y) in a text, and whether they are in m or in an unknown unit; None for other text."""
+    """Return the lengths x and y in a text, and whether they are in m or in an unknown unit; None for other text."""
     if not (found := _LENGTHS.match(text)):
         return None
-    x, y, unit = _number(found[1]), _number(found[3] or found[1]), found[4] if found[3] else found[2]
-    if unit is None:
-        return (x, y), False
-    metres = metres_of(unit)
-    return None if metres is None else ((x * metres, y * metres), True)
+    x, y, units = _number(found[1]), _number(found[3] or found[1]), (found[2] or found[4], found[4] or found[2])
+    if units == (None, None):
+        return x, y, False
+    x_unit, y_unit = map(metres_of, units)
+    return (x * x_unit, y * y_unit, True) if x_unit and y_unit else None
 
 
 def _number(text):
