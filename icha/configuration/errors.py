@@ -28,6 +28,7 @@ _NOT_A_SECTION = "is not a section; expected a mapping of keys to values"
 _REASONS = {
     "model_type": _NOT_A_SECTION,
     "model_attributes_type": _NOT_A_SECTION,
+    "bool_type": "is neither true nor false; expected true or false",
     "dict_type": "is not a mapping; expected names with their sections",
     "string_type": "is not text; expected text (in quotes if it looks like a number)",
 }

@@ -8,6 +8,7 @@ from pydantic import (
     AfterValidator,
     BeforeValidator,
     Field,
+    StrictBool,
     WithJsonSchema,
     WrapValidator,
     create_model,
@@ -31,7 +32,6 @@ from icha.path.targets import (
 )
 from icha.support.rules import NUMBER, REFINEMENT, SLOPE, TOLERANCE, FloatRange
 from icha.support.values import (
-    Flag,
     Label,
     Length,
     Name,
@@ -215,7 +215,7 @@ class Study(Section):
     ) = None
     """States at which the run saves its spots and distributions. The path reaches each of these states exactly.
     `every_stop` stands for all targets. Default: the last target."""
-    unload: Flag = False
+    unload: StrictBool = False
     """Whether to unload after loading, until the surfaces no longer touch."""
     turning_points: list[TurningPoint] = []
     """States at which the path turns after its last target: at the first one unloading ends, at the second one the next
