@@ -6,13 +6,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import scipy.optimize
-from fields import covered_nodes, displacement, displacement_field, gap
+from fields import contact_cover, covered_nodes, displacement, displacement_field, gap
 from half_space import periodic_displacement
 
 from icha import Material, SelfAffineSpectrum, Surface
 from icha.asperity.jkr import JKR
 from icha.contact.model import GAP_BINS, PRESSURE_BINS, gap_bins
-from icha.equilibrium.distributions import _gap_bin, contact_cover, gap_distribution, pressure_distribution
+from icha.equilibrium.distributions import _gap_bin, gap_distribution, pressure_distribution
 from icha.equilibrium.interacting_asperities import contact_of
 from icha.equilibrium.sites import Spots
 from icha.half_space.grid_displacement import row_blocks

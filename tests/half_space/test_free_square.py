@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 import scipy.integrate
 import scipy.optimize
-from fields import covered_nodes, displacement, displacement_field, gap
+from fields import contact_cover, covered_nodes, displacement, displacement_field, gap
 from half_space import displacement_by_quadrature, jkr_approach, jkr_force
 
 import icha
 from icha.asperity.jkr import JKR
 from icha.contact.model import Control, gap_bins
-from icha.equilibrium.distributions import contact_cover, gap_distribution
+from icha.equilibrium.distributions import gap_distribution
 from icha.equilibrium.interacting_asperities import InteractingAsperities
 from icha.half_space.ewald import PointHalfSpace
 from icha.half_space.free_square import image_potential, mean_displacement

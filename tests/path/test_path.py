@@ -231,8 +231,6 @@ def test_a_snapshot_before_first_contact_is_all_gap(surface):
     assert float(run.contact_area_fraction[0]) == 0 and run.sizes["spot"] == 0
     assert float((run.gap_density * np.diff(run.gap_bin_edges)).sum()) == pytest.approx(1, abs=1e-12)
     assert all(check.passed for check in check_run(run))
-    with pytest.raises(ValueError, match=r"path: a snapshot at a mean separation of 1\.0 m"):
-        simulate(surface, ADHESIVE, Path(reduced_pressures=[1e-3], snapshots=[("mean_separation", 1.0)]))
 
 
 def egg_box(waves=4, grid=64):
