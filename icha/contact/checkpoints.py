@@ -13,11 +13,11 @@ import zipfile
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Generic
+from typing import Any
 
 import numpy as np
 
-from icha.contact.model import Control, FullContact, NotConverged, S
+from icha.contact.model import Control, FullContact, NotConverged
 from icha.support.atomic_files import whole_file
 
 _FAILURES = {kind.__name__: kind for kind in (NotConverged, FullContact)}
@@ -26,7 +26,7 @@ _OF = "of.txt"
 
 
 @dataclass(frozen=True, eq=False)
-class CheckpointedContact(Generic[S]):
+class CheckpointedContact:
     """Contact model that loads an equilibrium from its checkpoint, or solves for it and saves a checkpoint.
 
     Attributes
@@ -41,11 +41,11 @@ class CheckpointedContact(Generic[S]):
     contact: Any
     of: str
     folder: Path
-    packed: Callable[[S, S], dict[str, np.ndarray]]
-    unpacked: Callable[[dict[str, np.ndarray], S], S]
+    packed: Callable[[Any, Any], dict[str, np.ndarray]]
+    unpacked: Callable[[dict[str, np.ndarray], Any], Any]
     _solves: Any = field(default_factory=hashlib.sha256)
 
-    def equilibrium(self, state: S, separation: float, control: Control | None = None, *, let_go: int = 0) -> S:
+    def equilibrium(self, state: Any, separation: float, control: Control | None = None, *, let_go: int = 0) -> Any:
         """Load the equilibrium from its checkpoint, or find it and save it; see `ContactModel.equilibrium`."""
         target = control and (control.quantity, float(control.target))
         self._solves.update(repr((float(separation), target, let_go)).encode())
@@ -71,12 +71,7 @@ class CheckpointedContact(Generic[S]):
 def prepare_checkpoints(folder: Path, of: str) -> Path:
     """Remove the folder of checkpoints if it belongs to another contact, create it, and return its path.
 
-    of : text that identifies surface, material, path and code.
-
-    Raises
-    ------
-    OSError
-        If other checkpoints cannot be removed, or the folder is not writable.
+    of : text that identifies surface, material, path and code. Raise `OSError` if the folder is not writable.
     """
     written = folder / _OF
     if not written.exists() or written.read_text(encoding="utf-8", errors="replace") != of:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -103,11 +103,7 @@ def events_between(before: State, after: State) -> Events:
     return Events.concatenate(after.history[len(before.history) :])
 
 
-S = TypeVar("S", bound=State)
-S_in = TypeVar("S_in", bound=State, contravariant=True)
-
-
-class ContactModel(Protocol[S]):
+class ContactModel(Protocol):
     """Contact of one surface and one material; a path computes each equilibrium from the one before.
 
     Attributes
@@ -131,10 +127,10 @@ class ContactModel(Protocol[S]):
     largest_area_fraction: float
     path_accuracy: PathAccuracy
 
-    def untouched(self) -> S:
+    def untouched(self) -> State:
         """Return the state without contact at the separation of first contact."""
 
-    def equilibrium(self, state: S, separation: float, control: Control | None = None, *, let_go: int = 0) -> S:
+    def equilibrium(self, state: State, separation: float, control: Control | None = None, *, let_go: int = 0) -> State:
         """Find the equilibrium at another mean separation, load or area, starting from a state.
 
         Parameters
@@ -151,47 +147,47 @@ class ContactModel(Protocol[S]):
             If the contact spreads over the whole surface.
         """
 
-    def pressure(self, state: S) -> float:
+    def pressure(self, state: State) -> float:
         """Return the force over the nominal area, Pa; negative in tension."""
 
-    def area_fraction(self, state: S) -> float:
+    def area_fraction(self, state: State) -> float:
         """Return the contact area over the nominal area."""
 
-    def mean_gap(self, state: S) -> float:
+    def mean_gap(self, state: State) -> float:
         """Return the mean gap over the nominal area, m; on a periodic surface the mean separation."""
 
-    def spot_count(self, state: S) -> int:
+    def spot_count(self, state: State) -> int:
         """Return the number of contact spots."""
 
-    def stiffness(self, state: S) -> float:
+    def stiffness(self, state: State) -> float:
         """Return the contact stiffness -dp/du of the present spots, Pa/m."""
 
-    def slope(self, quantity: str, state: S) -> float:
+    def slope(self, quantity: str, state: State) -> float:
         """Return the derivative of PRESSURE or AREA_FRACTION with respect to the mean separation, without events."""
 
-    def stored_energy(self, state: S) -> float:
+    def stored_energy(self, state: State) -> float:
         """Return elastic energy minus energy of adhesion, over the nominal area, J/m^2; zero without contact."""
 
-    def is_unstable(self, state: S) -> bool:
+    def is_unstable(self, state: State) -> bool:
         """Return whether a spot approaches as the surfaces move apart, which happens only on an unstable branch."""
 
-    def observables(self, surface: Surface) -> Observables[S]:
+    def observables(self, surface: Surface) -> Observables:
         """Return the object that computes what a run records of a state."""
 
 
-class Observables(Protocol[S_in]):
+class Observables(Protocol):
     """Values that a run records of a contact, by the names of its variables (`icha.datasets.variables.run`)."""
 
     def of_contact(self) -> dict[str, Any]:
         """Return the values that are the same in all states."""
 
-    def of_step(self, state: S_in) -> dict[str, Any]:
+    def of_step(self, state: State) -> dict[str, Any]:
         """Return the values that a run records of every state."""
 
-    def of_snapshot(self, state: S_in) -> dict[str, Any]:
+    def of_snapshot(self, state: State) -> dict[str, Any]:
         """Return the distributions of gap and pressure, and the spots."""
 
-    def reasons_against(self, separations: Iterable[float], pressed: S_in | None) -> list[str]:
+    def reasons_against(self, separations: Iterable[float], pressed: State | None) -> list[str]:
         """Return the reasons why the model does not represent the surface in the first loading.
 
         Parameters

@@ -11,11 +11,11 @@ from typing import NamedTuple
 
 # Largest error of an equilibrium of asperities, in h_rms.
 RESIDUAL_TOLERANCE = 1e-9
-# With adhesion a load is the difference of repulsion and attraction. If it is less than this fraction of the repulsion,
-# its error is relative to this fraction of the repulsion, not to the load.
+# With adhesion a load is the difference of repulsion and attraction. If it is below this fraction of the repulsion, its
+# error is relative to this fraction of the repulsion, not to the load.
 SMALLEST_LOAD = 1e-4
-# Largest error of a prescribed area without adhesion if contact is counted in whole cells: in cells, and relative to the
-# area.
+# Largest error of a prescribed area without adhesion if contact is counted in whole cells: in cells, and relative to
+# the area.
 AREA_TOLERANCE_CELLS, AREA_TOLERANCE_PART = 2.0, 0.1
 
 

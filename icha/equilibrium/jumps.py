@@ -44,10 +44,7 @@ def apply_jump_in(state: IterationState, evaluation: Evaluation, margin: float) 
 
     An asperity under a spot becomes part of this spot. An asperity that a union has just released stays in contact if
     its approach exceeds the jump-off approach. If any asperity of a union stays in contact, the union has split.
-
-    Returns
-    -------
-    The new state, and whether sites were added.
+    Return the new state and whether sites were added.
     """
     contact, law, asperities = state.contact, state.contact.law, state.contact.asperities
     spots = np.flatnonzero((evaluation.a > 0) & state.sites.present)
@@ -90,12 +87,7 @@ def _sudden_growth(contact, reach):
 
 
 def _evaluate_approaches(state, evaluation, spots, margin):
-    """Evaluate the approaches of all asperities that may have reached jump-in.
-
-    Returns
-    -------
-    The state with the new approaches, and the indices of these asperities.
-    """
+    """Evaluate the approaches of all asperities that may have reached jump-in; return the state and their indices."""
     contact, asperities, sites = state.contact, state.contact.asperities, state.sites
     reach = state.last_approach + _FASTEST_APPROACH * np.abs(state.last_separation - evaluation.separation)
     reach += _sudden_growth(contact, _SUDDEN_GUESS if margin > 0 else _SUDDEN_BOUND)

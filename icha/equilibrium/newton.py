@@ -36,9 +36,7 @@ _PAST_JUMP_OFF = 0.2
 def newton_step(equations: Equations, evaluation: Evaluation, size: float) -> tuple[Evaluation, bool, bool]:
     """Take one Newton step, and halve it until the error is smaller than its present `size`, in h_rms.
 
-    Returns
-    -------
-    The evaluation after the step, or the old one if no step reduces the error; whether the error is smaller; and
+    Return the evaluation after the step, or the old one if no step reduces the error; whether the error is smaller; and
     whether the exact matrix was needed.
     """
     for exact in (False, True):
@@ -56,13 +54,7 @@ def newton_step(equations: Equations, evaluation: Evaluation, size: float) -> tu
 
 
 def solve_response(equations: Equations, evaluation: Evaluation) -> np.ndarray:
-    """Return the response x = d(delta)/du of every site, (n,): the solution of (1 + W' da/d(delta)) x = -1, W' = dw/da.
-
-    Raises
-    ------
-    NotConverged
-        If the solution does not reach its tolerance.
-    """
+    """Return the response x = d(delta)/du of every site, (n,): solve (1 + W' da/d(delta)) x = -1 with W' = dw/da."""
     sites = equations.sites
     response = np.full(len(sites), -1.0)
     present, _, exact, approximate = _linearise(equations, evaluation)
@@ -84,10 +76,8 @@ def solve_response(equations: Equations, evaluation: Evaluation) -> np.ndarray:
 def _linearise(equations, evaluation):
     """Linearise the displacements at the m present sites as functions of their approaches.
 
-    Returns
-    -------
-    Indices of the present sites, (m,); da/d(delta) of these sites, (m,); and two functions of a change of the
-    approaches (m,) that return the change of the displacements (m,): an exact one and an approximate one.
+    Return the indices of these sites and their da/d(delta), both (m,), and two functions, an exact and an approximate
+    one, that turn changes of the approaches (m,) into changes of the displacements (m,).
     """
     sites = equations.sites
     present = np.flatnonzero(sites.present)
@@ -116,10 +106,7 @@ def _linearise(equations, evaluation):
 
 
 def _solve_step(equations, evaluation, exact):
-    """Return the full Newton step: the changes of the approaches (n,) and of the separation, m.
-
-    exact : whether the matrix is exact or approximate.
-    """
+    """Return the full Newton step by the exact or approximate matrix: changes of approaches (n,) and separation, m."""
     contact, sites, control = equations.contact, equations.sites, equations.control
     present, slope, exact_product, approximate_product = _linearise(equations, evaluation)
     product, tolerance = (exact_product, _EXACT_TOLERANCE) if exact else (approximate_product, _LINEAR_TOLERANCE)

@@ -245,10 +245,3 @@ class ContactState:
         names = ("position", "height", "radius_of_curvature", "approach", "members")
         columns = {name: getattr(self.sites, name)[self.contact_index] for name in names}
         return Spots(contact_radius=self.contact_radius[self.contact_index], **columns)
-
-    @cached_property
-    def spot_of_asperity(self) -> np.ndarray:
-        """Index of the spot to which each asperity belongs; -1 for an asperity out of contact."""
-        spot = np.full(len(self.sites) + 1, -1)
-        spot[self.contact_index] = np.arange(len(self.contact_index))
-        return spot[self.site_of_asperity]  # -1 takes the last entry

@@ -92,16 +92,9 @@ def find_equilibrium(
 
 
 def apply_events(state: IterationState, evaluation: Evaluation, margin: float) -> tuple[IterationState, bool]:
-    """Apply all jumps and unions that are due by more than a margin, m; on unloading also apply all splits.
+    """Apply all jumps and unions that are due by more than a margin, m, and on unloading all splits.
 
-    Returns
-    -------
-    The new state, and whether there was any event.
-
-    Raises
-    ------
-    FullContact
-        If more than half of the nominal area is in contact.
+    Return the new state and whether there was any event. Raise `FullContact` if half the nominal area is in contact.
     """
     contact = state.contact
     area = nominal_value(contact, AREA_FRACTION, evaluation.a, state.sites.radius_of_curvature)
@@ -133,12 +126,7 @@ def _count_round(state, visited):
 
 
 def _absorb_and_evaluate(state, evaluation, control):
-    """Remove new contacts under other spots; if there are any, evaluate the equations again.
-
-    Returns
-    -------
-    State and evaluation without these contacts.
-    """
+    """Remove new contacts under other spots, and return state and evaluation without them."""
     after = absorb_covered(state, evaluation)
     if after is not state:
         equations = Equations(state.contact, after.sites, control)

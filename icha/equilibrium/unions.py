@@ -96,10 +96,7 @@ def _select_merging_pairs(state, evaluation, margin, deep):
 
 
 def _record_unions(state, pairs, a, radius):
-    """Return the `MergeRecord` of every pair (k, 2) of spots, as an array (k,).
-
-    a, radius : contact radii of all spots (n,) and of the unions (k,), m.
-    """
+    """Return the `MergeRecord` of every pair (k, 2), from contact radii of the spots (n,) and of the unions (k,), m."""
     unions = np.full(len(pairs), None)
     sites, (i, j) = state.sites, pairs.T
     offset = periodic_difference(sites.position[j], sites.position[i], state.contact.asperities.cell)

@@ -177,11 +177,6 @@ class Ewald:
             self.period, self.alpha, self.contact_modulus, _LOOSE_CUT, _LOOSE_NUFFT_TOLERANCE, np.complex64
         )
 
-    @property
-    def loose_reach(self):
-        """Radius of the near field of the loose sum, m."""
-        return self.reach * _LOOSE_CUT / _CUT
-
     @cached_property
     def once(self):
         """Split with a smaller near field, for a sum whose pairs are used only once."""
@@ -292,7 +287,7 @@ class PointHalfSpace:
             kernels = [np.concatenate([m.data, k]) for (m, _), k in zip(before.near, kernels, strict=True)]
             later, earlier, r = (np.concatenate(p) for p in zip(before.pairs, (later, earlier, r), strict=True))
         near = [scipy.sparse.csr_matrix((kernel, earlier, start), shape=(n, n)) for kernel in kernels]
-        counts = r <= ewald.loose_reach
+        counts = r <= ewald.reach * _LOOSE_CUT / _CUT
         ends = np.append(0, np.cumsum(counts))[start]
         loose = scipy.sparse.csr_matrix((kernels[0][counts], earlier[counts], ends), shape=(n, n))
         pairs, near = (later, earlier, r), tuple((matrix, matrix.T) for matrix in near)

@@ -24,16 +24,9 @@ _WINDOW_OF_MOMENTS = 16.0
 
 
 def _find_distant_pairs(tree, position, radius, ewald):
-    """Return the pairs beyond the near field in which a large spot acts by its exact displacement.
+    """Return target, source and distance of the pairs beyond the near field in which a large spot acts exactly.
 
-    Parameters
-    ----------
-    tree : search tree of the targets.
-    position, radius : (m, 2) and (m,) float, centres and contact radii of the sources, m.
-
-    Returns
-    -------
-    Indices of targets and of sources, and distances, m, three arrays.
+    tree : search tree of the targets; position, radius : (m, 2) and (m,), centres and contact radii of the sources, m.
     """
     reach = np.minimum(_WINDOW_OF_MOMENTS * radius, 0.5 * ewald.period)
     wide = np.flatnonzero(reach > ewald.reach)

@@ -141,11 +141,6 @@ class EnergyBalance:
     load_jump: float = 0.0
     unattributed: float = 0.0
 
-    @property
-    def loss(self) -> float:
-        """Sum of all losses, J/m^2."""
-        return self.jump_in + self.jump_off + self.coalescence + self.load_jump + self.unattributed
-
     def add_step(self, contact: ContactModel, step: Step) -> EnergyBalance:
         """Return the balance after one more step.
 

@@ -67,12 +67,8 @@ def gaussian_summits(moments: SpectralMoments) -> GaussianSummits:
     """Return the summits of an isotropic Gaussian surface with Nayak's mean values, as McCool (1986) uses them.
 
     Density m4/(6 pi sqrt(3) m2), mean height 4 sqrt(m0/(pi alpha)), variance (1 - 0.8968/alpha) m0, and the radius of
-    their mean curvature, 3 sqrt(pi)/(8 sqrt(m4)).
-
-    Raises
-    ------
-    ValueError
-        If Nayak's parameter is less than 3/2, the smallest value of an isotropic surface.
+    their mean curvature, 3 sqrt(pi)/(8 sqrt(m4)). Raise `ValueError` if Nayak's parameter alpha is less than 3/2, the
+    smallest value of an isotropic surface.
     """
     alpha = moments.nayak_parameter
     if alpha < 1.5 * (1 - 1e-9):
@@ -109,13 +105,8 @@ def fuller_tabor_area(reduced_separation, moments: SpectralMoments, material: Ma
     """Return A/A0 of Gaussian summits that follow the JKR law, on loading (Fuller & Tabor 1975).
 
     Without attraction at a distance a summit makes contact at approach 0, where it jumps to the radius
-    (2 pi dgamma R^2/E*)^(1/3) and is in tension.
-
-    Parameters
-    ----------
-    reduced_separation : separation of the plane over h_rms, any shape.
-    moments : spectral moments of the surface, at its own rms slope.
-    material : modulus and surface energy; the range of attraction is not used.
+    (2 pi dgamma R^2/E*)^(1/3) and is in tension. `moments` are those of the surface at its own rms slope; the range of
+    attraction of the material is not used.
     """
     law = JKR(material)
     return _sum_over_summits(lambda a, R: np.pi * a**2, law, reduced_separation, moments)
@@ -131,12 +122,8 @@ def fuller_tabor_pressure(reduced_separation, moments: SpectralMoments, material
 def separation_at(quantity: Callable, value, moments: SpectralMoments, *arguments):
     """Return the reduced separations at which quantity(separation, moments, *arguments) has the values `value`.
 
-    The quantity must decrease with the separation.
-
-    Raises
-    ------
-    ValueError
-        If a value is not positive, or not found within 10 standard deviations of the mean summit.
+    The quantity must decrease with the separation. Raise `ValueError` if a value is not positive, or not found within
+    10 standard deviations of the mean summit height.
     """
     summits = gaussian_summits(moments)
     middle, reach = summits.mean_height / moments.rms_height, _FARTHEST_PLANE * summits.deviation / moments.rms_height

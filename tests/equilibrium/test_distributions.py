@@ -85,17 +85,6 @@ def test_at_every_single_summit_in_contact_the_gap_closes(case):
     np.testing.assert_allclose(w, spots.height[single] - state.separation, atol=1e-6 * surface.rms_height)
 
 
-def test_identity_of_the_gap_distribution(case):
-    surface, contact, state = case
-    gaps = gap_distribution(contact.law, surface, state)
-    area = contact.area_fraction(state)
-    assert np.sum(gaps["gap_density"] * np.diff(gap_bins(surface))) + area + gaps["overlap_fraction"] == pytest.approx(
-        1, abs=1e-12
-    )
-    assert 0 <= gaps["overlap_fraction"] < 0.1
-    assert np.all(gaps["gap_density"] >= 0)
-
-
 @pytest.fixture(scope="module")
 def rough():
     """A surface of several blocks of rows with disjoint spots of all sizes on it, in no particular equilibrium."""

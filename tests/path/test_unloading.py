@@ -307,16 +307,6 @@ def test_the_log_of_events_agrees_with_the_counts():
     assert len(np.unique(where, axis=0)) == len(where)
 
 
-def test_a_run_is_the_same_to_the_last_bit():
-    surface, material = paraboloid(32, 16.0), STICKY
-    path = Path([1e-3], unload=True, turning_points=[("reduced_pressure", 0.0), ("reduced_pressure", 2e-3)])
-    one, other = (icha.simulate(surface, material, path) for _ in range(2))
-    assert one.identical(other)
-    for name in one.variables:
-        if one[name].dtype.kind in "fi":
-            assert one[name].values.tobytes() == other[name].values.tobytes(), name
-
-
 def test_a_turning_point_beyond_the_model_is_refused_before_anything_runs():
     surface = paraboloid(32, 16.0)
     beyond = 1.01 * MAX_REDUCED_PRESSURE * float(surface.rms_slope)
