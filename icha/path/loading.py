@@ -106,13 +106,13 @@ class PathProgress:
         return step / 2
 
     def make_path_error(self, state: State, loading: bool, *failures: NotConverged) -> NotConverged:
-        """Return the exception for a path that cannot continue after a state; it tells if the surface is sticky."""
+        """Return the exception for a path that cannot continue after a state; it states if the surface is sticky."""
         contact, failures = self.contact, (*self.skipped, *failures)
         sticky = ""
         # Adhesion alone has spread the contact, or prevents the first equilibrium.
         no_equilibrium = contact.spot_count(state) == 0 and not any(isinstance(each, InsideJump) for each in failures)
         if contact.adhesive and loading and (contact.pressure(state) < 0 or no_equilibrium):
-            reason = "there is no equilibrium after first contact" if no_equilibrium else "the load is still tensile"
+            reason = "no equilibrium exists after first contact" if no_equilibrium else "the load is still tensile"
             sticky = f"; {reason}: the surface is sticky, adhesion pulls it towards full contact"
         return NotConverged(
             f"at a mean separation of {state.separation / contact.rms_height:.4f} h_rms, "

@@ -254,7 +254,7 @@ def _validate_turning_points(turning_points, last):
 
 
 def _label_pairs(name, pairs):
-    """Yield name in messages, kind and value of every pair of a list; raise `ValueError` if it is no known pair."""
+    """Yield name in messages, kind and value of every pair of a list; raise `ValueError` if it is not a valid pair."""
     if not isinstance(pairs, list | tuple):
         raise ValueError(f"{name}: expected a list of pairs (kind, value), got {pairs!r}")
     for index, pair in enumerate(pairs):

@@ -45,8 +45,8 @@ _MAX_SOLVES = 20
 _MAX_ITERATIONS = 100_000
 # Numbers of iterations between two checks of the gap: while it is open everywhere, and otherwise.
 _OPEN_ITERATIONS, _TOUCHING_ITERATIONS = 50, 1000
-# Distance over which the load on rough surfaces decreases by about a factor e, for the first step of the search; and
-# longest step of the search. Both are in h_rms.
+# Distance over which the load on rough surfaces decreases by about a factor e, which gives the first step of the search;
+# and longest step of the search. Both are in h_rms.
 _DECAY, _LONGEST_STEP = 0.4, 0.3
 
 REFERENCES = (
@@ -179,7 +179,7 @@ def refine(
     surface: Surface, material: Material, refinement: int, progress: Callable[[str], None] | None = None
 ) -> Surface:
     """Return the surface on a finer grid for the solver; raise `ValueError` if it does not resolve the attraction."""
-    surface.require_periodic("the solution by boundary elements")
+    surface.require_periodic("the solver for finite ranges")
     fine = surface.refined(REFINEMENT.validate("refinement", refinement))
     numbers = f"{fine.grid} nodes a side, spacing {fine.spacing:.4g} m"
     if material.surface_energy > 0:
@@ -403,7 +403,7 @@ def _dataset(surface, material, state, target, tolerance, seed):
     attrs = attributes(
         material,
         "Rough contact {} adhesion, boundary elements at finite range",
-        "One state of a periodic rough surface against an elastic half-space, by boundary elements.",
+        "One state of a periodic rough surface against an elastic half-space, solved with boundary elements.",
     )
     return build_dataset(SOLUTION, values, attrs)
 

@@ -266,7 +266,7 @@ def _dataset(surface, solver, legs, separation_step, seed):
     }
     attrs = attributes(
         material,
-        "Rough contact {} adhesion both ways, boundary elements at finite range",
+        "Loading and unloading of a rough contact {} adhesion, boundary elements at finite range",
         "A periodic rough surface against an elastic half-space, from apart to a load and apart again.",
     )
     return build_dataset(LOOP, values, attrs)
