@@ -17,8 +17,6 @@ from icha.support.statistics import ensemble
 
 # Loads at which curves are compared, per decade.
 _POINTS_PER_DECADE = 8
-# Points of a mean loop on every leg.
-_LEG_POINTS = 200
 # Relative difference below which the loads of two seeds count as the same.
 _SAME_LOAD = 1e-6
 
@@ -188,40 +186,6 @@ def at_common_loads(
     if not len(at):
         return at, np.empty((len(curves), 0))
     return at, np.array([interpolate(load, values, at, logarithmic=logarithmic) for load, values in curves])
-
-
-def at_common_displacements(legs: Sequence[xr.Dataset]) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-    """Evaluate reduced pressure and contact area of an ensemble on one leg of a path, at common displacements.
-
-    Displacements are measured from the point of the largest load, so that the means of two legs meet where the legs
-    meet. Members that are apart have zero pressure and area. If the legs end in contact, all end where the shortest
-    ends.
-
-    Parameters
-    ----------
-    legs : the same leg of every member (`icha.figures.select.branches`).
-
-    Returns
-    -------
-    separations : means of the mean separations over the rms height, in the order of the leg.
-    values : `reduced_pressure` and `contact_area_fraction`, (members, separations).
-    """
-    separations = [leg["reduced_separation"].values for leg in legs]
-    closest = [float(separation.min()) for separation in separations]
-    falling = separations[0][-1] < separations[0][0]
-    apart = all(float(leg["contact_area_fraction"].values[0 if falling else -1]) == 0 for leg in legs)
-    reach = max if apart else min
-    at = np.linspace(0, reach(np.ptp(separation) for separation in separations), _LEG_POINTS)
-    found = {}
-    for name in ("reduced_pressure", "contact_area_fraction"):
-        members = []
-        for leg, separation, least in zip(legs, separations, closest, strict=True):
-            order = np.argsort(separation, kind="stable")
-            outside = 0.0 if apart else None
-            members.append(np.interp(least + at, separation[order], leg[name].values[order], right=outside))
-        found[name] = np.array(members)
-    order = slice(None, None, -1 if falling else 1)
-    return (at + np.mean(closest))[order], {name: values[:, order] for name, values in found.items()}
 
 
 def _spread(area, axis):

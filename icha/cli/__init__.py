@@ -12,7 +12,6 @@ from icha.cli.new import new
 from icha.cli.project import echo, reports_errors
 from icha.cli.run import run
 from icha.cli.show import show
-from icha.cli.simulate import simulate
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -46,7 +45,7 @@ def icha(
     """
 
 
-for command in (new, describe, run, simulate, show, explore, check, verify, reproduce, upload):
+for command in (new, describe, run, show, explore, check, verify, reproduce, upload):
     app.command()(reports_errors(command))
 
 

@@ -39,18 +39,12 @@ def verify(deposit: Deposit, large: Large = False) -> None:
         with _intact(deposit, large) as folder:
             echo(f"{printable(deposit)}: intact: {_contents(folder)}")
     except _Damaged as damaged:
-        echo(damaged.problems)
-        echo(f"{printable(deposit)}: damaged: {format_count(damaged.count, 'problem')}", err=True, fg="red")
+        echo(damaged, err=True, fg="red")
         raise typer.Exit(FAILED) from None
 
 
 class _Damaged(UserError):
-    """A damaged deposit; `problems` lists what is wrong, and `count` is the number of problems."""
-
-    def __init__(self, deposit: Path, problems: tuple[str, ...]):
-        more = [f"… and {len(problems) - MOST_PROBLEMS:,} more"] if len(problems) > MOST_PROBLEMS else []
-        self.count, self.problems = len(problems), "\n".join([*problems[:MOST_PROBLEMS], *more])
-        super().__init__(f"{printable(deposit)}: the deposit is damaged:\n{self.problems}")
+    """A damaged deposit."""
 
 
 @contextlib.contextmanager
@@ -64,7 +58,10 @@ def _intact(deposit: Path, large: bool) -> Iterator[Path]:
         with whole_deposit(deposit, large=large) as folder:
             yield folder
     except DamagedDeposit as damaged:
-        raise _Damaged(deposit, damaged.args) from None
+        problems = damaged.args
+        more = [f"… and {len(problems) - MOST_PROBLEMS:,} more"] if len(problems) > MOST_PROBLEMS else []
+        heading = f"{printable(deposit)}: the deposit is damaged: {format_count(len(problems), 'problem')}"
+        raise _Damaged("\n".join([heading, *problems[:MOST_PROBLEMS], *more])) from None
 
 
 def _contents(folder: Path) -> str:

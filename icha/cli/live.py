@@ -14,12 +14,11 @@ from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
+from icha.cli.project import TARGETS
 from icha.datasets.results import CHECKS, MODEL_ERROR, REPORT
 from icha.support import formatting
 from icha.support.formatting import printable
 
-# Rules without a job of their own: they collect files of other rules.
-TARGET_RULES = ("all", "surfaces", "runs", "references", "dataset", "figures", "report", "publish")
 # Measured times outweigh expected ones once the jobs have taken this long, in s.
 PRIOR_SECONDS = 5.0
 # Expected core-seconds of a job without an estimate, which writes a few lines.
@@ -51,7 +50,7 @@ class JobRecord:
     rule : its rule.
     title : the message of the rule.
     outputs : paths of its results.
-    logs : paths of its logs.
+    log : path of its log; empty without a log.
     started : time in s.
     ended : time in s; None while the job runs.
     threads : number of cores that it uses.
@@ -60,7 +59,7 @@ class JobRecord:
     rule: str
     title: str
     outputs: tuple[str, ...]
-    logs: tuple[str, ...]
+    log: str
     started: float
     ended: float | None = None
     threads: int = 1
@@ -106,19 +105,18 @@ class Progress:
         with self.lock:
             match event["event"]:
                 case "run_info":
-                    self.total = {
-                        rule: count for rule, count in event["stats"].items() if rule not in (*TARGET_RULES, "total")
-                    }
-                    self.started = self.clock() if self.started is None else self.started
+                    # Rules of targets have no job of their own: they collect files of other rules.
+                    self.total = {name: n for name, n in event["stats"].items() if name not in (*TARGETS, "total")}
+                    self.started = self.started or self.clock()
                 case "resources_info" if event.get("cores") or event.get("nodes"):
                     self.cores = int(event.get("cores") or event["nodes"])
-                case "job_info" if event["rule_name"] not in TARGET_RULES:
+                case "job_info" if event["rule_name"] not in TARGETS:
                     self.running[event["jobid"]] = JobRecord(
                         event["rule_name"],
                         printable(event["rule_msg"] or event["rule_name"]),
                         tuple(event["output"] or ()),
                         # Snakemake adds remarks in brackets to the path.
-                        tuple(log.split(" (")[0] for log in event["log"] or ()),
+                        next(iter(event["log"] or ()), "").split(" (")[0],
                         self.clock(),
                         threads=event.get("threads") or 1,
                     )
@@ -194,13 +192,11 @@ def find_rule(output: str) -> str:
 
 def _complete_lines(job: JobRecord, folder: Path) -> list[str]:
     """Read the complete lines in the log of a job; none if there is no log."""
-    for log in job.logs:
-        try:
-            text = (folder / log).read_text(encoding="utf-8", errors="replace")
-        except OSError:
-            continue
-        return [printable(line) for line in text.split("\n")[:-1]]
-    return []
+    try:
+        text = (folder / job.log).read_text(encoding="utf-8", errors="replace")
+    except OSError:
+        return []
+    return [printable(line) for line in text.split("\n")[:-1]]
 
 
 def read_error(job: JobRecord, folder: Path) -> list[str]:

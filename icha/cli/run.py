@@ -1,6 +1,7 @@
 """The command `icha run`: start Snakemake, show its progress, and report the outcome."""
 
 import contextlib
+import itertools
 import json
 import os
 import re
@@ -19,6 +20,7 @@ from icha.cli.project import (
     DEFAULT,
     DEFAULT_CORES,
     FAILED,
+    TARGETS,
     Anyway,
     Config,
     Cores,
@@ -37,7 +39,6 @@ from icha.support import formatting
 from icha.support.atomic_files import find_obstacle
 from icha.support.formatting import format_count
 
-TARGETS = ("all", "surfaces", "runs", "references", "figures", "dataset", "report", "publish")
 STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 MOST_LINES = 12  # printed of the reason of a failure
 # Snakemake prints these lines in any case, before the reason why it ends.
@@ -85,6 +86,10 @@ def run(
     folder = (folder or project()).resolve()
     results = folder / "results" / campaign.name
     profile_folder = _profile_folder(profile, workflow)
+    names = itertools.takewhile(lambda target: not target.startswith("-"), targets)
+    if unknown := [name for name in names if name not in TARGETS and not name.startswith(f"results/{campaign.name}/")]:
+        expected = f"{', '.join(TARGETS)}, or a file under results/{campaign.name}/"
+        raise UserError(f"{', '.join(unknown)}: not a target; expected {expected}")
     if reason := find_conflict(shorten_path(results), campaign.name, path, workflow):
         raise UserError(f"{reason} Nothing was started")
     if obstacle := find_obstacle(shorten_path(folder / ".snakemake")):
@@ -99,7 +104,7 @@ def run(
         *(["--workflow-profile", str(profile_folder)] if profile else []),
     ]
     if dry_run:
-        jobs = _dry_run([*command, "--dry-run"], workflow, campaign, targets)
+        jobs = _dry_run([*command, "--dry-run"], workflow)
         print_plan(path, campaign, workflow, folder, cores or DEFAULT_CORES, profile=profile_folder)
         echo(jobs)
         return
@@ -118,12 +123,6 @@ def run(
     view = View(progress, campaign.name, folder, Console(highlight=False))
     log = _log_file(folder, campaign.name)
     status, stopped = _run_snakemake([*command, "--logger", "icha"], workflow, log, progress, view)
-    if status and progress.started is None and not stopped:
-        try:
-            _refuse_unknown_targets(_read(log), targets, campaign)
-        except UserError:
-            log.unlink(missing_ok=True)
-            raise
     # The estimate of `icha describe` is for all targets, and for this machine.
     expected = None if profile or set(targets) - {"all"} else time_on(items, cores or DEFAULT_CORES)
     _print_outcome(status, stopped, progress, campaign, folder, log, expected)
@@ -160,13 +159,12 @@ def _refuse_if_too_large(items, targets: list[str], cores: int, results: Path, p
         raise UserError(f"{lines}\nNothing was started; use --anyway to start nevertheless")
 
 
-def _dry_run(command: list[str], workflow: Path, campaign, targets: list[str]) -> str:
+def _dry_run(command: list[str], workflow: Path) -> str:
     """Let Snakemake plan; return how many jobs of which kind would run, or exit with its reason."""
     done = subprocess.run(command, cwd=workflow, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
     if done.returncode == 0:
         return _planned_jobs(done.stdout)
-    _refuse_unknown_targets(done.stdout, targets, campaign)
-    _print_failure("Snakemake could not start:", None, _reason_in(done.stdout))
+    _print_failure("Snakemake could not start:", _reason_in(done.stdout), fg="red")
     raise typer.Exit(FAILED)
 
 
@@ -183,18 +181,6 @@ def _planned_jobs(output: str) -> str:
     if outdated:
         return "\n".join([*outdated, "and all results that depend on these"])
     return "Nothing would run: all requested results exist and are up to date."
-
-
-def _refuse_unknown_targets(output: str, targets: list[str], campaign) -> None:
-    """Raise `UserError` if Snakemake ended because of an unknown target."""
-    unknown = re.findall(r"^No rule to produce (.+) \(if you use", output, re.MULTILINE)
-    if "\nInputFunctionException" in output:  # a file that a rule could make, but not of this campaign
-        unknown = [name for name in targets if name not in TARGETS and not name.startswith("-")]
-    if any(name in targets for name in unknown):
-        raise UserError(
-            f"{', '.join(unknown)}: not a target, and not a file of campaign {campaign.name}; expected "
-            f"{', '.join(TARGETS)}, or one of its files under results/{campaign.name}/"
-        )
 
 
 def _reason_in(output: str) -> list[str]:
@@ -277,10 +263,6 @@ def _run_snakemake(command: list[str], workflow: Path, log: Path, progress, view
     return status, bool(stopped)
 
 
-def _read(log: Path) -> str:
-    return log.read_text(encoding="utf-8", errors="replace")
-
-
 def _listen(reading: int, progress, view, stopped: list) -> None:
     """Read the events of Snakemake, one JSON object per line, until it ends."""
     from icha.cli.live import read_error
@@ -324,7 +306,7 @@ def _print_outcome(status: int, stopped: bool, progress, campaign, folder: Path,
         echo("Stopped before the end. Repeat the command to continue.", fg="red")
     elif status and not progress.failed:
         heading = "Snakemake could not continue:" if ended else "Snakemake could not start:"
-        _print_failure(heading, None, _reason_in(_read(log)))
+        _print_failure(heading, _reason_in(log.read_text(encoding="utf-8", errors="replace")), fg="red")
     elif status and progress.job_count > ended:
         echo(f"{format_count(progress.job_count - ended, 'job')} not run, since they need results of failed jobs")
     if ended or not status:  # otherwise the existing files are those of an earlier call
@@ -346,25 +328,21 @@ def _print_failures(status: int, stopped: bool, progress, campaign, folder: Path
     if incomplete:
         echo(f"{format_count(len(incomplete), 'run')} without a result:", fg="red")
         for path, reason in incomplete.items():
-            _print_failure(None, path, [reason])
+            _print_failure(f"  {path}", [reason], bold=True)
     failed = [job for job in progress.failed if not stopped or read_error(job, folder)]
     if failed:
         echo(f"{format_count(len(failed), 'job')} failed:", fg="red")
         for job in failed:
-            logs = ", ".join(str(shorten_path(folder / name)) for name in job.logs)
             # The verdict repeats the runs without a result.
             reason = [line for line in read_error(job, folder) if not any(line.startswith(path) for path in incomplete)]
-            unknown = f"it ended without a message, perhaps killed (out of memory?); see {logs or log}"
-            _print_failure(None, job.title, reason or [unknown])
-            if logs:
-                echo(f"    log: {logs}")
+            unknown = f"it ended without a message, perhaps killed (out of memory?); see {job.log or log}"
+            _print_failure(f"  {job.title}", reason or [unknown], bold=True)
+            if job.log:
+                echo(f"    log: {shorten_path(folder / job.log)}")
 
 
-def _print_failure(heading: str | None, name: str | None, lines: list[str]) -> None:
-    if heading:
-        echo(heading, fg="red")
-    if name:
-        echo(f"  {name}", bold=True)
+def _print_failure(heading: str, lines: list[str], **style) -> None:
+    echo(heading, **style)
     for line in lines[:MOST_LINES]:
         echo(f"    {line}")
     if len(lines) > MOST_LINES:

@@ -37,6 +37,7 @@ _REASONS = {
     "model_attributes_type": _NO_SECTION,
     "literal_error": "is not a choice; expected {expected}",
     "list_type": "is not a list; expected a list, such as [a, b]",
+    "bool_type": "is neither true nor false; expected true or false",
     "dict_type": "is not a mapping; expected names with their sections",
     "string_type": "is not text; expected text (in quotes if it looks like a number)",
 }

@@ -8,6 +8,7 @@ from pydantic import (
     AfterValidator,
     BeforeValidator,
     Field,
+    StrictBool,
     WithJsonSchema,
     WrapValidator,
     create_model,
@@ -29,7 +30,6 @@ from icha.path.targets import (
 )
 from icha.support.rules import NUMBER, SLOPE, FloatRange
 from icha.support.values import (
-    Flag,
     Length,
     Name,
     Problem,
@@ -208,7 +208,7 @@ class Study(Section):
     ) = None
     """States at which the run saves its spots and distributions. The path reaches each of these states exactly.
     `every_stop`: all targets. Default: the last target."""
-    unload: Flag = False
+    unload: StrictBool = False
     """Whether to unload after loading, until the surfaces no longer touch."""
     turning_points: list[TurningPoint] = []
     """States at which the path turns after its last target: the first ends unloading, the second ends the next loading,

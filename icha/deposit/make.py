@@ -23,7 +23,7 @@ from icha.deposit.program import Source
 from icha.deposit.readme import data_dictionary, dictionary_csv, readme
 from icha.deposit.verify import CHECKSUMS, CRATE, README, SOURCE, ZENODO, files_of, problem_with_name
 from icha.planning.costs import Cost
-from icha.planning.plan import read_attributes
+from icha.planning.plan import DONE, FAILED, run_state
 from icha.planning.results import campaign_files
 from icha.support.atomic_files import moving, sync_folder, whole_file
 from icha.support.checksums import is_whole, recorded_hash, sha256_of, stale
@@ -127,7 +127,7 @@ def refuse_mixed(results: Path, campaign: Campaign, recorded: Mapping[str, str])
     expected[files.dataset] = campaign_sha256(campaign)
     wrong = dict(stale(results, recorded))
     for path, sha256 in expected.items():
-        if (read_attributes(results / path) or {}).get("config_sha256") != sha256:
+        if run_state(results / path, sha256)[0] not in (DONE, FAILED):
             wrong[path] = "it was not computed with the settings of this campaign"
     for path, asked in recorded.items():
         if asked != recorded_hash(results, path):

@@ -16,7 +16,7 @@ from pathlib import Path
 
 from icha.support import formatting
 from icha.support.checksums import sha256_of
-from icha.support.formatting import is_printable, printable
+from icha.support.formatting import printable
 
 CHECKSUMS = "SHA256SUMS"
 # Files by which a deposit describes itself: to readers, as an RO-Crate, to Zenodo.
@@ -102,7 +102,7 @@ def problem_with_name(name: str) -> str:
         return "leads out of its folder, or to no file"
     if "\\" in name:
         return "has a backslash, which separates folders on other systems"
-    if not is_printable(name):
+    if printable(name) != name:
         return "has invisible characters"
     if len(name.encode()) > _LONGEST_PATH or max(len(each.encode()) for each in names) > _LONGEST_NAME:
         return "is too long"

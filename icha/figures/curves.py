@@ -46,15 +46,18 @@ def gap_label(data: xr.Dataset) -> str:
 
 
 class Curve(NamedTuple):
-    """The runs of one contact, and the look of their markers, arguments of `Axes.plot`."""
+    """The runs of one contact against load.
+
+    Attributes
+    ----------
+    runs : the runs.
+    stops : steps of the runs at the targets of their study, by seed.
+    look : look of the markers, arguments of `Axes.plot`.
+    """
 
     runs: select.ContactRuns
+    stops: dict[int, xr.Dataset]
     look: dict
-
-    @property
-    def stops(self) -> dict[int, xr.Dataset]:
-        """Steps of the runs at the targets of their study, by seed."""
-        return {seed: select.path_steps(run) for seed, run in self.runs.by_seed.items()}
 
 
 class Curves(NamedTuple):
@@ -63,7 +66,7 @@ class Curves(NamedTuple):
     Attributes
     ----------
     lines : the curves of the study's `shown_model`.
-    crosses : if that is the asperity model, the curves of the same contacts with boundary elements.
+    crosses : curves with boundary elements, if the lines are of the asperity model.
     looks : colours and markers of the lines.
     handles : what the legend names of them: materials, surfaces and slopes as far as there are several, and models.
     """
@@ -89,14 +92,18 @@ def study_curves(campaign: xr.DataTree, study: str, boundary_elements: str | Non
         look = looks.look(group.contact, applicable=group.applicable) | {"ls": "-" if looks.many else "none"} | changed
         if name != ASPERITIES_NAME:
             look |= {"marker": MODEL_MARKERS[name], "ms": look["ms"] + 2}
-        lines.append(Curve(group, look))
+        lines.append(_curve(group, look))
     other = boundary_elements or (study if name == ASPERITIES_NAME else None)
     truths = select.select_runs(campaign, other, ragged=False, model=REFERENCE_MODEL) if other else []
-    crosses = [Curve(truth, cross_look(looks, truth.contact)) for truth in select.group_by_contact(campaign, truths)]
+    crosses = [_curve(truth, cross_look(looks, truth.contact)) for truth in select.group_by_contact(campaign, truths)]
     changed |= {"ls": "-" if looks.many or any(len(group.by_seed) > 1 for group in groups) else "none"}
     changed |= {} if looks.by_place else {"marker": MODEL_MARKERS[name]}
     handles = looks.handles(**changed) | {name: model_handle(name, mfc="white")}
     return Curves(lines, crosses, looks, handles | ({SHORT_RANGE: model_handle(SHORT_RANGE)} if crosses else {}))
+
+
+def _curve(runs, look):
+    return Curve(runs, {seed: select.path_steps(run) for seed, run in runs.by_seed.items()}, look)
 
 
 def cross_look(looks: Looks, contact: Contact, model: str = SHORT_RANGE) -> dict:
@@ -170,7 +177,7 @@ def draw_curves(
     drawn = {axes: [] for axes in panels}
     for line in curves.lines:
         for axes, points in panels.items():
-            drawn[axes].append(_draw_line(axes, line, points, lines=len(curves.lines)))
+            drawn[axes].append(_draw_line(axes, line, points))
         if unloading:
             _draw_unloading(panels, line)
     for line in curves.crosses:
@@ -181,7 +188,7 @@ def draw_curves(
     return [tuple(map(np.concatenate, zip(*points, strict=True))) for points in drawn.values()]
 
 
-def _draw_line(axes, line, points, *, lines):
+def _draw_line(axes, line, points):
     """Draw a run by markers, or the mean of several seeds at common loads by a line, with their scatter."""
     from icha.analysis.common_loads import at_common_loads
 
@@ -189,7 +196,7 @@ def _draw_line(axes, line, points, *, lines):
     if len(members) > 1:
         load, values = at_common_loads(members, logarithmic=True)
         if len(load):
-            draw_members(axes, load, values, line.look, positive=True, lines=lines, asked=asked)
+            draw_members(axes, load, values, line.look, positive=True, asked=asked)
             return np.tile(load, len(values)), values.ravel()
     # Runs without a common load have no mean.
     for load, values in members:
@@ -211,14 +218,10 @@ def _draw_crosses(axes, line, points):
 
 
 def _draw_unloading(panels, line):
-    """Draw the unloading of a line's runs, or of several seeds its mean, while the load is compressive.
-
-    The axes keep their range.
-    """
-    runs = line.runs.by_seed.values()
-    for leg in select.average_legs([[("unloading", leg) for leg in select.unloading_legs(run)] for run in runs]):
+    """Draw the unloading of every run of a line while the load is compressive; the axes keep their range."""
+    for leg in [leg for run in line.runs.by_seed.values() for leg in select.unloading_legs(run)]:
         for axes, points in panels.items():
-            load, values = points(leg.values)
+            load, values = points(leg)
             # Just before separation loads are arbitrarily small.
             pressed = np.where(load > 0, load, np.nan)
             axes.add_artist(legend_handle(pressed, values, color=line.look["mec"], **_UNLOADING))

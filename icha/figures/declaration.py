@@ -12,7 +12,7 @@ ValueError if the campaign has no such study or snapshot; the message names the 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -26,6 +26,7 @@ from icha.support.values import Label, Name, Positive, Problem, Section, Seed, l
 
 # A configuration (`icha.configuration.campaign.Campaign`), which stands above this folder.
 Campaign = Any
+_NOT_UNLOADED = "is not unloaded; expected a study with `unload: true`"
 # Files by the names of the arguments that are read from them: one, or a list of them.
 Inputs = dict[str, str | list[str]]
 
@@ -160,16 +161,31 @@ class SnapshotFigure(StudyFigure):
         return arguments
 
 
+class TopographyFigure(StudyFigure):
+    """A figure of one topography of a study."""
+
+    surface: Label | None = Field(default=None, description="Surface to show. Default: the first of the study.")
+    seed: Seed | None = Field(default=None, description="Seed to show. Default: the first of the study.")
+
+
+class UnloadedFigure(StudyFigure):
+    """A figure of the runs of a study in loading and unloading."""
+
+    def study_problems(self, campaign: Campaign, study: Any) -> Iterator[Problem]:
+        """Also yield a problem if the study does not unload."""
+        yield from super().study_problems(campaign, study)
+        if not (study.unload or study.turning_points):
+            yield ("study",), self.study, _NOT_UNLOADED
+
+
 # Options that choose a run, which are also names of labels.
 _RUN_OPTIONS = {"study", "surface", "seed", "rms_slope", "material"}
 
 
-class RunFigure(StudyFigure):
+class RunFigure(TopographyFigure):
     """A figure of one run; options that are left out take the study's first value."""
 
-    surface: Label | None = Field(default=None, description="Surface to show.")
-    seed: Seed | None = Field(default=None, description="Seed to show.")
-    rms_slope: Positive | None = Field(default=None, description="Rms slope to show.")
+    rms_slope: Positive | None = Field(default=None, description="Rms slope to show. Default: the first of the study.")
     material: Label | None = Field(
         default=None, description="Material to show. Default: the first one with adhesion, if there is any."
     )
@@ -208,15 +224,9 @@ def is_solved_at_finite_range(campaign: Campaign, study: str) -> bool:
     return any(entry.study == study for entry in campaign.finite_range.values())
 
 
-def unloading_problems(campaign: Campaign, location: tuple, name: str, *, partly: bool) -> Iterator[Problem]:
-    """Yield a problem if a study does not unload completely; with `partly`, only if it does not unload at all."""
-    study = campaign.studies.get(name)
-    if study is not None and not (study.unload or (partly and study.turning_points)):
-        yield location, name, "is not unloaded; expected a study with `unload: true`"
-
-
-def studies_problems(campaign: Campaign, key: str, names: Iterable[str]) -> Iterator[Problem]:
-    """Yield a problem for each study of a list that does not exist or does not unload completely."""
-    for index, name in enumerate(names):
-        yield from unknown((key, index), name, campaign.studies)
-        yield from unloading_problems(campaign, (key, index), name, partly=False)
+def problems_of_unloading(campaign: Campaign, studies: Mapping[tuple, str]) -> Iterator[Problem]:
+    """Yield a problem for each study, by its location, that does not exist or does not unload completely."""
+    for location, name in studies.items():
+        yield from unknown(location, name, campaign.studies)
+        if name in campaign.studies and not campaign.studies[name].unload:
+            yield location, name, _NOT_UNLOADED

@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import partial
 
 from icha.figures.declaration import ComparedFigure, Declaration, dataset_and_model_error
-from icha.figures.errors import ErrorPanel, draw_errors
+from icha.figures.errors import draw_errors
 
 DECLARATION = Declaration(
     description=(
@@ -16,9 +16,6 @@ DECLARATION = Declaration(
     inputs=dataset_and_model_error,
 )
 
-QUANTITIES = (
-    ErrorPanel("area_error", r"error of $A/A_0$ (%)", 100),
-    ErrorPanel("separation_error", r"error of $\bar{u}$ (%)", 100),
-)
+LABELS = {"area_error": r"error of $A/A_0$ (%)", "separation_error": r"error of $\bar{u}$ (%)"}
 
-figure = partial(draw_errors, quantities=QUANTITIES)
+figure = partial(draw_errors, labels=LABELS, percent=True)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from icha.figures.declaration import Campaign, Declaration, FigureOptions, studies_problems
+from icha.figures.declaration import Campaign, Declaration, FigureOptions, problems_of_unloading
 from icha.figures.ensembles import Points, points_handles
 from icha.figures.looks import legend_below, looks_of_studies
 from icha.figures.select import ContactRuns, NothingToDraw, name_model, select_detached_lines
@@ -31,7 +31,7 @@ class LossFigure(FigureOptions):
 
     def problems(self, campaign: Campaign) -> Iterator[Problem]:
         """Yield the problems of studies that are unknown or do not unload completely."""
-        yield from studies_problems(campaign, "studies", self.studies)
+        yield from problems_of_unloading(campaign, {("studies", k): name for k, name in enumerate(self.studies)})
 
 
 DECLARATION = Declaration(description="Energy lost in a loop against contact area, and its parts.", options=LossFigure)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,25 +10,19 @@ import numpy as np
 from icha.datasets import results
 from icha.datasets.labels import RunLabels
 from icha.figures.curves import SEPARATION_LABEL
-from icha.figures.declaration import Campaign, Declaration, Inputs, RunFigure, unloading_problems
+from icha.figures.declaration import Campaign, Declaration, Inputs, RunFigure, UnloadedFigure
 from icha.figures.looks import BRANCH_DASHES, NOT_APPLICABLE_ALONE, legend_below
 from icha.figures.maps import topography_of
 from icha.figures.select import is_applicable, select_complete_run, unloading_legs
 from icha.figures.style import BLACK, GREY, in_style, legend_handle, material_label, new_panels, slope_label
-from icha.support.values import Problem
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
 
-class SnapMapFigure(RunFigure):
+class SnapMapFigure(RunFigure, UnloadedFigure):
     """A figure of the events of one run; options that are left out take the study's first value."""
-
-    def problems(self, campaign: Campaign) -> Iterator[Problem]:
-        """Also yield a problem if the study does not unload."""
-        yield from super().problems(campaign)
-        yield from unloading_problems(campaign, ("study",), self.study, partly=True)
 
 
 def inputs(campaign: Campaign, options: SnapMapFigure, files: results.ResultFiles) -> Inputs:

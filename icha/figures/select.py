@@ -112,14 +112,25 @@ def shown_model(study: xr.Dataset) -> str:
     return first_model(study["model"].values.tolist())
 
 
-def pick(label: str, wanted, present: Sequence):
-    """Return `wanted`, or the first of the values that a label has in complete runs if `wanted` is None."""
-    if wanted is None:
-        return present[0]
-    if wanted not in present:
-        complete = ", ".join(map(str, dict.fromkeys(present)))
-        raise NothingToDraw(f"no run of {label} {wanted} is complete; complete runs have {label}: {complete}")
-    return wanted
+def select_by_labels(
+    runs: Iterable[tuple[RunLabels, xr.Dataset]], **wanted: object
+) -> list[tuple[RunLabels, xr.Dataset]]:
+    """Return the runs with the wanted labels; for a label that is None, those with the label of the first such run.
+
+    Raises
+    ------
+    NothingToDraw
+        If no run has a wanted label.
+    """
+    runs = list(runs)
+    for name, value in wanted.items():
+        present = [getattr(labels, name) for labels, _ in runs]
+        value = present[0] if value is None else value
+        if value not in present:
+            complete = ", ".join(map(str, dict.fromkeys(present)))
+            raise NothingToDraw(f"no run of {name} {value} is complete; complete runs have {name}: {complete}")
+        runs = [(labels, run) for labels, run in runs if getattr(labels, name) == value]
+    return runs
 
 
 def select_complete_run(campaign: xr.DataTree, labels: RunLabels) -> xr.Dataset:
@@ -209,9 +220,7 @@ def snapshot_label(run: xr.Dataset, snapshot: int) -> str:
     return f"{_KIND_LABELS[kind]} = {format_number(value)}"
 
 
-def select_errors(
-    model_error: xr.DataTree | None, study: str
-) -> Iterator[tuple[str, tuple[str, str, float], xr.Dataset]]:
+def select_errors(model_error: xr.DataTree | None, study: str) -> Iterator[tuple[tuple[str, str, float], xr.Dataset]]:
     """Yield the errors of each contact of a study, along seeds and loads.
 
     Parameters
@@ -220,16 +229,15 @@ def select_errors(
 
     Yields
     ------
-    Name of an entry of the model error; material, surface and rms slope; errors of this entry and contact. A campaign
-    need not request all combinations of the labels of an entry, so that all errors of a contact may be NaN.
+    Material, surface and rms slope; errors of one entry for this contact, all NaN if the entry does not have it.
     """
-    for name, node in model_error.children.items() if model_error is not None else ():
+    for node in model_error.children.values() if model_error is not None else ():
         if node.attrs["study"] != study:
             continue
         errors = node.to_dataset().transpose("seed", ...)
         for material, (surface, slope) in itertools.product(errors["material"].values, surfaces_and_slopes(errors)):
             labels = {"surface": surface, "rms_slope": slope, "material": material}
-            yield name, (str(material), surface, slope), errors.isel(place_of(errors, labels))
+            yield (str(material), surface, slope), errors.isel(place_of(errors, labels))
 
 
 def asked_of_entry(errors: xr.Dataset) -> int:
@@ -239,44 +247,10 @@ def asked_of_entry(errors: xr.Dataset) -> int:
     return int((errors["status"] != NOT_IN_DESIGN).sum("seed"))
 
 
-# --- runs that were unloaded: legs, and pull-offs and losses as lines of points ---
+# --- runs that were unloaded, and pull-offs and losses as lines of points ---
 
 # Tension below this fraction of the largest pressure is rounding.
 ROUNDING = 1e-9
-
-
-class Leg(NamedTuple):
-    """A leg of a run, or the mean of the legs of several seeds.
-
-    Attributes
-    ----------
-    branch : `loading` or `unloading`.
-    values : reduced separation, reduced pressure and contact area fraction along the leg.
-    members : reduced pressure and contact area fraction of every seed, (seeds, k) each; empty for a single run.
-    """
-
-    branch: str
-    values: xr.Dataset
-    members: dict[str, np.ndarray]
-
-
-def average_legs(runs: Sequence[Sequence[tuple[str, xr.Dataset]]]) -> list[Leg]:
-    """Return means over the seeds, at common separations, of the legs of runs, given by branch and steps.
-
-    If the runs differ in their number of legs, return all legs.
-    """
-    from icha.analysis.common_loads import at_common_displacements
-
-    if len(runs) == 1 or len({len(legs) for legs in runs}) > 1:
-        return [Leg(branch, leg, {}) for legs in runs for branch, leg in legs]
-    found = []
-    for members in zip(*runs, strict=True):
-        branch, first = members[0]
-        separation, values = at_common_displacements([leg for _, leg in members])
-        means = {name: ("step", of_seeds.mean(axis=0)) for name, of_seeds in values.items()}
-        means["reduced_separation"] = ("step", separation)
-        found.append(Leg(branch, first.drop_dims("step").assign(means), values))
-    return found
 
 
 def select_unloaded_runs(campaign: xr.DataTree, study: str) -> list[tuple[RunLabels, xr.Dataset]]:
@@ -287,17 +261,12 @@ def select_unloaded_runs(campaign: xr.DataTree, study: str) -> list[tuple[RunLab
     Raises
     ------
     NothingToDraw
-        If no run is complete, or none was unloaded.
+        If no run is complete, or none unloads.
     """
     runs = [(labels, run) for labels, run in select_runs(campaign, study, ragged=False) if unloading_legs(run)]
     if not runs:
         raise NothingToDraw(f"study {study}: no run was unloaded; expected a study that unloads")
-    return [
-        (labels, run.assign(reduced_separation=run["mean_separation"] / run["rms_height"]))
-        if str(run["boundary"].values) == "free"
-        else (labels, run)
-        for labels, run in runs
-    ]
+    return [(labels, run.assign(reduced_separation=run["mean_separation"] / run["rms_height"])) for labels, run in runs]
 
 
 def select_detached_lines(

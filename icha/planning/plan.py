@@ -2,7 +2,6 @@
 
 import json
 import math
-import statistics
 from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import cache
@@ -62,6 +61,11 @@ class Item:
     def to_do(self) -> bool:
         """Whether the file must be computed; not for a failed run, which would fail again."""
         return self.state in (TO_DO, CHANGED, DAMAGED)
+
+    @property
+    def work(self) -> float:
+        """Expected work of the job, core-seconds."""
+        return self.cost.seconds * self.threads
 
 
 def plan(campaign: Campaign, results: Path) -> list[Item]:
@@ -204,34 +208,24 @@ def _cost_parameters(settings, rms_slope) -> dict:
     }
 
 
-# Attributes of the file of a run that determine its state.
-_OF_STATE = ("config_sha256", "incomplete", "failed_checks")
-
-
 def run_state(file: Path, sha256: str) -> tuple[str, str]:
-    """State of the file of a run, and the reason if the run failed."""
+    """Return the state of the file of a run, and the reason if the run failed; `sha256` is that of its settings."""
+    import h5py
+
     if not file.is_file():
         return TO_DO, ""
-    attributes = read_attributes(file)
-    if attributes is None:
-        return DAMAGED, ""
+    try:
+        with h5py.File(file, "r") as data:
+            names = ("config_sha256", "incomplete", "failed_checks")
+            attributes = {name: text(data.attrs[name]) for name in names if name in data.attrs}
+    except OSError as error:
+        if error.errno is not None:  # such as missing permission, which does not depend on the content
+            raise
+        return DAMAGED, ""  # not a valid netCDF-4 file
     if attributes.get("config_sha256") != sha256:
         return CHANGED, ""
     reason = why_no_result(attributes)
     return (FAILED, reason) if reason else (DONE, "")
-
-
-def read_attributes(file: Path) -> dict[str, str] | None:
-    """Read the attributes of a run that determine its state; None if the file is not valid netCDF-4."""
-    import h5py
-
-    try:
-        with h5py.File(file, "r") as data:
-            return {name: text(data.attrs[name]) for name in _OF_STATE if name in data.attrs}
-    except OSError as error:
-        if error.errno is not None:  # such as missing permission, which says nothing about the content
-            raise
-        return None
 
 
 def failed_runs(campaign: Campaign, results: Path) -> dict[str, str]:
@@ -245,7 +239,7 @@ def failed_runs(campaign: Campaign, results: Path) -> dict[str, str]:
 
 def expected_seconds(items: Iterable[Item], folder: str) -> dict[str, float]:
     """Return the expected core-seconds of each job, with scheduling; keys are the paths of files in `folder`."""
-    return {f"{folder}/{item.path}": item.cost.seconds * item.threads + WORKFLOW.job for item in items}
+    return {f"{folder}/{item.path}": item.work + WORKFLOW.job for item in items}
 
 
 def whole_cost(campaign: Campaign, results: Path) -> costs.Cost:
@@ -254,46 +248,7 @@ def whole_cost(campaign: Campaign, results: Path) -> costs.Cost:
     The cost is not calibrated by finished jobs, so every machine gives the same value.
     """
     items = [replace(item, state=TO_DO) for item in _items(campaign, results)]
-    return costs.Cost(time_on(items, 1), memory_on(items, 1), total(items).disk)
-
-
-@dataclass(frozen=True)
-class Total:
-    """Totals of several items.
-
-    Attributes
-    ----------
-    count, done, failed, to_do : numbers of items, of all and by state.
-    work : of items to do, core-seconds.
-    memory : of the largest job, bytes.
-    disk : of all files, bytes.
-    typical : median time of a job, s.
-    """
-
-    count: int
-    done: int
-    failed: int
-    to_do: int
-    work: float
-    memory: float
-    disk: float
-    typical: float
-
-
-def total(items: Iterable[Item]) -> Total:
-    """Add up items."""
-    items = list(items)
-    left = [item for item in items if item.to_do]
-    return Total(
-        len(items),
-        sum(item.state == DONE for item in items),
-        sum(item.state == FAILED for item in items),
-        len(left),
-        sum(item.cost.seconds * item.threads for item in left),
-        max((item.cost.memory for item in items), default=0.0),
-        sum(item.cost.disk for item in items),
-        statistics.median(item.cost.seconds for item in items) if items else 0.0,
-    )
+    return costs.Cost(time_on(items, 1), memory_on(items, 1), sum(item.cost.disk for item in items))
 
 
 def time_on(items: Iterable[Item], cores: int) -> float:
@@ -308,7 +263,7 @@ def time_on(items: Iterable[Item], cores: int) -> float:
         left = [item for item in items if item.stage == stage and item.to_do]
         scheduling = WORKFLOW.job * len(left)
         longest = max((item.cost.seconds for item in left), default=0.0)
-        seconds += max((total(left).work + scheduling) / cores, longest, scheduling)
+        seconds += max((sum(item.work for item in left) + scheduling) / cores, longest, scheduling)
     return seconds
 
 

@@ -113,9 +113,8 @@ def find_shortages(items: Collection[Item], cores: int, results: Path, profile: 
             f"about {formatting.size(needed)} of memory are needed on {format_count(cores, 'core')}, and this machine "
             f"has {formatting.size(available)}"
         )
-        for fewer in range(cores - 1, 0, -1):
-            if (less := memory_on(items, fewer, most)) <= available:
-                message += f"; --cores {fewer} needs {formatting.size(less)}"
-                break
+        fewer = [number for number in range(1, cores) if memory_on(items, number, most) <= available]
+        if fewer:
+            message += f"; --cores {fewer[-1]} needs {formatting.size(memory_on(items, fewer[-1], most))}"
         shortages.append(message)
     return shortages

@@ -31,6 +31,7 @@ from icha.surfaces.moments import (
     SpectralMoments,
     cells_per_short_wave,
     height_statistics,
+    self_affine_integral,
     slope_anisotropy,
     spectral_moments,
     summit_density,
@@ -52,14 +53,8 @@ def self_affine_moments(
     They are integrals over the plane of wave vectors: m0 = int C, m2 = 1/2 int q^2 C, m4 = 3/8 int q^4 C.
     """
     q_l, q_0, q_1 = (2 * math.pi / length for length in (period, rolloff_wavelength, short_wavelength))
-
-    def moment(order):
-        # int q^(order + 1) C dq, where C is constant up to the roll-off and then falls as q^(-2 (1 + H)).
-        power = order - 2 * hurst
-        falling = math.log(q_1 / q_0) if power == 0 else math.expm1(power * math.log(q_1 / q_0)) / power
-        return (q_0 ** (order + 2) - q_l ** (order + 2)) / (order + 2) + q_0 ** (order + 2) * falling
-
-    return SpectralMoments(moment(0), moment(2) / 2, 3 / 8 * moment(4))
+    m0, m2, m4 = (self_affine_integral(order, q_l, q_1, q_0, hurst) for order in (1, 3, 5))
+    return SpectralMoments(m0, m2 / 2, 3 / 8 * m4)
 
 
 def surface_facts(campaign: Campaign, name: str) -> dict[str, float]:

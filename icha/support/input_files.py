@@ -25,14 +25,6 @@ _COPIES = 3
 _MOST_NAMES, _DEEPEST = 100_000, 50
 _WHOLE = "expected a file that holds all of its data"
 
-_KINDS = {
-    stat.S_IFDIR: "is a folder",
-    stat.S_IFIFO: "is a pipe",
-    stat.S_IFCHR: "is a device",
-    stat.S_IFBLK: "is a device",
-    stat.S_IFSOCK: "is a socket",
-}
-
 
 class RefusedFile(ValueError):
     """A file that is not read because it might do harm; the message says why, and what is expected."""
@@ -52,12 +44,14 @@ class TooLarge(RefusedFile):
 def problem_with_path(path: str | os.PathLike) -> str | None:
     """Describe why a path cannot be opened as a file; None if it can. Reading a pipe or device might never end."""
     try:
-        kind = stat.S_IFMT(os.stat(path).st_mode)
+        mode = os.stat(path).st_mode
     except (FileNotFoundError, NotADirectoryError, ValueError):  # ValueError for zero bytes in a path
         return "no such file"
     except OSError as error:
         return f"cannot be read ({error.strerror})"
-    return _KINDS.get(kind)
+    if stat.S_ISDIR(mode):
+        return "is a folder"
+    return None if stat.S_ISREG(mode) else "is not a file but a device, a pipe or a socket"
 
 
 def most_memory(file: str | os.PathLike | None = None) -> int:

@@ -48,13 +48,6 @@ _LONG_NAMES |= {
 }
 _LONG_NAMES |= {f"{name}s": factor for name, factor in _LONG_NAMES.items()} | {"inches": "0.0254"}
 
-# Units to suggest for a wrong case or a missing ^.
-_SUGGESTED = {
-    "Pa": ("Pa", "hPa", "kPa", "MPa", "GPa", "N/m^2", "kN/m^2", "MN/m^2", "N/mm^2"),
-    "J/m^2": ("J/m^2", "mJ/m^2", "uJ/m^2", "N/m", "mN/m", "uN/m"),
-    "m": ("m", "dm", "cm", "mm", "um", "nm", "pm", "in", "mil"),
-}
-
 PATTERN = rf"^\s*{_NUMBER}\s*[A-Za-zµμÅ].*$"
 # Names become folders and files; commands would read one that begins with a hyphen as an option.
 NAME_PATTERN = r"^[a-z0-9_][a-z0-9_-]*$"
@@ -93,16 +86,7 @@ def conversion_factor(unit: str, si_unit: str) -> Decimal:
         return Decimal(1)
     if (unit, si_unit) in USUAL:
         return Decimal(USUAL[unit, si_unit])
-    try:
-        return _length(unit) if si_unit == "m" else _by_pint(unit, si_unit)
-    except ValueError as error:
-        similar = [known for known in _SUGGESTED.get(si_unit, ()) if _letters(known) == _letters(unit)]
-        raise ValueError(f"{error} (did you mean {similar[0]!r}?)" if similar else str(error)) from None
-
-
-def _letters(unit):
-    """Return a unit in lower case, without blanks and signs of a power."""
-    return re.sub(r"[\s^*]", "", unicodedata.normalize("NFKC", unit)).replace("\u03bc", "u").lower()
+    return _length(unit) if si_unit == "m" else _by_pint(unit, si_unit)
 
 
 def _length(unit):
@@ -218,13 +202,6 @@ def integer(rule: IntegerRange):
     return Annotated[int, BeforeValidator(read), WithJsonSchema(schema)]
 
 
-def flag(value: Any) -> bool:
-    """Return true or false; refuse other values that YAML and Python accept for them."""
-    if not isinstance(value, bool):
-        raise ValueError("is neither true nor false; expected true or false")
-    return value
-
-
 def distinct(values):
     """Refuse a list with an entry that is given twice."""
     seen = set()
@@ -298,7 +275,6 @@ Modulus = quantity(CONTACT_MODULUS, "25 MPa")
 SurfaceEnergy = quantity(SURFACE_ENERGY, "50 mJ/m^2")
 Positive = number(POSITIVE)
 Seed = integer(SEED)
-Flag = Annotated[bool, BeforeValidator(flag)]
 
 
 def stops(kind, in_order):

@@ -53,6 +53,20 @@ def summit_density(m2: float, m4: float) -> float:
     return m4 / (6 * math.sqrt(3) * math.pi * m2)
 
 
+def self_affine_integral(order: int, start: float, end: float, roll: float, hurst: float) -> float:
+    """Integral of k^order C(k)/C0 from `start` to `end`, where C = C0 up to `roll`, then falls as k^(-2 - 2 hurst)."""
+
+    def up_to(end):
+        flat = min(end, roll) ** (order + 1) / (order + 1)
+        if end <= roll:
+            return flat
+        power = order - 1 - 2 * hurst
+        falling = math.log(end / roll) if power == 0 else math.expm1(power * math.log(end / roll)) / power
+        return flat + roll ** (order + 1) * falling
+
+    return up_to(end) - up_to(start)
+
+
 def self_affine_full_contact_energy(
     period: float, rolloff_wavelength: float, short_wavelength: float, hurst: float
 ) -> float:
@@ -70,16 +84,7 @@ def self_affine_full_contact_energy(
 
     def moment(order):
         total = np.sum(np.maximum(k / roll, 1.0) ** (-2 * (1 + hurst)) * k**order)
-        return float(total) + 2 * math.pi * (integral(order + 1, last) - integral(order + 1, dense))
-
-    def integral(order, end):
-        """Integral of k^order C/C0 from 0 to end; C is flat up to the roll-off, then falls as k^(-2 - 2 H)."""
-        flat = min(end, roll) ** (order + 1) / (order + 1)
-        if end <= roll:
-            return flat
-        power = order - 1 - 2 * hurst
-        falling = math.log(end / roll) if power == 0 else math.expm1(power * math.log(end / roll)) / power
-        return flat + roll ** (order + 1) * falling
+        return float(total) + 2 * math.pi * self_affine_integral(order + 1, dense, last, roll, hurst)
 
     return period * moment(1) / (8 * math.pi * moment(2))
 

@@ -217,20 +217,14 @@ def test_what_cannot_be_compared_is_named():
     solution = own_solution(runs()[labels], 3e-3)
     with pytest.raises(ValueError, match=STATE + "seed is 1 for the run, 2 for the solution"):
         model_error(tree(), [(place, solution.assign(seed=2))])
-    with pytest.raises(ValueError, match=STATE + r"the solution is one of reduced pressure 0\.01"):
+    with pytest.raises(ValueError, match=STATE + r"the solution is for reduced pressure 0\.01"):
         model_error(tree(), [(place, own_solution(runs()[labels], 1e-2))])
     with pytest.raises(ValueError, match=r"reduced pressure 0\.02: no snapshot of reduced_pressure 0\.02; the run has"):
         model_error(tree(), [(place._replace(reduced_pressure=0.02), solution)])
     with pytest.raises(ValueError, match=r"run one/rough/seed9/slope1/soft.*no seed 9"):
         model_error(tree(), [(place._replace(seed=9), solution)])
-    with pytest.raises(ValueError, match=STATE + "this solution is given twice"):
-        model_error(tree(), [(place, solution)] * 2)
-    with pytest.raises(ValueError, match=STATE + "boundary elements have a contact area of 0"):
+    with pytest.raises(ValueError, match=STATE + "the contact area of boundary elements is 0"):
         model_error(tree(), [(place, own_solution(runs()[labels], 3e-3, area=0.0))])
-    with pytest.raises(ValueError, match=r"entry truth, run .*/hertz, reduced pressure 0\.01: no solution"):
-        model_error(tree(), solutions()[:-1])
-    with pytest.raises(ValueError, match="at least one"):
-        model_error(tree(), [])
 
 
 def test_runs_that_ended_early_do_not_count(tmp_path):

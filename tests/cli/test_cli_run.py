@@ -184,20 +184,6 @@ def test_the_table_of_jobs_of_snakemake_is_read():
     assert "Nothing would run" not in _planned_jobs(f"damaged, {outdated}\n{nothing}")
 
 
-@pytest.mark.parametrize(
-    ("target", "options"),
-    [
-        ("nosuchtarget", ["--dry-run"]),
-        pytest.param("results/tiny/runs/load/rough/seed9/slope1/bare.nc", [], marks=pytest.mark.slow),
-    ],
-)
-def test_unknown_targets_are_user_errors(project, target, options):
-    # The warning is on the confirmed sticky material.
-    warning, error = run(project, target, *options, status=2).splitlines()
-    assert warning.startswith("Warning: ") and "full contact has the lower energy" in warning
-    assert error.startswith(f"Error: {target}: not a target, and not a file of campaign tiny; expected all,")
-
-
 def contents(folder):
     return {file: (file.read_bytes(), file.stat().st_mtime_ns) for file in folder.rglob("*") if file.is_file()}
 

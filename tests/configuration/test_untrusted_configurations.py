@@ -91,16 +91,17 @@ def test_messages_have_no_control_characters(load):
 def test_pipes_and_devices_are_not_opened(tmp_path, refused):
     pipe = tmp_path / "pipe"
     os.mkfifo(pipe)
-    wrong = {pipe: "is a pipe", "/dev/zero": "is a device", tmp_path: "is a folder", tmp_path / "none": "no such file"}
+    other = "is not a file but a device, a pipe or a socket"
+    wrong = {pipe: other, "/dev/zero": other, tmp_path: "is a folder", tmp_path / "none": "no such file"}
     for path, problem in wrong.items():
         with pytest.raises(ConfigurationError, match=f"{problem}; expected a YAML file"):
             load_configuration(path)
-    for path, kind in ((str(pipe), "pipe"), ("/dev/zero", "device")):
+    for path in (str(pipe), "/dev/zero"):
         for surface in (measured_surface(path=path), {"kind": "file", "height_unit": "um", "period": "1 mm"}):
-            refused("surfaces.rough", surface | {"path": path}, f"surfaces.rough.path: '{path}' is a {kind}")
+            refused("surfaces.rough", surface | {"path": path}, f"surfaces.rough.path: '{path}' {other}")
         columns = {"load": {"column": "a", "unit": "1"}, "area": {"column": "b", "unit": "1"}}
         entry = {"path": path, "label": "a", "citation": "b", "study": "one"} | columns
-        refused("measurements", {"m": entry}, f"measurements.m.path: '{path}' is a {kind}")
+        refused("measurements", {"m": entry}, f"measurements.m.path: '{path}' {other}")
 
 
 WRONG = {

@@ -188,15 +188,6 @@ def test_fig13_draws_boundary_elements_over_their_run(tree, name, markers):
     assert {f"{name}, loading", f"{name}, unloading"} <= set(legend(figure))
 
 
-def test_fig13_without_a_seed_shows_one_with_boundary_elements_or_the_mean(tree):
-    other = separate.run("sticky", 0.5, seed=2, depth=0.5)
-    assert not any("boundary" in name for name in legend(fig13_loops.figure(tree, [other], study="hard", seed=1)))
-    assert any("boundary" in name for name in legend(fig13_loops.figure(tree, [other], study="hard")))
-    assert "single seeds beside their mean, n = 2" in legend(fig13_loops.figure(tree, study="hard"))
-    with pytest.raises(ValueError, match=r"study hard: no run is of the same contact .* surface_energy 0\.06"):
-        fig13_loops.figure(tree, [other.assign(surface_energy=0.06)], study="hard")
-
-
 # --- figure 14 --------------------------------------------------------------------------------------------------
 
 
@@ -224,9 +215,9 @@ def test_fig14_shows_means_and_scatter_over_the_seeds(tree):
     )
     np.testing.assert_allclose(np.transpose(sticky[0].get_data()), sorted(states.mean(axis=1).tolist()))
     assert np.all(bare[0].get_ydata() == 0)
-    assert "0.5" in right.get_title("right")
     assert sticky[0].get_color() == left.containers[0][0].get_color() != bare[0].get_color()
-    assert len(legend(figure)) == 3
+    # Materials, the slope of (b), and the seeds.
+    assert len(legend(figure)) == 4
 
 
 def test_fig14_shows_zero_and_values_that_span_decades():
@@ -306,7 +297,7 @@ def test_fig15_fits_nothing_through_two_loads_or_other_seeds(tree):
     ]
     figure = fig15_loss.figure(separate.tree(*runs), studies=list(DEPTHS))
     assert not any("r^2" in name for name in legend(figure))
-    assert len(figure.axes[0].containers[0][0].get_xdata()) == 3
+    assert np.count_nonzero(np.isfinite(figure.axes[0].containers[0][0].get_xdata())) == 3
 
 
 def points(*runs):

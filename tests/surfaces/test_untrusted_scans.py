@@ -266,9 +266,9 @@ def test_paths_that_are_no_files_are_not_opened(tmp_path, monkeypatch):
         monkeypatch.chdir(tmp_path)
         own.bind("socket.npy")
         for path, flaw in (
-            (tmp_path / "pipe.npy", "is a pipe"),
-            (tmp_path / "socket.npy", "is a socket"),
-            ("/dev/zero", "is a device"),
+            (tmp_path / "pipe.npy", "is not a file"),
+            (tmp_path / "socket.npy", "is not a file"),
+            ("/dev/zero", "is not a file"),
             (tmp_path, "is a folder"),
             (tmp_path / "none.npy", "no such file"),
             ("a\0b", "no such file"),
