@@ -45,7 +45,7 @@ _MAX_SOLVES = 20
 _MAX_ITERATIONS = 100_000
 # Numbers of iterations between two checks of the gap: while it is open everywhere, and otherwise.
 _OPEN_ITERATIONS, _TOUCHING_ITERATIONS = 50, 1000
-# Distance over which the load on rough surfaces decreases by about a factor e, used for the first step of the search; and
+# Distance over which the load on rough surfaces decreases by about a factor e, for the first step of a search; and
 # longest step of the search. Both are in h_rms.
 _DECAY, _LONGEST_STEP = 0.4, 0.3
 
