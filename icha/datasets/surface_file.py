@@ -57,7 +57,7 @@ def write_surface(
     if spectrum is not None:
         values |= get_values(spectrum, "rolloff_wavelength", "short_wavelength", "hurst")
     if measured is not None:
-        values["measured_rms_slope"] = measured.rms_slope
+        values["measured_rms_slope"] = measured.surface.rms_slope
     kind, origin = "Self-affine surface" if spectrum is not None else "Surface from a file", {}
     if measured is not None:
         kind = "Measured topography"
