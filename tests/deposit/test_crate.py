@@ -4,7 +4,6 @@ import hashlib
 import json
 import re
 import shutil
-from pathlib import Path
 from urllib.parse import unquote
 
 import pytest
@@ -130,15 +129,6 @@ def test_authors_licence_and_paper_of_the_model(entities):
     assert root["keywords"] == ["adhesion", "rough surfaces, soft"]
     paper = entities[root["citation"]["@id"]]
     assert paper["@id"] == MODEL_PAPER.address and paper["name"] == MODEL_PAPER.line
-
-
-def test_no_time_no_name_made_at_random_and_no_place_of_this_machine(deposit):
-    text = (deposit / CRATE).read_text(encoding="utf-8")
-    assert not re.search(r"\d\d:\d\d", text)
-    assert set(re.findall(r"\d{4}-\d\d-\d\d", text)) - {ORCID[:10]} == {"2026-01-31"}
-    assert not re.search(r"[0-9a-f]{8}-[0-9a-f]{4}-", text)
-    assert not re.search(r'(startTime|endTime|"/|file:|arcp:)', text)
-    assert str(Path.home()) not in text and str(deposit) not in text
 
 
 def test_the_same_deposit_has_the_same_bytes_whatever_the_order_of_jobs(deposit, tmp_path):
