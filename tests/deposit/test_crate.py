@@ -143,10 +143,9 @@ def test_it_is_a_workflow_run_crate_and_can_be_read(name, deposit, tmp_path):
         shutil.copytree(deposit, folder)
     else:
         written(folder, PUBLICATIONS[name])
-    done = validated(sealed(folder), "roc-validator", "runcrate")
+    done = validated(sealed(folder), "roc-validator")
     assert done.returncode == 0, done.stdout + done.stderr
     assert re.search(r"^roc-validator: passed; \d{2,} checks of workflow-run-crate-0.5, 0 problems", done.stdout)
-    assert f"runcrate: passed; {len(JOBS) + 1} actions" in done.stdout
     content = json.loads((folder / CRATE).read_bytes())
     content["@graph"] = [entity for entity in content["@graph"] if entity["@id"] != "#configuration"]
     (folder / CRATE).write_text(json.dumps(content))

@@ -146,7 +146,7 @@ def test_the_page_for_readers_has_the_numbers(published):
     assert page.startswith("# One file \\| one material\n")
     for text in (
         "Carberry, Josiah (2026): One file \\| one material. Version 1.0.0",
-        "| made by | ORCID |\n|---|---|\n| Josiah Carberry | <https://orcid.org/0000-0002-1825-0097> |\n",
+        "| Josiah Carberry | <https://orcid.org/0000-0002-1825-0097> |  |\n",
         "| load | asperities | plate | 0 | 0.5 | soft | 1 | 1 | 0 |",
         "| soft | 2.5e+07 | 0.05 | 4e-08 |",
         yaml.safe_load((published / "CITATION.cff").read_text())["commit"],
