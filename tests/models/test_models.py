@@ -114,11 +114,6 @@ def test_every_run_of_both_models_is_taken_out_unchanged(runs):
         select_run(tree, labels("other"))
 
 
-def test_a_run_under_the_name_of_another_model_is_refused(runs):
-    with pytest.raises(ValueError, match=r"one/rough/seed1/slope1/boundary_elements/soft: the dataset's model is asp"):
-        campaign_tree([(labels(REFERENCE_MODEL), runs[labels(DEFAULT_MODEL)])])
-
-
 def test_a_failed_run_of_boundary_elements_leaves_the_others_whole(runs):
     broken = labels(REFERENCE_MODEL)
     whole = runs[broken]
