@@ -23,7 +23,6 @@ from icha.cli import app
 from icha.cli.live import Progress, View, read_error, read_last_line
 from icha.cli.project import list_campaigns, reports_errors
 from icha.configuration.cases import run_cases, run_sha256
-from icha.configuration.errors import ConfigurationError
 from icha.configuration.load import load_configuration
 from icha.datasets.campaign_file import write_campaign
 from icha.datasets.files import read_dataset, write_dataset
@@ -253,23 +252,6 @@ def test_only_the_boundary_of_a_complete_file_is_left_to_fill_in(project, bounda
     assert any(line.strip().startswith(f"#   {boundary}  ") for line in text.splitlines()), "no explanation"
     file.write_text(text.replace("boundary: ", f"boundary: {boundary}"))
     assert load_configuration(file).warnings == ()
-
-
-def test_a_scan_with_a_wrong_unit_is_refused_unless_its_size_is_confirmed(project):
-    write_scan("far.txt", rough_heights() * 1e7, "160 m")
-    output("new", "far", "--measured", "far.txt")
-    key = "surfaces.far.size"
-    file = CAMPAIGNS / "far.yaml"
-    text = file.read_text().replace("boundary: ", "boundary: free")
-    file.write_text(text)
-    refused = printed("describe", "far", status=2)
-    assert f"{key}: '160 m' is unusual" in refused and f"`confirmed: [{key}]`" in refused
-    file.write_text(f"{text}\nconfirmed: [{key}]\n")
-    (warning,) = load_configuration(file).warnings
-    assert f"{key}: '160 m' is unusual" in warning and "confirmed" in warning
-    file.write_text(text.replace("touches_first", "size: 160 um\n    touches_first"))
-    with pytest.raises(ConfigurationError, match=r"surfaces\.far\.height_unit: 'rms slope .*' is unusual"):
-        load_configuration(file)
 
 
 def test_a_scan_is_analysed_before_anything_is_computed(project):
