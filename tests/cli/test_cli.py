@@ -330,19 +330,6 @@ def test_outside_a_clone_the_installed_workflow_is_used(empty_folder):
     assert "configuration: config/config.yaml" in output("describe")
 
 
-@pytest.mark.parametrize("place", ["results", "results/smoke"])
-@pytest.mark.parametrize("link", [True, False])
-def test_an_obstacle_in_place_of_a_folder_is_named(empty_folder, place, link):
-    obstacle = empty_folder / place
-    obstacle.parent.mkdir(exist_ok=True)
-    if link:
-        obstacle.symlink_to("nowhere")
-    else:
-        obstacle.write_text("something else")
-    refused = output("run", "smoke", status=2)
-    assert f"Error: {place} is a {'link to nowhere' if link else 'file'}" in refused and "File exists" not in refused
-
-
 def test_the_states_of_runs_are_distinguished(tiny):
     campaign, results = tiny
     done, changed, failed, missing = run_cases(campaign)

@@ -81,7 +81,7 @@ def item(name, seconds=1.0, memory=1 * GB, stage=0, state=TO_DO, threads=1):
 def test_time_is_that_of_the_start_and_of_one_stage_after_the_other():
     jobs = [item("a", 10), item("b", 2), item("c", 4, stage=1)]
     start, job = start_up(jobs), WORKFLOW.job
-    assert start > WORKFLOW.environment
+    assert start > WORKFLOW.start
     assert time_on(jobs, 1) == pytest.approx(start + 16 + 3 * job)
     assert time_on(jobs, 10**6) == pytest.approx(start + 10 + 4)
     assert time_on([item("a", state=DONE)], 1) == 0

@@ -4,18 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from icha.support.atomic_files import find_obstacle, is_left_over, probe_folder, take_over, whole_file
-
-
-def test_what_is_where_a_folder_is_to_be_is_named(tmp_path):
-    (tmp_path / "file").write_text("something else")
-    (tmp_path / "link").symlink_to("nowhere")
-    (tmp_path / "folder").mkdir()
-    assert find_obstacle(tmp_path / "folder/results/mine") is None
-    assert find_obstacle(tmp_path / "file/mine") == f"{tmp_path}/file is a file, not a folder"
-    assert find_obstacle(tmp_path / "link/mine").startswith(
-        f"{tmp_path}/link is a link to nowhere, which does not exist"
-    )
+from icha.support.atomic_files import is_left_over, probe_folder, take_over, whole_file
 
 
 def test_whatever_a_killed_program_leaves_is_known_by_its_name(tmp_path, monkeypatch):
