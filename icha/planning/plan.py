@@ -179,10 +179,10 @@ def _derived_files(campaign, files: CampaignFiles, computed: list[Item]) -> Iter
         for path in paths:
             yield "dataset and checks", rule, path, stage, inputs, cost(rule, count, disk_of_table, values)
     result_files = ResultFiles(campaign.name)
-    for name in campaign.figures.by_name():
+    for name, options in campaign.figures.by_name().items():
         path = result_files.path(results_files.FIGURE, name=name, ending="png")
         inputs = campaign.figures.inputs(name, campaign, result_files).values()
-        shown = set(campaign.figures.studies_of(name, campaign))
+        shown = set(options.studies_of(campaign))
         count = sum(case.study in shown for case in files.runs.values())
         grids = [campaign.grid(surface) for study in shown for surface in campaign.studies[study].surfaces]
         nodes = max(grids) ** 2 if DECLARATIONS[name].holds_topography else 0

@@ -42,7 +42,7 @@ figures = Figures.model_validate({"fig99_trivial": {"study": "slopes"}})
 assert list(figures.by_name()) == ["fig99_trivial"]
 assert "and nothing else" in json_schema() and "`figures.fig99_trivial`" in key_tables()
 inputs = figures.inputs("fig99_trivial", None, ResultFiles("small", sys.argv[1]))
-arguments = figures.arguments("fig99_trivial", None)
+arguments = figures.fig99_trivial.arguments(None)
 draw_figure("fig99_trivial", "a.png", "a.pdf", inputs=inputs, arguments=arguments)
 """
 
