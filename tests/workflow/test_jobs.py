@@ -204,9 +204,7 @@ def test_a_file_or_a_broken_link_instead_of_the_results_is_named(link, tmp_path,
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(before_jobs, "hold_lock", lambda path: None)
     Path("results").symlink_to("nowhere") if link else Path("results").write_text("something else")
-    with pytest.raises(
-        SystemExit, match="results/tiny cannot be written to: instead of a folder there is"
-    ):
+    with pytest.raises(SystemExit, match="results/tiny cannot be written to: instead of a folder there is"):
         campaign(before_jobs)
 
 
