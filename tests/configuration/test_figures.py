@@ -12,13 +12,6 @@ def test_figures_of_snapshots_need_one(load):
         load({"figures": figures, "studies.one.snapshots": []})
 
 
-def test_the_figure_of_tabor_parameters_needs_adhesion(load):
-    figures = {"fig9_tabor": {"study": "one"}}
-    load({"figures": figures})
-    with pytest.raises(ConfigurationError, match=r"fig9_tabor\.study: 'one' has no material with adhesion"):
-        load({"figures": figures, "materials.soft.surface_energy": "0 J/m^2"})
-
-
 def test_a_map_shows_the_first_run_with_the_requested_labels(load):
     campaign = load({"figures": {"fig4_contact_map": {"study": "one", "seed": 2, "snapshot": {"area_fraction": 0.02}}}})
     arguments = campaign.campaign.figures.arguments("fig4_contact_map", campaign.campaign)
