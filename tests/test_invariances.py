@@ -1,9 +1,8 @@
 """Invariances of both models on random contacts: units, position and direction, range, steps, threads."""
 
-import hashlib
-
 import numpy as np
 import pytest
+from digests import digest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
@@ -71,16 +70,6 @@ def assert_same(one, other, bound, counts=COUNTS):
     np.testing.assert_allclose(other["reduced_separation"], one["reduced_separation"], atol=bound)
     for name in counts:
         np.testing.assert_array_equal(other[name], one[name], err_msg=name)
-
-
-def digest(run, without=()):
-    """All bytes of a run's values."""
-    total = hashlib.sha256()
-    for name, variable in run.drop_vars(without).variables.items():
-        values = variable.values
-        total.update(name.encode())
-        total.update(repr(values.tolist()).encode() if values.dtype == object else values.tobytes())
-    return total.hexdigest()
 
 
 def scaled(surface, material, length, stress):

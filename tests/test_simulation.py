@@ -1,6 +1,5 @@
 """Loading sweeps as a whole: identities, symmetries, scaling, refinement, bytes, and reported failures."""
 
-import hashlib
 import os
 import pickle
 import subprocess
@@ -9,6 +8,7 @@ import sys
 import numpy as np
 import pytest
 import xarray as xr
+from digests import digest
 
 from icha import ConvergenceError, Material, Path, SelfAffineSpectrum, Surface, simulate
 from icha.asperity.stickiness import stickiness
@@ -149,19 +149,10 @@ def test_refining_the_grid_of_one_spectrum(material, seed):
 SCRIPT = """
 import hashlib, sys
 sys.path.insert(0, {here!r})
-from test_simulation import digest, run_of, rough, ADHESIVE
+from digests import digest
+from test_simulation import run_of, rough, ADHESIVE
 print(digest(run_of(rough(ratio=16), ADHESIVE)))
 """
-
-
-def digest(dataset):
-    """Hash of every value, bit by bit."""
-    total = hashlib.sha256()
-    for name in sorted(dataset.variables):
-        values = dataset[name].values
-        total.update(name.encode())
-        total.update(repr(values.tolist()).encode() if values.dtype == object else values.tobytes())
-    return total.hexdigest()
 
 
 def test_the_same_bytes_on_a_second_run_and_with_one_and_two_threads():
@@ -178,20 +169,6 @@ def test_the_same_bytes_on_a_second_run_and_with_one_and_two_threads():
             check=True,
         )
         assert result.stdout.strip() == here, threads
-
-
-def test_netcdf_keeps_every_value(run, tmp_path):
-    file = tmp_path / "run.nc"
-    run.to_netcdf(file)
-    with xr.open_dataset(file) as back:
-        back.load()
-    assert set(back.variables) == set(run.variables)
-    for name in run.variables:
-        assert back[name].dims == run[name].dims
-        np.testing.assert_array_equal(back[name].values, run[name].values, err_msg=name)
-        # Bounds have the units of what they bound: xarray does not write them twice.
-        assert back[name.replace("_bounds", "_centre")].attrs["units"] == run[name].attrs["units"]
-    assert back.attrs == run.attrs
 
 
 # --- failures -----------------------------------------------------------------------------------------------

@@ -107,9 +107,12 @@ def compare_single_spots(
 def _summit_of_spots(contact, state):
     """Return the summit at the centre of each spot, (s,) int, or -1; a spot may also cover other summits."""
     spots, asperities = state.spots, contact.asperities
-    owned = np.flatnonzero(state.spot_of_asperity >= 0)
+    index = np.full(len(state.sites) + 1, -1)
+    index[state.contact_index] = np.arange(len(spots))
+    spot_of_asperity = index[state.site_of_asperity]  # -1 takes the last entry
+    owned = np.flatnonzero(spot_of_asperity >= 0)
     position = np.mod(asperities.position[owned], asperities.period)
-    at_summit = np.all(spots.position[state.spot_of_asperity[owned]] == position, axis=1)
+    at_summit = np.all(spots.position[spot_of_asperity[owned]] == position, axis=1)
     summit = np.full(len(spots), -1)
-    summit[state.spot_of_asperity[owned[at_summit]]] = owned[at_summit]
+    summit[spot_of_asperity[owned[at_summit]]] = owned[at_summit]
     return summit

@@ -22,7 +22,7 @@ from icha.datasets.labels import LABELS, RunLabels, SolutionLabels, arrange_slop
 from icha.datasets.variables.campaign import COMPLETE, INCOMPLETE, NOT_IN_DESIGN, RAGGED, STATUS
 from icha.datasets.variables.model_error import ASKED, BINS, FINITE_RANGE, MODEL_ERROR, SHORT_RANGE
 from icha.datasets.variables.terms import MATERIAL, Variable
-from icha.equilibrium.distributions import nodes_in_discs
+from icha.equilibrium.distributions import cover_grid
 from icha.path.targets import REDUCED_PRESSURE
 from icha.support.statistics import ensemble
 
@@ -279,7 +279,7 @@ def contact_of_spots(run: xr.Dataset, snapshot: int, grid: int) -> np.ndarray:
     """Return whether each node lies inside a spot of a snapshot, (n, n) bool along y and x."""
     spots = spots_of(run, snapshot)
     centres = np.column_stack([spots["spot_x"].values, spots["spot_y"].values])
-    return nodes_in_discs(float(run["period"]), grid, centres, spots["spot_radius"].values)
+    return cover_grid(float(run["period"]), grid, centres, spots["spot_radius"].values)[1]
 
 
 def jaccard(one: np.ndarray, other: np.ndarray) -> float:

@@ -68,7 +68,7 @@ def check_loop(run) -> Iterator[tuple]:
 
 def _has_united(run):
     """Return whether spots have united by a rule, which may cost or gain a little energy."""
-    return model_of(run.attrs).unites and int(run["coalescence_count"][-1]) > 0
+    return model_of(run.attrs).by_summits and int(run["coalescence_count"][-1]) > 0
 
 
 def _check_losses(run, scale):

@@ -6,7 +6,6 @@ import re
 import shutil
 import sys
 import tempfile
-import textwrap
 from collections.abc import Iterator
 from importlib.metadata import version
 from pathlib import Path
@@ -135,20 +134,10 @@ def reproduce(
 
 
 def _introduce(deposit: Path, original: Path, folder: Path | None) -> None:
-    """Print what a deposit contains and its metadata; refuse it if it was made with other versions."""
-    from icha.deposit.metadata import read_zenodo_metadata, summary_of
+    """Print the size of a deposit and what computes it again; refuse it if it was made with other versions."""
     from icha.deposit.reproduce import RerunError, count_changed_files, other_versions
-    from icha.deposit.verify import ZENODO
 
-    try:
-        metadata = summary_of(read_zenodo_metadata(original)) if (original / ZENODO).is_file() else {}
-    except ValueError as error:
-        raise RerunError(str(error)) from None
     echo(f"deposit:    {printable(deposit)}, {_contents(original)}")
-    echo("its metadata, which ICHA cannot verify:" if metadata else "it has no metadata on title and authors")
-    for name, text in metadata.items():
-        if text:
-            echo(f"  {name + ':':<10}{printable(textwrap.shorten(text, 200, placeholder=' …'))}")
     if differences := other_versions(original):
         raise RerunError(
             "was made with other versions than those installed; expected the same versions. Run `make environment` in "

@@ -15,7 +15,6 @@ from rich.table import Table
 from rich.text import Text
 
 from icha.cli.project import TARGETS
-from icha.datasets.results import CHECKS, MODEL_ERROR, REPORT
 from icha.support import formatting
 from icha.support.formatting import printable
 
@@ -23,20 +22,6 @@ from icha.support.formatting import printable
 PRIOR_SECONDS = 5.0
 # Expected core-seconds of a job without an estimate, which writes a few lines.
 DEFAULT_SECONDS = 0.1
-# Rule of an output file by the beginning of its path in the folder of results; the first match counts.
-RULES = {
-    "surfaces/": "surface",
-    "runs/": "run",
-    "references/boundary_elements/": "boundary_elements",
-    "references/loops/": "boundary_element_loop",
-    "references/": "reference",
-    "dataset/": "campaign_dataset",
-    MODEL_ERROR: "model_error",
-    "aggregated/": "comparison",
-    CHECKS: "checks",
-    "figures/": "figure",
-    REPORT: "report_page",
-}
 MOST_JOBS = 8  # running jobs in the live view
 MOST_ERROR_LINES = 3  # of a failed job in the view
 
@@ -78,7 +63,7 @@ class Progress:
 
     Attributes
     ----------
-    expected : expected core-seconds of the job of an output file, by the path of the file.
+    expected : rule and expected core-seconds of the job of an output file, by the path of the file.
     clock : function that returns the time in s.
     total : number of jobs by rule.
     running : running jobs by their number.
@@ -89,7 +74,7 @@ class Progress:
     called : time of the call of `icha run` in s.
     """
 
-    expected: Mapping[str, float] = field(default_factory=dict)
+    expected: Mapping[str, tuple[str, float]] = field(default_factory=dict)
     clock: Callable[[], float] = time.monotonic
     total: dict[str, int] = field(default_factory=dict)
     running: dict[int, JobRecord] = field(default_factory=dict)
@@ -138,12 +123,6 @@ class Progress:
         """Number of jobs that succeeded or failed."""
         return len(self.done) + len(self.failed)
 
-    def counts(self) -> list[tuple[str, int, int, int, int]]:
-        """Return each rule with its numbers of jobs: done, running, failed, all; in the order of the plan."""
-        done, failed = (Counter(job.rule for job in jobs) for jobs in (self.done, self.failed))
-        running = Counter(job.rule for job in self.running.values())
-        return [(rule, done[rule], running[rule], failed[rule], total) for rule, total in self.total.items()]
-
     def seconds_left(self) -> float | None:
         """Estimate the time until all jobs are done, from expected and measured times; None before the first plan.
 
@@ -162,7 +141,7 @@ class Progress:
 
     def _expected_work(self, job: JobRecord) -> float:
         """Return the core-seconds that a job is expected to take."""
-        return max((self.expected.get(output, 0.0) for output in job.outputs), default=0.0) or DEFAULT_SECONDS
+        return max((self.expected[each][1] for each in job.outputs if each in self.expected), default=DEFAULT_SECONDS)
 
     def _waiting_work(self, begun: list[JobRecord]) -> float:
         """Return the expected core-seconds of the jobs that have not begun.
@@ -171,9 +150,9 @@ class Progress:
         """
         outputs = {output for job in begun for output in job.outputs}
         expected: dict[str, list[float]] = {}
-        for output, seconds in self.expected.items():
+        for output, (rule, seconds) in self.expected.items():
             if output not in outputs:
-                expected.setdefault(find_rule(output), []).append(seconds)
+                expected.setdefault(rule, []).append(seconds)
         waiting = Counter(self.total) - Counter(job.rule for job in begun)
         means = {rule: sum(seconds) / len(seconds) for rule, seconds in expected.items()}
         return sum(count * means.get(rule, DEFAULT_SECONDS) for rule, count in waiting.items())
@@ -182,12 +161,6 @@ class Progress:
         """Return the estimated time until all jobs are done, as text."""
         seconds = self.seconds_left()
         return "time left unknown" if seconds is None else f"about {formatting.duration(seconds)} left"
-
-
-def find_rule(output: str) -> str:
-    """Return the rule that makes a file under `results/<campaign>/`."""
-    path = "/".join(Path(output).parts[2:])
-    return next((rule for beginning, rule in RULES.items() if path.startswith(beginning)), "")
 
 
 def _complete_lines(job: JobRecord, folder: Path) -> list[str]:
@@ -268,7 +241,10 @@ class View:
         table = Table(box=None, pad_edge=False, header_style="dim")
         for heading in ("", "done", "running", "failed", "of", ""):
             table.add_column(heading, justify="right" if heading else "left")
-        for rule, done, running, failed, total in self._progress.counts():
+        states = (self._progress.done, self._progress.running.values(), self._progress.failed)
+        counts = [Counter(job.rule for job in jobs) for jobs in states]
+        for rule, total in self._progress.total.items():
+            done, running, failed = (count[rule] for count in counts)
             style = "red" if failed else "green" if done == total else "bold" if running else "dim"
             cells = [str(number or "") for number in (done, running, failed)]
             bar = ProgressBar(total=total, completed=done + failed, width=20)

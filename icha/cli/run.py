@@ -36,7 +36,6 @@ from icha.cli.project import (
     shorten_path,
 )
 from icha.support import formatting
-from icha.support.atomic_files import find_obstacle
 from icha.support.formatting import format_count
 
 STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
@@ -92,8 +91,6 @@ def run(
         raise UserError(f"{', '.join(unknown)}: not a target; expected {expected}")
     if reason := find_conflict(shorten_path(results), campaign.name, path, workflow):
         raise UserError(f"{reason} Nothing was started")
-    if obstacle := find_obstacle(shorten_path(folder / ".snakemake")):
-        raise UserError(f"{obstacle}: Snakemake needs this folder for its records. Remove it or repair it")
     command = [
         # -P: a file in the working directory must not replace a module of the same name.
         *(sys.executable, "-P", "-m", "snakemake", *targets),
@@ -111,7 +108,7 @@ def run(
     from rich.console import Console
 
     from icha.cli.live import Progress, View
-    from icha.planning.plan import expected_seconds, plan, time_on
+    from icha.planning.plan import expected_work, plan, time_on
     from icha.planning.validity import expected_validity
 
     items = plan(campaign, results)
@@ -119,7 +116,7 @@ def run(
         _refuse_if_too_large(items, targets, cores or DEFAULT_CORES, results, read_profile(profile_folder))
     if not set(targets) - set(TARGETS):
         _print_validity(expected_validity(campaign))
-    progress = Progress(expected_seconds(items, f"results/{campaign.name}"))
+    progress = Progress(expected_work(items, f"results/{campaign.name}"))
     view = View(progress, campaign.name, folder, Console(highlight=False))
     log = _log_file(folder, campaign.name)
     status, stopped = _run_snakemake([*command, "--logger", "icha"], workflow, log, progress, view)

@@ -12,7 +12,6 @@ import statistics
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from icha.datasets.results import COMPRESSED_SIZES
 from icha.path.targets import DEFAULT_STEP
 from icha.support.parallel import LARGE_GRID
 
@@ -67,9 +66,9 @@ class PowerLaw:
         return self.base + self.scale * math.prod(quantities[name] ** power for name, power in self.powers.items())
 
 
-# Laws of runs are named by the model, adhesion and unloading. Quantities are `nodes` of the grid of the surface or the
-# solver, `spots` at the largest load, `stops` (targets of the path), `load` p/(E* h'rms), `step` of the mean gap in
-# h_rms, and `runs` of a campaign.
+# Laws of runs are named by the model, adhesion and unloading; others by the rule of Snakemake. Quantities are: `nodes`
+# of the grid of the surface or the solver, `spots` at the largest load, `stops` (targets of the path), `load`
+# p/(E* h'rms), `step` of the mean gap in h_rms, and `runs` of a campaign.
 LAWS = {
     "surface": PowerLaw(0.015, 2.4e-7, {"nodes": 1}),
     "asperities": PowerLaw(0.14, 1.6e-3, {"spots": 1.06}),
@@ -84,14 +83,14 @@ LAWS = {
     "finite range, adhesion": PowerLaw(0, 1.2e-8, {"nodes": 1.56, "load": -0.5}),
     "finite range, cycle": PowerLaw(0, 2.8e-7, {"nodes": 1.72, "step": -0.1}),
     "finite range, adhesion, cycle": PowerLaw(0, 1.4e-6, {"nodes": 1.72, "step": -0.1}),
-    "theories": PowerLaw(0.28, 0, {}),
-    "dataset": PowerLaw(0.07, 0.015, {"runs": 1}),
+    "reference": PowerLaw(0.28, 0, {}),
+    "campaign_dataset": PowerLaw(0.07, 0.015, {"runs": 1}),
     "comparison": PowerLaw(0.07, 0.003, {"runs": 1}),
-    "model error": PowerLaw(0.07, 0.05, {"runs": 1}),
+    "model_error": PowerLaw(0.07, 0.05, {"runs": 1}),
     "checks": PowerLaw(0.06, 0.006, {"runs": 1}),
     "figure": PowerLaw(1.3, 0.007, {"runs": 1}),
     "map": PowerLaw(0, 9.5e-8, {"nodes": 1}),
-    "report": PowerLaw(0.25, 0.01, {"runs": 1}),
+    "report_page": PowerLaw(0.25, 0.01, {"runs": 1}),
 }
 
 
@@ -131,10 +130,8 @@ def _memory_before(grid):
 def surface_cost(grid: int) -> Cost:
     """Return the cost of a topography with `grid` nodes along a side."""
     heights = _DOUBLE * grid**2
-    # Compression saves about a sixth of the heights.
-    compression = 0.84 if grid**2 in COMPRESSED_SIZES else 1.0
     seconds = LAWS["surface"].seconds(nodes=grid**2)
-    return Cost(seconds, _memory_before(grid) + 2.7 * heights, 18e3 + compression * heights)
+    return Cost(seconds, _memory_before(grid) + 2.7 * heights, 18e3 + heights)
 
 
 def spots(summits: float, load: float) -> float:
@@ -233,24 +230,24 @@ _BLOCKS = 35 * MiB
 # Arrays of a topography that a contact map holds at a time, by the number of models that it shows.
 MAP_ARRAYS = {1: 2, 2: 7}
 # Memory of the libraries and pages of a job, bytes.
-_LIBRARIES = {"figure": 85 * MiB, "report": 18 * MiB}
+_LIBRARIES = {"figure": 85 * MiB, "report_page": 18 * MiB}
 
 
-def derived_cost(kind: str, runs: int, disk: float, values: float = 0.0, *, nodes: int = 0, models: int = 1) -> Cost:
+def derived_cost(rule: str, runs: int, disk: float, values: float = 0.0, *, nodes: int = 0, models: int = 1) -> Cost:
     """Cost of a file that is computed from a surface or from runs.
 
     Parameters
     ----------
-    kind : name of its law in `LAWS`.
+    rule : the rule that makes it, which is the name of its law in `LAWS`.
     runs : number of runs that it contains or shows.
     disk : size of the file, bytes.
     values : sum of the `values` of all runs of the campaign, bytes.
     nodes : nodes of the topography that a figure shows, 0 without one.
     models : number of models whose contacts a figure shows.
     """
-    seconds = LAWS[kind].seconds(runs=runs) + LAWS["map"].seconds(nodes=nodes)
-    read = min(_COPIES * values, _BLOCKS if kind == "dataset" else _MOST_READ)
-    memory = _LIBRARIES.get(kind, 4 * MiB) + MAP_ARRAYS[models] * _DOUBLE * nodes + read
+    seconds = LAWS[rule].seconds(runs=runs) + LAWS["map"].seconds(nodes=nodes)
+    read = min(_COPIES * values, _BLOCKS if rule == "campaign_dataset" else _MOST_READ)
+    memory = _LIBRARIES.get(rule, 4 * MiB) + MAP_ARRAYS[models] * _DOUBLE * nodes + read
     return Cost(seconds, WORKFLOW.forked + memory, disk)
 
 

@@ -36,6 +36,7 @@ class Item:
     Attributes
     ----------
     part : part of the campaign that it belongs to, as `icha describe` lists them.
+    rule : the rule of Snakemake that makes it.
     path : in the folder of results.
     state : DONE, TO_DO, CHANGED, FAILED or DAMAGED.
     cost : of its job.
@@ -45,6 +46,7 @@ class Item:
     """
 
     part: str
+    rule: str
     path: str
     state: str
     cost: costs.Cost
@@ -55,7 +57,7 @@ class Item:
     @property
     def is_run(self) -> bool:
         """Whether the file is a run of a study."""
-        return self.path.startswith("runs/")
+        return self.rule == "run"
 
     @property
     def to_do(self) -> bool:
@@ -81,16 +83,12 @@ def plan(campaign: Campaign, results: Path) -> list[Item]:
     results : its folder of results, whose benchmarks calibrate the expected times for this machine.
     """
     items = _items(campaign, results)
-    kinds: dict[str, list[Item]] = {}
+    kinds: dict[tuple[str, str], list[Item]] = {}
     for item in items:
-        kinds.setdefault(_kind(item), []).append(item)
+        kinds.setdefault((item.part, item.rule), []).append(item)
     factors = {kind: _correction(members, results) for kind, members in kinds.items()}
-    return [replace(item, cost=replace(item.cost, seconds=item.cost.seconds * factors[_kind(item)])) for item in items]
-
-
-def _kind(item: Item) -> str:
-    """Return the name of the jobs that take similar times: a study, or a part and a folder of results."""
-    return item.part if item.part.startswith("study ") else item.path.split("/")[0] + item.part
+    seconds = (item.cost.seconds * factors[item.part, item.rule] for item in items)
+    return [replace(item, cost=replace(item.cost, seconds=each)) for item, each in zip(items, seconds, strict=True)]
 
 
 def _correction(items: list[Item], results: Path) -> float:
@@ -113,11 +111,11 @@ def _items(campaign, results) -> list[Item]:
     files = campaign_files(campaign)
     items = list(_computed_files(campaign, results, files))
     outdated = {item.path for item in items if item.to_do}
-    for part, path, stage, inputs, cost in _derived_files(campaign, files, items):
+    for part, rule, path, stage, inputs, cost in _derived_files(campaign, files, items):
         state = _state(results, path)
         if state == DONE and not outdated.isdisjoint(inputs):
             state = TO_DO
-        items.append(Item(part, path, state, cost, stage=stage))
+        items.append(Item(part, rule, path, state, cost, stage=stage))
         if items[-1].to_do:
             outdated.add(path)
     return items
@@ -132,7 +130,8 @@ def _computed_files(campaign, results, files) -> Iterator[Item]:
     summits, run_cost = cache(lambda surface: surface_facts(campaign, surface)["summits"]), cache(costs.run_cost)
     for path, (name, _) in files.surfaces.items():
         grid = campaign.grid(name)
-        yield Item("surfaces", path, _state(results, path), costs.surface_cost(grid), costs.job_threads(grid))
+        cost, threads = costs.surface_cost(grid), costs.job_threads(grid)
+        yield Item("surfaces", "surface", path, _state(results, path), cost, threads)
     for path, case in files.runs.items():
         state, reason = run_state(results / path, run_sha256(campaign, case))
         if not is_whole(results, path):
@@ -142,9 +141,10 @@ def _computed_files(campaign, results, files) -> Iterator[Item]:
         ratio = energy_ratio(campaign, case) if sweep["adhesive"] else math.inf
         cost = run_cost(case.model, grid, summits(case.surface), energy_ratio=ratio, **sweep)
         part = f"study {case.study}" + (f", {MODELS[case.model].words}" if case.model != DEFAULT_MODEL else "")
-        yield Item(part, path, state, cost, costs.job_threads(grid), reason)
+        yield Item(part, "run", path, state, cost, costs.job_threads(grid), reason)
     for path in files.theories:
-        yield Item("theories", path, _state(results, path), costs.derived_cost("theories", 0, 35e3))
+        cost = costs.derived_cost("reference", 0, 35e3)
+        yield Item("theories", "reference", path, _state(results, path), cost)
     for path, solution in files.solutions.items():
         load = {"load": solution.reduced_pressure}
         yield _finite_range(campaign, results, path, campaign.finite_range[solution.entry], solution, load)
@@ -157,38 +157,42 @@ def _finite_range(campaign, results, path, entry, case, quantity) -> Item:
     """Return the file of a solution or a loop by boundary elements at a finite range."""
     adhesive = campaign.materials[case.material].surface_energy > 0
     cost = costs.finite_range_cost(campaign.grid(case.surface) * entry.refinement, adhesive=adhesive, **quantity)
-    part = f"boundary elements{', cycle' if 'step' in quantity else ''} {case.entry}"
-    return Item(part, path, _state(results, path), cost)
+    part, rule = "boundary elements", "boundary_elements"
+    if "step" in quantity:
+        part, rule = f"{part}, cycle", "boundary_element_loop"
+    return Item(f"{part} {case.entry}", rule, path, _state(results, path), cost)
 
 
 def _derived_files(campaign, files: CampaignFiles, computed: list[Item]) -> Iterator[tuple]:
-    """Yield part, path, stage, inputs and cost of the files that are derived from runs."""
+    """Yield part, rule, path, stage, inputs and cost of the files that are derived from runs."""
     runs, cost = len(files.runs), costs.derived_cost
     disk = sum(item.cost.disk for item in computed if item.is_run)
     values = sum(item.cost.values for item in computed)
     beside = [*files.compared, *files.solutions]
     tables = [
-        ("dataset", [files.dataset], 1, files.runs, runs, 0.5 * disk),
+        ("campaign_dataset", [files.dataset], 1, files.runs, runs, 0.5 * disk),
         ("comparison", [files.comparison], 2, [files.dataset], runs, 0.03 * disk + 90e3),
-        ("model error", files.model_error, 2, [files.dataset, *beside], len(beside), 150e3),
+        ("model_error", files.model_error, 2, [files.dataset, *beside], len(beside), 150e3),
         ("checks", [files.checks], 2, [files.dataset, *files.solutions], runs, 5e3 * runs),
     ]
-    for kind, paths, stage, inputs, count, disk_of_table in tables:
+    for rule, paths, stage, inputs, count, disk_of_table in tables:
         for path in paths:
-            yield "dataset and checks", path, stage, inputs, cost(kind, count, disk_of_table, values)
+            yield "dataset and checks", rule, path, stage, inputs, cost(rule, count, disk_of_table, values)
     result_files = ResultFiles(campaign.name)
-    for name in campaign.figures.by_name():
+    for name, options in campaign.figures.by_name().items():
         path = result_files.path(results_files.FIGURE, name=name, ending="png")
         inputs = campaign.figures.inputs(name, campaign, result_files).values()
-        shown = set(campaign.figures.studies_of(name, campaign))
+        shown = set(options.studies_of(campaign))
         count = sum(case.study in shown for case in files.runs.values())
         grids = [campaign.grid(surface) for study in shown for surface in campaign.studies[study].surfaces]
         nodes = max(grids) ** 2 if DECLARATIONS[name].holds_topography else 0
         models = max((len(campaign.studies[study].models) for study in shown), default=1)
         flat = [path for each in inputs for path in ([each] if isinstance(each, str) else each)]
-        yield "figures", path, 3, flat, cost("figure", count, 400e3, values, nodes=nodes, models=models)
+        cost_of_figure = cost("figure", count, 400e3, values, nodes=nodes, models=models)
+        yield "figures", "figure", path, 3, flat, cost_of_figure
     disk_of_report = 700e3 + 250e3 * len(files.figures) // 2
-    yield "report", files.report, 4, files.computed, cost("report", runs, disk_of_report, values)
+    cost_of_report = cost("report_page", runs, disk_of_report, values)
+    yield "report", "report_page", files.report, 4, files.computed, cost_of_report
 
 
 def _cost_parameters(settings, rms_slope) -> dict:
@@ -237,9 +241,9 @@ def failed_runs(campaign: Campaign, results: Path) -> dict[str, str]:
     return {path: reason for path, (state, reason) in states.items() if state == FAILED}
 
 
-def expected_seconds(items: Iterable[Item], folder: str) -> dict[str, float]:
-    """Return the expected core-seconds of each job, with scheduling; keys are the paths of files in `folder`."""
-    return {f"{folder}/{item.path}": item.work + WORKFLOW.job for item in items}
+def expected_work(items: Iterable[Item], folder: str) -> dict[str, tuple[str, float]]:
+    """Return rule and expected core-seconds of each job, with scheduling; keys are the paths of files in `folder`."""
+    return {f"{folder}/{item.path}": (item.rule, item.work + WORKFLOW.job) for item in items}
 
 
 def whole_cost(campaign: Campaign, results: Path) -> costs.Cost:

@@ -1,5 +1,6 @@
 """Types of values in a configuration, such as `25 MPa`, which is kept as a float in SI units."""
 
+import contextlib
 import math
 import operator
 import re
@@ -99,22 +100,14 @@ def _length(unit):
 
 
 def _by_pint(unit, si_unit):
-    import pint
-
-    registry = _registry()
-    if not _UNIT.fullmatch(unit):
-        raise ValueError(f"{unit!r} is not a unit")
-    try:
-        quantity = registry.Quantity(Decimal(1), registry.parse_units(unit))
-        factor = quantity.to("" if si_unit == "1" else si_unit).magnitude
-    except pint.UndefinedUnitError:
-        raise ValueError(f"{unit!r} is not a known unit") from None
-    except pint.DimensionalityError:
-        raise ValueError(f"{unit!r} is not a unit of {PHYSICAL_NAMES[si_unit]}") from None
-    except Exception:  # pint raises a dozen types of errors for text that is not a unit
-        raise ValueError(f"{unit!r} is not a unit") from None
+    """Exact factor by pint, which raises a dozen types of errors for text that is not a unit."""
+    factor = math.nan
+    if _UNIT.fullmatch(unit):
+        with contextlib.suppress(Exception):
+            quantity = _registry().Quantity(Decimal(1), _registry().parse_units(unit))
+            factor = quantity.to("" if si_unit == "1" else si_unit).magnitude
     if not 0 < float(factor) < math.inf:
-        raise ValueError(f"{unit!r} is a unit too large or too small for a number")
+        raise ValueError(f"{unit!r} is not a unit of {PHYSICAL_NAMES[si_unit]}")
     return factor
 
 
@@ -212,21 +205,20 @@ def distinct(values):
     return values
 
 
-def increasing(values):
-    """Refuse a list of numbers that does not increase."""
-    return _require_order(values, operator.gt, "increasing")
+def _ordered(follows, order: str, unit: str = ""):
+    """Return a validator that refuses a list of numbers in another order."""
+
+    def check(values):
+        for before, after in pairwise(values):
+            if not follows(after, before):
+                raise ValueError(f"{after:g}{unit} comes after {before:g}{unit}; expected values in {order} order")
+        return values
+
+    return check
 
 
-def decreasing(values):
-    """Refuse a list of lengths that does not decrease."""
-    return _require_order(values, operator.lt, "decreasing", " m")
-
-
-def _require_order(values, follows, order, unit=""):
-    for before, after in pairwise(values):
-        if not follows(after, before):
-            raise ValueError(f"{after:g}{unit} comes after {before:g}{unit}; expected values in {order} order")
-    return values
+increasing = _ordered(operator.gt, "increasing")
+decreasing = _ordered(operator.lt, "decreasing", " m")
 
 
 def exactly_one(section):

@@ -230,14 +230,14 @@ def test_many_filled_points_and_edges_that_do_not_fit_are_reported(project):
     heights[20:45, 10:40] = np.nan
     write_scan("scan.txt", heights[:48, :48], "10 um")
     written = printed("new", "mine", "--measured", "scan.txt")
-    assert "scan: read as matrix, 750 points without height were filled" in written
-    assert "scan: 33 % of the points are filled" in written and "opposite edges" not in written
+    assert "scan: read as matrix, 750 points without height filled (33 % of all points)" in written
+    assert "opposite edges" not in written
     assert "scan: warning: more than 5 % of the points are filled" in written
     file = CAMPAIGNS / "mine.yaml"
     for boundary, warning in (("periodic", True), ("window", False)):
         file.write_text(re.sub("boundary: .*", f"boundary: {boundary}  # to fill in", file.read_text()))
         described = printed("describe", "mine")
-        assert "33 % of the points are filled" in described
+        assert "filled (33 % of all points)" in described
         assert ("warning: `boundary: periodic`, but opposite edges differ" in described) == warning
 
 
@@ -275,7 +275,7 @@ def test_a_scan_with_a_wrong_unit_is_refused_unless_its_size_is_confirmed(projec
 def test_a_scan_is_analysed_before_anything_is_computed(project):
     write_scan("scan.txt", rough_heights(noise=20e-9), "10 um")
     written = output("new", "mine", "--measured", "scan.txt", "--boundary-elements")
-    assert "scan: read as matrix, no point is missing\n" in written
+    assert "scan: read as matrix, all points have a height\n" in written
     assert re.search(r"^scan: \d+ rows x \d+ columns of points; pixels of \S+ \S+ x ", written, re.MULTILINE)
     rms, wavelength = re.search(r"noise floor of (\S+) nm rms; waves shorter than (\S+) um are", written).groups()
     assert float(rms) == pytest.approx(20, rel=0.1) and 0.5 < float(wavelength) < 2
@@ -348,7 +348,7 @@ def test_outside_a_clone_the_installed_workflow_is_used(empty_folder):
     assert "configuration: config/config.yaml" in output("describe")
 
 
-@pytest.mark.parametrize("place", ["results", "results/smoke", ".snakemake"])
+@pytest.mark.parametrize("place", ["results", "results/smoke"])
 @pytest.mark.parametrize("link", [True, False])
 def test_an_obstacle_in_place_of_a_folder_is_named(empty_folder, place, link):
     obstacle = empty_folder / place
@@ -534,7 +534,7 @@ def started(number, rule="run", log=()):
 
 @pytest.fixture
 def progress():
-    progress = Progress({f"results/tiny/runs/{k}.nc": 10.0 for k in range(4)}, Clock())
+    progress = Progress({f"results/tiny/runs/{k}.nc": ("run", 10.0) for k in range(4)}, Clock())
     progress.update({"event": "resources_info", "cores": 2})
     progress.update({"event": "run_info", "stats": {"run": 4, "all": 1, "total": 5}})
     return progress
@@ -547,7 +547,7 @@ def test_events_are_counted_by_rule(progress):
     progress.update(started(9, rule="all"))
     assert progress.update({"event": "job_finished", "job_id": 0}).title == "Sweep 0"
     assert progress.update({"event": "job_error", "jobid": 1}).rule == "run"
-    assert progress.counts() == [("run", 1, 1, 1, 4)]
+    assert progress.ended_count == 2 and progress.total == {"run": 4} and len(progress.running) == 1
     assert progress.update({"event": "job_finished", "job_id": 9}) is None
 
 

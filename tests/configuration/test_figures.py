@@ -14,7 +14,7 @@ def test_figures_of_snapshots_need_one(load):
 
 def test_a_map_shows_the_first_run_with_the_requested_labels(load):
     campaign = load({"figures": {"fig4_contact_map": {"study": "one", "seed": 2, "snapshot": {"area_fraction": 0.02}}}})
-    arguments = campaign.campaign.figures.arguments("fig4_contact_map", campaign.campaign)
+    arguments = campaign.campaign.figures.fig4_contact_map.arguments(campaign.campaign)
     assert arguments["run"] == ("one", "asperities", "rough", 2, 0.2, "soft")
     assert arguments["kind"] == "area_fraction" and set(arguments) == {"run", "kind", "target"}
 

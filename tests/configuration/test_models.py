@@ -17,7 +17,7 @@ def test_grids_of_4_to_8_cells_are_warned_of_only_for_boundary_elements(load):
     coarse = {"surfaces.rough.grid": 40}
     assert load(coarse).campaign.warnings() == []
     (warning,) = load(BOTH | coarse).campaign.warnings()
-    assert "surfaces.rough.grid: 40 gives boundary elements 4 cells" in warning and "a grid of at least 80" in warning
+    assert "surfaces.rough.grid: 40 gives 4 grid cells" in warning and "a grid of at least 80" in warning
     assert load(BOTH).campaign.warnings() == []
 
 

@@ -52,16 +52,6 @@ def test_damaged_surface_files(load, tmp_path):
             load({"surfaces.rough": file_surface(name)})
 
 
-def test_a_topography_that_exceeds_the_memory_is_a_message(load, monkeypatch):
-    def fail(*_, **__):
-        raise MemoryError("Unable to allocate 80 GiB for an array")
-
-    monkeypatch.setattr("icha.surfaces.measured.scan.read_height_map", fail)
-    # Long values are cut short.
-    with pytest.raises(ConfigurationError, match=r"surfaces\.rough\.path: '/.* fit .*Unable to allocate 80 GiB"):
-        load({"surfaces.rough": file_surface("heights.npy")})
-
-
 def test_a_surface_file_is_one_realisation_beside_the_configuration(load, tmp_path):
     np.save(tmp_path / "heights.npy", np.random.default_rng(1).normal(size=(16, 16)))
     campaign = load({"surfaces.rough": file_surface("heights.npy")}).campaign

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import scipy.optimize
-from half_space import all_pairs, jkr_approach, jkr_force, periodic_displacement
+from half_space import all_pairs, jkr_approach, jkr_force, periodic_displacement, spot_of_asperity
 from hypothesis import example, given
 from hypothesis import strategies as st
 
@@ -131,7 +131,7 @@ def test_interacting_spots_against_an_independent_solution(count, energy):
     state = contact.equilibrium(contact.untouched(), 0.85e-6)
     assert len(state.spots) == count
     spots = state.spots
-    np.testing.assert_array_equal(np.sort(state.spot_of_asperity), np.arange(count))
+    np.testing.assert_array_equal(np.sort(spot_of_asperity(state)), np.arange(count))
     order = [int(np.argmin(np.hypot(*(spots.position - p).T))) for p in contact.asperities.position]
     alone = contact.law.contact_radius(contact.asperities.height - 0.85e-6, contact.asperities.radius_of_curvature)
     expected = independent_solution(contact, 0.85e-6, energy, alone)
@@ -174,7 +174,7 @@ def test_stiffness_against_differences(energy):
         state = contact.equilibrium(state, level * contact.rms_height)
     step = 1e-6 * contact.rms_height
     ahead, behind = (contact.equilibrium(state, state.separation + s) for s in (-step, step))
-    np.testing.assert_array_equal(ahead.spot_of_asperity, behind.spot_of_asperity)
+    np.testing.assert_array_equal(spot_of_asperity(ahead), spot_of_asperity(behind))
     difference = (contact.pressure(ahead) - contact.pressure(behind)) / (2 * step)
     assert contact.stiffness(state) == pytest.approx(difference, rel=1e-5)
 
@@ -243,8 +243,8 @@ def assert_consistent(contact, state):
         np.isin(state.site_of_asperity[state.site_of_asperity >= 0], np.flatnonzero(state.contact_radius > 0))
     )
     # Every spot has an owner, and no free asperity is left beyond its jump-in but the pending ones.
-    assert set(state.spot_of_asperity[state.spot_of_asperity >= 0]) == set(range(len(spots)))
-    free = state.spot_of_asperity < 0
+    assert set(spot_of_asperity(state)[spot_of_asperity(state) >= 0]) == set(range(len(spots)))
+    free = spot_of_asperity(state) < 0
     there = contact.asperities.position[free]
     w = displacement_at(law, period, there, spots.position, a, R)
     approach = contact.asperities.height[free] - state.separation - w

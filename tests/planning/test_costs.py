@@ -84,7 +84,7 @@ def test_memory_of_a_dataset_is_estimated_from_the_files_of_its_runs(tmp_path):
     assert memory == pytest.approx(2.7 * arrays, rel=0.5)
     # Large arrays stay in the file, and the dataset is written block by block.
     assert costs.derived_cost("checks", 10**5, 1.0, 1e12).memory < 2e9
-    assert costs.derived_cost("dataset", 60, 1.0, 1e9).memory < 1e8
+    assert costs.derived_cost("campaign_dataset", 60, 1.0, 1e9).memory < 1e8
 
 
 def test_what_jobs_took_corrects_what_is_expected_of_others():

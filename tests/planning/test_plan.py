@@ -75,7 +75,7 @@ def test_what_is_made_of_something_new_is_made_anew(campaign, tmp_path):
 
 
 def item(name, seconds=1.0, memory=1 * GB, stage=0, state=TO_DO, threads=1):
-    return Item("part", name, state, Cost(seconds, memory, 5 * GB), threads, stage=stage)
+    return Item("part", "run", name, state, Cost(seconds, memory, 5 * GB), threads, stage=stage)
 
 
 def test_time_is_that_of_the_start_and_of_one_stage_after_the_other():

@@ -73,7 +73,7 @@ def test_xyz_written_with_few_digits(tmp_path):
 
 def test_xyz_with_a_point_twice_or_off_the_grid(tmp_path):
     path = write_xyz(tmp_path / "scan.xyz", [*range(160), 5])
-    with pytest.raises(UnfitTopography, match="x = 1250, y = 0 is given twice"):
+    with pytest.raises(UnfitTopography, match="x = 1250, y = 0 twice"):
         scan(path, height_unit=NM)
     path.write_text(path.read_text().replace("\n1250 250 ", "\n1300 250 "))
     with pytest.raises(UnfitTopography, match="regular grid"):
@@ -352,7 +352,7 @@ def write_npz(path, **arrays):
 def test_of_several_arrays_one_must_be_named(tmp_path, name, write):
     path = tmp_path / name
     write(path, Intensity=np.abs(HEIGHTS), Z=HEIGHTS, pixel=np.ones((1, 1)))
-    with refused("data", "the file has 2; expected one of: Intensity, Z"):
+    with refused("data", "the file has 2 arrays; expected one of: Intensity, Z"):
         scan(path, **LINES)
     read = scan(path, data="Z", **LINES)
     assert_read(read)

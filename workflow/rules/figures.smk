@@ -29,7 +29,7 @@ rule figure:
         mem_mb=lambda wildcards: figure_memory(CAMPAIGN, holds_topography=DECLARATIONS[wildcards.name].holds_topography),
         runtime=10,
     params:
-        arguments=lambda wildcards: CAMPAIGN.figures.arguments(wildcards.name, CAMPAIGN),
+        arguments=lambda wildcards: CAMPAIGN.figures.by_name()[wildcards.name].arguments(CAMPAIGN),
         # Tables of measurements are compared by content, not by time.
         sha256=lambda wildcards: [
             sha256_of(Path(table))

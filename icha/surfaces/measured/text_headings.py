@@ -5,11 +5,11 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from icha.surfaces.measured.settings import UnfitTopography, metres_of
+from icha.surfaces.measured.settings import Preparation, UnfitTopography, metres_of
 from icha.surfaces.measured.text_lines import AMBIGUOUS_COMMA
 
 # First word of the line with the width of an image that Gwyddion exported, in the languages of its menus. The next line
-# gives the height of the image.
+# contains the height of the image.
 _WIDTH = re.compile(r"^#?\s*(Width|Šířka|Breite|Anchura|Largeur|Larghezza|幅|폭|Largura|Ширина)\s*[:：]\s*(.*)$")
 _NUMBER = r"([-+]?\d+(?:[.,]\d+)?(?:[eE][-+]?\d+)?)"
 # One length or two, such as 12 µm x 12 µm.
@@ -37,9 +37,8 @@ class Heading:
     ----------
     height_unit, lateral_unit : m.
     size : (x, y) of the scan, m.
-    coordinates : (x, y) of the scan in a unit that the heading does not give.
+    coordinates : (x, y) of the scan in a unit that the heading does not contain.
     missing : numbers that stand for a missing height.
-    ambiguous : text of a size whose comma may be decimal or separate thousands.
     """
 
     height_unit: float | None
@@ -47,33 +46,39 @@ class Heading:
     size: tuple[float, float] | None
     coordinates: tuple[float, float] | None
     missing: tuple[float, ...]
-    ambiguous: str | None
 
 
-def read_heading(lines: Sequence[str], shape: tuple[int, int], decimal_comma: bool) -> Heading:
-    """Read the heading of a table of a shape (rows, columns), whose numbers have decimal commas or not."""
+def read_heading(lines: Sequence[str], shape: tuple[int, int], decimal_comma: bool, settings: Preparation) -> Heading:
+    """Read the heading of a table of a shape (rows, columns), whose numbers have decimal commas or not.
+
+    Raises UnfitTopography if a comma in the size may be decimal or separate thousands, and the settings have no size.
+    """
     entries, sides = _entries(lines), image_sides(lines)
     if {"ncols", "nrows", "cellsize"} <= entries.keys():
         entries.setdefault(_MISSING[0], _ESRI_MISSING)
 
-    def given(names):
+    def values(names):
         return [entries[name] for name in names if name in entries]
 
-    sizes, pixels = given(_SIZES), given(_PIXELS)
+    sizes, pixels = values(_SIZES), values(_PIXELS)
     commas = [text for text in (*sizes, *pixels, *sides) if AMBIGUOUS_COMMA.match(text)]
-    size, coordinates = _sizes(sides, sizes, pixels, shape)
+    if commas and not decimal_comma and settings.size is None:
+        raise UnfitTopography(
+            "size",
+            f"is {commas[0]!r} in the file; the comma may be decimal or separate thousands; expected the size here",
+        )
+    size, coordinates = _size([*([" x ".join(sides)] if sides else []), *sizes], pixels, shape)
     return Heading(
-        height_unit=next(filter(None, map(metres_of, given(_UNITS))), None),
+        height_unit=next(filter(None, map(metres_of, values(_UNITS))), None),
         lateral_unit=metres_of(entries.get("lateral units", "")),
         size=size,
         coordinates=coordinates,
-        missing=tuple(_value(found[1]) for found in map(_LENGTHS.match, given(_MISSING)) if found),
-        ambiguous=commas[0] if commas and not decimal_comma else None,
+        missing=tuple(_number(found[1]) for found in map(_LENGTHS.match, values(_MISSING)) if found),
     )
 
 
 def image_sides(lines: Sequence[str]) -> list[str]:
-    """Return the texts of width and height of an image that Gwyddion exported; an empty list for others."""
+    """Return the texts of width and height of an image that Gwyddion exported; an empty list for other headings."""
     for line, following in itertools.pairwise(lines):
         if (found := _WIDTH.match(line)) and ":" in following:
             return [found[2].strip(), following.partition(":")[2].strip()]
@@ -81,20 +86,20 @@ def image_sides(lines: Sequence[str]) -> list[str]:
 
 
 def check_counts(lines: Sequence[str], shapes: Sequence[tuple[int, int]]) -> None:
-    """Raise UnfitTopography unless one of the shapes has the numbers of rows and columns that the heading gives."""
+    """Raise UnfitTopography unless one of the shapes has the numbers of rows and columns in the heading."""
     entries = _entries(lines)
     for axis, (what, names) in enumerate(_COUNTS.items()):
         counts = [int(entries[name]) for name in names if entries.get(name, "").isdecimal()]
         if counts and counts[0] not in [shape[axis] for shape in shapes]:
             raise UnfitTopography(
                 "path",
-                f"has {shapes[-1][axis]} {what} of numbers and {counts[0]} by its heading, as if cut off or damaged; "
-                "expected a whole table. Export it again, or correct the heading",
+                f"has {shapes[-1][axis]} {what} of numbers, but {counts[0]} according to its heading; expected a whole "
+                "table. Export it again, or correct the heading",
             )
 
 
 def _entries(lines):
-    """Values of the lines of a heading, by their names in small letters."""
+    """Return the values in the lines of a heading, by their names in small letters."""
     entries = {}
     for line in lines:
         if found := _ENTRY.match(line):
@@ -102,14 +107,11 @@ def _entries(lines):
     return entries
 
 
-def _sizes(image_sides, sizes, pixels, shape):
-    """Return the size (x, y) in m and the size in an unknown unit; a size that the heading does not contain is None."""
-    sides = [_lengths(text) for text in image_sides]
-    if sides and all(side and side[1] for side in sides):
-        return tuple(lengths[0] for lengths, _ in sides), None
+def _size(sizes, pixels, shape):
+    """Return the size (x, y) in m, and the size in an unknown unit; each is None if the heading does not contain it."""
     rows, columns = shape
     for texts, (nx, ny) in ((sizes, (1, 1)), (pixels, (columns, rows))):
-        for (x, y), in_metres in filter(None, map(_lengths, texts)):
+        for x, y, in_metres in filter(None, map(_lengths, texts)):
             if in_metres:
                 return (x * nx, y * ny), None
             if texts is pixels:
@@ -118,15 +120,15 @@ def _sizes(image_sides, sizes, pixels, shape):
 
 
 def _lengths(text):
-    """Return the lengths (x, y) in a text, and whether they are in m or in an unknown unit; None for other text."""
+    """Return the lengths x and y in a text, and whether they are in m or in an unknown unit; None for other text."""
     if not (found := _LENGTHS.match(text)):
         return None
-    x, y, unit = _value(found[1]), _value(found[3] or found[1]), found[4] if found[3] else found[2]
-    if unit is None:
-        return (x, y), False
-    metres = metres_of(unit)
-    return None if metres is None else ((x * metres, y * metres), True)
+    x, y, units = _number(found[1]), _number(found[3] or found[1]), (found[2] or found[4], found[4] or found[2])
+    if units == (None, None):
+        return x, y, False
+    x_unit, y_unit = map(metres_of, units)
+    return (x * x_unit, y * y_unit, True) if x_unit and y_unit else None
 
 
-def _value(text):
+def _number(text):
     return float(text.replace(",", "."))
