@@ -39,13 +39,9 @@ def test_summit_statistics_are_those_of_the_random_field():
     assert 1 / found.radius_of_curvature == pytest.approx(curvature, rel=3e-3)
 
 
-def random_heights(count=2_000_000):
-    theory = theories.gaussian_summits(MOMENTS)
-    return theory, theory.mean_height + theory.deviation * np.random.default_rng(1).standard_normal(count)
-
-
 def test_greenwood_williamson_is_the_sum_over_random_summits():
-    theory, heights = random_heights()
+    theory = theories.gaussian_summits(MOMENTS)
+    heights = theory.mean_height + theory.deviation * np.random.default_rng(1).standard_normal(2_000_000)
     for u in SEPARATIONS:
         depth = heights - u * MOMENTS.rms_height
         depth = depth[depth > 0]
