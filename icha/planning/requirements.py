@@ -7,8 +7,8 @@ import shutil
 from collections.abc import Collection, Mapping
 from pathlib import Path
 
-from icha.configuration.boundary_elements import BesideStudy
 from icha.configuration.campaign import Campaign
+from icha.configuration.studies import BesideStudy
 from icha.datasets.labels import RunLabels
 from icha.planning.costs import MAP_ARRAYS, RUN_SIZES, job_threads
 from icha.planning.plan import Item, memory_on

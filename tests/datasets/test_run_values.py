@@ -1,6 +1,5 @@
 """The fast reader of runs returns the content of the file."""
 
-import netCDF4
 import numpy as np
 import pytest
 import small_campaign as small
@@ -31,13 +30,3 @@ def test_why_a_run_is_incomplete_is_read(tmp_path):
     values, attrs = read_run_values(path)
     assert attrs["incomplete"] == "lost at 3 µm"
     assert "mean_separation" in values
-
-
-def test_files_of_other_variables_or_dimensions_are_refused(tmp_path):
-    run = small.run()
-    with pytest.raises(ValueError, match=r"run\.nc: not a run dataset, it has a variable 'colour'"):
-        read_run_values(written(run.assign(colour=run["residual"]), tmp_path / "run.nc"))
-    with netCDF4.Dataset(written(run.drop_vars("residual"), tmp_path / "other.nc"), "a") as file:
-        file.createVariable("residual", "f8", ("snapshot",))[:] = 0
-    with pytest.raises(ValueError, match=r"other\.nc: not a run dataset, 'residual' does not have the dimensions"):
-        read_run_values(tmp_path / "other.nc")

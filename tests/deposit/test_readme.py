@@ -150,7 +150,7 @@ def test_the_page_counts_runs_that_end_at_the_limit_of_their_model():
     runs[first] = runs[first].assign_attrs(beyond_model="the path ends before its last target")
     tree = small.campaign_tree(runs.items(), attrs={"campaign": "small"})
     page = page_of(tree, check_campaign(tree), load_configuration(REPOSITORY / "config/campaigns/smoke.yaml").campaign)
-    assert "Of 1 of them the path leads beyond the range of the model" in page and "and complete.\n" not in page
+    assert "The path of 1 of them leads beyond the range of the model" in page and "and complete.\n" not in page
 
 
 def test_the_example_selects_a_run_of_surfaces_with_slopes_of_their_own(tmp_path, monkeypatch):
@@ -159,7 +159,7 @@ def test_the_example_selects_a_run_of_surfaces_with_slopes_of_their_own(tmp_path
     page = page_of(tree, check_campaign(tree), load_configuration(REPOSITORY / "config/campaigns/smoke.yaml").campaign)
     write_campaign(runs, tmp_path / "dataset/smoke.nc")
     monkeypatch.chdir(tmp_path)
-    example = re.search(r"^study = .*\nruns = .*$", page, re.MULTILINE)[0]
+    example = re.search(r"^study = .*\nruns = .*\nruns = .*$", page, re.MULTILINE)[0]
     namespace = {"xr": xr}
     exec(example, namespace)
     assert namespace["runs"].sizes["material"] == 2 and float(namespace["runs"]["rms_slope"]) == 0.5

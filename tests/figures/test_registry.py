@@ -37,12 +37,12 @@ icha.figures.__path__.append(sys.argv[1])
 from icha.configuration.figures import Figures
 from icha.configuration.schema import json_schema, key_tables
 from icha.datasets.results import ResultFiles
-from icha.figures.registry import draw_figure
+from icha.figures.registry import DECLARATIONS, draw_figure
 figures = Figures.model_validate({"fig99_trivial": {"study": "slopes"}})
 assert list(figures.by_name()) == ["fig99_trivial"]
 assert "and nothing else" in json_schema() and "`figures.fig99_trivial`" in key_tables()
-inputs = figures.inputs("fig99_trivial", None, ResultFiles("small", sys.argv[1]))
-arguments = figures.arguments("fig99_trivial", None)
+inputs = DECLARATIONS["fig99_trivial"].inputs(None, figures.fig99_trivial, ResultFiles("small", sys.argv[1]))
+arguments = figures.fig99_trivial.arguments(None)
 draw_figure("fig99_trivial", "a.png", "a.pdf", inputs=inputs, arguments=arguments)
 """
 

@@ -101,11 +101,17 @@ def test_model_is_the_first_dimension_of_every_study(runs, tmp_path):
     assert "Griffith" in tree.attrs["references"] and "Violano" in tree.attrs["references"]
 
 
-def test_a_run_under_the_name_of_another_model_is_refused(runs):
-    with pytest.raises(ValueError, match=r"one/rough/seed1/slope1/boundary_elements/soft: the dataset's model is asp"):
-        campaign_tree([(labels(REFERENCE_MODEL), runs[labels(DEFAULT_MODEL)])])
+def test_every_run_of_both_models_is_taken_out_unchanged(runs):
+    tree = campaign_tree(runs.items())
+    for each, original in runs.items():
+        taken = select_run(tree, each)
+        assert taken.attrs["contact_model"] == each.model
+        kept = set(original.variables) - {"contact_map", "contact_pressure"}
+        assert set(taken.variables) - {"model", "surface", "material"} == kept
+        for name in kept:
+            np.testing.assert_array_equal(taken[name].values, original[name].values, err_msg=f"{each} {name}")
     with pytest.raises(ValueError, match=r"no model 'other'; expected one of asperities, boundary_elements"):
-        select_run(campaign_tree(runs.items()), labels("other"))
+        select_run(tree, labels("other"))
 
 
 def test_a_failed_run_of_boundary_elements_leaves_the_others_whole(runs):

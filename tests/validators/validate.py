@@ -31,7 +31,7 @@ from typing import NamedTuple
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 CRATE = "ro-crate-metadata.json"
-PROFILE = "provenance-run-crate-0.5"
+PROFILE = "workflow-run-crate-0.5"
 CONVENTIONS = "cf:1.11"
 # Attributes by which a variable names others (CF 1.11, appendix A).
 NAMING = "ancillary_variables bounds cell_measures climatology coordinates formula_terms grid_mapping".split()
@@ -69,7 +69,7 @@ def check_checksums(folder: Path) -> Outcome:
 
 
 def check_crate(folder: Path) -> Outcome:
-    """roc-validator: the crate is a Provenance Run Crate; what is only recommended is a remark."""
+    """roc-validator: the crate is a Workflow Run Crate; what is only recommended is a remark."""
     from rocrate_validator import services
     from rocrate_validator.models import Severity
 
@@ -142,17 +142,6 @@ def check_citation(folder: Path) -> Outcome:
     except Exception as error:
         return Outcome("CITATION.cff", [str(error).strip().splitlines()[0]])
     return Outcome(f"CITATION.cff {citation.cffversion}", [])
-
-
-def check_datacite(folder: Path) -> Outcome:
-    """The schema of DataCite 4.5, and its XML can be made from it."""
-    from datacite import schema45
-
-    metadata = json.loads((folder / "datacite.json").read_bytes())
-    problems = _violations(schema45.validator, metadata)
-    if not problems:
-        schema45.tostring(metadata)
-    return Outcome(f"{len(metadata)} properties", problems)
 
 
 def check_zenodo(folder: Path) -> Outcome:
@@ -296,7 +285,6 @@ VALIDATORS: dict[str, Callable[[Path], Outcome]] = {
     "roc-validator": check_crate,
     "runcrate": check_actions,
     "cffconvert": check_citation,
-    "datacite": check_datacite,
     "zenodo": check_zenodo,
     "compliance-checker": check_conventions,
 }

@@ -165,7 +165,7 @@ def configuration_of(monkeypatch):
 
 
 def test_wrong_values_on_the_command_line_are_messages_and_unwise_ones_warnings(configuration_of, tmp_path):
-    with pytest.raises(SystemExit, match=r"--config: name: 'My Campaign'(.|\n)*--config: studies.none.targets:"):
+    with pytest.raises(SystemExit, match=r"with --config: name: 'My Campaign'(.|\n)*studies.none.targets:"):
         configuration_of(SMOKE, name="My Campaign", studies={"none": {}})
     with pytest.raises(SystemExit, match="expected one file"):
         configuration_of("config/config.yaml", SMOKE)
