@@ -37,7 +37,7 @@ class JobRecord:
     outputs : paths of its results.
     log : path of its log; empty without a log.
     started : time in s.
-    ended : time in s; None while the job runs.
+    seconds : duration in s; 0 while the job runs.
     threads : number of cores that it uses.
     """
 
@@ -46,13 +46,8 @@ class JobRecord:
     outputs: tuple[str, ...]
     log: str
     started: float
-    ended: float | None = None
+    seconds: float = 0.0
     threads: int = 1
-
-    @property
-    def seconds(self) -> float:
-        """Duration in s; 0 while the job runs."""
-        return (self.ended or self.started) - self.started
 
 
 @dataclass
@@ -108,7 +103,7 @@ class Progress:
                 case "job_finished" | "job_error" as name:
                     jobs, key = (self.done, "job_id") if name == "job_finished" else (self.failed, "jobid")
                     if job := self.running.pop(event[key], None):
-                        job.ended = self.clock()
+                        job.seconds = self.clock() - job.started
                         jobs.append(job)
                         return job
         return None

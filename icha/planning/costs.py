@@ -25,18 +25,17 @@ class Workflow:
 
     Attributes
     ----------
-    start : time from the call to the first job: `icha run`, Snakemake, the plan.
+    start : time from the call to the first job: `icha run`, Snakemake, and the imports of the process that jobs are
+        forked from.
     planned : further time for each file of the plan.
-    environment : time of the imports of the process that jobs are forked from, once.
     job : time of a job outside its work: scheduling, fork, log, checksums.
     memory : of Snakemake, `icha run` and the process that jobs are forked from.
     forked : memory of a job that is a fork, before its work.
     program : memory of a job that is a process of its own, before its work.
     """
 
-    start: float = 2.6
+    start: float = 4.6
     planned: float = 0.0012
-    environment: float = 2.0
     job: float = 0.17
     memory: float = 310 * MiB
     forked: float = 22 * MiB

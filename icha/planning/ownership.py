@@ -9,7 +9,7 @@ import os
 from pathlib import Path
 
 from icha.datasets.results import CONFIGURATION
-from icha.support.atomic_files import find_obstacle, whole_file
+from icha.support.atomic_files import whole_file
 
 RECORD = "belongs_to.txt"
 
@@ -24,8 +24,6 @@ def find_conflict(results: Path, name: str, file: Path, workflow: Path) -> str |
     file : its configuration file.
     workflow : folder of the workflow.
     """
-    if obstacle := find_obstacle(results):
-        return f"{obstacle}: results cannot be written there. Remove it or repair it."
     owner, record = _read_owner(results), _record_of(results, file, workflow)
     if owner in (None, record) or _is_copy(results, file):
         return None

@@ -181,7 +181,7 @@ def _derived_files(campaign, files: CampaignFiles, computed: list[Item]) -> Iter
     result_files = ResultFiles(campaign.name)
     for name, options in campaign.figures.by_name().items():
         path = result_files.path(results_files.FIGURE, name=name, ending="png")
-        inputs = campaign.figures.inputs(name, campaign, result_files).values()
+        inputs = DECLARATIONS[name].inputs(campaign, options, result_files).values()
         shown = set(options.studies_of(campaign))
         count = sum(case.study in shown for case in files.runs.values())
         grids = [campaign.grid(surface) for study in shown for surface in campaign.studies[study].surfaces]
@@ -241,11 +241,6 @@ def failed_runs(campaign: Campaign, results: Path) -> dict[str, str]:
     return {path: reason for path, (state, reason) in states.items() if state == FAILED}
 
 
-def expected_work(items: Iterable[Item], folder: str) -> dict[str, tuple[str, float]]:
-    """Return rule and expected core-seconds of each job, with scheduling; keys are the paths of files in `folder`."""
-    return {f"{folder}/{item.path}": (item.rule, item.work + WORKFLOW.job) for item in items}
-
-
 def whole_cost(campaign: Campaign, results: Path) -> costs.Cost:
     """Return the expected cost of a whole campaign: seconds on one core, memory of the largest job, disk.
 
@@ -275,12 +270,7 @@ def start_up(items: Collection[Item]) -> float:
     """Time until the first job, s: start of Snakemake, its plan, and imports of the jobs."""
     if not any(item.to_do for item in items):
         return 0.0
-    return WORKFLOW.start + WORKFLOW.planned * len(items) + WORKFLOW.environment
-
-
-def overhead(items: Collection[Item]) -> float:
-    """Time of starting and scheduling the jobs to be done, core-seconds."""
-    return start_up(items) + WORKFLOW.job * sum(item.to_do for item in items)
+    return WORKFLOW.start + WORKFLOW.planned * len(items)
 
 
 def memory_on(items: Iterable[Item], cores: int, most: float = math.inf) -> float:

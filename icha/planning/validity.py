@@ -2,7 +2,6 @@
 
 import math
 from functools import cache
-from pathlib import Path
 
 from icha.analysis.validity import (
     COMPLETE,
@@ -15,7 +14,6 @@ from icha.analysis.validity import (
     describe_sticky,
     join_first,
     statements,
-    statements_on_dataset,
 )
 from icha.asperity.full_contact import gaussian_complete_pressure
 from icha.asperity.material import WU_HOLDS_FROM, Material
@@ -136,11 +134,3 @@ def _describe_outside(tabor):
             ends = dict.fromkeys(f"{float(f'{mu:.2g}'):g}" for mu in (min(values), max(values)))
             cases.append(f"{material} on {surface} (about {' to '.join(ends)})")
     return f"some or all spots expected outside: {join_first(cases)}" if cases else ""
-
-
-def found_validity(dataset: Path) -> list[Statement]:
-    """State the validity of the campaign dataset in a file."""
-    import xarray as xr
-
-    with xr.open_datatree(dataset, engine="netcdf4") as tree:
-        return statements_on_dataset(tree)

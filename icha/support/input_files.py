@@ -183,17 +183,14 @@ def read_columns(path: str | Path, columns: dict[str, float]) -> list:
         raise ValueError(f"cannot be read ({reason}); expected a CSV file") from None
     if not rows:
         raise ValueError("holds no values; expected a CSV file with a line of headings and at least one of numbers")
-    found = []
-    for heading, factor in columns.items():
+    found = {heading: [] for heading in columns}
+    for heading, numbers in found.items():
         if heading not in rows[0]:
             raise ValueError(f"has no column {heading!r}; expected one of {', '.join(map(str, rows[0]))}")
-        numbers = []
         for number, row in enumerate(rows, start=1):
+            place = f"column {heading!r}, row {number}: {row[heading]!r}"
             try:
                 numbers.append(POSITIVE.validate("", float(row[heading])))
             except (TypeError, ValueError):
-                raise ValueError(
-                    f"column {heading!r}, row {number}: {row[heading]!r}; expected a number greater than 0"
-                ) from None
-        found.append(np.array(numbers) * factor)
-    return found
+                raise ValueError(f"{place}; expected a number greater than 0") from None
+    return [np.array(found[heading]) * factor for heading, factor in columns.items()]

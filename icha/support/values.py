@@ -288,8 +288,6 @@ class Section(BaseModel):
 def _seeds(value: Any) -> Any:
     """Expand seeds: a range such as `1..50`, or a list of integers and ranges."""
     expected = "expected integers from 0 and ranges of them, such as 1..50 or [1..5, 9]"
-    if isinstance(value, list) and not value:
-        return value
     found = []
     for entry in value if isinstance(value, list) else [value]:
         if not isinstance(entry, str):

@@ -1,9 +1,9 @@
 """What is planned: everything that is made, with what it costs; and what the machine must have for it."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
+import yaml
+from conftest import REPOSITORY
 
 from icha.configuration.load import load_configuration
 from icha.planning import requirements
@@ -81,7 +81,7 @@ def item(name, seconds=1.0, memory=1 * GB, stage=0, state=TO_DO, threads=1):
 def test_time_is_that_of_the_start_and_of_one_stage_after_the_other():
     jobs = [item("a", 10), item("b", 2), item("c", 4, stage=1)]
     start, job = start_up(jobs), WORKFLOW.job
-    assert start > WORKFLOW.environment
+    assert start > WORKFLOW.start
     assert time_on(jobs, 1) == pytest.approx(start + 16 + 3 * job)
     assert time_on(jobs, 10**6) == pytest.approx(start + 10 + 4)
     assert time_on([item("a", state=DONE)], 1) == 0
@@ -118,7 +118,13 @@ def test_too_little_room_is_told_with_what_is_free(monkeypatch, tmp_path):
     assert requirements.find_shortages([item("a"), item("b", state=DONE)], 2, tmp_path, {}) == []
 
 
-def test_what_there_is_is_looked_at_where_results_will_be(tmp_path):
-    assert requirements.free_disk(tmp_path / "not" / "there") > 0
-    assert requirements.free_disk(Path("results")) > 0
-    assert requirements.memory_of_machine() > 1e8
+def test_runs_of_both_models_at_given_loads_are_compared(tmp_path):
+    content = yaml.safe_load((REPOSITORY / "config/campaigns/smoke.yaml").read_text(encoding="utf-8"))
+    del content["figures"]
+    for study in ("challenge", "multi_slope"):  # at given loads, and at given areas
+        content["studies"][study]["models"] = ["asperities", "boundary_elements"]
+    (tmp_path / "both.yaml").write_text(yaml.safe_dump(content), encoding="utf-8")
+    files = campaign_files(load_configuration(tmp_path / "both.yaml").campaign)
+    assert files.model_error == ["aggregated/model_error.nc"] and not files.solutions
+    assert {case.study for case in files.compared.values()} == {"challenge"}
+    assert set(files.compared) < set(files.runs) and all("/boundary_elements/" in file for file in files.compared)

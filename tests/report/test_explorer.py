@@ -160,19 +160,6 @@ def test_the_page_needs_no_other_files_and_no_network(page):
     assert text.count("</script>") == 3 and "Small &lt;/script&gt; campaign" in text
 
 
-def test_a_topography_is_found_by_any_name(folder, tmp_path, monkeypatch):
-    name = "surfaces/\u202e{surface}-{seed}.nc"
-    for seed in (1, 2, 3):
-        old = folder / f"surfaces/rough/seed{seed}.nc"
-        (folder / name.format(surface="rough", seed=seed)).write_bytes(old.read_bytes())
-    monkeypatch.setattr("icha.datasets.results.SURFACE", name)
-    write_explorer(folder, tmp_path / "page.html", largest=20)
-    data = data_of(tmp_path / "page.html")
-    assert {contact["topography"] for contact in data["contacts"]} <= {*data["topographies"]}
-    for seed in (1, 2, 3):
-        (folder / name.format(surface="rough", seed=seed)).unlink()
-
-
 def test_the_size_of_a_page_is_limited(folder, page, data, tmp_path):
     library = page.stat().st_size - len(json.dumps(data))
     largest = (library + 0.6 * len(json.dumps(data))) / 1e6

@@ -1,38 +1,10 @@
 """What is in the way of a folder, and what killed programs leave behind."""
 
-import os
 from pathlib import Path
 
 import pytest
 
-from icha.support.atomic_files import find_obstacle, is_left_over, probe_folder, take_over, whole_file
-
-
-def test_what_is_where_a_folder_is_to_be_is_named(tmp_path):
-    (tmp_path / "file").write_text("something else")
-    (tmp_path / "link").symlink_to("nowhere")
-    (tmp_path / "folder").mkdir()
-    assert find_obstacle(tmp_path / "folder/results/mine") is None
-    assert find_obstacle(tmp_path / "file/mine") == f"{tmp_path}/file is a file, not a folder"
-    assert find_obstacle(tmp_path / "link/mine").startswith(
-        f"{tmp_path}/link is a link to nowhere, which does not exist"
-    )
-
-
-def test_a_link_into_a_folder_that_may_not_be_entered_is_in_the_way(tmp_path, monkeypatch):
-    closed, link = tmp_path / "closed", tmp_path / "results"
-    link.symlink_to(closed / "results")
-    found = os.stat
-
-    def stat(path, *args, follow_symlinks=True, **options):
-        if follow_symlinks and Path(path) in (link, link / "mine"):
-            raise PermissionError(13, "Permission denied")
-        return found(path, *args, follow_symlinks=follow_symlinks, **options)
-
-    monkeypatch.setattr(os, "stat", stat)
-    assert find_obstacle(link / "mine") == (
-        f"{link} is a link to {closed}/results, which does not exist or cannot be reached"
-    )
+from icha.support.atomic_files import is_left_over, probe_folder, take_over, whole_file
 
 
 def test_whatever_a_killed_program_leaves_is_known_by_its_name(tmp_path, monkeypatch):
