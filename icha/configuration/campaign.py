@@ -93,7 +93,7 @@ class Campaign(Section):
     studies: Annotated[dict[Name, Study], Field(min_length=1)]
     """Studies by name."""
     finite_range: Annotated[dict[Name, BoundaryElements], _FEW] = {}
-    """Solutions by boundary elements at a finite range of attraction, by name, to compare with the runs of a study."""
+    """Boundary elements at a finite range of attraction, by name, to compare with the runs of a study."""
     boundary_element_loops: Annotated[dict[Name, BoundaryElementLoops], _FEW] = {}
     """Loading and unloading with boundary elements at a finite range of attraction, by name, to compare with the runs
     of a study that unloads."""
@@ -211,15 +211,14 @@ class Campaign(Section):
         for label, study in self.studies.items():
             yield from _within(("studies", label), study.problems(self.snapshots_of(label)))
             yield from _within(("studies", label), self._model_problems(study))
-        for section in (*BESIDE_STUDIES, "measurements"):
-            for label, entry in getattr(self, section).items():
+        sections = {section: getattr(self, section) for section in (*BESIDE_STUDIES, "measurements")}
+        for section, entries in (sections | {"figures": self.figures.by_name()}).items():
+            for label, entry in entries.items():
                 yield from _within((section, label), entry.problems(self))
         for label in self.finite_range:
             if label in self.studies and self.compares_models(label):
                 reason = "is the name of a study that has boundary elements itself; expected another name"
                 yield ("finite_range", label), label, reason
-        for label, figure in self.figures.by_name().items():
-            yield from _within(("figures", label), figure.problems(self))
 
     def measurement_problems(self) -> Iterator[Problem]:
         """Report tables of measurements that cannot be read."""

@@ -144,7 +144,7 @@ class Author(Section):
 
     @property
     def is_person(self) -> bool:
-        """Whether the author is a person."""
+        """True if the author is a person."""
         return self.name is None
 
     @property

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from icha.contact.model import ContactModel, NotConverged, State
-from icha.path.energy_balance import Step, Waypoint, waypoint_between
+from icha.path.energy_balance import Step, Waypoint, waypoint_without_target
 from icha.path.loading import PathProgress
 from icha.path.step_accuracy import StepAccuracy
 from icha.path.stops import (
@@ -54,7 +54,7 @@ def follow_cycle(
         targets.remove(each)
         progress.record_target(each.target, state)
         yield Waypoint(each.target, state, 0)
-    yield waypoint_between(start, 0)
+    yield waypoint_without_target(start, 0)
     cycle = _Cycle(contact, longest, progress, start)
     if contact.adhesive:
         cycle.step_length = cycle.event_length
@@ -179,7 +179,9 @@ class _Cycle:
                 pending.remove(listed)
                 if leg == 0:
                     self.progress.record_target(listed.target, met)
-            waypoint = waypoint_between(met, leg, step) if target is None else Waypoint(target.target, met, leg, step)
+            waypoint = (
+                waypoint_without_target(met, leg, step) if target is None else Waypoint(target.target, met, leg, step)
+            )
             sent = yield waypoint
         if self.loading:
             # A reloading adds only separations below all earlier stations.

@@ -52,7 +52,7 @@ class StepAccuracy:
         self.lowest_pressure = min(self.lowest_pressure, self.contact.pressure(state))
 
     def total_work_after(self, step: Step) -> float:
-        """Return the sum of work and losses with one more step, J/m^2."""
+        """Return the value of `total_work` after one more step, J/m^2."""
         return self.total_work + (abs(step.work) + abs(step.loss))
 
     def allows_twice_the_length(self, step: Step) -> bool:

@@ -181,7 +181,7 @@ def _derived_files(campaign, files: CampaignFiles, computed: list[Item]) -> Iter
     result_files = ResultFiles(campaign.name)
     for name, options in campaign.figures.by_name().items():
         path = result_files.path(results_files.FIGURE, name=name, ending="png")
-        inputs = campaign.figures.inputs(name, campaign, result_files).values()
+        inputs = DECLARATIONS[name].inputs(campaign, options, result_files).values()
         shown = set(options.studies_of(campaign))
         count = sum(case.study in shown for case in files.runs.values())
         grids = [campaign.grid(surface) for study in shown for surface in campaign.studies[study].surfaces]

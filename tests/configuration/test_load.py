@@ -96,8 +96,3 @@ def test_slopes_of_scans_are_compared_once_they_are_known(load):
     assert load({**measured, "publication": {"known_failures": failures}})
     with pytest.raises(ConfigurationError, match=r"rms_slope: 0.5 is not in study 'one'"):
         load({**measured, "figures": {"fig4_contact_map": {"study": "one", "rms_slope": 0.5}}})
-
-
-def test_campaigns_are_immutable(load):
-    with pytest.raises(ValueError, match="frozen"):
-        load().campaign.materials["soft"].contact_modulus = 1.0

@@ -20,13 +20,6 @@ def test_the_slope_that_a_topography_has(load, tmp_path):
     assert case.path == f"one/rough/seed0/slope{number_label(case.rms_slope)}/soft"
 
 
-def test_few_cells_are_a_warning(load):
-    assert not load().campaign.warnings()
-    (warning,) = load({"surfaces.rough.grid": 30}).campaign.warnings()
-    assert "surfaces.rough.grid: 30 gives 3 grid cells" in warning
-    assert load({"surfaces.rough.grid": 20}).campaign.warnings()
-
-
 @pytest.mark.parametrize(
     ("heights", "message"),
     [

@@ -51,6 +51,7 @@ class Layout:
     columns: int
 
 
+@dataclass(eq=False)
 class SourceFile:
     """The file of a scan; each attribute is read from the file once, at its first use.
 
@@ -59,9 +60,7 @@ class SourceFile:
     path : the file.
     """
 
-    def __init__(self, path: Path):
-        """Read nothing yet."""
-        self.path = path
+    path: Path
 
     @cached_property
     def layout(self) -> Layout | None:

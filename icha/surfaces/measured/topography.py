@@ -161,7 +161,7 @@ def remove_trend(scan: Scan, settings: Preparation) -> Scan:
 
 
 def refuse_flat(prepared: Scan, square: Scan, settings: Preparation) -> None:
-    """Raise UnfitTopography if the prepared heights are no more than rounding errors of the original heights."""
+    """Raise UnfitTopography if the prepared heights are only rounding errors of the original heights."""
     known = np.isfinite(square.heights)
     if np.ptp(prepared.heights) <= _FLAT * np.nanmax(np.abs(square.heights), where=known, initial=0.0):
         apart = "" if settings.detrend == "none" else ", apart from the trend that is removed"
