@@ -96,12 +96,9 @@ def test_units_drop_out(model, data, lengths, pressures):
 @settings(max_examples=2)
 @given(contacts(DEFAULT_MODEL, ADHERING), st.floats(-4, 4), st.floats(-3, 3))
 def test_units_drop_out_of_a_loop(contact, lengths, pressures):
-    surface, material = contact
     length, stress = 10**lengths, 10**pressures
-    larger = Surface(surface.heights * length, PERIOD * length)
-    scaled = Material(MODULUS * stress, material.surface_energy * stress * length, material.interaction_range * length)
-    way = {"reduced_pressures": [3e-3], "unload": True, "max_step": 0.5}
-    one, other = (pressed(*each, DEFAULT_MODEL, **way) for each in ((surface, material), (larger, scaled)))
+    path = {"reduced_pressures": [3e-3], "unload": True, "max_step": 0.5}
+    one, other = (pressed(*each, DEFAULT_MODEL, **path) for each in (contact, scaled(*contact, length, stress)))
     assert ("hysteresis_loss" in one) == ("hysteresis_loss" in other)
     assume("hysteresis_loss" in one)
     jumps = int(one["jump_in_count"][-1] + one["jump_off_count"][-1])

@@ -248,8 +248,10 @@ def _writing(folder: str):
     try:
         yield
     except OSError as error:
+        exists = isinstance(error, FileExistsError | NotADirectoryError)
+        reason = "instead of a folder there is a file, or a link to nowhere" if exists else error.strerror
         raise SystemExit(
-            f"{folder} cannot be written to: {error.strerror}. Nothing was computed. Free some space, change its "
+            f"{folder} cannot be written to: {reason}. Nothing was computed. Free some space, change its "
             f"permissions, or {ANOTHER_FOLDER}."
         ) from None
 

@@ -171,7 +171,7 @@ def _compare_stops(labels, run, truth):
         if in_both and truth["mean_separation"].values[true_stops[load]] > 0:
             solution = _as_solution(truth, true_stops[load], load)
             state = _amounts(run.isel(step=stops[load]), solution)
-            if "contact" in solution and (snapshot := _snapshot_at(run, load)) is not None:
+            if "contact" in solution and (snapshot := snapshot_if_any(run, REDUCED_PRESSURE, load)) is not None:
                 state |= _shapes(run, snapshot, solution)
         found[SolutionLabels(labels.study, labels.study, *labels[2:], load)] = state
     return found
@@ -183,10 +183,10 @@ def _stops(run):
     return {float(run["step_target"].values[step]): step for step in np.flatnonzero(targets.values).tolist()}
 
 
-def _snapshot_at(run, load):
-    """Return the snapshot of a run at a reduced pressure; None if there is no such snapshot."""
+def snapshot_if_any(run: xr.Dataset, kind: str, target: float) -> int | None:
+    """Return the position of the snapshot of a kind and target in a run; None if the run does not have it."""
     try:
-        return find_snapshot(run, REDUCED_PRESSURE, load)
+        return find_snapshot(run, kind, target)
     except ValueError:
         return None
 
@@ -197,7 +197,8 @@ def _as_solution(run, step, load):
     If the step has a snapshot, the distributions and the contact map are included. In the limit of a short range no
     stress acts outside contact, so that the contact areas by all definitions are equal.
     """
-    state, snapshot = run.drop_dims([*RAGGED, "snapshot"], errors="ignore").isel(step=step), _snapshot_at(run, load)
+    state = run.drop_dims([*RAGGED, "snapshot"], errors="ignore").isel(step=step)
+    snapshot = snapshot_if_any(run, REDUCED_PRESSURE, load)
     if snapshot is not None:
         contact = run["contact_map"].isel(snapshot=snapshot).rename(row="y", column="x") >= _HALF
         state = state_of(run, snapshot).assign(contact=contact)

@@ -53,20 +53,11 @@ class Range(NamedTuple):
     ----------
     words : name of the quantity in messages.
     least, most : smallest and largest value.
-    reason : text that replaces the value in a message; empty to print the value.
     """
 
     words: str
     least: float
     most: float
-    reason: str = ""
-
-    @property
-    def shown(self) -> str:
-        """The range as messages print it."""
-        if self.most == math.inf:
-            return f"{self.least:g} and more"
-        return f"{self.least:g} to {self.most:g}"
 
 
 # Ranges of the surfaces and materials in study `short_range` of campaign `validation`, rounded outwards. A test
@@ -85,16 +76,16 @@ VALIDATED = {
     "nodes_per_short_wave": Range("nodes per shortest wave", 5.8, math.inf),
     "full_contact_energy_ratio": Range("U_full/dgamma", 76.0, math.inf),
     # 1 for a single square, 0 for a periodic surface.
-    "free_edges": Range("free edges", 0, 0, "free edges, which boundary elements cannot have: give `boundary: window`"),
+    "free_edges": Range("free edges (0 with `boundary: window`)", 0, 0),
 }
 
 
 def outside_validation(facts: Mapping[str, float]) -> list[str]:
     """List the facts outside the range of the validation, with value and range; keys are those of `VALIDATED`."""
     return [
-        known.reason or f"{known.words} {facts[name]:.2g}, validated: {known.shown}"
-        for name, known in VALIDATED.items()
-        if name in facts and not known.least <= facts[name] <= known.most
+        f"{words} {facts[name]:.2g}, validated: {least:g} {'and more' if most == math.inf else f'to {most:g}'}"
+        for name, (words, least, most) in VALIDATED.items()
+        if name in facts and not least <= facts[name] <= most
     ]
 
 
@@ -341,13 +332,9 @@ def _used(models):
 
 def _error(adhesive):
     """Describe the errors of runs with adhesion, if `adhesive` contains True, and without, if it contains False."""
-
-    def describe(quantity):
-        ranges = [VALIDATION[each][quantity] for each in sorted(adhesive, reverse=True)]
-        first, *others = (f"{-high:.0f} to {-low:.0f} %" for low, high in ranges)
-        if not others or others == [first]:
-            return f"{first} too small"
-        return f"{first} too small with adhesion and {others[0]} without"
-
-    quantities = ", ".join(f"{name} {describe(name)}" for name in VALIDATION[True])
-    return f"{quantities}, compared with boundary elements"
+    found = []
+    for quantity in VALIDATION[True]:
+        ranges = (VALIDATION[each][quantity] for each in sorted(adhesive, reverse=True))
+        first, *others = dict.fromkeys(f"{-high:.0f} to {-low:.0f} %" for low, high in ranges)
+        found.append(f"{quantity} {first} too small" + (f" with adhesion and {others[0]} without" if others else ""))
+    return f"{', '.join(found)}, compared with boundary elements"

@@ -111,11 +111,6 @@ def _check_loading(run) -> Iterator[tuple]:
         yield "stiffness", np.count_nonzero(run["contact_stiffness"] < 0), 0
 
 
-def _largest_fall(values):
-    """Return the largest fall from one value to the next; 0 if no value falls."""
-    return float(np.max(-np.diff(values), initial=0.0))
-
-
 def _largest_fall_in_loading(loading, name):
     """Return the largest fall of a variable from target to target and from step to step, over its largest magnitude.
 
@@ -124,8 +119,9 @@ def _largest_fall_in_loading(loading, name):
     """
     values, at_targets = loading[name], loading["step_kind"] != BETWEEN
     united = np.cumsum(np.diff(loading["coalescence_count"], prepend=0) != 0)
-    parts = [values[at_targets], *(values[united == part] for part in np.unique(united))]
-    return max(map(_largest_fall, parts)) / (float(np.max(np.abs(values))) or 1.0)
+    parts = [values[at_targets], *(values[united == count] for count in np.unique(united))]
+    fall = max(float(np.max(-np.diff(part), initial=0.0)) for part in parts)
+    return fall / (float(np.max(np.abs(values))) or 1.0)
 
 
 def _largest_rises_of_separation(loading):

@@ -212,7 +212,13 @@ def upload(
         server = Zenodo(address, _token(address))
         with _intact(archive, large) as folder:
             metadata = read_zenodo_metadata(folder)
-            _refuse_foreign_doi(metadata, draft)
+            # Zenodo has reserved such a DOI for one draft, and all files of the deposit contain it.
+            reserved = re.fullmatch(r"10\.\d+/zenodo\.(\d+)", str(metadata.get("doi")))
+            if reserved and int(reserved[1]) != draft:
+                raise UserError(
+                    f"the deposit has the DOI {metadata['doi']}, which is reserved for draft {reserved[1]}; use "
+                    f"--draft {reserved[1]}, or make the deposit without publication.doi"
+                )
             files = [archive, folder / README, folder / CRATE]
             rows = {"to": f"{address}, {f'draft {draft}' if draft else 'new draft'}", **summary_of(metadata)}
             for path in files:
@@ -238,16 +244,6 @@ def _token(address: str) -> str:
             f"{address}/account/settings/applications/tokens/new/"
         )
     return token
-
-
-def _refuse_foreign_doi(metadata: dict, draft: int | None) -> None:
-    """Refuse a DOI that Zenodo has reserved for another draft, since all files of the deposit name it."""
-    found = re.fullmatch(r"10\.\d+/zenodo\.(\d+)", str(metadata.get("doi")))
-    if found and int(found[1]) != draft:
-        raise UserError(
-            f"the deposit has the DOI {metadata['doi']}, which is reserved for draft {found[1]}; use --draft "
-            f"{found[1]}, or make the deposit without publication.doi"
-        )
 
 
 def _send(server, files, metadata, number) -> None:

@@ -138,7 +138,8 @@ def _print_sums(console, items) -> None:
     """Print a table with a row for each kind of result."""
     from rich.table import Table
 
-    from icha.planning.plan import DONE, FAILED, overhead
+    from icha.planning.costs import WORKFLOW
+    from icha.planning.plan import DONE, FAILED, start_up
 
     def cells(items, further=0.0):
         left = [item for item in items if item.to_do]
@@ -151,7 +152,7 @@ def _print_sums(console, items) -> None:
 
     table = Table(box=None, pad_edge=False, header_style="dim", show_footer=True)
     table.add_column("", footer="all", overflow="fold")
-    further = overhead(items)
+    further = start_up(items) + WORKFLOW.job * sum(item.to_do for item in items)
     headings = ("files", "done", "failed", "to do", "each", "core time", "memory", "disk")
     for heading, footer in zip(headings, cells(items, further), strict=True):
         # A narrow terminal breaks the names, not the numbers.

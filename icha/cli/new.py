@@ -83,7 +83,5 @@ def _print_section(section: dict) -> None:
     to_scale = not section["to_fill_in"].keys() - {"boundary"}
     for line in describe_scan(section["name"], section["scan"], to_scale=to_scale):
         echo(line)
-    if not to_scale:
-        echo(f"{section['name']}: `icha describe` analyses its spectrum once units and size are known")
     for key, reason in section["to_fill_in"].items():
         echo(f"to fill in: surfaces.{section['name']}.{key} ({reason})", fg="yellow")

@@ -40,7 +40,7 @@ from icha.support.formatting import format_count
 
 STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 MOST_LINES = 12  # printed of the reason of a failure
-# Snakemake prints these lines in any case, before the reason why it ends.
+# Snakemake always prints these lines, before the reason why it ends.
 PREAMBLE = r"Using workflow specific profile|Assuming unrestricted|host: |Building DAG of jobs|total +\d+$"
 
 
@@ -108,7 +108,8 @@ def run(
     from rich.console import Console
 
     from icha.cli.live import Progress, View
-    from icha.planning.plan import expected_work, plan, time_on
+    from icha.planning.costs import WORKFLOW
+    from icha.planning.plan import plan
     from icha.planning.validity import expected_validity
 
     items = plan(campaign, results)
@@ -116,13 +117,12 @@ def run(
         _refuse_if_too_large(items, targets, cores or DEFAULT_CORES, results, read_profile(profile_folder))
     if not set(targets) - set(TARGETS):
         _print_validity(expected_validity(campaign))
-    progress = Progress(expected_work(items, f"results/{campaign.name}"))
+    expected = {f"results/{campaign.name}/{item.path}": (item.rule, item.work + WORKFLOW.job) for item in items}
+    progress = Progress(expected)
     view = View(progress, campaign.name, folder, Console(highlight=False))
     log = _log_file(folder, campaign.name)
     status, stopped = _run_snakemake([*command, "--logger", "icha"], workflow, log, progress, view)
-    # The estimate of `icha describe` is for all targets, and for this machine.
-    expected = None if profile or set(targets) - {"all"} else time_on(items, cores or DEFAULT_CORES)
-    _print_outcome(status, stopped, progress, campaign, folder, log, expected)
+    _print_outcome(status, stopped, progress, campaign, folder, log)
     if status:
         raise typer.Exit(FAILED)
     if not set(targets) - {"all", "report", "publish"}:
@@ -145,9 +145,7 @@ def _refuse_if_too_large(items, targets: list[str], cores: int, results: Path, p
     """Raise `UserError` if memory or disk space is probably too small."""
     from icha.planning.requirements import find_shortages
 
-    if "surfaces" in targets:
-        items = [item for item in items if item.part == "surfaces"]
-    elif any(target.startswith("results/") for target in targets):
+    if any(target.startswith("results/") for target in targets):
         return  # the cost of single files is unknown
     # Resources of the command line precede those of the profile.
     resources = [each for each in targets if "=" in each] + profile.get("resources", [])
@@ -277,8 +275,8 @@ def _listen(reading: int, progress, view, stopped: list) -> None:
                 view.print_job(job, failed)
 
 
-def _print_outcome(status: int, stopped: bool, progress, campaign, folder: Path, log: Path, expected) -> None:
-    """Print the numbers of finished jobs, the reasons of failures, and the paths of results and log; `expected`: s."""
+def _print_outcome(status: int, stopped: bool, progress, campaign, folder: Path, log: Path) -> None:
+    """Print the numbers of finished jobs, the reasons of failures, and the paths of results and log."""
     from icha.support.atomic_files import probe_folder
 
     results = folder / "results" / campaign.name
@@ -288,14 +286,11 @@ def _print_outcome(status: int, stopped: bool, progress, campaign, folder: Path,
     if status == 0 and progress.started is None:
         echo("Nothing to do: all requested results exist and are up to date.")
     elif ended:
-        text = f"{len(progress.done)} of {format_count(progress.job_count, 'job')} done in "
-        text += formatting.duration(progress.clock() - progress.called)
-        if expected and ended == progress.job_count:
-            text += f"; expected about {formatting.duration(expected)}"
-        echo(text)
+        duration = formatting.duration(progress.clock() - progress.called)
+        echo(f"{len(progress.done)} of {format_count(progress.job_count, 'job')} done in {duration}")
     _print_failures(status, stopped, progress, campaign, folder, log)
     if status and results.is_dir() and (reason := probe_folder(results)):
-        # Logs are in this folder, so jobs may have been unable to report it.
+        # The logs are in this folder, too, so the jobs may have been unable to report the error.
         echo(
             f"cannot write to {shorten_path(results)}: {reason.strerror}. Repair this and repeat the command", fg="red"
         )
@@ -330,9 +325,9 @@ def _print_failures(status: int, stopped: bool, progress, campaign, folder: Path
     if failed:
         echo(f"{format_count(len(failed), 'job')} failed:", fg="red")
         for job in failed:
-            # The verdict repeats the runs without a result.
+            # The message of the job "Verdict on the checks" repeats the runs without a result.
             reason = [line for line in read_error(job, folder) if not any(line.startswith(path) for path in incomplete)]
-            unknown = f"it ended without a message, perhaps killed (out of memory?); see {job.log or log}"
+            unknown = f"it ended without a message, perhaps because memory was exhausted; see {job.log or log}"
             _print_failure(f"  {job.title}", reason or [unknown], bold=True)
             if job.log:
                 echo(f"    log: {shorten_path(folder / job.log)}")
@@ -348,16 +343,19 @@ def _print_failure(heading: str, lines: list[str], **style) -> None:
 
 def _print_checks(campaign, results: Path) -> None:
     """Print whether the checks passed, and whether the models are applicable."""
+    import xarray as xr
+
     from icha.analysis.checks import read_checks
+    from icha.analysis.validity import statements_on_dataset
     from icha.planning.results import campaign_files
-    from icha.planning.validity import found_validity
 
     files = campaign_files(campaign)
     checks = read_checks(results / files.checks)
     passed = sum(check.passed for check in checks)
     echo(f"checks:  {passed if passed < len(checks) else 'all'} of {len(checks)} passed: the equations are solved")
     echo("Applicability of the models, which is a separate question:")
-    _print_validity(found_validity(results / files.dataset))
+    with xr.open_datatree(results / files.dataset, engine="netcdf4") as tree:
+        _print_validity(statements_on_dataset(tree))
 
 
 def _print_validity(statements) -> None:

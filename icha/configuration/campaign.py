@@ -48,7 +48,7 @@ class Topography(NamedTuple):
     rms_slope : measured slope; None if no study uses it.
     sha256 : checksum of the file.
     full_contact_energy : U_full/E* at rms slope 1, m.
-    complete_contact_pressure : pressure over E* for complete contact at rms slope 1.
+    complete_contact_pressure : pressure over E* at which contact is complete, at rms slope 1.
     """
 
     grid: int
@@ -93,7 +93,7 @@ class Campaign(Section):
     studies: Annotated[dict[Name, Study], Field(min_length=1)]
     """Studies by name."""
     finite_range: Annotated[dict[Name, BoundaryElements], _FEW] = {}
-    """Solutions by boundary elements at a finite range of attraction, by name, to compare with the runs of a study."""
+    """Boundary elements at a finite range of attraction, by name, to compare with the runs of a study."""
     boundary_element_loops: Annotated[dict[Name, BoundaryElementLoops], _FEW] = {}
     """Loading and unloading with boundary elements at a finite range of attraction, by name, to compare with the runs
     of a study that unloads."""
@@ -148,7 +148,7 @@ class Campaign(Section):
         return campaign
 
     def topography(self, surface: str) -> Topography | None:
-        """Return the facts of a topography from a file; None for a random one."""
+        """Return the facts of a topography from a file; None for a random topography."""
         return self._topographies.get(surface)
 
     def origin(self, section: str, name: str) -> str:
@@ -180,7 +180,7 @@ class Campaign(Section):
         return snapshots + [state for p in loads if (state := ("reduced_pressure", p)) not in known]
 
     def contacts_beside(self, entry: BesideStudy) -> list[Contact]:
-        """Return the contacts of its study that an entry of `finite_range` or `boundary_element_loops` solves."""
+        """Return the contacts that an entry of `finite_range` or `boundary_element_loops` solves."""
         lists = (entry.surfaces, entry.seeds, entry.rms_slopes, entry.materials)
         asked = [None if values is None else set(values) for values in lists]
 
@@ -211,15 +211,14 @@ class Campaign(Section):
         for label, study in self.studies.items():
             yield from _within(("studies", label), study.problems(self.snapshots_of(label)))
             yield from _within(("studies", label), self._model_problems(study))
-        for section in (*BESIDE_STUDIES, "measurements"):
-            for label, entry in getattr(self, section).items():
+        sections = {section: getattr(self, section) for section in (*BESIDE_STUDIES, "measurements")}
+        for section, entries in (sections | {"figures": self.figures.by_name()}).items():
+            for label, entry in entries.items():
                 yield from _within((section, label), entry.problems(self))
         for label in self.finite_range:
             if label in self.studies and self.compares_models(label):
                 reason = "is the name of a study that has boundary elements itself; expected another name"
                 yield ("finite_range", label), label, reason
-        for label, figure in self.figures.by_name().items():
-            yield from _within(("figures", label), figure.problems(self))
 
     def measurement_problems(self) -> Iterator[Problem]:
         """Report tables of measurements that cannot be read."""
@@ -248,7 +247,7 @@ class Campaign(Section):
                 )
 
     def warnings(self) -> list[str]:
-        """Return warnings about valid but coarse grids of random surfaces."""
+        """Return warnings about grids of random surfaces that are valid but coarse."""
         expected: dict[str, int] = {}
         for study in self.studies.values():
             least = _ADVISABLE_CELLS if any(MODELS[model].by_cells for model in study.models) else _LEAST_CELLS

@@ -5,8 +5,7 @@ from typing import Annotated, Any
 
 from pydantic import Field, create_model, model_validator
 
-from icha.datasets.results import ResultFiles
-from icha.figures.declaration import Campaign, FigureOptions, Inputs
+from icha.figures.declaration import FigureOptions
 from icha.figures.registry import DECLARATIONS
 from icha.support.values import File, Name, Positive, Problem, Section, Text, conversion_factor, unknown
 
@@ -36,7 +35,7 @@ class Measurement(Section):
     label: Text
     """Name in the legend; formulas stand between two `$`."""
     citation: Text
-    """Source of the numbers, for the report."""
+    """Source of the numbers; the report prints it."""
     study: Name
     """Name of the study to compare with."""
     load: Column
@@ -51,7 +50,7 @@ class Measurement(Section):
 
     @property
     def load_is_pressure(self) -> bool:
-        """Whether the load column holds nominal pressures."""
+        """True if the column of the load contains nominal pressures."""
         return _factor(self.load.unit, "1") is None
 
     @property
@@ -67,8 +66,6 @@ class Measurement(Section):
             raise ValueError(f"load: unit {load!r}; expected '1' or a unit of pressure, such as 'kPa'")
         if _factor(area, "1") is None:
             raise ValueError(f"area: unit {area!r}; expected '1' or 'percent'")
-        if self.load.column == self.area.column:
-            raise ValueError(f"area: column {self.area.column!r} contains the load; expected another column")
         if self.load_is_pressure and (self.material is None or self.rms_slope is None):
             raise ValueError(f"load in {load!r} without material and rms_slope; expected both, or loads of unit '1'")
         return self
@@ -84,10 +81,6 @@ class _Drawn(Section):
     def by_name(self) -> dict[str, FigureOptions]:
         """Return the options of the figures to draw, by name."""
         return {name: getattr(self, name) for name in type(self).model_fields if getattr(self, name) is not None}
-
-    def inputs(self, name: str, campaign: Campaign, files: ResultFiles) -> Inputs:
-        """Return the input files of a figure, by the arguments of the function that draws it."""
-        return DECLARATIONS[name].inputs(campaign, getattr(self, name), files)
 
 
 Figures = create_model(

@@ -137,7 +137,7 @@ def _list_or_word(value: Any, read_list: Callable[[Any], Any]) -> Any:
 
 
 class _OrEveryStop:
-    """Annotation for the JSON schema of a list, instead of which the word `every_stop` may stand."""
+    """Annotation for the JSON schema: a list, or the word `every_stop`."""
 
     def __get_pydantic_json_schema__(self, core_schema: Any, handler: Callable[[Any], dict]) -> dict:
         """Return the schema of the list or the word."""
@@ -162,7 +162,7 @@ for _section in (*SURFACE_KINDS.values(), MaterialSection):
 
 
 def _section_of_scalars(name, kind, doc, fields=None):
-    """Make a section with a key, of type `kind`, for every parameter that can be varied."""
+    """Make a section with a key of the type `kind` for every parameter that a study may vary."""
     scalars = {key: (kind | None, Field(default=None, description=text)) for key, text in SCALARS.items()}
     return create_model(name, __base__=Section, __doc__=doc, __module__=__name__, **(fields or {}), **scalars)
 
@@ -216,7 +216,7 @@ class Study(Section):
     """States at which the run saves its spots and distributions. The path reaches each of these states exactly.
     `every_stop` stands for all targets. Default: the last target."""
     unload: StrictBool = False
-    """Whether to unload after loading, until the surfaces no longer touch."""
+    """True to unload after loading, until the surfaces no longer touch."""
     turning_points: list[TurningPoint] = []
     """States at which the path turns after its last target: at the first one unloading ends, at the second one the next
     loading ends, and so on."""
@@ -267,7 +267,7 @@ class Study(Section):
             yield from self._path_problems(snapshots)
 
     def _states(self) -> Iterator[tuple[tuple, str, float]]:
-        """Yield location, kind and value of the targets, snapshots and turning points that are written."""
+        """Yield location, kind and value of the targets, snapshots and turning points in the configuration."""
         for k, (kind, value) in enumerate(self.targets.states):
             yield ("targets", f"{kind}s", k), kind, value
         snapshots = [] if self.snapshots == EVERY_STOP else self.snapshots or []
@@ -329,11 +329,8 @@ class BesideStudy(Section):
                     yield (key, index), value, f"is not in study {self.study!r}; expected one of {expected}"
         contacts = campaign.contacts_beside(self)
         if not contacts and MEASURED not in study.rms_slopes:
-            yield (
-                (),
-                self.study,
-                "has no run with the chosen surfaces, seeds, slopes and materials; expected combinations of the study",
-            )
+            reason = "has no run with these surfaces, seeds, slopes and materials; expected combinations of the study"
+            yield ("study",), self.study, reason
         pairs = list(dict.fromkeys((each.surface, each.material) for each in contacts))
         for name in dict.fromkeys(name for name, _ in pairs):
             if campaign.is_free(name):
@@ -362,10 +359,7 @@ class BoundaryElementLoops(BesideStudy):
 
     def _study_problems(self, campaign, study):
         """Report also a study that does not unload, or not from a reduced pressure."""
-        if not study.unload or study.turning_points:
-            reason = "does not unload after its targets; expected a study with `unload: true` and no turning points"
-            yield ("study",), self.study, reason
-        if study.targets.last[0] != "reduced_pressure":
-            reason = "has other targets; expected reduced pressures, because unloading begins at the last one"
-            yield ("study",), self.study, reason
+        if not study.unload or study.turning_points or study.targets.last[0] != "reduced_pressure":
+            reason = "does not unload after its last reduced pressure; expected a study with `reduced_pressures`, "
+            yield ("study",), self.study, f"{reason}`unload: true` and no turning points"
         yield from super()._study_problems(campaign, study)

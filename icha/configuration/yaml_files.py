@@ -133,7 +133,7 @@ def dump_yaml(content: Mapping, origin: str) -> str:
 
 
 def merge(content: Mapping, overrides: Mapping) -> dict:
-    """Return `content` with the values of `overrides`, which replace lists as a whole."""
+    """Return `content` with the values of `overrides`. A list replaces the whole former list."""
     result = dict(content)
     for key, value in overrides.items():
         inside = result.get(key)
@@ -165,12 +165,10 @@ def apply_defaults(content: Mapping) -> dict:
 
 def _fill_in(entry: Mapping, given: Mapping) -> dict:
     """Return an entry with its defaults, without the keys that only surfaces of other kinds have."""
-    kind = entry.get("kind", given.get("kind"))
-    other_keys: set[str] = set()
-    if isinstance(kind, str) and kind in SURFACE_KINDS:
-        other_keys = {key for section in SURFACE_KINDS.values() for key in section.model_fields}
-        other_keys -= set(SURFACE_KINDS[kind].model_fields)
-    return {key: value for key, value in given.items() if key not in other_keys} | dict(entry)
+    kinds = [section.model_fields for section in SURFACE_KINDS.values()]
+    kind = SURFACE_KINDS.get(str(entry.get("kind", given.get("kind"))))
+    others = set().union(*kinds).difference(kind.model_fields) if kind else set()
+    return {key: value for key, value in given.items() if key not in others} | dict(entry)
 
 
 def location_in_defaults(location: tuple, written: Mapping) -> tuple:

@@ -124,7 +124,7 @@ class Equations:
         return Evaluation(approach, separation, a, equilibrium_height, error, control_error, repulsion, interaction)
 
     def error_size(self, evaluation: Evaluation, target_weight: float = _TARGET_WEIGHT) -> float:
-        """Return the largest error, in h_rms; the relative error of the load or area is multiplied by the weight."""
+        """Return the larger error: of the sites in h_rms, or the relative one of the load or area times a weight."""
         size = float(np.max(np.abs(evaluation.error), initial=0.0)) / self.contact.rms_height
         if self.control is None:
             return size

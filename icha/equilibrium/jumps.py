@@ -30,7 +30,7 @@ _SAME_STRENGTH = 1e-3
 
 
 def add_candidates(state: IterationState, separation: float) -> IterationState:
-    """Make asperities candidates that will probably be in contact at a separation, m; used without adhesion only."""
+    """Add as candidates the asperities that will probably be in contact at a separation, m; without adhesion only."""
     fall = state.last_separation - separation
     growth = _PROBABLE_APPROACH * fall + _sudden_growth(state.contact, _SUDDEN_GUESS)
     candidates = np.flatnonzero((state.last_approach + growth > 0) & state.without_site)
@@ -80,7 +80,7 @@ def apply_jump_in(state: IterationState, evaluation: Evaluation, margin: float) 
 
 
 def _sudden_growth(contact, reach):
-    """Return by how much jumps of other spots may increase an approach, m; `reach` is a pair x, y as above."""
+    """Return by how much jumps of other spots may increase an approach, m; `reach` is a pair like _SUDDEN_GUESS."""
     heights, jumps = reach
     largest_jump = -contact.law.jump_off_approach(np.max(contact.asperities.radius_of_curvature))
     return heights * contact.rms_height + jumps * largest_jump
@@ -108,7 +108,7 @@ def _evaluate_approaches(state, evaluation, spots, margin):
 
 
 def _largest_of_each_group(state, jumping):
-    """Select those of some jumping asperities that would not lie under a larger spot of another one."""
+    """Return the indices of jumping asperities without those that would lie under the larger spot of another one."""
     asperities = state.contact.asperities
     if len(jumping) < 2:
         return jumping

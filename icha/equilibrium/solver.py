@@ -172,7 +172,7 @@ def _build_contact_state(state, evaluation, control):
 
 
 def _update_candidates(state, evaluation):
-    """Make candidates of positive approach contacts, and other contacts candidates; used without adhesion only."""
+    """Turn candidates with a positive approach into contacts, and contacts without one into candidates; no adhesion."""
     sites, status, site_of_asperity = state.sites, state.sites.status.copy(), state.site_of_asperity.copy()
     made = np.flatnonzero((status == CANDIDATE) & (evaluation.approach > 0))
     status[made] = CONTACT

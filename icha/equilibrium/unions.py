@@ -118,7 +118,7 @@ def _log_contacts_of_candidates(state, candidates):
 
 
 def split_unions(state: IterationState, evaluation: Evaluation) -> IterationState:
-    """Replace every union that has become so small that its two spots would no longer overlap by these two spots."""
+    """Split the unions whose contact radii are below the radii at which their two spots just touch."""
     a, sites = evaluation.a, state.sites
     touching = np.array([0.0 if union is None else union.touching_radius for union in sites.union[: len(a)]])
     split = np.flatnonzero((sites.status[: len(a)] == CONTACT) & (a < touching))
@@ -128,7 +128,7 @@ def split_unions(state: IterationState, evaluation: Evaluation) -> IterationStat
 
 
 def _split_union(state, site, a):
-    """Replace one union by its two spots, whose radii have shrunk as that of the union, to its present radius a, m."""
+    """Replace a union by its two spots; their radii shrink by the same factor as that of the union, now a, m."""
     sites, law, union = state.sites, state.contact.law, state.sites.union[site]
     contact_radius = union.contact_radius * (a / union.union_radius)
     merged = state.site_of_asperity == site

@@ -6,7 +6,6 @@ modules of all figures. Therefore these modules import libraries for drawing, an
 the functions that draw.
 
 The function `figure` takes the data of the `inputs`, and the `arguments` of the options as keywords. It raises
-ValueError if the campaign has no such study or snapshot; the message names the existing ones. It raises
 `icha.figures.select.NothingToDraw` if no run in the figure is complete.
 """
 
@@ -178,10 +177,6 @@ class UnloadedFigure(StudyFigure):
             yield ("study",), self.study, _NOT_UNLOADED
 
 
-# Options that choose a run, which are also names of labels.
-_RUN_OPTIONS = {"study", "surface", "seed", "rms_slope", "material"}
-
-
 class RunFigure(TopographyFigure):
     """A figure of one run; options that are left out take the study's first value."""
 
@@ -193,30 +188,28 @@ class RunFigure(TopographyFigure):
     def arguments(self, campaign: Campaign) -> dict[str, Any]:
         """Return the arguments, with the labels of the run instead of the options that choose the run."""
         arguments = super().arguments(campaign)
-        return {name: arguments[name] for name in arguments.keys() - _RUN_OPTIONS} | {"run": tuple(self.run(campaign))}
+        others = arguments.keys() - set(RunLabels._fields)
+        return {name: arguments[name] for name in others} | {"run": tuple(self.run(campaign))}
 
     def run(self, campaign: Campaign) -> RunLabels:
         """Return the first requested run with adhesion; without any, return the first requested run."""
         model = first_model(campaign.studies[self.study].models)
-        wanted = self.model_dump(include=_RUN_OPTIONS, exclude_none=True)
+        wanted = self.model_dump(include=set(RunLabels._fields), exclude_none=True)
         runs = [RunLabels(self.study, model, *contact) for contact in campaign.contacts(self.study)]
         runs = [run for run in runs if wanted.items() <= run._asdict().items()]
         return next((run for run in runs if campaign.materials[run.material].surface_energy > 0), runs[0])
 
 
 class ComparedFigure(StudyFigure):
-    """A figure that compares a study's runs with boundary elements."""
+    """A comparison of a study with boundary elements. The study needs both `models`, or an entry of `finite_range`."""
 
     def study_problems(self, campaign: Campaign, study: Any) -> Iterator[Problem]:
         """Also yield a problem if the study has no boundary elements at the same loads."""
         yield from super().study_problems(campaign, study)
         if campaign.compares_models(self.study) or is_solved_at_finite_range(campaign, self.study):
             return
-        reason = (
-            "has no boundary elements at the same loads; expected a study with both `models` and reduced_pressures as "
-            "targets, or a study that an entry of finite_range names"
-        )
-        yield ("study",), self.study, reason
+        expected = "both `models` and reduced_pressures as targets, or a study that an entry of finite_range names"
+        yield ("study",), self.study, f"has no boundary elements at the same loads; expected a study with {expected}"
 
 
 def is_solved_at_finite_range(campaign: Campaign, study: str) -> bool:

@@ -1,4 +1,4 @@
-"""Means over seeds: lines with bands and points with bars, or the single seeds where these are few."""
+"""Means over seeds: lines with confidence bands, points with bars, or the single seeds if they are few."""
 
 from __future__ import annotations
 
@@ -18,14 +18,12 @@ if TYPE_CHECKING:
     from matplotlib.container import ErrorbarContainer
     from matplotlib.lines import Line2D
 
-# Approximate number of markers of a mean.
+# Approximate number of markers on the line of a mean.
 _MEAN_MARKERS = 8
 _SEED_LINE = {"ls": "-", "lw": 0.5, "alpha": 0.5, "zorder": 1.6}
 _SEED_DOT = {"ls": "none", "marker": ".", "ms": 5, "mew": 0, "alpha": 0.5, "zorder": 2.5}
 _BARS = {"elinewidth": 0.6, "capsize": 1.5}
 _CROSS = {"ls": "none", "marker": "x", "mew": 0.7, "label": FEWER_SEEDS}
-# Distance in zorder of the marks of means over fewer seeds from their curve.
-_BEFORE_POINTS = 0.101
 # Opacity of bands.
 _SHADE = 0.18
 
@@ -35,8 +33,8 @@ def draw_members(axes: Axes, x: np.ndarray, members: np.ndarray, look: dict, *, 
 
     Parameters
     ----------
-    positive : whether the axis is logarithmic, so that the band is positive and zeros are left out.
-    asked : number of members requested; marks of means over fewer show it (`mark_fewer`).
+    positive : whether the axis is logarithmic. If so, the band is positive, and zeros are left out.
+    asked : number of requested members; marks of means over fewer members are crossed.
     """
     mean, known = ensemble(members).mean, np.isfinite(members)
     if len(members) > 1:
@@ -47,7 +45,7 @@ def draw_members(axes: Axes, x: np.ndarray, members: np.ndarray, look: dict, *, 
 
 
 def _break_lines(known, *rows):
-    """Insert NaN into each row where the members (members, k) change, so that no line joins means over others."""
+    """Insert NaN into each row wherever the known members (members, k) change, so that lines are interrupted there."""
     breaks = 1 + np.flatnonzero((known[:, 1:] != known[:, :-1]).any(axis=0))
     return [np.insert(np.asarray(row, float), breaks, np.nan, axis=-1) for row in rows]
 
@@ -55,25 +53,25 @@ def _break_lines(known, *rows):
 def mark_fewer(
     axes: Axes, x: np.ndarray, y: np.ndarray, known: np.ndarray, look: dict, asked: int | np.ndarray, every: int = 1
 ) -> None:
-    """Cross the marks of means over fewer members than requested.
+    """Draw crosses over the marks of means over fewer members than requested.
 
     Parameters
     ----------
     x, y : (k,) float, the means.
-    known : (members, k) bool, which members each mean is over.
+    known : (members, k) bool, whether a mean includes a member.
     look : look of the marks, arguments of `Axes.plot`.
-    asked : number of requested members, of all points or of each.
-    every : distance between marked points, in points.
+    asked : number of requested members, for all points or for each.
+    every : a mark stands at every so many points.
     """
     counts = known.sum(axis=0)
     fewer = (counts > 0) & (counts < asked)
     if fewer.any():
-        mark = {"color": look["color"], "ms": look.get("ms", 5) + 4, "zorder": look.get("zorder", 2) + _BEFORE_POINTS}
+        mark = {"color": look["color"], "ms": look.get("ms", 5) + 4, "zorder": look.get("zorder", 2) + 0.2}
         axes.plot(x, np.where(fewer, y, np.nan), markevery=every, **mark, **_CROSS)
 
 
 def _draw_scatter(axes, x, members, colour, *, positive):
-    """Draw the scatter of an ensemble: a band, which does not widen the panel, or every member if they are few."""
+    """Draw the confidence band of the mean, or every member if they are few; a band does not change the axes."""
     over = ensemble(members)
     if over.count.min(initial=len(members)) < ENOUGH:
         # A single point has no line.
@@ -88,13 +86,19 @@ def _draw_scatter(axes, x, members, colour, *, positive):
 
 
 def join_bins(edges: np.ndarray, contents: np.ndarray, least: float) -> tuple[np.ndarray, np.ndarray]:
-    """Join neighbouring bins until the members (members, bins) together have a content of `least` in each.
+    """Join neighbouring bins until each has the content `least`, summed over all members.
 
-    Empty bins at both ends are left out; the last joined bin also has the rest.
+    Empty bins at both ends are left out. The last joined bin also takes what remains.
+
+    Parameters
+    ----------
+    edges : (bins + 1,) float, edges of the bins.
+    contents : (members, bins) float, content of each bin.
+    least : least content of a joined bin.
 
     Returns
     -------
-    Edges of the joined bins, and densities (members, joined bins); empty if all bins are.
+    Edges of the joined bins, and densities (members, joined bins). Both are empty if all bins are empty.
     """
     filled = np.flatnonzero(contents.any(axis=0))
     if not len(filled):
@@ -113,7 +117,7 @@ def join_bins(edges: np.ndarray, contents: np.ndarray, least: float) -> tuple[np
 def draw_points(
     axes: Axes, x: np.ndarray, members: np.ndarray, look: dict, *, positive: bool, asked: int | np.ndarray = 0
 ) -> ErrorbarContainer:
-    """Draw the means of an ensemble with bars along y, or with the single members if there are few.
+    """Draw the means of an ensemble as points with confidence bars, or with dots of the members if they are few.
 
     A line joins neighbouring points only if they are means over the same members.
 
@@ -121,8 +125,8 @@ def draw_points(
     ----------
     x : (k,) or (members, k) float.
     members : (members, k) float, NaN where a member has no value.
-    positive : whether values are positive, so that their bars are.
-    asked : number of members requested, of all points or of each; marks of means over fewer show it (`mark_fewer`).
+    positive : whether the values are positive. If so, the bars are positive too.
+    asked : number of requested members, for all points or for each; marks of means over fewer members are crossed.
     """
     known, over = np.isfinite(members), ensemble(members)
     x = np.where(known, x, np.nan)
@@ -139,21 +143,21 @@ def draw_points(
 
 
 class Points:
-    """A line of points, each a mean over its seeds, in the order of x.
+    """A line of points, which are means over seeds, in the order of x.
 
-    Means are over the seeds that all points have, or over all seeds of each point if they share none.
+    Means are over the seeds that all points have. If no seed is common to all points, means are over all seeds.
 
     Parameters
     ----------
     groups : the runs of each point.
-    quantities : names of x and of one or several y of a run.
-    factor : unit of y, by which they are multiplied.
+    quantities : names of the variables x, y, and further y.
+    factor : factor from the values of y to their unit in the figure.
 
     Attributes
     ----------
-    members : (quantities, seeds, k) float, values of every seed; NaN where a point lacks it.
-    same_seeds : whether all points are of the same seeds.
-    asked : (k,) int, numbers of seeds requested.
+    members : (quantities, seeds, k) float, values of every seed; NaN if a point does not have the seed.
+    same_seeds : whether all points are means over the same seeds.
+    asked : (k,) int, numbers of requested seeds.
     """
 
     def __init__(self, groups: Sequence[ContactRuns], *quantities: str, factor: float = 1.0):
@@ -176,28 +180,28 @@ class Points:
 
     @property
     def counts(self) -> list[int]:
-        """Numbers of seeds that the means are over, (k,)."""
+        """Number of seeds in each mean, (k,)."""
         return np.isfinite(self.members[0]).sum(axis=0).tolist()
 
     def draw(self, axes: Axes, look: dict, quantity: int = 1) -> ErrorbarContainer:
-        """Draw one of the quantities against the first quantity."""
+        """Draw a quantity, given by its position, against x."""
         return draw_points(axes, self.members[0], self.members[quantity], look, positive=True, asked=self.asked)
 
 
 def lines_handles(counts: Iterable[int]) -> dict[str, Line2D]:
-    """Return legend entries of lines that are means over these numbers of seeds."""
+    """Return the legend entries of lines that are means over `counts` seeds."""
     band = {"alpha": 0.35, "lw": 6, "solid_capstyle": "butt"}
     return _handles(counts, {"mean and 95 % band": band, "single seeds beside their mean": _SEED_LINE})
 
 
 def points_handles(counts: Iterable[int]) -> dict[str, Line2D]:
-    """Return legend entries of points that are means over these numbers of seeds."""
+    """Return the legend entries of points that are means over `counts` seeds."""
     bars = {"marker": "|", "ls": "none", "ms": 8}
     return _handles(counts, {"means, bars 95 %": bars, "single seeds beside their mean": _SEED_DOT})
 
 
 def _handles(counts, looks):
-    """Return legend entries, with words and looks of means over enough seeds and of means over few."""
+    """Return legend entries; `looks` has words and look of means over many seeds first, and of means over few next."""
     sizes, found = {int(count) for count in counts if count > 1}, {}
     for enough, (words, look) in zip((True, False), looks.items(), strict=True):
         if group := {size for size in sizes if (size >= ENOUGH) == enough}:

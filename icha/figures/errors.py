@@ -19,11 +19,12 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-# Largest number of surfaces and slopes for which all materials share their panels.
+# Largest number of surfaces and slopes with which all materials share a panel.
 _MOST_LINES = 2
-# Ratio of the positions of points at one load, so that their bars do not hide each other.
+# Points at the same load are drawn apart by this ratio, so that their bars do not hide each other.
 _APART = 1.025
-# Ratio by which the axis of loads extends beyond the loads, and the least one from the middle, with a label.
+# Ratio by which the axis of loads extends beyond the loads, and the least ratio from its middle to its ends, which
+# leaves room for a label.
 _MARGIN, _LEAST_REACH = 1.2, 1.6
 
 
@@ -35,16 +36,11 @@ def draw_errors(
 
     Parameters
     ----------
-    campaign : the campaign dataset, from which materials have their colours.
+    campaign : the campaign dataset; the order of its materials gives their colours.
     model_error : `icha.analysis.model_error.model_error` of the campaign.
     study : name of the study; all entries that compare its runs are drawn.
     labels : labels of the axes by the names of the variables.
     percent : whether the variables are relative errors, drawn in per cent. Other variables are never negative.
-
-    Raises
-    ------
-    NothingToDraw
-        If no run of the study that was compared is complete.
     """
     curves = _curves(model_error, study, list(labels))
     contacts = [contact for contact, _ in curves]

@@ -8,10 +8,7 @@ from icha.figures.declaration import ComparedFigure, Declaration, dataset_and_mo
 from icha.figures.errors import draw_errors
 
 DECLARATION = Declaration(
-    description=(
-        "Relative error of contact area and mean separation against boundary elements. The study needs both `models`, "
-        "or an entry of `finite_range`."
-    ),
+    description="Error of contact area and mean separation of the asperity model, relative to boundary elements.",
     options=ComparedFigure,
     inputs=dataset_and_model_error,
 )

@@ -8,10 +8,7 @@ from icha.figures.declaration import ComparedFigure, Declaration, dataset_and_mo
 from icha.figures.errors import draw_errors
 
 DECLARATION = Declaration(
-    description=(
-        "Distance of the distributions of pressure and gap, and of the contact map, from those of boundary elements. "
-        "The study needs both `models`, or an entry of `finite_range`."
-    ),
+    description="Differences of distributions and contact maps between the asperity model and boundary elements.",
     options=ComparedFigure,
     inputs=dataset_and_model_error,
 )

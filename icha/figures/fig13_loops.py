@@ -27,7 +27,7 @@ class LoopsFigure(TruthFigure, TopographyFigure, UnloadedFigure):
 
 
 def inputs(campaign: Campaign, options: LoopsFigure, files: results.ResultFiles) -> Inputs:
-    """Return the runs, and loading and unloading with boundary elements at a finite range, if there are any."""
+    """Return the campaign dataset, and files with boundary elements at a finite range, if there are any."""
     loops = [
         files.path(results.LOOP, ContactLabels(label, *contact))
         for label, entry in campaign.boundary_element_loops.items()
@@ -43,12 +43,12 @@ DECLARATION = Declaration(
     inputs=inputs,
 )
 
-# Largest number of loops for which all slopes share their panels.
+# Largest number of loops with which all slopes share a panel.
 _MOST_LOOPS = 4
-# Tension over the largest pressure, below which an inset enlarges it, and range of the inset over the tension.
+# If the tension over the largest pressure is smaller, an inset enlarges it. Range of the inset over the tension.
 _SMALL_TENSION = 0.25
 _REACH = 1.4
-# Distance between marks of boundary elements, in diagonals of the panel.
+# Distance between the marks of boundary elements, in lengths of the diagonal of the panel.
 _APART = 0.025
 _LOOP = {"lw": 0.9}
 _PULL_OFF = {"ls": "none", "mec": "black", "mew": 0.7, "ms": 4.6, "zorder": 6}
@@ -93,7 +93,7 @@ def figure(
     campaign : the campaign dataset.
     loops : loading and unloading of runs of the study with boundary elements at finite ranges, if there are any.
         Only those of the topography are shown.
-    surface, seed : those of the topography; None for the first complete run.
+    surface, seed : labels of the topography. Default: those of the first complete run.
     """
     from icha.analysis.model_error import difference_of_contacts
 
@@ -102,7 +102,7 @@ def figure(
     truths = [*(run for _, run in others if select.unloading_legs(run)), *loops]
     slopes = sorted({labels.rms_slope for labels, _ in runs}, reverse=True)
     own_rows = len(runs) > _MOST_LOOPS and 1 < len(slopes) < len(runs)
-    # Slopes that have panels of their own need no other distinction.
+    # Slopes that have their own panels need no markers.
     contacts = [(labels.material, labels.surface, None if own_rows else labels.rms_slope) for labels, _ in runs]
     looks = looks_of_studies(campaign, [study], contacts)
     drawn = []
@@ -149,7 +149,7 @@ def _draw(ax, loop, names, *, turn):
 
 
 def _enlarge(ax, loops):
-    """Add an inset around zero load to the panel of loads, if the largest tension is positive but small."""
+    """Add an inset that enlarges the panel of loads around zero load, if there is tension but it is small."""
     from matplotlib.ticker import MaxNLocator
 
     separations, pressures, areas = (
@@ -172,7 +172,7 @@ def _enlarge(ax, loops):
 
 
 def _handles(looks, loops, *, marked):
-    """Return the handles of the legend by name; `marked`: whether loops have markers, since slopes share a panel."""
+    """Return the legend entries by name; `marked`: whether markers distinguish the loops."""
     handles = looks.handles(**_LOOP, **({} if marked else {"marker": "none"}))
     for branch, dashes in BRANCH_DASHES.items():
         handles[branch] = legend_handle(color=GREY, ls=dashes, **_LOOP)
@@ -185,5 +185,5 @@ def _handles(looks, loops, *, marked):
 
 
 def _truth_name(truth):
-    """Return the name of boundary elements; only runs of a campaign have the attribute `contact_model`."""
+    """Return the legend name of boundary elements; those at a finite range have no attribute `contact_model`."""
     return SHORT_RANGE if truth.attrs.get("contact_model") == REFERENCE_MODEL else FINITE_RANGE

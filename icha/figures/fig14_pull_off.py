@@ -44,10 +44,10 @@ DECLARATION = Declaration(
     description="Pull-off against rms slope, and against the largest load.", options=PullOffFigure
 )
 
-# Ratio of values above which their axis is logarithmic.
+# If the ratio of the largest to the smallest value is larger, the axis is logarithmic.
 _SPAN = 30.0
 _LINE = {"lw": 0.9}
-# Quantity along y.
+# Variable along y.
 _Y = "pull_off_pressure"
 
 
@@ -71,7 +71,11 @@ def figure(campaign: xr.DataTree, *, study: str, load_studies: Sequence[str] = (
         loads, values = np.concatenate([line.means for line in lines.values()], axis=1)
         _scale(ax, values)
         ax.set_ylabel(f"pull-off pressure ({unit})")
-    _label_slopes(panels[0], sorted({point.labels.rms_slope for line in by_slope.values() for point in line}))
+    slopes = sorted({point.labels.rms_slope for line in by_slope.values() for point in line})
+    scale = "log" if slopes[-1] > 3 * slopes[0] else "linear"
+    panels[0].set(xlabel=r"rms slope  $h_{\mathrm{rms}}^{\prime}$", xscale=scale)
+    panels[0].set_xticks(slopes, [f"{slope:g}" for slope in slopes])
+    panels[0].minorticks_off()
     if by_load:
         panels[1].set_xlabel(r"largest reduced pressure  $F/(E^{\ast}h_{\mathrm{rms}}^{\prime}A_0)$")
         if loads.min() > 0:
@@ -82,16 +86,8 @@ def figure(campaign: xr.DataTree, *, study: str, load_studies: Sequence[str] = (
     return fig
 
 
-def _label_slopes(ax, slopes):
-    """Label the axis of slopes by the slopes that are drawn."""
-    ax.set_xlabel(r"rms slope  $h_{\mathrm{rms}}^{\prime}$")
-    ax.set_xscale("log" if slopes[-1] > 3 * slopes[0] else "linear")
-    ax.set_xticks(slopes, [f"{slope:g}" for slope in slopes])
-    ax.minorticks_off()
-
-
 def _scale(ax, values):
-    """Scale an axis so that it shows all values: logarithmic if they span decades, linear around zero."""
+    """Scale the y axis so that it shows all values: logarithmic if they span decades, but linear near zero."""
     positive = drop_rounding_errors(values)
     if len(positive) and positive.max() > _SPAN * positive.min():
         least = 10.0 ** np.floor(np.log10(positive.min()))

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 
 def inputs(campaign: Campaign, options: StudyFigure, files: results.ResultFiles) -> Inputs:
-    """Return the runs, theories for their first surface, and boundary elements at a finite range, if any."""
+    """Return the campaign dataset, theories for its first surface, and the model error if it has finite ranges."""
     found = dataset_and_theories(campaign, options, files)
     if is_solved_at_finite_range(campaign, options.study):
         found["model_error"] = files.path(results.MODEL_ERROR)
@@ -38,18 +38,18 @@ def inputs(campaign: Campaign, options: StudyFigure, files: results.ResultFiles)
 
 
 DECLARATION = Declaration(
-    description="Contact area and mean separation against load, with theories, and what the logarithmic axes hide.",
+    description="Contact area and mean separation against load, with theories, and differences between the models.",
     options=StudyFigure,
     inputs=inputs,
 )
 
 # Height of the panels of differences over that of the panels above them.
 _LOWER = 0.42
-# Largest relative difference of loads that are the same, since each model has its tolerance.
+# Loads with a smaller relative difference are the same; they differ because each model has its own tolerance.
 _SAME_LOAD = 1e-6
-# Labels of the axis of separations if it is short.
+# Ticks of the axis of separations if it spans less than two decades.
 _SEPARATIONS = (0.05, 0.1, 0.2, 0.3, 0.5, 0.7, 1, 1.5, 2, 3, 5)
-# Points of a run, and their symbol.
+# Function that returns the points of a run, and symbol of the quantity.
 _QUANTITIES = ((curves.area_points, "A"), (curves.gap_points, r"\bar{u}"))
 
 
@@ -69,7 +69,7 @@ def figure(
     if solved := _finite_range_curves(model_error, study, shown.looks):
         shown.crosses.extend(solved)
         shown.handles[FINITE_RANGE] = model_handle(FINITE_RANGE, ms=8)
-    # The limit of a short range, with which the crosses begin, comes first, because finite ranges only bound it.
+    # The crosses begin with the limit of a short range, which is used if there is one. Finite ranges only bound it.
     truths = {truth.runs.contact: truth for truth in reversed(shown.crosses)}
     compared = [(line, truths[line.runs.contact]) for line in shown.lines if line.runs.contact in truths]
     fig, axes = new_panels(4.5, 2, sharex=True, height_ratios=(1, _LOWER)) if compared else new_panels(3.3)
@@ -121,9 +121,9 @@ def _finite_range_curves(model_error, study, looks):
 
 
 def _difference(line, truth, points):
-    """Return loads, and differences (seeds, loads) of runs from boundary elements with the same seed, in per cent.
+    """Return loads, and differences (seeds, loads) of a curve from boundary elements of the same seeds, in per cent.
 
-    The loads are those of the runs, as far as boundary elements reach. Their values are interpolated.
+    The loads are those of the curve within the loads of boundary elements, whose values are interpolated.
     """
     from icha.analysis.common_loads import at_common_loads, interpolate
 
@@ -142,7 +142,7 @@ def _difference(line, truth, points):
 
 
 def _draw_references(left, right, references, limits):
-    """Draw theories of rough contact and published points within the limits of the loads."""
+    """Draw theories of rough contact, within the limits of the loads, and published points."""
     p, black = references["reduced_pressure"].values, {"color": BLACK, "lw": 1, "zorder": 2}
     shown = (p >= limits[0] / 1.5) & (p <= limits[1] * 1.5)
     left.plot(p[shown], references["persson_area_fraction"].values[shown], label="Persson", **black)
@@ -161,7 +161,7 @@ def _draw_references(left, right, references, limits):
 
 
 def _draw_separate_summits(left, right, references, dataset, looks):
-    """Draw theories of separate summits as thin lines, if the references have them; Fuller & Tabor by material."""
+    """Draw the theories of separate summits as thin lines, if any; that of Fuller & Tabor for each material."""
     theories = []
     if "greenwood_williamson_reduced_pressure" in references:
         theories.append(("Greenwood & Williamson", (0, (5, 2, 1, 2)), GREY, "greenwood_williamson", references))

@@ -25,9 +25,9 @@ DECLARATION = Declaration(
     options=SnapshotFigure,
 )
 
-# Least number of sampled gaps in a plotted point; bins with fewer are joined with their neighbours.
+# Least number of grid cells in a point of P(u). Bins with fewer cells are joined with their neighbours.
 _LEAST_CELLS = 100
-# The same for nodes in contact, which are few.
+# The same for P(p) of boundary elements, which have few nodes in contact.
 _LEAST_NODES = 25
 # Largest number of markers of boundary elements.
 _BESIDE_MARKERS = 14
@@ -70,7 +70,7 @@ def figure(campaign: xr.DataTree, *, study: str, kind: str | None = None, target
 
 
 def _finish(left, right, pressures, highest, load):
-    """Label both panels; draw Persson's theory at a reduced pressure and set the limits of the panel of pressures."""
+    """Label both panels, draw Persson's theory for a reduced pressure, and set the limits of the panel of pressures."""
     from icha.references.persson import persson_pressure_density
 
     if load > 0:

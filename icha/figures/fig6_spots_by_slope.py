@@ -83,16 +83,13 @@ def _draw_slopes(ax, runs, kind, colours, length):
     from matplotlib.collections import PatchCollection
     from matplotlib.patches import Wedge
 
+    from icha.analysis.model_error import state_of
     from icha.datasets.campaign import find_snapshot, spots_of
 
     at = {slope: find_snapshot(run, kind) for slope, run in runs.items()}
-
-    def area(slope):
-        run = runs[slope]
-        return float(run["contact_area_fraction"].values[int(run["snapshot_step"].values[at[slope]])])
-
-    # Spots that cover less lie on top.
-    for order, slope in enumerate(sorted(colours, key=area, reverse=True)):
+    areas = {slope: float(state_of(run, at[slope])["contact_area_fraction"]) for slope, run in runs.items()}
+    # Spots that cover a smaller area are drawn on top.
+    for order, slope in enumerate(sorted(colours, key=areas.get, reverse=True)):
         run, look = runs[slope], {"facecolor": colours[slope], "edgecolor": "black", "lw": 0.25}
         side, spots = float(run["period"]) * length, spots_of(run, at[slope])
         places = (spots[f"spot_{name}"].values * length for name in ("x", "y", "radius"))
@@ -100,7 +97,7 @@ def _draw_slopes(ax, runs, kind, colours, length):
         if kind == "relative_load":
             draw_spots(ax, circles, zorder=2 + order, **look)
         else:
-            # The spots nearly coincide. Every slope fills a sector of the disc, so that all are visible.
+            # The spots of all slopes nearly coincide. Each slope fills a sector of the circle, so that all are visible.
             share = 360 / len(runs)
             start = 90 + share * list(colours).index(slope)
             ax.add_collection(PatchCollection([Wedge((x, y), r, start, start + share) for x, y, r in circles], **look))

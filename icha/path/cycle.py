@@ -15,7 +15,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from icha.contact.model import ContactModel, NotConverged, State
-from icha.path.energy_balance import Step, Waypoint, waypoint_between
+from icha.path.energy_balance import Step, Waypoint, waypoint_without_target
 from icha.path.loading import PathProgress
 from icha.path.step_accuracy import StepAccuracy
 from icha.path.stops import (
@@ -54,7 +54,7 @@ def follow_cycle(
         targets.remove(each)
         progress.record_target(each.target, state)
         yield Waypoint(each.target, state, 0)
-    yield waypoint_between(start, 0)
+    yield waypoint_without_target(start, 0)
     cycle = _Cycle(contact, longest, progress, start)
     if contact.adhesive:
         cycle.step_length = cycle.event_length
@@ -179,7 +179,9 @@ class _Cycle:
                 pending.remove(listed)
                 if leg == 0:
                     self.progress.record_target(listed.target, met)
-            waypoint = waypoint_between(met, leg, step) if target is None else Waypoint(target.target, met, leg, step)
+            waypoint = (
+                waypoint_without_target(met, leg, step) if target is None else Waypoint(target.target, met, leg, step)
+            )
             sent = yield waypoint
         if self.loading:
             # A reloading adds only separations below all earlier stations.
@@ -254,10 +256,10 @@ class _Cycle:
     def _choose_next_length(self, step, state):
         """Return the length of the next step after a step to a state, m.
 
-        If the model does not predict steps, it is twice the last length. After an event it is at least the length of
-        steps without events. Before a known event it is half the distance to the event, or the whole distance if this
-        is short enough to resolve the event. Otherwise it is twice the last length, or the last length if the error of
-        a longer step would be too large.
+        If the model does not predict steps, a step is twice as long as the last one. After an event a step has at least
+        the length of steps without events. Before a known event it covers half the distance to the event, or the whole
+        distance if this is short enough to resolve the event. Otherwise it is twice as long as the last one, or as long
+        if the error of a longer step would be too large.
         """
         longer = min(self.longest, 2 * self.step_length)
         if not self.contact.path_accuracy.predicts_steps:

@@ -201,7 +201,7 @@ class Waypoint:
         return self.leg % 2 == 0
 
 
-def waypoint_between(state: State, leg: int, step: Step | None = None) -> Waypoint:
+def waypoint_without_target(state: State, leg: int, step: Step | None = None) -> Waypoint:
     """Return the waypoint of an equilibrium that meets no target."""
     return Waypoint(Target(BETWEEN, state.separation), state, leg, step)
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 from icha.contact.model import ContactModel, State
 from icha.path.cycle import follow_cycle
-from icha.path.energy_balance import EnergyBalance, Waypoint, waypoint_between
+from icha.path.energy_balance import EnergyBalance, Waypoint, waypoint_without_target
 from icha.path.loading import PathProgress, first_loading
 from icha.path.stops import SAME_EXCESS, TargetFunction
 from icha.path.targets import BETWEEN, LOAD_CONTROL, REDUCED_PRESSURE, Path, Target
@@ -88,7 +88,7 @@ def select_load_control(
             balance = balance.add_load_jump(contact, visited, state, level)
         elif waypoint.step is not None:
             balance = balance.add_step(contact, waypoint.step)
-        yield replace(waypoint_between(state, waypoint.leg) if landed else waypoint, balance=balance)
+        yield replace(waypoint_without_target(state, waypoint.leg) if landed else waypoint, balance=balance)
         visited, left_out, landing, level = state, None, None, pressure
     if visited is not None and left_out is not None:
         yield replace(left_out, balance=balance.add_load_jump(contact, visited, left_out.state, level))

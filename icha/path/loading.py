@@ -65,7 +65,7 @@ class PathProgress:
         self.idle += 1
 
     def record_target(self, target: Target, state: State) -> None:
-        """Count and report one more target."""
+        """Count and report a target that the path has met."""
         self.reached, self.idle = self.reached + 1, 0
         self.report_position(f"stop {self.reached} of {self.total}: {target.describe(6)}", state)
 

@@ -135,7 +135,7 @@ def finite_range_solution(
     refinement : nodes per node of the surface's grid, along a side.
     tolerance : relative error at which the solver stops.
     seed : recorded in the dataset.
-    progress : called with lines of text; the first one has the spacing of the grid and the longest one allowed.
+    progress : called with a line of text for every mean gap of the search.
 
     Returns
     -------
@@ -167,7 +167,7 @@ def contact_state(
 ) -> NodalState:
     """Return the state of a contact under one load at all nodes; the arguments are those of `finite_range_solution`."""
     target = POSITIVE.validate("reduced_pressure", reduced_pressure) * surface.rms_slope * material.contact_modulus
-    fine = refine(surface, material, refinement, progress)
+    fine = refine(surface, material, refinement)
     state = _solve_nonadhesive(fine, material, target, TOLERANCE.validate("tolerance", tolerance))
     if material.surface_energy == 0:
         return state
@@ -175,20 +175,10 @@ def contact_state(
     return _find_gap_at_load(contact, target, state.mean_separation, progress)
 
 
-def refine(
-    surface: Surface, material: Material, refinement: int, progress: Callable[[str], None] | None = None
-) -> Surface:
+def refine(surface: Surface, material: Material, refinement: int) -> Surface:
     """Return the surface on a finer grid for the solver; raise `ValueError` if it does not resolve the attraction."""
     surface.require_periodic("the solver for finite ranges")
     fine = surface.refined(REFINEMENT.validate("refinement", refinement))
-    numbers = f"{fine.grid} nodes a side, spacing {fine.spacing:.4g} m"
-    if material.surface_energy > 0:
-        numbers += (
-            f"; with adhesion at most {longest_spacing(material):.4g} m; sqrt(dgamma dx/E*)/range = "
-            f"{strength_number(material, fine.spacing):.3g}"
-        )
-    if progress:
-        progress(numbers)
     if problem := resolution_problem(material, fine.spacing):
         raise ValueError(f"interaction_range: {problem}")
     return fine

@@ -76,7 +76,7 @@ def finite_range_loop(
     """
     target = POSITIVE.validate("largest_reduced_pressure", largest_reduced_pressure)
     step = POSITIVE.validate("separation_step", separation_step) * surface.rms_height
-    fine = refine(surface, material, refinement, progress)
+    fine = refine(surface, material, refinement)
     solver = _LoopSolver(fine, material, TOLERANCE.validate("tolerance", tolerance))
     legs = _load_and_unload(solver, step, target * surface.rms_slope * material.contact_modulus, progress)
     return _dataset(surface, solver, legs, separation_step, seed)

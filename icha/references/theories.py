@@ -9,7 +9,8 @@ import xarray as xr
 
 from icha.asperity.material import Material
 from icha.datasets.attributes import THEORY, file_attributes
-from icha.datasets.variables.terms import TERMS
+from icha.datasets.build import describe_variables
+from icha.datasets.variables.terms import TERMS, read_tables
 from icha.references import persson, summit_theories
 from icha.surfaces.moments import SpectralMoments
 from icha.surfaces.spectrum import SelfAffineSpectrum
@@ -51,9 +52,10 @@ def reference_dataset(
     Greenwood & Williamson and of Fuller & Tabor along `summit_point`, at the areas `summit_area_fraction`; and
     published points along `gfmd_point`.
     """
-    variables = _mean_field_theories(np.asarray(reduced_pressures, float), spectrum) | _published_points(spectrum)
+    values = _mean_field_theories(np.asarray(reduced_pressures, float), spectrum) | _published_points(spectrum)
     if moments is not None:
-        variables |= _summit_theories(moments, adhesive)
+        values |= _summit_theories(moments, adhesive)
+    variables = describe_variables(_TABLE, values)
     described = file_attributes(
         "Theories of rough contact, and published points",
         "Contact area, mean separation and contact stiffness against reduced pressure.",
@@ -65,103 +67,80 @@ def reference_dataset(
     return xr.Dataset(variables, attrs=described | dict(attrs))
 
 
-_PRESSURE, _AREA, _SEPARATION, _NAYAK = (
-    TERMS[name].long_name
-    for name in ("reduced_pressure", "contact_area_fraction", "reduced_separation", "nayak_parameter")
-)
+def _sources():
+    """Return the sources of all variables that are theories or published points, by name."""
+    points, separation = literature("gfmd_area"), ("reduced_pressure", "reduced_separation")
+    return {
+        "persson_area_fraction": persson.PERSSON,
+        "xu_area_fraction": persson.XU,
+        **dict.fromkeys(("persson_reduced_separation", "persson_reduced_stiffness"), persson.YANG_PERSSON),
+        "bush_gibson_thomas_area_fraction": summit_theories.BUSH_GIBSON_THOMAS,
+        **dict.fromkeys((f"gfmd_{name}" for name in _GFMD), f"{points['citation']} {points['description']}"),
+        **{f"greenwood_williamson_{name}": summit_theories.GREENWOOD_WILLIAMSON for name in separation},
+        **{f"fuller_tabor_{name}": summit_theories.FULLER_TABOR for name in separation},
+    }
 
 
-def _make_variable(dim, values, long_name, source=""):
-    """Make a variable without a unit from its values, with the publication of the theory as its source."""
-    described = {"units": "1", "long_name": long_name}
-    return xr.Variable(dim, values, described | ({"references": source} if source else {}))
+_GFMD = ("reduced_pressure", "area_fraction", "area_scatter")
+_TABLE = read_tables(
+    "theories.txt",
+    TERMS,
+    {name: {"references": source} for name, source in _sources().items()},
+    area=TERMS["contact_area_fraction"].long_name,
+    pressure=TERMS["reduced_pressure"].long_name,
+    separation=TERMS["reduced_separation"].long_name,
+)[""]
 
 
 def _mean_field_theories(pressure, spectrum):
-    """Return the variables of Persson's theory and that of Bush, Gibson & Thomas at reduced pressures, by name."""
-    dim = "reduced_pressure"
-    variables = {
-        dim: _make_variable(dim, pressure, _PRESSURE),
-        "persson_area_fraction": _make_variable(
-            dim, persson.persson_area(pressure), f"{_AREA}, Persson", persson.PERSSON
-        ),
-        "xu_area_fraction": _make_variable(
-            dim, persson.corrected_persson_area(pressure), f"{_AREA}, Persson corrected by Xu and others", persson.XU
-        ),
+    """Return the values of Persson's theory and that of Bush, Gibson & Thomas at reduced pressures, by variable."""
+    area = summit_theories.bush_gibson_thomas_area(pressure)
+    separate = area <= summit_theories.SEPARATE_SUMMITS_AREA_LIMIT
+    values = {
+        "reduced_pressure": pressure,
+        "persson_area_fraction": persson.persson_area(pressure),
+        "xu_area_fraction": persson.corrected_persson_area(pressure),
+        "linear_pressure": pressure[separate],
+        "bush_gibson_thomas_area_fraction": area[separate],
     }
     if spectrum is not None:
-        separation = persson.persson_mean_separation(pressure, spectrum)
-        stiffness = persson.persson_stiffness(pressure, spectrum)
-        long_name = "contact stiffness times rms height over contact modulus and rms slope, Yang and Persson"
-        variables |= {
-            "persson_reduced_separation": _make_variable(
-                dim, separation, f"{_SEPARATION}, Yang and Persson", persson.YANG_PERSSON
-            ),
-            "persson_reduced_stiffness": _make_variable(dim, stiffness, long_name, persson.YANG_PERSSON),
-        }
-    linear = pressure[summit_theories.bush_gibson_thomas_area(pressure) <= summit_theories.SEPARATE_SUMMITS_AREA_LIMIT]
-    area, long_name = summit_theories.bush_gibson_thomas_area(linear), f"{_AREA}, Bush, Gibson and Thomas"
-    return variables | {
-        "linear_pressure": _make_variable("linear_point", linear, _PRESSURE),
-        "bush_gibson_thomas_area_fraction": _make_variable(
-            "linear_point", area, long_name, summit_theories.BUSH_GIBSON_THOMAS
-        ),
-    }
+        values["persson_reduced_separation"] = persson.persson_mean_separation(pressure, spectrum)
+        values["persson_reduced_stiffness"] = persson.persson_stiffness(pressure, spectrum)
+    return values
 
 
 def _summit_theories(moments, adhesive):
-    """Return the variables of the theories of Greenwood & Williamson and of Fuller & Tabor, by name."""
-    dim, by = "summit_point", "Greenwood and Williamson"
+    """Return the values of the theories of Greenwood & Williamson and of Fuller & Tabor, by variable."""
     separation = summit_theories.separation_at(summit_theories.greenwood_williamson_area, SUMMIT_AREAS, moments)
-    pressure = summit_theories.greenwood_williamson_pressure(separation, moments)
-    variables = {
-        "nayak_parameter": _make_variable((), moments.nayak_parameter, _NAYAK),
-        "summit_area_fraction": _make_variable(dim, SUMMIT_AREAS, f"{_AREA}, at which separate summits are evaluated"),
-        "greenwood_williamson_reduced_pressure": _make_variable(
-            dim, pressure, f"{_PRESSURE}, {by}", summit_theories.GREENWOOD_WILLIAMSON
-        ),
-        "greenwood_williamson_reduced_separation": _make_variable(
-            dim, separation, f"{_SEPARATION}, {by}", summit_theories.GREENWOOD_WILLIAMSON
-        ),
+    values = {
+        "nayak_parameter": moments.nayak_parameter,
+        "summit_area_fraction": SUMMIT_AREAS,
+        "greenwood_williamson_reduced_pressure": summit_theories.greenwood_williamson_pressure(separation, moments),
+        "greenwood_williamson_reduced_separation": separation,
     }
     if not adhesive:
-        return variables
-    curves = []
+        return values
+    pressures, separations = [], []
     for (rms_slope, _), material in adhesive.items():
         scaled = moments.scaled_to_rms_slope(rms_slope)
         separation = summit_theories.separation_at(summit_theories.fuller_tabor_area, SUMMIT_AREAS, scaled, material)
-        curves.append((summit_theories.fuller_tabor_pressure(separation, scaled, material), separation))
-    pressures, separations = np.moveaxis(np.array(curves), 1, 0)
+        pressures.append(summit_theories.fuller_tabor_pressure(separation, scaled, material))
+        separations.append(separation)
     slopes, names = zip(*adhesive, strict=True)
-    curve, by = "fuller_tabor_curve", "Fuller and Tabor"
-    return variables | {
-        "fuller_tabor_rms_slope": _make_variable(
-            curve, np.array(slopes, float), "root mean square slope of the surface"
-        ),
-        "fuller_tabor_material": _make_variable(curve, np.array(names, dtype=object), "name of the material"),
-        "fuller_tabor_reduced_pressure": _make_variable(
-            (curve, dim), pressures, f"{_PRESSURE}, {by}", summit_theories.FULLER_TABOR
-        ),
-        "fuller_tabor_reduced_separation": _make_variable(
-            (curve, dim), separations, f"{_SEPARATION}, {by}", summit_theories.FULLER_TABOR
-        ),
+    return values | {
+        "fuller_tabor_rms_slope": slopes,
+        "fuller_tabor_material": names,
+        "fuller_tabor_reduced_pressure": pressures,
+        "fuller_tabor_reduced_separation": separations,
     }
 
 
 def _published_points(spectrum):
-    """Return the variables of points by Green's function molecular dynamics, if they are of this spectrum, by name."""
+    """Return the points by Green's function molecular dynamics by variable, if they are of this spectrum."""
     gfmd = literature("gfmd_area")
     if spectrum is None:
         return {}
     ratios = (spectrum.rolloff_wavelength / spectrum.period, spectrum.period / spectrum.short_wavelength)
     if not np.allclose((spectrum.hurst, *ratios), (gfmd["hurst"], 1.0, gfmd["cutoff_ratio"]), rtol=1e-3):
         return {}
-    points = gfmd["citation"] + " " + gfmd["description"]
-    return {
-        f"gfmd_{name}": _make_variable("gfmd_point", np.array(gfmd[name]), f"{long_name}, GFMD", points)
-        for name, long_name in (
-            ("reduced_pressure", _PRESSURE),
-            ("area_fraction", _AREA),
-            ("area_scatter", f"standard deviation over realisations of the {_AREA}"),
-        )
-    }
+    return {f"gfmd_{name}": gfmd[name] for name in _GFMD}

@@ -10,7 +10,6 @@ import base64
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 
@@ -23,7 +22,7 @@ from icha.contact.models import MODEL_PAPER
 from icha.datasets.results import EXPLORER
 from icha.figures.captions import count_runs
 from icha.figures.registry import figure_number
-from icha.report.sections import draw_spectra, list_sources, summarise_errors, summarise_surface
+from icha.report.sections import list_sources, picture_of_spectra, summarise_errors, summarise_surface
 from icha.report.studies import summarise_study
 from icha.report.template import MOST_ROWS, write_page
 
@@ -83,7 +82,11 @@ def write_report(
     citations : further sources to cite, such as those of measurements.
     further_software : packages that this campaign needs besides `SOFTWARE`.
     """
-    link = partial(_link, Path(path).parent)
+
+    def link(target):
+        """Return the path of a file relative to the folder of the page."""
+        return None if target is None else Path(os.path.relpath(target, Path(path).parent)).as_posix()
+
     checks, surfaces = list(checks), list(surfaces)
     studies = [summarise_study(campaign, name) for name in campaign.children]
     errors = list(model_error.children.values()) if model_error is not None else []
@@ -108,7 +111,7 @@ def write_report(
         surfaces=[summarise_surface(surface) for surface in surfaces[:MOST_ROWS]],
         surface_count=len(surfaces),
         sources=list_sources(surfaces),
-        spectra=draw_spectra(surfaces),
+        spectra=picture_of_spectra(surfaces),
         figures=_pictures(figures, campaign, link),
         entries=[summarise_errors(node.to_dataset()) for node in errors],
         references=list(dict.fromkeys(source.strip() for source in texts.split(";") if source.strip())),
@@ -120,11 +123,6 @@ def write_report(
         citations=citations,
         software={name: version(name) for name in (*SOFTWARE, *further_software)},
     )
-
-
-def _link(folder: Path, target: str | os.PathLike | None) -> str | None:
-    """Return the path of a file relative to the folder of the page."""
-    return None if target is None else Path(os.path.relpath(target, folder)).as_posix()
 
 
 def _pictures(figures: Sequence[ReportFigure], campaign: xr.DataTree, link) -> list[dict]:

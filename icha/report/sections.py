@@ -53,7 +53,7 @@ def list_sources(surfaces) -> list[dict[str, str]]:
     return [dict(zip(keys, row, strict=True)) for row in dict.fromkeys(rows)]
 
 
-def draw_spectra(surfaces) -> str | None:
+def picture_of_spectra(surfaces) -> str | None:
     """Draw the power spectra, averaged over the seeds of each surface: a PNG in base64; None if no file has one."""
     members: dict[str, list] = {}
     for surface in surfaces:
@@ -62,12 +62,12 @@ def draw_spectra(surfaces) -> str | None:
     if not members:
         return None
     file = io.BytesIO()
-    _draw_spectra(members).savefig(file, format="png", dpi=150, metadata={"Software": None})
+    draw_spectra(members).savefig(file, format="png", dpi=150, metadata={"Software": None})
     return base64.b64encode(file.getvalue()).decode("ascii")
 
 
 @in_style
-def _draw_spectra(members):
+def draw_spectra(members):
     """Draw a curve for each surface; many surfaces have graded colours, and the legend names some of them."""
     colours = graded_colours(len(members)) if len(members) > MOST_COLOURS else COLOURS
     named = some_of(list(members))

@@ -86,17 +86,6 @@ def sync_folder(folder: Path) -> None:
             _sync(Path(top))
 
 
-def find_obstacle(folder: Path) -> str | None:
-    """Describe the file or broken link that prevents a folder; None if the folder exists or can be created."""
-    for path in (folder, *folder.parents):
-        # The methods of Path raise errors below a folder that may not be entered.
-        if os.path.exists(path):
-            return None if os.path.isdir(path) else f"{path} is a file, not a folder"
-        if os.path.islink(path):
-            return f"{path} is a link to {os.readlink(path)}, which does not exist or cannot be reached"
-    return None
-
-
 def probe_folder(folder: Path) -> OSError | None:
     """Write some data to a folder and remove them; return the error if it cannot be written to."""
     probe = folder / f".{os.getpid()}.probe{_ENDING}"

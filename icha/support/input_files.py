@@ -27,11 +27,11 @@ _WHOLE = "expected a file that holds all of its data"
 
 
 class RefusedFile(ValueError):
-    """A file that is not read because it might do harm; the message says why, and what is expected."""
+    """A file that is not read because it might do harm; the message gives the reason and what is expected."""
 
 
 class TooLarge(RefusedFile):
-    """A file that would take more memory than the limit; the message says how to raise it."""
+    """A file that would take more memory than the limit; the message explains how to raise the limit."""
 
     def __init__(self, needed: str, most: int):
         """Describe the memory `needed`, the limit of `most` bytes, and how to raise it."""
@@ -183,17 +183,14 @@ def read_columns(path: str | Path, columns: dict[str, float]) -> list:
         raise ValueError(f"cannot be read ({reason}); expected a CSV file") from None
     if not rows:
         raise ValueError("holds no values; expected a CSV file with a line of headings and at least one of numbers")
-    found = []
-    for heading, factor in columns.items():
+    found = {heading: [] for heading in columns}
+    for heading, numbers in found.items():
         if heading not in rows[0]:
             raise ValueError(f"has no column {heading!r}; expected one of {', '.join(map(str, rows[0]))}")
-        numbers = []
         for number, row in enumerate(rows, start=1):
+            place = f"column {heading!r}, row {number}: {row[heading]!r}"
             try:
                 numbers.append(POSITIVE.validate("", float(row[heading])))
             except (TypeError, ValueError):
-                raise ValueError(
-                    f"column {heading!r}, row {number}: {row[heading]!r}; expected a number greater than 0"
-                ) from None
-        found.append(np.array(numbers) * factor)
-    return found
+                raise ValueError(f"{place}; expected a number greater than 0") from None
+    return [np.array(found[heading]) * factor for heading, factor in columns.items()]

@@ -104,7 +104,7 @@ class Surface:
 
     @property
     def free(self) -> bool:
-        """Whether the surface is a single square."""
+        """True if the surface is a single square."""
         return self.boundary == FREE
 
     def require_periodic(self, purpose: str) -> None:

@@ -218,12 +218,7 @@ def test_pressure_tail_falls_as_the_inverse_cube(law):
 
 
 @pytest.mark.parametrize(
-    ("argument", "value"),
-    [
-        ("contact_modulus", "25 MPa"),
-        ("surface_energy", -1e-3),
-        ("interaction_range", 0.0),
-    ],
+    ("argument", "value"), [("contact_modulus", "25 MPa"), ("surface_energy", -1e-3), ("interaction_range", 0.0)]
 )
 def test_bad_material_is_refused_by_name(argument, value):
     good = {"contact_modulus": MODULUS, "surface_energy": ENERGY, "interaction_range": RANGE}

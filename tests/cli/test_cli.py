@@ -23,7 +23,6 @@ from icha.cli import app
 from icha.cli.live import Progress, View, read_error, read_last_line
 from icha.cli.project import list_campaigns, reports_errors
 from icha.configuration.cases import run_cases, run_sha256
-from icha.configuration.errors import ConfigurationError
 from icha.configuration.load import load_configuration
 from icha.datasets.campaign_file import write_campaign
 from icha.datasets.files import read_dataset, write_dataset
@@ -255,23 +254,6 @@ def test_only_the_boundary_of_a_complete_file_is_left_to_fill_in(project, bounda
     assert load_configuration(file).warnings == ()
 
 
-def test_a_scan_with_a_wrong_unit_is_refused_unless_its_size_is_confirmed(project):
-    write_scan("far.txt", rough_heights() * 1e7, "160 m")
-    output("new", "far", "--measured", "far.txt")
-    key = "surfaces.far.size"
-    file = CAMPAIGNS / "far.yaml"
-    text = file.read_text().replace("boundary: ", "boundary: free")
-    file.write_text(text)
-    refused = printed("describe", "far", status=2)
-    assert f"{key}: '160 m' is unusual" in refused and f"`confirmed: [{key}]`" in refused
-    file.write_text(f"{text}\nconfirmed: [{key}]\n")
-    (warning,) = load_configuration(file).warnings
-    assert f"{key}: '160 m' is unusual" in warning and "confirmed" in warning
-    file.write_text(text.replace("touches_first", "size: 160 um\n    touches_first"))
-    with pytest.raises(ConfigurationError, match=r"surfaces\.far\.height_unit: 'rms slope .*' is unusual"):
-        load_configuration(file)
-
-
 def test_a_scan_is_analysed_before_anything_is_computed(project):
     write_scan("scan.txt", rough_heights(noise=20e-9), "10 um")
     written = output("new", "mine", "--measured", "scan.txt", "--boundary-elements")
@@ -346,19 +328,6 @@ def test_outside_a_clone_the_installed_workflow_is_used(empty_folder):
     # Files of the folder precede installed ones.
     shutil.copyfile(file, "config/config.yaml")
     assert "configuration: config/config.yaml" in output("describe")
-
-
-@pytest.mark.parametrize("place", ["results", "results/smoke"])
-@pytest.mark.parametrize("link", [True, False])
-def test_an_obstacle_in_place_of_a_folder_is_named(empty_folder, place, link):
-    obstacle = empty_folder / place
-    obstacle.parent.mkdir(exist_ok=True)
-    if link:
-        obstacle.symlink_to("nowhere")
-    else:
-        obstacle.write_text("something else")
-    refused = output("run", "smoke", status=2)
-    assert f"Error: {place} is a {'link to nowhere' if link else 'file'}" in refused and "File exists" not in refused
 
 
 def test_the_states_of_runs_are_distinguished(tiny):

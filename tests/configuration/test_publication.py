@@ -3,51 +3,9 @@
 import datetime
 
 import pytest
-from demo_configuration import CARBERRY, GOOD_RUN, ORCID
+from demo_configuration import CARBERRY, ORCID
 
 from icha.configuration.errors import ConfigurationError
-
-DOI = "10.1007/s11249-017-0900-2"
-PERSON_ROR = CARBERRY | {"ror": "https://ror.org/05gq02987"}
-FAILURE = {"run": GOOD_RUN, "reason": "why"}
-BOUNDARY_ELEMENTS = "one/rough/seed1/slope1/boundary_elements/soft"
-# Wrong values of a key, and the beginnings of their messages.
-WRONG = [
-    ("authors", [CARBERRY | {"orcid": "1"}], "authors[0].orcid: '1' is not valid; expected an ORCID"),
-    ("authors", [CARBERRY | {"orcid": "0000-0002-1825-0098"}], "authors[0].orcid: '0000-0002-1825-0098' is not valid"),
-    ("authors", [{"name": "A", "orcid": ORCID}], "authors[0]: expected orcid only for a person"),
-    ("authors", [{"family_names": "Carberry"}], "authors[0]: {'family_names': 'Carberry'} is neither"),
-    ("authors", [CARBERRY | {"ror": "x"}], "authors[0].ror: 'x' is not valid; expected a ROR"),
-    ("authors", [{"name": "A", "ror": "https://ror.org/03yrm5c27"}], ".ror: 'https://ror.org/03yrm5c27' is not valid"),
-    ("authors", [PERSON_ROR], "authors[0]: expected orcid only for a person, and ror"),
-    ("authors", [{"name": "The team"}, CARBERRY, {"name": "The team"}], "name='The team'"),
-    ("authors", [CARBERRY | {"affiliation": "Brown\x07"}], "authors[0].affiliation: 'Brown\\x07' holds"),
-    ("version", 1.10, "version: 1.1 is not valid; expected letters and digits"),
-    ("version", "../1", "version: '../1' is not valid"),
-    ("date", "2026-02-30", "date: '2026-02-30' is not valid; expected year"),
-    ("date", "2026-01-31 12:00:00", "date: '2026-01-31 12:00:00' is not valid"),
-    ("related_identifiers", [{"identifier": "the paper", "relation": "Cites"}], "'the paper' is not valid"),
-    ("related_identifiers", [{"identifier": "https://a.org/b c", "relation": "Cites"}], "'https://a.org/b c' is not"),
-    ("related_identifiers", [{"identifier": DOI, "relation": "Quotes"}], "[0].relation: 'Quotes' is not valid"),
-    ("related_identifiers", [{"identifier": x + DOI, "relation": "Cites"} for x in ("", "doi:")], "is given twice"),
-    ("doi", "reserved", "doi: 'reserved' is not valid; expected a DOI"),
-    ("doi", "10.1000/<1", "doi: '10.1000/<1' is not valid"),
-    ("funding", [{}], "funding[0].funder: the key is missing"),
-    ("funding", [{"funder": "A", "funder_id": "https://example.org"}], "funder_id: 'https://example.org' is not valid"),
-    ("funding", [{"funder": "A", "award_url": "https://a.org/\u200b"}], "'https://a.org/\\u200b' is not valid"),
-    ("known_failures", 2 * [FAILURE], "is given twice"),
-    ("known_failures", [FAILURE | {"run": BOUNDARY_ELEMENTS}], f"[0].run: '{BOUNDARY_ELEMENTS}' is not a run"),
-    ("known_failures", [FAILURE | {"reason": "\n"}], "known_failures[0].reason: '\\n' is blank"),
-    ("title", "A title\n", "title: 'A title\\n' holds a line break"),
-    ("keywords", ["a", "\u200b"], "keywords[1]: '\\u200b' is blank"),
-    ("communities", ["Contact Mechanics"], "communities[0]: 'Contact Mechanics' is not valid"),
-    ("keyword", ["x"], "keyword: unknown key"),
-]
-
-
-@pytest.mark.parametrize(("key", "value", "message"), WRONG)
-def test_wrong_values_are_refused(key, value, message, refused):
-    refused("publication", {key: value}, message)
 
 
 @pytest.mark.parametrize("ror", ["03yrm5c26", "05gq02987", "00k4n6c32", "01bj3aw27", "02mhbdp94"])
@@ -80,8 +38,3 @@ def test_days_of_the_command_line(load):
     assert load(overrides={"publication": {"date": day}}).campaign.publication.date == "2026-01-31"
     with pytest.raises(ConfigurationError, match=r"publication\.date: .* is not valid; expected "):
         load(overrides={"publication": {"date": datetime.datetime(2026, 1, 31, 12)}})
-
-
-def test_texts_of_the_campaign_that_no_deposit_can_have(refused):
-    refused("title", "A\nB", "title: 'A\\nB' holds a line break")
-    refused("summary", " ", "summary: ' ' is blank; expected ")

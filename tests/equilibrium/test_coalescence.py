@@ -41,13 +41,6 @@ def test_the_centroid_is_taken_across_the_border():
     assert across[1:] == inside[1:]
 
 
-def test_the_order_of_a_pair_does_not_matter():
-    position, a, R = np.array([[0.02, 0.98], [0.97, 0.03]]), np.array([0.03, 0.05]), np.array([0.6, 1.1])
-    one, other = equivalent(position, a, R), equivalent(position[::-1], a[::-1], R[::-1])
-    for first, second in zip(one, other, strict=True):
-        np.testing.assert_allclose(first, second, rtol=1e-13)
-
-
 def brute_force_pairs(position, a):
     found = []
     for i in range(len(a)):

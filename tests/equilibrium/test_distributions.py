@@ -226,15 +226,3 @@ def test_pressures_and_gaps_beyond_the_bins_are_counted_in_the_last_one():
     content = gaps["gap_density"] * np.diff(gap_bins(surface))
     assert content[-1] > 0.9
     assert np.sum(content) + contact.area_fraction(state) == pytest.approx(1, abs=1e-12)
-
-
-def test_the_last_bin_of_gaps_reaches_into_the_deepest_pit():
-    """On a flat plate with one deep pit the largest gap is the depth of the pit, far beyond 31.6 rms heights."""
-    n = 128
-    heights = 0.001 * np.cos(2 * np.pi * 8 * np.arange(n) / n) * np.ones((n, 1))
-    heights[5, 7] = -1.0
-    edges = gap_bins(Surface(heights, PERIOD))
-    assert len(edges) == len(GAP_BINS)
-    assert edges[-1] == pytest.approx(1.001, abs=1e-3)
-    shallow = Surface(np.delete(np.delete(heights, 5, axis=0), 7, axis=1), PERIOD)
-    np.testing.assert_array_equal(gap_bins(shallow), GAP_BINS * shallow.rms_height)

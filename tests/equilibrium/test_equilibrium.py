@@ -24,9 +24,6 @@ PERIOD, R = 100e-6, 100e-6
 RANGE = ((ENERGY / MODULUS) ** 2 * R) ** (1 / 3) / 3
 
 
-# --- one asperity on a grid ---------------------------------------------------------------------------------
-
-
 def bump_heights(n=64, centre=(0.503, 0.4963)):
     x = np.arange(n) / n
     dx, dy = x - centre[0], x - centre[1]
@@ -82,9 +79,6 @@ def test_jump_in_of_a_bump_happens_at_wus_gap():
     assert after.spots.contact_radius[0] == pytest.approx(expected, rel=1e-6)
     # The jump is into tension.
     assert contact.pressure(after) < 0
-
-
-# --- several asperities -------------------------------------------------------------------------------------
 
 
 def group(count, energy):
@@ -156,9 +150,6 @@ def test_a_shielded_asperity_does_not_touch():
     a = state.spots.contact_radius[0]
     w = periodic_displacement(0.08 * PERIOD, 0.0, a, R, MODULUS, 0.0, PERIOD)
     assert low - u - w < 0
-
-
-# --- a rough surface ----------------------------------------------------------------------------------------
 
 
 def rough(energy, grid=64, seed=1, ratio=16):

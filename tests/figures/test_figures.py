@@ -59,13 +59,12 @@ def truth(area=1.5):
 
 
 # With images, and with circles.
-@pytest.mark.parametrize("name", ["fig1", *(pytest.param(name, marks=pytest.mark.slow) for name in ("fig4", "fig6"))])
+@pytest.mark.parametrize("name", ["fig1", pytest.param("fig4", marks=pytest.mark.slow)])
 def test_same_bytes_twice_whatever_the_users_settings(tmp_path, surface, name):
     def draw():
         return {
             "fig1": lambda: fig1_jkr.figure(),
             "fig4": lambda: fig4_contact_map.figure(compared.tree(), surface, truth(), run=LABELS),
-            "fig6": lambda: fig6_spots_by_slope.figure(small.tree(), study="slopes", material="hertz"),
         }[name]()
 
     save(draw(), tmp_path / "a.png", tmp_path / "a.pdf")
@@ -208,8 +207,6 @@ def test_fig5_draws_measurements_over_the_curves(tmp_path):
 
 
 def test_values_that_the_campaign_lacks_are_named_with_those_it_has():
-    with pytest.raises(ValueError, match=r"no study 'nothing'.*expected one of: slopes, single"):
-        fig2_area_and_gap.figure(small.tree(), study="nothing")
     with pytest.raises(NothingToDraw, match="no run of material steel is complete; complete runs have material: soft"):
         fig6_spots_by_slope.figure(small.tree(), study="slopes", material="steel")
 

@@ -22,12 +22,6 @@ def surface():
     return SelfAffineSpectrum(PERIOD, 0.2 * PERIOD, PERIOD / 16, 0.8).realise(64, 1)
 
 
-@pytest.fixture(scope="module")
-def large():
-    """Enough summits that one event is not a per cent of the area."""
-    return SelfAffineSpectrum(PERIOD, 0.2 * PERIOD, PERIOD / 32, 0.8).realise(128, 1)
-
-
 BOTH = pytest.mark.parametrize("material", [ADHESIVE, BARE], ids=["adhesive", "bare"])
 
 
@@ -82,14 +76,6 @@ def test_a_state_does_not_depend_on_the_kind_of_its_target(surface, material):
             assert float(other[name][0]) == pytest.approx(float(one[name][0]), rel=1e-7), name
 
 
-@BOTH
-def test_steps_of_half_the_length_and_more_targets_change_the_area_by_less_than_a_per_cent(large, material):
-    few = simulate(large, material, Path([1e-3, 1e-2], max_step=0.1))
-    many = simulate(large, material, Path([3e-4, 1e-3, 2e-3, 5e-3, 1e-2], max_step=0.05))
-    for name in ("contact_area_fraction", "mean_separation"):
-        np.testing.assert_allclose(many[name][[1, -1]], few[name], rtol=0.01)
-
-
 def test_a_target_inside_a_jump_is_met_on_the_branch_after_it_as_far_as_that_reaches_back(surface):
     """The first contact with adhesion jumps to a finite area, which shrinks to jump-off as the surfaces part again."""
     contact = contact_of(surface, ADHESIVE)
@@ -106,14 +92,6 @@ def test_a_target_inside_a_jump_is_met_on_the_branch_after_it_as_far_as_that_rea
     with pytest.raises(ConvergenceError, match="lies inside a jump") as caught:
         simulate(surface, ADHESIVE, Path(area_fractions=[0.1 * jumped]))
     assert caught.value.dataset.sizes["step"] == 0
-
-
-def test_the_path_starts_where_the_first_asperity_makes_contact(surface):
-    contact = contact_of(surface, ADHESIVE)
-    first = np.max(contact.asperities.height - contact.law.jump_in_approach(contact.asperities.radius_of_curvature))
-    assert contact.untouched().separation == pytest.approx(first, rel=1e-14)
-    run = simulate(surface, ADHESIVE, Path(mean_separations=[first * (1 + 1e-6), first * (1 - 1e-6)]))
-    assert run.spot_count.values.tolist() == [0, 1]
 
 
 def model_of(surface, model):

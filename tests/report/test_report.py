@@ -25,7 +25,7 @@ from icha.figures.style import save
 from icha.report import report, studies
 from icha.report.report import ReportFigure, write_report
 from icha.report.run_times import write_times
-from icha.report.sections import _draw_spectra, read_surface_statistics
+from icha.report.sections import draw_spectra, read_surface_statistics
 from icha.report.studies import collect_states
 from icha.report.template import format_range, format_scientific
 from icha.support.formatting import format_quantity
@@ -178,12 +178,12 @@ def test_unloaded_runs_have_tables_of_pull_off_and_loss(write):
     assert pull_off["soft"]["Seeds"] == "2" and pull_off["soft"]["over all asperities"] == "0.250"
     assert pull_off["hertz"]["Pull-off"] == "0 Pa" and pull_off["hertz"]["Last contact"] == "–"
     # All is lost in jumps out of contact, and nothing without adhesion.
-    assert loss["soft"]["Jumping off, %"] == "100.0" and loss["hertz"]["Jumping off, %"] == "–"
+    assert loss["soft"]["Jump-off, %"] == "100.0" and loss["hertz"]["Jump-off, %"] == "–"
     assert loss["hertz"]["Loss"] == "0 J/m²" and loss["hertz"]["over Δγ"] == "–"
     over = np.array([float(run["hysteresis_loss"]) / 0.05 for run in runs])
     mean, low, high = (format_scientific(each) for each in (over.mean(), over.min(), over.max()))
     assert loss["soft"]["over Δγ"] == f"{mean}<br>({low} … {high})".replace("-", "−")
-    assert "Unions, %" not in loss["soft"], "a loss of zero in all rows has no column"
+    assert "Coalescence, %" not in loss["soft"], "a loss of zero in all rows has no column"
 
 
 def test_statistics_are_of_the_first_loading(write):
@@ -324,10 +324,10 @@ def test_surfaces_have_spectra_and_sources(write, tmp_path):
 def test_spectra_are_means_over_the_seeds_and_many_have_graded_colours(parts):
     plain = read_surface_statistics(parts[0] / "s.nc")
     twice = [plain, plain.assign(power_spectrum=3 * plain["power_spectrum"], seed=2)]
-    (axes,) = _draw_spectra({"rough": twice}).axes
+    (axes,) = draw_spectra({"rough": twice}).axes
     power = plain["power_spectrum"].values
     np.testing.assert_allclose(axes.get_lines()[0].get_ydata(), 2 * power[power > 1e-16 * power.max()])
-    many = _draw_spectra({f"rough-hurst0.{k}": [plain] for k in range(20, 60)})
+    many = draw_spectra({f"rough-hurst0.{k}": [plain] for k in range(20, 60)})
     assert len({line.get_color() for line in many.axes[0].get_lines()}) == 40 and len(many.legends[0].get_texts()) == 9
 
 

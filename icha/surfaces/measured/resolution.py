@@ -59,7 +59,7 @@ class ScanResolution(PreparedTopography):
 
     @property
     def edges_fit(self) -> bool:
-        """Whether the prepared surface is free, or periodic without a step between cells."""
+        """True if the prepared surface is free, or periodic without a step between cells."""
         return self.surface.free or edges_fit(self.surface.heights)
 
     @cached_property
