@@ -22,20 +22,19 @@ UNION_LIMIT = 1e-3
 
 # Meanings of the checks by name. Energies are relative to the largest work of the run.
 LOOP_CHECKS = {
-    "events": "number of events that are counted and not logged, or logged only",
+    "events": "number of events that are only in the counts or only in the log",
     "loss adds up": "hysteresis loss against its parts, over the largest work",
     "loss is the work": "hysteresis loss against the work done up to complete separation, over the largest work",
     "loop loses energy": "energy gained in the whole loop, over the largest work",
     "jumps lose energy": "energy gained in jumps into and out of contact together, over the largest work",
     "jumps off lose energy": "energy gained in jumps out of contact, over the largest work",
-    "unions lose energy": "energy gained in unions of spots and their undoing, over the largest work",
+    "unions lose energy": "energy gained in coalescence and splitting of spots, over the largest work",
     "load jumps lose energy": "energy gained in jumps at constant load, over the largest work",
     "separated: spots": "number of spots left in contact at the end of unloading",
     "separated: pressure": "nominal pressure left at the end of unloading, in Pa",
     "pull-off pressure": "pull-off pressure against the largest tension of the last unloading, over the largest "
     "pressure there",
-    "loop closes": "hysteresis loss without adhesion or union by rule, where nothing is irreversible, over the largest "
-    "work",
+    "loop closes": "hysteresis loss without adhesion and coalescence, which must be zero, over the largest work",
 }
 
 

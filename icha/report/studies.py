@@ -35,11 +35,11 @@ EVENT_COUNTS = ("spot_count", "jump_in_count", "jump_off_count", "coalescence_co
 STATISTICS = ("asperity_count", "nayak_parameter", "stickiness", "tabor_parameter", "full_contact_energy_ratio")
 # Contributions to a loss, and their names on the page.
 LOSS_NAMES = {
-    "loss_by_jump_in": "jumping in",
-    "loss_by_jump_off": "jumping off",
-    "loss_by_coalescence": "unions",
-    "loss_by_load_jump": "at fixed load",
-    "loss_unattributed": "no event",
+    "loss_by_jump_in": "jump-in",
+    "loss_by_jump_off": "jump-off",
+    "loss_by_coalescence": "coalescence",
+    "loss_by_load_jump": "jumps at fixed load",
+    "loss_unattributed": "without event",
 }
 
 

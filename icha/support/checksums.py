@@ -126,7 +126,7 @@ def stale(
             continue
         written = known(path)
         if not written.asked:
-            yield path, "there is no record of what it was made from"
+            yield path, "its record of settings and inputs is missing"
         elif asked is not None and asked(path) != written.asked:
             yield path, OTHER_SETTINGS
         else:

@@ -27,11 +27,11 @@ _WHOLE = "expected a file that holds all of its data"
 
 
 class RefusedFile(ValueError):
-    """A file that is not read because it might do harm; the message says why, and what is expected."""
+    """A file that is not read because it might do harm; the message gives the reason and what is expected."""
 
 
 class TooLarge(RefusedFile):
-    """A file that would take more memory than the limit; the message says how to raise it."""
+    """A file that would take more memory than the limit; the message explains how to raise the limit."""
 
     def __init__(self, needed: str, most: int):
         """Describe the memory `needed`, the limit of `most` bytes, and how to raise it."""
