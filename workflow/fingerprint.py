@@ -105,7 +105,7 @@ def _module_file(name: str, missing_ok: bool = False) -> Path | None:
 
 @cache
 def _data_files(file: Path) -> list[Path]:
-    """Return the files in the folder of a module that its text names by their path, or by that of their folder."""
+    """Return the data files beside a module whose path, or the path of whose folder, is a text in the module."""
     files = set()
     for name in _syntax_of(file).names:
         path = file.parent / name

@@ -99,8 +99,8 @@ def _check_losses(run, scale):
 def count_unshared_separations(run) -> int:
     """Count the separations of later legs that the first loading does not have.
 
-    At such a separation two steps of the later leg correspond to one of the first loading, each with an error of its
-    work.
+    At such a separation, two steps of the later leg correspond to one step of the first loading. The work of each step
+    has an error.
     """
     first, later = (np.unique(run["mean_separation"][run["leg"] == 0]), run["mean_separation"][run["leg"] > 0])
     same = 10 * RESIDUAL_TOLERANCE * float(run["rms_height"])
@@ -118,7 +118,7 @@ def work_error(run) -> float:
     """Bound the error of the work of a path by the tolerances of its equilibria, J/m^2.
 
     An error of the separation causes an error of the pressure that is larger by the factor of the stiffness. An error
-    of the stiffness changes the cubic through both ends of a step, whose integral is the work.
+    of the stiffness changes the cubic through both ends of a step; the work is the integral of this cubic.
     """
     width, stiffness = np.abs(np.diff(run["mean_separation"])), finite_stiffness(run)
     ends = np.abs(stiffness[1:]) + np.abs(stiffness[:-1])

@@ -32,7 +32,7 @@ class JobRecord:
 
     Attributes
     ----------
-    rule : its rule.
+    rule : name of its rule in Snakemake.
     title : the message of the rule.
     outputs : paths of its results.
     log : path of its log; empty without a log.
@@ -209,7 +209,7 @@ class View:
         self._console.print(Text(printable(text), style=style), soft_wrap=True)
 
     def print_job(self, job: JobRecord, failed: bool) -> None:
-        """Print the number of finished jobs, a finished job, and why it failed; with a table, only failed jobs."""
+        """Print a finished job and the number of finished jobs; if there is a table, print only failed jobs."""
         if self._is_live and not failed:
             return
         progress, total = self._progress, str(self._progress.job_count)

@@ -21,7 +21,7 @@ _DOUBLE = 8
 
 @dataclass(frozen=True)
 class Workflow:
-    """Time (s) and memory (bytes) of a campaign outside the work of its jobs.
+    """Time (s) and memory (bytes) that a campaign takes in addition to the work of its jobs.
 
     Attributes
     ----------
@@ -29,7 +29,7 @@ class Workflow:
         forked from.
     planned : further time for each file of the plan.
     job : time of a job outside its work: scheduling, fork, log, checksums.
-    memory : of Snakemake, `icha run` and the process that jobs are forked from.
+    memory : memory of Snakemake, `icha run` and the process that jobs are forked from.
     forked : memory of a job that is a fork, before its work.
     program : memory of a job that is a process of its own, before its work.
     """
@@ -147,7 +147,7 @@ class RunSize:
     arrays : number of arrays of the grid that a run holds at a time.
     summit : memory of a run per summit, bytes.
     maps : size of the maps in the file per cell and snapshot, compressed, bytes.
-    sticky : U_full/dgamma below which the time of a run grows as its inverse.
+    sticky : value of U_full/dgamma below which the time of a run is proportional to 1/(U_full/dgamma).
     minutes : time limit of a loading, of a cycle, and of a run on several cores.
     """
 

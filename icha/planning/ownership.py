@@ -1,8 +1,8 @@
 """Ownership of results: each folder of results belongs to one configuration file, and no other file may replace them.
 
-The record holds the path of the file, relative to the folder that holds results/, or to the workflow if the file came
-with it, so it stays valid if these folders move. Results without a record, as of older versions, belong to the first
-file that is run.
+The record contains the path of the file. The path is relative to the folder that holds results/, or to the workflow if
+the file came with the workflow. So the record stays valid if these folders move. Results without a record, as of older
+versions, belong to the first file that is run.
 """
 
 import os

@@ -73,7 +73,7 @@ class Item:
 def plan(campaign: Campaign, results: Path) -> list[Item]:
     """List all files of a campaign, except those of negligible cost, in the order in which they are made.
 
-    A run is done if its file exists and has the present settings (`config_sha256`); only Snakemake knows whether the
+    A run is done if its file exists and has the present settings (`config_sha256`); only Snakemake detects whether the
     program has changed since. Another file is done if it and its inputs exist. A file that differs from its record
     (`icha.support.checksums`) is damaged.
 
@@ -213,7 +213,7 @@ def _cost_parameters(settings, rms_slope) -> dict:
 
 
 def run_state(file: Path, sha256: str) -> tuple[str, str]:
-    """Return the state of the file of a run, and the reason if the run failed; `sha256` is that of its settings."""
+    """Return the state of the file of a run, and the reason if the run failed; `sha256`: checksum of its settings."""
     import h5py
 
     if not file.is_file():
@@ -253,8 +253,8 @@ def whole_cost(campaign: Campaign, results: Path) -> costs.Cost:
 def time_on(items: Iterable[Item], cores: int) -> float:
     """Return the expected time from the call to the end on some cores, s; 0 if nothing is to be done.
 
-    The work of a stage is divided among the cores, but takes at least the time of its longest job, and that of
-    scheduling all its jobs one by one.
+    The work of a stage is divided among the cores. A stage takes at least the time of its longest job, and at least the
+    time of scheduling all its jobs one by one.
     """
     items = list(items)
     seconds = start_up(items)

@@ -94,7 +94,7 @@ def free_disk(folder: Path) -> int:
 def find_shortages(items: Collection[Item], cores: int, results: Path, profile: Mapping) -> list[str]:
     """Describe the memory or disk space that this machine lacks for the remaining jobs.
 
-    `profile` holds the settings of a profile of Snakemake: the executor, and the memory that jobs may take together.
+    `profile` contains the settings of a Snakemake profile: the executor, and the largest memory of all parallel jobs.
     """
     shortages = []
     disk, free = sum(item.cost.disk for item in items if item.to_do), free_disk(results)

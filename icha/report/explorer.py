@@ -76,7 +76,7 @@ def write_explorer(
     Raises
     ------
     ValueError
-        If the campaign dataset or everything in `only` is missing, no contact fits, or a file cannot be read.
+        If the dataset is missing, a choice in `only` does not exist, no contact fits, or a file cannot be read.
     """
     from plotly.offline import get_plotlyjs
 

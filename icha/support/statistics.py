@@ -15,9 +15,9 @@ class Ensemble(NamedTuple):
 
     Attributes
     ----------
-    mean : needs one member.
-    deviation : standard deviation of the members (with Bessel's correction); needs two.
-    confidence : half the width of the 95 % confidence interval of the mean; needs two.
+    mean : mean of the members; needs one member.
+    deviation : standard deviation of the members (with Bessel's correction); needs two members.
+    confidence : half the width of the 95 % confidence interval of the mean; needs two members.
     count : number of members.
     """
 
