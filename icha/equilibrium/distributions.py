@@ -82,8 +82,8 @@ def _gap_bin(u, edges):
 def pressure_distribution(law: JKR, surface: Surface, spots: Spots) -> dict:
     """Return the distribution P(p) of the pressure over the nominal area, as a dictionary with the keys below.
 
-    The closed form for every spot gives it without a grid. The integral of P(p) is A/A0. The sum of density times width
-    times mean over the bins is F/A0. The last bin, which ends at 500 E* h'_rms, includes larger pressures.
+    P(p) follows from a closed form for every spot, without a grid. The integral of P(p) is A/A0. The sum of density
+    times width times mean over the bins is F/A0. The last bin, which ends at 500 E* h'_rms, includes larger pressures.
 
     Returns
     -------
