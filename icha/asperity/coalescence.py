@@ -11,7 +11,10 @@ from icha.surfaces.square import periodic_difference
 
 
 def overlapping_pairs(position, a, first, second, r):
-    """Return the pairs of spots that overlap, r_ij < a_i + a_j, sorted by the depth of their overlap.
+    """Return the pairs (k, 2) of spots that overlap, r_ij < a_i + a_j, sorted by the depth of their overlap.
+
+    The deepest overlap a_i + a_j - r_ij is the first one. Pairs of equal depth are sorted by their positions, so that
+    the result does not depend on the order of the input.
 
     Parameters
     ----------
@@ -19,11 +22,6 @@ def overlapping_pairs(position, a, first, second, r):
     a : (n,) float, contact radii, m.
     first, second : (p,) int, indices of the spots of pairs; a pair counts only with the larger spot first.
     r : (p,) float, distances of the pairs, m.
-
-    Returns
-    -------
-    (k, 2) int, with the deepest overlap a_i + a_j - r_ij first. Pairs of equal depth are sorted by their positions, so
-    that the result does not depend on the order of the input.
     """
     depth = a[first] + a[second] - r
     larger = (a[second] < a[first]) | ((a[second] == a[first]) & (second > first))

@@ -127,8 +127,8 @@ def _largest_fall_in_loading(loading, name):
 def _largest_rises_of_separation(loading):
     """Return the largest rise of the mean separation in a step, m, where no spots unite, and where spots unite.
 
-    At targets of the area the separation may rise: if the area jumps past a target, the target is met on the branch
-    after the jump. Such steps do not count.
+    Steps to targets of the area do not count, because there the separation may rise: if the area jumps past a target,
+    the path meets the target on the branch after the jump.
     """
     rise = np.diff(loading["mean_separation"])
     given_area = (loading["step_kind"][1:] == AREA_FRACTION) & (np.diff(loading["contact_area_fraction"]) > 0)
@@ -137,7 +137,7 @@ def _largest_rises_of_separation(loading):
 
 
 def _target_error(run):
-    """Return the largest relative error of a target; from areas counted in cells, their tolerance is subtracted."""
+    """Return the largest relative error of a target; the tolerance of areas counted in cells is subtracted."""
     scale = float(run["contact_modulus"])
     reached = {
         "reduced_pressure": run["reduced_pressure"],

@@ -39,9 +39,10 @@ def icha(
 ) -> None:
     """Adhesive contact of rough surfaces: campaigns of runs from one YAML file.
 
-    Start with `icha new NAME`, look at it with `icha describe NAME`, compute it with `icha run NAME`.
+    Write a campaign with `icha new NAME`. See what it will compute with `icha describe NAME`. Compute it with
+    `icha run NAME`.
 
-    Exit status: 0 on success, 1 if something failed, 2 if the call or the configuration is wrong.
+    Exit status: 0 on success, 1 if a job, a check or a file has failed, 2 if the call or the configuration is wrong.
     """
 
 

@@ -23,8 +23,8 @@ def explore(
     """Write a page on which a slider moves along the loading paths of a campaign.
 
     On the page, choose a contact and a model. The slider changes the spots or patches on the topography, the marked
-    point on the curves, and the distributions. The page is one file and needs no network. Contacts that do not fit on
-    the page are omitted and counted.
+    point on the curves, and the distributions. The page is one file and needs no network. If the page has no room for
+    all contacts, the command prints how many it has omitted.
     """
     from icha.datasets.results import EXPLORER
     from icha.deposit.verify import CHECKSUMS

@@ -20,7 +20,7 @@ from icha.support.formatting import printable
 
 # Measured times outweigh expected ones once the jobs have taken this long, in s.
 PRIOR_SECONDS = 5.0
-# Expected core-seconds of a job without an estimate, which writes a few lines.
+# Expected core-seconds of a job that the plan does not list. Such a job writes a few lines.
 DEFAULT_SECONDS = 0.1
 MOST_JOBS = 8  # running jobs in the live view
 MOST_ERROR_LINES = 3  # of a failed job in the view
@@ -32,7 +32,7 @@ class JobRecord:
 
     Attributes
     ----------
-    rule : its rule.
+    rule : name of its rule in Snakemake.
     title : the message of the rule.
     outputs : paths of its results.
     log : path of its log; empty without a log.
@@ -121,7 +121,7 @@ class Progress:
     def seconds_left(self) -> float | None:
         """Estimate the time until all jobs are done, from expected and measured times; None before the first plan.
 
-        Jobs that cannot run because another one failed count as if they were still to run.
+        A job that cannot run because another one failed counts as a job that is still to run.
         """
         if self.started is None:
             return None
@@ -159,7 +159,7 @@ class Progress:
 
 
 def _complete_lines(job: JobRecord, folder: Path) -> list[str]:
-    """Read the complete lines in the log of a job; none if there is no log."""
+    """Read the complete lines in the log of a job; return an empty list without a log."""
     try:
         text = (folder / job.log).read_text(encoding="utf-8", errors="replace")
     except OSError:
@@ -209,7 +209,7 @@ class View:
         self._console.print(Text(printable(text), style=style), soft_wrap=True)
 
     def print_job(self, job: JobRecord, failed: bool) -> None:
-        """Print the number of finished jobs, a finished job, and why it failed; with a table, only failed jobs."""
+        """Print a finished job and the number of finished jobs; if there is a table, print only failed jobs."""
         if self._is_live and not failed:
             return
         progress, total = self._progress, str(self._progress.job_count)

@@ -40,7 +40,7 @@ from icha.support.formatting import format_count
 
 STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 MOST_LINES = 12  # printed of the reason of a failure
-# Snakemake prints these lines in any case, before the reason why it ends.
+# Snakemake always prints these lines, before the reason why it ends.
 PREAMBLE = r"Using workflow specific profile|Assuming unrestricted|host: |Building DAG of jobs|total +\d+$"
 
 
@@ -290,7 +290,7 @@ def _print_outcome(status: int, stopped: bool, progress, campaign, folder: Path,
         echo(f"{len(progress.done)} of {format_count(progress.job_count, 'job')} done in {duration}")
     _print_failures(status, stopped, progress, campaign, folder, log)
     if status and results.is_dir() and (reason := probe_folder(results)):
-        # Logs are in this folder, so jobs may have been unable to report it.
+        # The logs are in this folder, too, so the jobs may have been unable to report the error.
         echo(
             f"cannot write to {shorten_path(results)}: {reason.strerror}. Repair this and repeat the command", fg="red"
         )
@@ -325,9 +325,9 @@ def _print_failures(status: int, stopped: bool, progress, campaign, folder: Path
     if failed:
         echo(f"{format_count(len(failed), 'job')} failed:", fg="red")
         for job in failed:
-            # The verdict repeats the runs without a result.
+            # The message of the job "Verdict on the checks" repeats the runs without a result.
             reason = [line for line in read_error(job, folder) if not any(line.startswith(path) for path in incomplete)]
-            unknown = f"it ended without a message, perhaps killed (out of memory?); see {job.log or log}"
+            unknown = f"it ended without a message, perhaps because memory was exhausted; see {job.log or log}"
             _print_failure(f"  {job.title}", reason or [unknown], bold=True)
             if job.log:
                 echo(f"    log: {shorten_path(folder / job.log)}")

@@ -70,8 +70,8 @@ def _resolution(scan, to_scale: bool, models: list[Model]) -> Iterator[str]:
     )
     if unsupported := len(scan.asperities.unsupported_height):
         yield (
-            f"the asperity model excludes {unsupported} of these summits, which the nodes around do not support, as at "
-            "steps, spikes, pits and plateaus"
+            f"the asperity model excludes {unsupported} of these summits, because the nodes around them do not support "
+            "them, as at steps, spikes, pits and plateaus"
         )
     reasons = scan.reasons_against_asperities
     if reasons and (not models or any(model.by_summits for model in models)):

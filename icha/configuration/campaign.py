@@ -48,7 +48,7 @@ class Topography(NamedTuple):
     rms_slope : measured slope; None if no study uses it.
     sha256 : checksum of the file.
     full_contact_energy : U_full/E* at rms slope 1, m.
-    complete_contact_pressure : pressure over E* for complete contact at rms slope 1.
+    complete_contact_pressure : pressure over E* at which contact is complete, at rms slope 1.
     """
 
     grid: int
@@ -148,7 +148,7 @@ class Campaign(Section):
         return campaign
 
     def topography(self, surface: str) -> Topography | None:
-        """Return the facts of a topography from a file; None for a random one."""
+        """Return the facts of a topography from a file; None for a random topography."""
         return self._topographies.get(surface)
 
     def origin(self, section: str, name: str) -> str:
@@ -180,7 +180,7 @@ class Campaign(Section):
         return snapshots + [state for p in loads if (state := ("reduced_pressure", p)) not in known]
 
     def contacts_beside(self, entry: BesideStudy) -> list[Contact]:
-        """Return the contacts of its study that an entry of `finite_range` or `boundary_element_loops` solves."""
+        """Return the contacts that an entry of `finite_range` or `boundary_element_loops` solves."""
         lists = (entry.surfaces, entry.seeds, entry.rms_slopes, entry.materials)
         asked = [None if values is None else set(values) for values in lists]
 
@@ -247,7 +247,7 @@ class Campaign(Section):
                 )
 
     def warnings(self) -> list[str]:
-        """Return warnings about valid but coarse grids of random surfaces."""
+        """Return warnings about grids of random surfaces that are valid but coarse."""
         expected: dict[str, int] = {}
         for study in self.studies.values():
             least = _ADVISABLE_CELLS if any(MODELS[model].by_cells for model in study.models) else _LEAST_CELLS

@@ -111,8 +111,7 @@ def run_sha256(campaign: Campaign, case: RunLabels) -> str:
 def campaign_sha256(campaign: Campaign, of_run: Callable[[RunLabels], str] | None = None) -> str:
     """Compute the checksum of everything that determines the runs of a campaign, without its figures and title.
 
-    If the checksums of the runs are known already, pass `of_run`, a function that returns the checksum of a run.
-    Without `of_run`, `run_sha256` computes the checksums.
+    `of_run` returns the checksum of a run, if it is known already; by default `run_sha256` computes the checksums.
     """
     of_run = of_run or partial(run_sha256, campaign)
     return _sha256({case.path: of_run(case) for case in run_cases(campaign)})

@@ -96,7 +96,7 @@ def _points(label: str, study: Study) -> Iterator[dict[str, _Located]]:
 
 
 def _cases(study: Study) -> list[dict[str, Any]]:
-    """Return the values that each case of a study fixes; a study without cases has one that fixes none."""
+    """Return the values that each case of a study fixes; a study without `cases` has a single case without values."""
     return [{}] if study.cases is None else [case.model_dump(exclude_none=True) for case in study.cases]
 
 

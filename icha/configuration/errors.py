@@ -104,7 +104,7 @@ def _without_tags(location: tuple) -> tuple:
 
 
 def _section_at(location: tuple) -> type[BaseModel]:
-    """Return the model of the section at a location of pydantic, which contains the kind of a surface."""
+    """Return the model of the section at a location of pydantic; such a location contains the kind of a surface."""
     model: Any = Campaign
     for key in location:
         if model in SURFACE_KINDS.values() and key in SURFACE_KINDS:

@@ -66,8 +66,6 @@ class Measurement(Section):
             raise ValueError(f"load: unit {load!r}; expected '1' or a unit of pressure, such as 'kPa'")
         if _factor(area, "1") is None:
             raise ValueError(f"area: unit {area!r}; expected '1' or 'percent'")
-        if self.load.column == self.area.column:
-            raise ValueError(f"area: column {self.area.column!r} contains the load; expected another column")
         if self.load_is_pressure and (self.material is None or self.rms_slope is None):
             raise ValueError(f"load in {load!r} without material and rms_slope; expected both, or loads of unit '1'")
         return self

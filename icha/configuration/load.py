@@ -1,4 +1,4 @@
-"""Load a configuration file: its text becomes a campaign, or a list of all problems."""
+"""Load a configuration file: turn its text into a campaign, or report all problems."""
 
 import itertools
 import os
@@ -93,7 +93,7 @@ def load_configuration(
 
 
 def _check_text(path: Path, origin: str, written: Mapping) -> Campaign:
-    """Return the campaign of a text, before the files that it names are read."""
+    """Return the campaign in the text of a file, after checking the text but not the files that it names."""
 
     def implausible():
         return plausibility_problems(unusual_values(written), written.get(CONFIRMED))
@@ -121,7 +121,7 @@ def _named_files(campaign: Campaign) -> dict[tuple[str, str], str]:
 
 
 def _files_outside(campaign: Campaign, folder: str | os.PathLike) -> list[Problem]:
-    """Report files of a campaign that are not in a folder, after resolving links."""
+    """Report files of a campaign that are outside of a folder, after resolving links."""
     return [
         ((section, campaign.origin(section, name), "path"), path, "is in another folder; expected files beside it")
         for (section, name), path in _named_files(campaign).items()

@@ -1,4 +1,4 @@
-"""Unusual values, most of which have a wrong unit.
+"""Find unusual values, most of which have a wrong unit.
 
 An unusual value is refused, unless the list `confirmed` of the campaign contains its key; then it causes a warning.
 """
@@ -119,7 +119,7 @@ def unusual_topography(location: tuple, section: Any, period: float, rms_slope: 
 def plausibility_problems(
     unusual: Collection[Unusual], confirmed: Any, addition: str = f"`{CONFIRMED}: [{{}}]` at the top level"
 ) -> Iterator[Problem]:
-    """Report unusual values that are not in the list `confirmed`; `addition` is the text that confirms a key {}."""
+    """Report unusual values whose keys are not in the list `confirmed`; `addition` states how to confirm a key {}."""
     for each in unusual:
         if not (isinstance(confirmed, list) and each.key in confirmed):
             reason = f"is unusual{each.source}; expected {each.usual}. Correct it, or add {addition.format(each.key)}"

@@ -85,7 +85,7 @@ def _matching(pattern: str) -> Callable[[str], str | None]:
 
 
 def _checked(read: Callable[[str], str | None], what: str, example: str):
-    """Make the type of a text that `read` turns into its plain form, or into None if the text is wrong."""
+    """Make the type of a text; `read` returns its plain form, or None if the text is wrong."""
 
     def check(value: Any) -> str:
         # The YAML reader turns a date into a `datetime.date`, and a version such as 1.10 into the number 1.1.

@@ -137,7 +137,7 @@ def _list_or_word(value: Any, read_list: Callable[[Any], Any]) -> Any:
 
 
 class _OrEveryStop:
-    """Annotation for the JSON schema of a list, instead of which the word `every_stop` may stand."""
+    """Annotation for the JSON schema: a list, or the word `every_stop`."""
 
     def __get_pydantic_json_schema__(self, core_schema: Any, handler: Callable[[Any], dict]) -> dict:
         """Return the schema of the list or the word."""
@@ -162,7 +162,7 @@ for _section in (*SURFACE_KINDS.values(), MaterialSection):
 
 
 def _section_of_scalars(name, kind, doc, fields=None):
-    """Make a section with a key, of type `kind`, for every parameter that can be varied."""
+    """Make a section with a key of the type `kind` for every parameter that a study may vary."""
     scalars = {key: (kind | None, Field(default=None, description=text)) for key, text in SCALARS.items()}
     return create_model(name, __base__=Section, __doc__=doc, __module__=__name__, **(fields or {}), **scalars)
 
@@ -267,7 +267,7 @@ class Study(Section):
             yield from self._path_problems(snapshots)
 
     def _states(self) -> Iterator[tuple[tuple, str, float]]:
-        """Yield location, kind and value of the targets, snapshots and turning points that are written."""
+        """Yield location, kind and value of the targets, snapshots and turning points in the configuration."""
         for k, (kind, value) in enumerate(self.targets.states):
             yield ("targets", f"{kind}s", k), kind, value
         snapshots = [] if self.snapshots == EVERY_STOP else self.snapshots or []

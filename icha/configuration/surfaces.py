@@ -205,7 +205,7 @@ class SelfAffineSurface(Section):
         return self.grid * self.short_wavelength / self.period
 
     def grid_of_cells(self, cells: int) -> int:
-        """Return the smallest grid with a number of cells per shortest wavelength."""
+        """Return the smallest grid that has `cells` cells per shortest wavelength."""
         return math.ceil(cells * self.period / self.short_wavelength * (1 - ROUNDING))
 
     @field_validator("rolloff_wavelength", "short_wavelength", "grid")

@@ -1,4 +1,4 @@
-"""Topographies from files: their facts, for a campaign, and `icha.read_scan`, for scripts."""
+"""Read topographies from files: their facts for campaigns, and `icha.read_scan` for scripts."""
 
 from __future__ import annotations
 

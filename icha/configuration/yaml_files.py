@@ -133,7 +133,7 @@ def dump_yaml(content: Mapping, origin: str) -> str:
 
 
 def merge(content: Mapping, overrides: Mapping) -> dict:
-    """Return `content` with the values of `overrides`, which replace lists as a whole."""
+    """Return `content` with the values of `overrides`. A list replaces the whole former list."""
     result = dict(content)
     for key, value in overrides.items():
         inside = result.get(key)

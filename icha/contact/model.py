@@ -133,18 +133,13 @@ class ContactModel(Protocol):
     def equilibrium(self, state: State, separation: float, control: Control | None = None, *, let_go: int = 0) -> State:
         """Find the equilibrium at another mean separation, load or area, starting from a state.
 
+        Raise `NotConverged` if it is not found, and `FullContact` if the contact spreads over the whole surface.
+
         Parameters
         ----------
         separation : mean separation, or its first guess if there is a `control`, m.
         control : load or area that is prescribed instead of the separation.
         let_go : number of spots, those closest to jump-off, whose contact is broken before the search.
-
-        Raises
-        ------
-        NotConverged
-            If the equilibrium is not found.
-        FullContact
-            If the contact spreads over the whole surface.
         """
 
     def pressure(self, state: State) -> float:

@@ -12,7 +12,9 @@ from icha.surfaces.surface import Surface
 
 
 def cover_grid(period: float, grid: int, centres, radii, free_square: bool = False) -> tuple[np.ndarray, np.ndarray]:
-    """Return which part of each cell of a grid discs cover, and which nodes lie in a disc.
+    """Return the fraction of the cell around each node that discs cover, and whether the node is in a disc, (n, n).
+
+    Where discs overlap, their fractions add up and may exceed 1.
 
     Parameters
     ----------
@@ -20,11 +22,6 @@ def cover_grid(period: float, grid: int, centres, radii, free_square: bool = Fal
     grid : nodes along a side, n.
     centres, radii : (m, 2) and (m,) float, m.
     free_square : whether each disc exists once; otherwise it repeats with the period.
-
-    Returns
-    -------
-    (n, n) float, covered fraction of the cell around each node; where discs overlap, their fractions add up and may
-    exceed 1. And (n, n) bool, whether the node itself lies in a disc.
     """
     blocks = on_cores(lambda rows: _cover_rows(period, grid, centres, radii, rows, free_square), row_blocks(grid))
     cover, inside = zip(*blocks, strict=True)
@@ -85,8 +82,8 @@ def _gap_bin(u, edges):
 def pressure_distribution(law: JKR, surface: Surface, spots: Spots) -> dict:
     """Return the distribution P(p) of the pressure over the nominal area, as a dictionary with the keys below.
 
-    The closed form for every spot gives it without a grid. The integral of P(p) is A/A0. The sum of density times width
-    times mean over the bins is F/A0. The last bin, which ends at 500 E* h'_rms, includes larger pressures.
+    P(p) follows from a closed form for every spot, without a grid. The integral of P(p) is A/A0. The sum of density
+    times width times mean over the bins is F/A0. The last bin, which ends at 500 E* h'_rms, includes larger pressures.
 
     Returns
     -------

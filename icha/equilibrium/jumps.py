@@ -30,7 +30,7 @@ _SAME_STRENGTH = 1e-3
 
 
 def add_candidates(state: IterationState, separation: float) -> IterationState:
-    """Make asperities candidates that will probably be in contact at a separation, m; used without adhesion only."""
+    """Add as candidates the asperities that will probably be in contact at a separation, m; without adhesion only."""
     fall = state.last_separation - separation
     growth = _PROBABLE_APPROACH * fall + _sudden_growth(state.contact, _SUDDEN_GUESS)
     candidates = np.flatnonzero((state.last_approach + growth > 0) & state.without_site)

@@ -159,10 +159,8 @@ class Sites:
     def compact(self) -> tuple[Sites, np.ndarray | None]:
         """Delete removed sites if they are many, or if the table has grown by half since the half-space was set up.
 
-        Returns
-        -------
-        The table, and the new index of every site, (n + 1,) int: -1 for removed sites and in the last place. The index
-        is None if the table is unchanged.
+        Return the table, and the new index of every site, (n + 1,) int: -1 for removed sites and in the last place. The
+        index is None if the table is unchanged.
         """
         removed = self.status == REMOVED
         if len(self) <= _GROWTH * self.arranged and np.count_nonzero(removed) <= _REMOVED_FRACTION * len(self):

@@ -105,9 +105,7 @@ class Interaction:
     def tangent(self, a) -> tuple[Callable, Callable]:
         """Linearise the displacement at contact radii a (n,), m; changes of spots of radius zero are ignored.
 
-        Returns
-        -------
-        Two functions of changes of the radii (n,), m, that return the changes of the displacement (n,), m. The first
+        Return two functions that turn changes of the radii (n,), m, into changes of the displacement (n,), m. The first
         one is exact; the second one is accurate to a thousandth and several times faster.
         """
         law, R, half_space = self.law, self.radius_of_curvature, self.half_space

@@ -256,10 +256,10 @@ class _Cycle:
     def _choose_next_length(self, step, state):
         """Return the length of the next step after a step to a state, m.
 
-        If the model does not predict steps, it is twice the last length. After an event it is at least the length of
-        steps without events. Before a known event it is half the distance to the event, or the whole distance if this
-        is short enough to resolve the event. Otherwise it is twice the last length, or the last length if the error of
-        a longer step would be too large.
+        If the model does not predict steps, a step is twice as long as the last one. After an event a step has at least
+        the length of steps without events. Before a known event it covers half the distance to the event, or the whole
+        distance if this is short enough to resolve the event. Otherwise it is twice as long as the last one, or as long
+        if the error of a longer step would be too large.
         """
         longer = min(self.longest, 2 * self.step_length)
         if not self.contact.path_accuracy.predicts_steps:

@@ -64,8 +64,8 @@ class StepAccuracy:
 
         It is not in three cases. The events of the step, which may happen anywhere in it, make the work too uncertain.
         Spots unite or split in a long step. Or, in a step without events, the integral of the pressure is inaccurate
-        and differs from the change of the stored energy. Steps up to 1/256 of the longest one are exempt from the last
-        case.
+        and differs from the change of the stored energy. Steps up to 1/256 of the longest step are not examined for
+        this last case.
         """
         length = abs(step.separation_change)
         if step.unresolved > self.allowed_unknown_work(step):

@@ -103,14 +103,8 @@ def find_target_state(target: TargetFunction, before: State, after: State) -> St
 
     The bracket of the two states is halved until the solver meets the target inside it. If an event changes the
     quantity beyond its target, the bracket becomes very narrow. Then the solver looks for the target on the branch
-    after the event, where load control would continue.
-
-    Raises
-    ------
-    InsideJump
-        If no equilibrium on that branch meets the target.
-    NotConverged
-        If an equilibrium far from any jump is not found.
+    after the event, where load control would continue. Raise `InsideJump` if no equilibrium on that branch meets the
+    target, and `NotConverged` if an equilibrium far from any jump is not found.
     """
     contact = target.contact
     if target.control is None:
@@ -165,11 +159,8 @@ def find_first_target(
 ) -> tuple[TargetFunction | None, State]:
     """Find the target that the path meets first between two states, and the state at this target.
 
+    If there is no target between the states, return None and `after`.
     direction : direction of the separation: -1 on loading, 1 on unloading.
-
-    Returns
-    -------
-    The target and the state that meets it; None and `after` if there is no target between the states.
     """
     first: tuple[TargetFunction | None, State] = None, after
     for target in targets:

@@ -21,7 +21,7 @@ _DOUBLE = 8
 
 @dataclass(frozen=True)
 class Workflow:
-    """Time (s) and memory (bytes) of a campaign outside the work of its jobs.
+    """Time (s) and memory (bytes) that a campaign takes in addition to the work of its jobs.
 
     Attributes
     ----------
@@ -29,7 +29,7 @@ class Workflow:
         forked from.
     planned : further time for each file of the plan.
     job : time of a job outside its work: scheduling, fork, log, checksums.
-    memory : of Snakemake, `icha run` and the process that jobs are forked from.
+    memory : memory of Snakemake, `icha run` and the process that jobs are forked from.
     forked : memory of a job that is a fork, before its work.
     program : memory of a job that is a process of its own, before its work.
     """
@@ -61,7 +61,7 @@ class PowerLaw:
     powers: Mapping[str, float]
 
     def seconds(self, **quantities: float) -> float:
-        """Time of a job with these quantities, s; quantities without a power are ignored."""
+        """Return the time of a job with these quantities, s; quantities without a power are ignored."""
         return self.base + self.scale * math.prod(quantities[name] ** power for name, power in self.powers.items())
 
 
@@ -94,7 +94,7 @@ LAWS = {
 
 
 def _law(solver: str, *, adhesive: bool, cycle: bool = False) -> PowerLaw:
-    """Power law of a solver, with or without adhesion, for loading alone or a cycle."""
+    """Return the power law of a solver, with or without adhesion, for loading alone or a cycle."""
     return LAWS[", ".join([solver, *["adhesion"] * adhesive, *["cycle"] * cycle])]
 
 
@@ -104,9 +104,9 @@ class Cost:
 
     Attributes
     ----------
-    seconds : on the cores that it gets.
+    seconds : time on the cores that it gets.
     memory : largest memory of the job itself, bytes.
-    disk : bytes.
+    disk : size of its file, bytes.
     values : part of `disk` that a run adds to the campaign dataset, bytes.
     """
 
@@ -122,7 +122,7 @@ def job_threads(grid: int) -> int:
 
 
 def _memory_before(grid):
-    """Memory of the job of a surface before its work, bytes. Only jobs of one core are forks of a common process."""
+    """Return the memory of a job before its work, bytes. Only jobs on one core are forks of a common process."""
     return WORKFLOW.program if job_threads(grid) > 1 else WORKFLOW.forked
 
 
@@ -147,7 +147,7 @@ class RunSize:
     arrays : number of arrays of the grid that a run holds at a time.
     summit : memory of a run per summit, bytes.
     maps : size of the maps in the file per cell and snapshot, compressed, bytes.
-    sticky : U_full/dgamma below which the time of a run grows as its inverse.
+    sticky : value of U_full/dgamma below which the time of a run is proportional to 1/(U_full/dgamma).
     minutes : time limit of a loading, of a cycle, and of a run on several cores.
     """
 
@@ -178,18 +178,18 @@ def run_cost(
     max_step: float = DEFAULT_STEP,
     energy_ratio: float = math.inf,
 ) -> Cost:
-    """Cost of a run of `icha.simulate`.
+    """Return the cost of a run of `icha.simulate`.
 
     Parameters
     ----------
     model : contact model.
-    grid : nodes a side of the surface.
+    grid : nodes along a side of the surface.
     summits : number of its summits.
     load : largest reduced pressure p/(E* h'_rms) of the first loading.
     stops : number of targets of the first loading.
     snapshots : number of targets with a snapshot.
     adhesive : whether the surface energy is not zero.
-    legs : legs after the first loading: 0, or 1 and more for unloading and loading again.
+    legs : number of legs after the first loading, such as 1 for unloading.
     max_step : longest step of the mean separation, in h_rms.
     energy_ratio : elastic energy of full contact over the adhesion energy, U_full/dgamma.
     """
@@ -213,7 +213,7 @@ def run_cost(
 
 
 def finite_range_cost(nodes: int, *, adhesive: bool, **quantity: float) -> Cost:
-    """Cost of boundary elements at a finite range, on `nodes` a side.
+    """Return the cost of boundary elements at a finite range, with `nodes` along a side of the grid.
 
     `quantity` is the `load` of a single solution, or the `step` of the mean gap of a loop.
     """
@@ -233,7 +233,7 @@ _LIBRARIES = {"figure": 85 * MiB, "report_page": 18 * MiB}
 
 
 def derived_cost(rule: str, runs: int, disk: float, values: float = 0.0, *, nodes: int = 0, models: int = 1) -> Cost:
-    """Cost of a file that is computed from a surface or from runs.
+    """Return the cost of a file that is computed from a surface or from runs.
 
     Parameters
     ----------
@@ -251,7 +251,7 @@ def derived_cost(rule: str, runs: int, disk: float, values: float = 0.0, *, node
 
 
 def correction(pairs: Sequence[tuple[float, float]]) -> float:
-    """Factor on the expected times of jobs, from pairs (expected, measured) of jobs of the same kind.
+    """Return the factor on the expected times of jobs, from pairs (expected, measured) of jobs of the same kind.
 
     The factor is the median of measured over expected times. Few pairs move it towards 1; without pairs it is 1.
     """

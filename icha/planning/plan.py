@@ -40,8 +40,8 @@ class Item:
     path : in the folder of results.
     state : DONE, TO_DO, CHANGED, FAILED or DAMAGED.
     cost : of its job.
-    threads : cores that its job takes.
-    reason : why the run failed.
+    threads : number of cores that its job uses.
+    reason : reason why the run failed.
     stage : jobs of a stage wait for those of earlier stages.
     """
 
@@ -56,24 +56,24 @@ class Item:
 
     @property
     def is_run(self) -> bool:
-        """Whether the file is a run of a study."""
+        """Return whether the file is a run of a study."""
         return self.rule == "run"
 
     @property
     def to_do(self) -> bool:
-        """Whether the file must be computed; not for a failed run, which would fail again."""
+        """Return whether the file must be computed; False for a failed run, which would fail again."""
         return self.state in (TO_DO, CHANGED, DAMAGED)
 
     @property
     def work(self) -> float:
-        """Expected work of the job, core-seconds."""
+        """Return the expected work of the job, core-seconds."""
         return self.cost.seconds * self.threads
 
 
 def plan(campaign: Campaign, results: Path) -> list[Item]:
     """List all files of a campaign, except those of negligible cost, in the order in which they are made.
 
-    A run is done if its file exists and has the present settings (`config_sha256`); only Snakemake knows whether the
+    A run is done if its file exists and has the present settings (`config_sha256`); only Snakemake detects whether the
     program has changed since. Another file is done if it and its inputs exist. A file that differs from its record
     (`icha.support.checksums`) is damaged.
 
@@ -99,7 +99,7 @@ def _correction(items: list[Item], results: Path) -> float:
 
 
 def _benchmark(results: Path, item: Item) -> float | None:
-    """Time of the last job of a file, s; None if it is unknown."""
+    """Return the measured time of the last job of a file, s; None if it is unknown."""
     try:
         lines = (results / job_file(item.path, "benchmarks", ".jsonl")).read_text(encoding="utf-8").splitlines()
         return float(json.loads(lines[-1])["s"])
@@ -154,7 +154,7 @@ def _computed_files(campaign, results, files) -> Iterator[Item]:
 
 
 def _finite_range(campaign, results, path, entry, case, quantity) -> Item:
-    """Return the file of a solution or a loop by boundary elements at a finite range."""
+    """Return the file of a solution or a loop of boundary elements at a finite range."""
     adhesive = campaign.materials[case.material].surface_energy > 0
     cost = costs.finite_range_cost(campaign.grid(case.surface) * entry.refinement, adhesive=adhesive, **quantity)
     part, rule = "boundary elements", "boundary_elements"
@@ -196,7 +196,7 @@ def _derived_files(campaign, files: CampaignFiles, computed: list[Item]) -> Iter
 
 
 def _cost_parameters(settings, rms_slope) -> dict:
-    """Arguments of `run_cost` from the settings of a run."""
+    """Return the arguments of `run_cost` from the settings of a run."""
     path, snapshots = settings["path"], settings["path"]["snapshots"]
     # Estimates of the reduced pressure: half of an area fraction; a guess for separations.
     factors = {"reduced_pressure": 1, "relative_load": 1 / rms_slope, "area_fraction": 1 / 2, "mean_separation": 0}
@@ -213,7 +213,7 @@ def _cost_parameters(settings, rms_slope) -> dict:
 
 
 def run_state(file: Path, sha256: str) -> tuple[str, str]:
-    """Return the state of the file of a run, and the reason if the run failed; `sha256` is that of its settings."""
+    """Return the state of the file of a run, and the reason if the run failed; `sha256`: checksum of its settings."""
     import h5py
 
     if not file.is_file():
@@ -233,7 +233,7 @@ def run_state(file: Path, sha256: str) -> tuple[str, str]:
 
 
 def failed_runs(campaign: Campaign, results: Path) -> dict[str, str]:
-    """Paths of the runs that failed with the present settings, with their reasons."""
+    """Return the paths of the runs that failed with the present settings, with their reasons."""
     states = {
         case.path: run_state(results / path, run_sha256(campaign, case))
         for path, case in campaign_files(campaign).runs.items()
@@ -253,8 +253,8 @@ def whole_cost(campaign: Campaign, results: Path) -> costs.Cost:
 def time_on(items: Iterable[Item], cores: int) -> float:
     """Return the expected time from the call to the end on some cores, s; 0 if nothing is to be done.
 
-    The work of a stage is divided among the cores, but takes at least the time of its longest job, and that of
-    scheduling all its jobs one by one.
+    The work of a stage is divided among the cores. A stage takes at least the time of its longest job, and at least the
+    time of scheduling all its jobs one by one.
     """
     items = list(items)
     seconds = start_up(items)
@@ -267,14 +267,14 @@ def time_on(items: Iterable[Item], cores: int) -> float:
 
 
 def start_up(items: Collection[Item]) -> float:
-    """Time until the first job, s: start of Snakemake, its plan, and imports of the jobs."""
+    """Return the time until the first job, s: start of Snakemake, its plan, and imports of the jobs."""
     if not any(item.to_do for item in items):
         return 0.0
     return WORKFLOW.start + WORKFLOW.planned * len(items)
 
 
 def memory_on(items: Iterable[Item], cores: int, most: float = math.inf) -> float:
-    """Memory of Snakemake and of the largest jobs to be done that run in parallel, bytes.
+    """Return the memory of Snakemake and of the largest jobs that will run in parallel, bytes.
 
     Parallel jobs take at most `most`, unless a single one needs more.
     """

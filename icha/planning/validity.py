@@ -36,17 +36,17 @@ from icha.surfaces.moments import (
 )
 
 # Radius of the mean curvature of the summits of a Gaussian surface times its rms curvature (McCool 1986).
-# icha.references.summit_theories has it, too, but takes long to import.
+# The module icha.references.summit_theories contains it, too, but takes long to import.
 _SUMMIT_RADIUS = 3 * math.sqrt(math.pi) / 8
 
-# Tabor parameter, over that of the mean curvature, which one in twenty of the first spots falls below.
+# Tabor parameter of the 5 % of the first spots with the smallest one, over that of the mean curvature.
 _SMALLEST_TABOR = 0.84
 
 
 def self_affine_moments(
     period: float, rolloff_wavelength: float, short_wavelength: float, hurst: float
 ) -> SpectralMoments:
-    """Moments of a self-affine surface with roll-off, up to a common factor; lengths in m.
+    """Return the moments of a self-affine surface with roll-off, up to a common factor; lengths in m.
 
     They are integrals over the plane of wave vectors: m0 = int C, m2 = 1/2 int q^2 C, m4 = 3/8 int q^4 C.
     """
@@ -56,7 +56,7 @@ def self_affine_moments(
 
 
 def surface_facts(campaign: Campaign, name: str) -> dict[str, float]:
-    """Properties of a surface at rms slope 1: those of `icha.analysis.validity.VALIDATED`, and three more.
+    """Return properties of a surface at rms slope 1: those of `icha.analysis.validity.VALIDATED`, and three more.
 
     A random surface is Gaussian and isotropic; the properties of a surface from a file are computed from its heights.
 

@@ -10,7 +10,7 @@ import xarray as xr
 from icha.asperity.material import Material
 from icha.datasets.attributes import THEORY, file_attributes
 from icha.datasets.build import describe_variables
-from icha.datasets.variables.terms import TERMS, read_tables
+from icha.datasets.variables.theories import THEORIES
 from icha.references import persson, summit_theories
 from icha.surfaces.moments import SpectralMoments
 from icha.surfaces.spectrum import SelfAffineSpectrum
@@ -82,14 +82,9 @@ def _sources():
 
 
 _GFMD = ("reduced_pressure", "area_fraction", "area_scatter")
-_TABLE = read_tables(
-    "theories.txt",
-    TERMS,
-    {name: {"references": source} for name, source in _sources().items()},
-    area=TERMS["contact_area_fraction"].long_name,
-    pressure=TERMS["reduced_pressure"].long_name,
-    separation=TERMS["reduced_separation"].long_name,
-)[""]
+_TABLE = THEORIES | {
+    name: THEORIES[name]._replace(further={"references": source}) for name, source in _sources().items()
+}
 
 
 def _mean_field_theories(pressure, spectrum):

@@ -76,7 +76,7 @@ def write_explorer(
     Raises
     ------
     ValueError
-        If the campaign dataset or everything in `only` is missing, no contact fits, or a file cannot be read.
+        If the dataset is missing, a choice in `only` does not exist, no contact fits, or a file cannot be read.
     """
     from plotly.offline import get_plotlyjs
 
@@ -258,7 +258,7 @@ def _snapshot(run: xr.Dataset, snapshot: int, maps: Sequence[str] | None) -> dic
         "larger": _points(patches_above(areas, cell)),
     }
     gap, densities = gap_densities([(run, snapshot)])
-    if len(gap):  # near full contact there is no distribution of gaps
+    if len(gap):  # near full contact, too few gaps for a distribution remain
         data["gap"] = _points((gap, densities))
     if maps is not None:
         data["map"] = maps[snapshot]
@@ -293,7 +293,7 @@ def encode_map(contact: np.ndarray) -> str:
 
 
 def find_partners(one: xr.Dataset, other: xr.Dataset) -> list[int]:
-    """Find, for every step of a run, the step of another run at the same state of the path; -1 if there is none.
+    """Find, for every step of a run, the step of another run at the same state of the path; -1 without such a step.
 
     A step that reaches a target corresponds to the step of the other run at the same target on the same leg. Any other
     step corresponds to the step on the same leg with the nearest mean separation.

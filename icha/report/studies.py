@@ -35,11 +35,11 @@ EVENT_COUNTS = ("spot_count", "jump_in_count", "jump_off_count", "coalescence_co
 STATISTICS = ("asperity_count", "nayak_parameter", "stickiness", "tabor_parameter", "full_contact_energy_ratio")
 # Contributions to a loss, and their names on the page.
 LOSS_NAMES = {
-    "loss_by_jump_in": "jumping in",
-    "loss_by_jump_off": "jumping off",
-    "loss_by_coalescence": "unions",
-    "loss_by_load_jump": "at fixed load",
-    "loss_unattributed": "no event",
+    "loss_by_jump_in": "jump-in",
+    "loss_by_jump_off": "jump-off",
+    "loss_by_coalescence": "coalescence",
+    "loss_by_load_jump": "jumps at fixed load",
+    "loss_unattributed": "without event",
 }
 
 
@@ -92,7 +92,7 @@ def _material(dataset: xr.Dataset) -> dict[str, str]:
 
 
 def _run(labels: RunLabels, run: xr.Dataset) -> dict:
-    """Return the statistics of a run; events up to the end of its first loading, since none remain after separation."""
+    """Return the statistics of a run; the numbers of events are those at the end of its first loading."""
     loaded = np.flatnonzero(loading_stops(run).values)[-1:]
     return {
         "labels": labels,
@@ -109,7 +109,7 @@ def _run(labels: RunLabels, run: xr.Dataset) -> dict:
 
 
 def collect_states(run: xr.Dataset) -> dict[tuple[str, float], dict[str, float]]:
-    """Return reduced pressure, A/A0 and mean gap over h_rms at the stops of a loading, by kind and target."""
+    """Return reduced pressure, A/A0 and mean gap over h_rms at the targets of a loading, by kind and value."""
     stops = path_steps(run)
     keys = zip(stops["step_kind"].values.tolist(), stops["step_target"].values.tolist(), strict=True)
     values = {
@@ -150,7 +150,7 @@ def _table(runs) -> dict:
 def _ensembles(dataset: xr.Dataset, runs: list[RunLabels]) -> list[tuple[dict, list[RunLabels]]]:
     """Group runs that differ only in their seed; runs to which the model is not applicable are apart.
 
-    Each group comes with what identifies its row in a table, and with its number of seeds and that of requested ones.
+    Return the start of a table row for each group (labels, numbers of seeds and of requested seeds), and its runs.
     """
     groups: dict[tuple[RunLabels, bool], list[RunLabels]] = {}
     for run in runs:

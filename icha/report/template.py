@@ -1,4 +1,4 @@
-"""Templates of the pages, and how they print numbers and symbols."""
+"""Templates of the pages, and the formats of numbers and symbols on them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Checks of input files from unknown sources: kind of file, memory limit of reading, traps in HDF5 files; CSV tables.
+"""Checks of input files from unknown sources: kind of file, memory limit of reading, dangerous HDF5 files; CSV tables.
 
 A small file can declare a very large array, or unpack to one. Readers compare declared sizes with the limit
 (`require_room`), and limit the memory of the libraries that read the file (`bounded_memory`).
@@ -27,11 +27,11 @@ _WHOLE = "expected a file that holds all of its data"
 
 
 class RefusedFile(ValueError):
-    """A file that is not read because it might do harm; the message says why, and what is expected."""
+    """A file that is not read because it might do harm; the message gives the reason and what is expected."""
 
 
 class TooLarge(RefusedFile):
-    """A file that would take more memory than the limit; the message says how to raise it."""
+    """A file that would take more memory than the limit; the message explains how to raise the limit."""
 
     def __init__(self, needed: str, most: int):
         """Describe the memory `needed`, the limit of `most` bytes, and how to raise it."""
@@ -104,7 +104,7 @@ def bounded_memory(most: int | None = None) -> Iterator[None]:
 
 
 def text(attribute: bytes | str | Iterable[bytes | str]) -> str:
-    """Convert a text attribute to str, as bytes or in an array of one, as netCDF stores non-ASCII texts."""
+    """Convert a text attribute to str; netCDF stores non-ASCII texts as bytes or as an array with one text."""
     if not isinstance(attribute, bytes | str):
         (attribute,) = attribute
     return attribute.decode() if isinstance(attribute, bytes) else str(attribute)
@@ -169,7 +169,7 @@ def read_columns(path: str | Path, columns: dict[str, float]) -> list:
     Raises
     ------
     ValueError
-        If the file cannot be read, or a column is missing or holds anything but positive numbers.
+        If the file cannot be read, a column is missing, or a value is not a positive number.
     """
     import numpy as np  # imported here because most commands read no table
 

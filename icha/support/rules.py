@@ -51,7 +51,7 @@ class FloatRange:
         return f"a number in {self.interval}" + (", where the asperity model holds" if self.model_ends else "")
 
     def validate(self, name: str, value) -> float:
-        """Return the value of argument `name` as a float; raise ValueError naming it if it breaks the rule."""
+        """Return the value of argument `name` as a float; raise ValueError with the name if it breaks the rule."""
         unit = "" if self.unit == "1" else f" (in {self.unit})"
         if isinstance(value, bool) or not isinstance(value, numbers.Real):
             raise ValueError(f"{name}: {value!r} is not a number{unit}")
@@ -81,7 +81,7 @@ class IntegerRange:
         return not isinstance(value, bool) and isinstance(value, numbers.Integral) and self.least <= value <= self.most
 
     def validate(self, name: str, value) -> int:
-        """Return the value of argument `name` as an int; raise ValueError naming it if it breaks the rule."""
+        """Return the value of argument `name` as an int; raise ValueError with the name if it breaks the rule."""
         if isinstance(value, bool) or not isinstance(value, numbers.Integral):
             raise ValueError(f"{name}: {value!r} is not an integer")
         if not self.contains(value):

@@ -15,7 +15,7 @@ from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Fie
 
 from icha.support.rules import CONTACT_MODULUS, LENGTH, POSITIVE, SEED, SURFACE_ENERGY, FloatRange, IntegerRange
 
-# A number as text: PyYAML reads `1.0e6` and `1e-3` as text, so text must be accepted.
+# A number as text. PyYAML reads `1.0e6` and `1e-3` as text, so text must be accepted as a number.
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _QUANTITY = re.compile(rf"\s*({_NUMBER})\s*(.*?)\s*", re.DOTALL)
 _UNIT = re.compile(r"[A-Za-zµμÅ°%²³⁻·][\w\s*/^().µμÅ°%²³⁻·-]*")
@@ -80,7 +80,7 @@ def _registry():
 
 @lru_cache(maxsize=1024)
 def conversion_factor(unit: str, si_unit: str) -> Decimal:
-    """Exact factor from `unit` to `si_unit`; raise ValueError if `unit` is unknown or of another dimension."""
+    """Return the exact factor from `unit` to `si_unit`; raise ValueError if `unit` is unknown or unsuitable."""
     if len(unit) > _LONGEST:
         raise ValueError(f"a text of {len(unit)} letters is not a unit")
     if unit == si_unit == "1":
@@ -91,7 +91,7 @@ def conversion_factor(unit: str, si_unit: str) -> Decimal:
 
 
 def _length(unit):
-    """Exact factor from a unit of length to metres; accepts both signs for micro and both for angstrom."""
+    """Return the exact factor from a unit of length to metres; accept both signs for micro and both for angstrom."""
     name = unicodedata.normalize("NFKC", unit.strip())
     factor = _SYMBOLS.get(name) or _LONG_NAMES.get(name.lower())
     if factor is None:
@@ -100,7 +100,7 @@ def _length(unit):
 
 
 def _by_pint(unit, si_unit):
-    """Exact factor by pint, which raises a dozen types of errors for text that is not a unit."""
+    """Return the exact factor by pint, which raises a dozen types of errors for text that is not a unit."""
     factor = math.nan
     if _UNIT.fullmatch(unit):
         with contextlib.suppress(Exception):
@@ -153,7 +153,7 @@ def finite(value) -> float:
 
 
 def quantity(rule: FloatRange, example: str):
-    """Type of a value with its unit, kept as a float in the unit of `rule`."""
+    """Return the type of a value with its unit; the value becomes a float in the unit of `rule`."""
     bounds = f"in {rule.interval} {rule.unit}" if rule.most is not None else "0 or greater"
     expected = f"{PHYSICAL_NAMES[rule.unit]} with its unit, {bounds}, such as {example!r}"
     schema = {"type": "string", "pattern": PATTERN, "examples": [example]}
@@ -161,14 +161,14 @@ def quantity(rule: FloatRange, example: str):
 
 
 def number(rule: FloatRange):
-    """Type of a number without a unit."""
+    """Return the type of a number without a unit."""
     bounds = {"exclusiveMinimum": rule.above, "minimum": rule.least, "maximum": rule.most}
     schema = {"type": "number"} | {key: bound for key, bound in bounds.items() if bound is not None}
     return _float(to_number, rule, rule.expected, schema)
 
 
 def _float(convert, rule, expected, schema, *metadata):
-    """Type of a float that `convert` reads and a rule checks; the message states what is expected."""
+    """Return the type of a float that `convert` reads and a rule checks; its message states what is expected."""
 
     def read(value: Any) -> float:
         try:
@@ -183,7 +183,7 @@ def _float(convert, rule, expected, schema, *metadata):
 
 
 def integer(rule: IntegerRange):
-    """Type of an integer."""
+    """Return the type of an integer."""
     least, most = rule.least, rule.most
 
     def read(value: Any) -> int:
@@ -270,12 +270,12 @@ Seed = integer(SEED)
 
 
 def stops(kind, in_order):
-    """Type of a list of at least one value that `in_order` accepts."""
+    """Return the type of a list of at least one value; `in_order` checks the order of the values."""
     return Annotated[list[kind], Field(min_length=1), AfterValidator(in_order)]
 
 
 def list_of_names(kind=Name):
-    """Type of a list of at least one name, each given once."""
+    """Return the type of a list of at least one name, in which each name is given once."""
     return Annotated[list[kind], Field(min_length=1), AfterValidator(distinct)]
 
 

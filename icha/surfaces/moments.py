@@ -54,7 +54,7 @@ def summit_density(m2: float, m4: float) -> float:
 
 
 def self_affine_integral(order: int, start: float, end: float, roll: float, hurst: float) -> float:
-    """Integral of k^order C(k)/C0 from `start` to `end`, where C = C0 up to `roll`, then falls as k^(-2 - 2 hurst)."""
+    """Integrate k^order C(k)/C0 from `start` to `end`, where C = C0 up to `roll`, then falls as k^(-2 - 2 hurst)."""
 
     def up_to(end):
         flat = min(end, roll) ** (order + 1) / (order + 1)

@@ -138,8 +138,8 @@ class SelfAffineSpectrum:
         cells = grid * self.short_wavelength / self.period
         if cells < 2 * (1 - _ROUNDING):
             raise ValueError(
-                f"grid: {grid} nodes give {cells:.3g} cells per shortest wavelength; "
-                f"at least {math.ceil(2 * self.period / self.short_wavelength * (1 - _ROUNDING))} nodes are needed"
+                f"grid: {grid} nodes give {cells:.3g} cells per shortest wavelength; expected at least "
+                f"{math.ceil(2 * self.period / self.short_wavelength * (1 - _ROUNDING))} nodes"
             )
         if cells < 4 * (1 - _ROUNDING):
             warnings.warn(

@@ -9,7 +9,7 @@ def cell_of(period, free):
 
 
 def periodic_difference(first, second, period):
-    """Return the shortest difference first - second of coordinates in the periodic cell, of any shape, m."""
+    """Return the shortest difference first - second of coordinates (m, arrays of any shape) in a periodic cell."""
     difference = first - second
     return difference - period * np.rint(difference / period)
 

@@ -88,7 +88,7 @@ class Asperities:
 
     @property
     def cell(self) -> float:
-        """Period of positions, m; for a single square twice the side, so that the differences of positions stay."""
+        """Period of positions, m; for a single square twice its side, so that no difference of positions is wrapped."""
         return cell_of(self.period, self.free)
 
     def __len__(self) -> int:
@@ -305,9 +305,9 @@ def paraboloid_departure(
     Returns
     -------
     float, the mean of abs(ln(d / (a^2 / 2R))) over the spots, weighted by area. Here d is the mean depth, below the
-    summit, of the circle of radius a around the summit. Elongated summits follow another paraboloid at small a, whose
-    curvature is the arithmetic mean of the principal curvatures; if its value is smaller, this value is returned. The
-    value is 0 if no spot is wider than half a cell.
+    summit, of the circle of radius a around the summit. At small a, elongated summits follow another paraboloid, whose
+    curvature is the arithmetic mean of the principal curvatures; the smaller of the two values is returned. The value
+    is 0 if no spot is wider than half a cell.
     """
     mode = "mirror" if surface.free else "grid-wrap"
     spline = scipy.ndimage.spline_filter(surface.heights, order=3, mode=mode)

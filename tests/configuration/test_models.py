@@ -4,9 +4,8 @@ import pytest
 
 from icha.configuration.cases import run_cases, run_settings, run_sha256
 from icha.configuration.errors import ConfigurationError
-from icha.planning.costs import RUN_SIZES
 from icha.planning.plan import plan
-from icha.planning.requirements import run_memory, run_minutes, surface_threads
+from icha.planning.requirements import run_memory, run_minutes
 from icha.planning.results import campaign_files
 
 BOTH = {"studies.one.models": ["asperities", "boundary_elements"]}
@@ -57,8 +56,6 @@ def test_boundary_elements_are_planned_as_a_part_of_their_own_at_their_own_cost(
     quick, slow = runs[:4], runs[4:]
     assert min(item.cost.seconds for item in slow) > 2 * max(item.cost.seconds for item in quick)
     first, *_, last = run_cases(campaign)
-    held = 600 + RUN_SIZES["boundary_elements"].arrays * 8 * 512**2 / 1e6
-    assert run_memory(campaign, last) > held > run_memory(campaign, first)
+    assert run_memory(campaign, last) > run_memory(campaign, first)
     assert run_memory(campaign, last) * 1e6 > slow[0].cost.memory
     assert run_minutes(campaign, last) > run_minutes(campaign, first)
-    assert surface_threads(campaign, "rough") == 1

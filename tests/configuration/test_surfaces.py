@@ -24,10 +24,8 @@ def test_the_slope_that_a_topography_has(load, tmp_path):
     ("heights", "message"),
     [
         (np.full((16, 16), np.nan), "256 of 256 heights that are not finite"),
-        (np.where(np.eye(16) > 0, np.inf, 1.0), "16 of 256 heights that are not finite"),
         (np.ones((16, 15)), r"shape \(16, 15\)"),
         (np.ones((16, 16, 2)), r"shape \(16, 16, 2\)"),
-        (np.ones((4, 4)), r"shape \(4, 4\)"),
         (np.ones((16, 16)), "all the same"),
         (np.full((16, 16), "a"), "not real numbers"),
     ],

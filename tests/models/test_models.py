@@ -51,11 +51,6 @@ def test_other_models_are_refused_by_name(model):
         icha.simulate(small.surface(), small.MATERIALS["soft"], PATH, model=model)
 
 
-def test_asperities_are_what_is_meant_where_no_model_is_named(runs):
-    plain = icha.simulate(small.surface(), small.MATERIALS["soft"], PATH, seed=1)
-    xr.testing.assert_identical(plain, runs[labels(DEFAULT_MODEL)])
-
-
 def test_a_run_says_by_which_model_it_is(runs, tmp_path):
     asperities, patched = runs[labels(DEFAULT_MODEL)], runs[labels(REFERENCE_MODEL)]
     assert set(patched.variables) - set(asperities.variables) == set(OF_MODELS)

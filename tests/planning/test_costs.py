@@ -1,4 +1,4 @@
-"""What is expected of the costs of a computation: against measured times, on real surfaces, and what corrects it."""
+"""Expected costs: compared with measured times and real surfaces, and corrected by finished jobs."""
 
 import csv
 from pathlib import Path
@@ -92,5 +92,5 @@ def test_what_jobs_took_corrects_what_is_expected_of_others():
     assert costs.correction([(1.0, 4.0)]) == pytest.approx(2.0)
     many = [(t, 4 * t) for t in np.linspace(1, 2, 99)]
     assert costs.correction(many) == pytest.approx(4.0, rel=0.02)
-    # One job that was slow for a reason of its own does not matter.
+    # A single slow job has no effect.
     assert costs.correction([*many, (1.0, 1000.0)]) == pytest.approx(4.0, rel=0.02)

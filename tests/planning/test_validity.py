@@ -1,4 +1,4 @@
-"""What is expected, before a run, of where the jump into contact lies outside what was verified."""
+"""Expected validity before a run: curvatures, Tabor parameters and stickiness of the surfaces."""
 
 import re
 

@@ -148,7 +148,7 @@ def test_between_stops_the_other_model_is_at_the_nearest_separation():
 def test_failures_are_shown_and_runs_without_a_stop_are_counted(folder, page, data):
     assert contact_of(data, FAILED)["runs"]["asperities"]["failure"] == REASON
     assert NOTHING[0] == "slopes" and len(data["contacts"]) == len({each._replace(model="") for each in runs()}) - 1
-    assert "Omitted: 1 contact whose runs reached no stop" in page.read_text(encoding="utf-8")
+    assert "Omitted: 1 contact whose runs reached no target" in page.read_text(encoding="utf-8")
 
 
 def test_the_page_needs_no_other_files_and_no_network(page):

@@ -1,4 +1,4 @@
-"""What is in the way of a folder, and what killed programs leave behind."""
+"""Temporary files of killed programs are recognised by their names; an owner writes from any folder."""
 
 from pathlib import Path
 
@@ -7,9 +7,9 @@ import pytest
 from icha.support.atomic_files import is_left_over, probe_folder, take_over, whole_file
 
 
-def test_whatever_a_killed_program_leaves_is_known_by_its_name(tmp_path, monkeypatch):
+def test_files_of_a_killed_program_are_recognised_by_their_names(tmp_path, monkeypatch):
     with pytest.raises(KeyboardInterrupt), monkeypatch.context() as patch:
-        patch.setattr(Path, "unlink", lambda *_, **__: None)  # as by a kill, after which nothing is removed
+        patch.setattr(Path, "unlink", lambda *_, **__: None)  # a killed program removes nothing
         assert probe_folder(tmp_path) is None
         with whole_file(tmp_path / "a.txt") as temporary:
             temporary.write_text("half")
@@ -20,7 +20,7 @@ def test_whatever_a_killed_program_leaves_is_known_by_its_name(tmp_path, monkeyp
 
 
 def test_an_owner_writes_other_files_from_wherever_it_is(tmp_path, monkeypatch):
-    """As the program does at its end, in another folder than that of the campaign."""
+    """The program may end in another folder than that of the campaign."""
     monkeypatch.setenv("ICHA_OWNER", "")
     monkeypatch.chdir(tmp_path)
     take_over(".snakemake/tiny.owner")

@@ -1,4 +1,4 @@
-"""The number of cores follows what the process may use, and never changes a bit of a result."""
+"""Results have the same bits on any number of cores."""
 
 import numpy as np
 import pytest

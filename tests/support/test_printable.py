@@ -1,4 +1,4 @@
-"""What comes from files and jobs acts on no terminal, log or page."""
+"""Texts from files and jobs have no effect on a terminal, a log or a page."""
 
 import sys
 import unicodedata
@@ -24,8 +24,8 @@ EVIL = "a\x1b[2J\x9b1m\r\b\x07\x7f\u202eb\u2028c\u200b"
 def test_nothing_acts_on_a_terminal():
     assert printable(EVIL) == r"a\x1b[2J\x9b1m\r\x08\x07\x7f\u202eb\u2028c\u200b"
     assert printable("a\nb\tc") == r"a\nb\tc" and printable_lines("a\nb\tc") == "a\nb\tc"
-    # The kinds of characters by the standard, not by the list of the module: whatever is left is none of them, but for
-    # joiners, and signs of Arabic, Syriac, Egyptian and music, which are seen.
+    # By the categories of the Unicode standard, no control character remains. Joiners, and signs of Arabic, Syriac,
+    # Egyptian and music, are visible and remain.
     left = printable("".join(map(chr, range(sys.maxunicode + 1))))
     kinds = {unicodedata.category(each) for each in left} - {"Cf"}
     assert not kinds & {"Cc", "Cs", "Zl", "Zp"}
@@ -83,7 +83,7 @@ def test_pages_hold_no_overrides_and_no_control_characters():
     assert text.count(r"\u202e") == 2 and "<b>" not in text and text.endswith("3 <i>\u200d</i>")
 
 
-def test_what_the_page_of_paths_is_told_is_printable():
+def test_the_data_of_the_page_of_paths_are_printable():
     campaign = SimpleNamespace(attrs={"title": EVIL, "campaign": EVIL})
     page = _filled(campaign, {"contacts": [{"study": EVIL, "steps": [1.0, 2]}]}, library="", largest=1)
     assert not set("\x1b\x9b\b\u202e\u2028") & set(page) and page.count(r"\\u202e") == 1 and "[1.0, 2]" in page

@@ -1,4 +1,4 @@
-"""Rules for values: the same for arguments and for configurations, each in its own words."""
+"""Arguments and configuration keys are checked by the same rules."""
 
 import pytest
 from pydantic import TypeAdapter, ValidationError

@@ -114,13 +114,10 @@ def test_points_with_a_column_too_many(tmp_path, further):
     path = written(tmp_path, text(points(further), " "), "scan.txt")
     with refused("columns", r"a line has 4 numbers.*\[1, 2, 3\]"):
         read(path)
-    assert_heights(read(path, columns=(1, 2, 3), size=None, lateral_unit=UM))
-
-
-def test_points_without_data(tmp_path):
-    lines = points()
+    lines = points(further)
     lines[50][2] = "no data"
-    assert_heights(read(written(tmp_path, text(lines, " "), "scan.xyz"), lateral_unit=UM), missing=1)
+    path = written(tmp_path, text(lines, ","), "scan.xyz")
+    assert_heights(read(path, columns=(1, 2, 3), size=None, lateral_unit=UM), missing=1)
 
 
 @pytest.mark.parametrize("damage", ["short", "long", "word"])

@@ -237,18 +237,6 @@ def test_groups_that_lie_deep_in_one_another_are_refused_at_once(tmp_path):
         scan(tmp_path / "scan.h5", **LINES)
 
 
-def test_soft_links_are_no_datasets(tmp_path):
-    path = tmp_path / "scan.h5"
-    with h5py.File(path, "w") as file:
-        file["heights"] = HEIGHTS
-        file["other"] = h5py.SoftLink("/heights")
-        file["nowhere"] = h5py.SoftLink("/none")
-        file["itself"] = h5py.SoftLink("/itself")
-    assert scan(path, **LINES).heights.shape == HEIGHTS.shape
-    with pytest.raises(UnfitTopography, match="is not a dataset of the file; expected one of: heights"):
-        scan(path, **LINES, data="other")
-
-
 def test_paths_that_are_no_files_are_not_opened(tmp_path, monkeypatch):
     os.mkfifo(tmp_path / "pipe.npy")
     settings = {"format": "auto", "boundary": "free"}

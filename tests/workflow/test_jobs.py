@@ -1,4 +1,4 @@
-"""What every job does besides its work: records of results, checks of inputs, its log, its end with Snakemake."""
+"""Every job records its results, checks its inputs, writes a log, and ends with Snakemake."""
 
 import json
 import os

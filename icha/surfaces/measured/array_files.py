@@ -82,7 +82,7 @@ def read_netcdf(source, settings: Preparation) -> FileContent:
 
 
 def _side(coordinate, count):
-    """Return the length of a side in m, None if the file does not contain it, and whether its coordinate decreases."""
+    """Return the length of a side in m (None if the file does not contain it) and whether its coordinate decreases."""
     if coordinate is None or coordinate.ndim != 1:
         return None, False
     unit, values = _unit_of(coordinate.__dict__), _read_variable(coordinate)
@@ -92,7 +92,7 @@ def _side(coordinate, count):
         return None, False
     _, lines, step = grid_indices(values, coordinate.name)
     if lines != count:
-        raise UnfitTopography("path", f"has unequal distances along {coordinate.name}; expected equal ones")
+        raise UnfitTopography("path", f"has unequal distances along {coordinate.name}; expected equal distances")
     return (count * step * unit if unit is not None else None), values[0] > values[-1]
 
 
@@ -125,7 +125,7 @@ def read_hdf5(source, settings: Preparation) -> FileContent:
 
 
 def _unpack(dataset):
-    """Read a dataset, nan where numbers are missing, after unpacking by its attributes as in netCDF."""
+    """Read a dataset and unpack its numbers as its attributes define, as in netCDF; nan where numbers are missing."""
     stored, attributes = dataset[...], dataset.attrs
     fills = [each for name in ("_FillValue", "missing_value") for each in np.ravel(attributes.get(name, []))]
     # The fill value 0 is the default of HDF5, so zeros are heights.
@@ -210,7 +210,7 @@ def read_instrument(file, settings: Preparation) -> FileContent:
 
 
 def _choose_channel(opened, settings):
-    """Return the channel that the settings name, or the default one, and its name, empty if it is the only map."""
+    """Return the channel that the settings name, else the default channel, and its name; "" if it is the only map."""
     channels = opened.channels
     names = [channel.name for channel in channels]
     maps = find_maps({k: tuple(channel.nb_grid_pts) for k, channel in enumerate(channels)})

@@ -230,7 +230,7 @@ def _image_sides(lines: Sequence[str]) -> list[str]:
 
 
 def _check_counts(lines: Sequence[str], shapes: Sequence[tuple[int, int]]) -> None:
-    """Raise UnfitTopography unless one of the shapes has the numbers of rows and columns in the heading."""
+    """Raise UnfitTopography unless one of the shapes has as many rows and columns as the heading states."""
     entries = _entries(lines)
     for axis, (what, names) in enumerate(_COUNTS.items()):
         counts = [int(entries[name]) for name in names if entries.get(name, "").isdecimal()]

@@ -41,7 +41,7 @@ class Layout:
 
     Attributes
     ----------
-    heading : lines above the numbers, remarks included.
+    heading : lines above the numbers, including remarks.
     notation : delimiter and decimal sign.
     columns : numbers in the first line of numbers.
     """
@@ -130,7 +130,7 @@ class SourceFile:
 
     @cached_property
     def instrument(self):
-        """The file as SurfaceTopography opens it; None if SurfaceTopography does not know its format."""
+        """The file, opened with SurfaceTopography; None if SurfaceTopography does not know its format."""
         return open_instrument(self.path)
 
 
@@ -208,7 +208,7 @@ def _decide_on_commas(notation, lines, count):
     if notation.delimiter == "," and not with_comma and are_halves_of_decimals(rows):
         raise UnfitTopography(
             "path",
-            f"has commas that stand between numbers and seem to be decimal, too, as in {','.join(rows[0][:4])}; "
+            f"has commas between numbers and others that seem to be decimal, as in {','.join(rows[0][:4])}; "
             "expected semicolons between numbers with decimal commas, quotes around these, or decimal points",
         )
     return replace(notation, decimal_comma=notation.decimal_comma or has_decimal_commas(fields))

@@ -78,7 +78,7 @@ def prepared_topography(path: str | os.PathLike, preparation: Mapping) -> Prepar
     Raises
     ------
     UnfitTopography
-        A ValueError with the setting that does not fit the file (its attribute `key`), the reason, and the expectation.
+        A ValueError with the setting that does not fit the file (attribute `key`), the reason, and what is expected.
     """
     file, settings = Path(path), Preparation(**preparation)
     scan = load_scan(file, settings)
@@ -187,7 +187,7 @@ def fill_missing_points(scan: Scan, settings: Preparation) -> Scan:
 
 
 def _harmonic(heights, missing, *, periodic):
-    """Solve Laplace's equation: each missing height (count,) is the mean of its four neighbours, at edges of three."""
+    """Solve Laplace's equation: each missing height (count,) is the mean of its neighbours, four or at edges fewer."""
     row, column = np.nonzero(missing)
     count, pairs = len(row), []
     index = np.full(missing.shape, -1)
@@ -228,7 +228,7 @@ def resample_to_square_pixels(scan: Scan, settings: Preparation) -> Scan:
 
 
 def _by_cosine_series(heights, axis, step, count):
-    """Evaluate the cosine series in the middle of `count` cells, `step` old ones wide, along an axis."""
+    """Evaluate the cosine series along an axis, in the middle of `count` new cells that are `step` old cells wide."""
     # Slow to import, and rarely needed.
     from scipy.signal import czt
 
@@ -266,7 +266,7 @@ def filter_short_waves(scan: Scan, settings: Preparation) -> Scan:
 
 
 def treat_edges(scan: Scan, settings: Preparation) -> tuple[Surface, list[str]]:
-    """Make the surface: treat the edges as the boundary requires, and change the grid. Return also all steps."""
+    """Treat the edges as the boundary requires, and change the grid; return the surface and all steps."""
     nodes = settings.grid or (2 if settings.boundary == MIRROR else 1) * max(scan.heights.shape)
     try:
         # Resampling copies the heights.
@@ -302,7 +302,7 @@ def treat_edges(scan: Scan, settings: Preparation) -> tuple[Surface, list[str]]:
 
 
 def _resampled(heights, grid, *, free):
-    """Resample to grid x grid points by the Fourier series; a free square, by the cosine series."""
+    """Resample to grid x grid points by the Fourier series, or a free square by the cosine series."""
     # Slow to import, and rarely needed.
     from scipy.signal import resample
 
