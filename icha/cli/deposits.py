@@ -135,7 +135,7 @@ def reproduce(
 
 def _introduce(deposit: Path, original: Path, folder: Path | None) -> None:
     """Print the size of a deposit and what computes it again; refuse it if it was made with other versions."""
-    from icha.deposit.reproduce import RerunError, count_changed_files, other_versions
+    from icha.deposit.reproduce import RerunError, other_versions
 
     echo(f"deposit:    {printable(deposit)}, {_contents(original)}")
     if differences := other_versions(original):
@@ -144,8 +144,6 @@ def _introduce(deposit: Path, original: Path, folder: Path | None) -> None:
             "a clone of that version, or in a copy of the deposit's source:\n" + "\n".join(differences)
         )
     echo(f"program:    the installed ICHA {version('icha')}; nothing in the deposit is executed")
-    if changed := count_changed_files(original):
-        echo(f"            (the deposit's source differs from it in {format_count(changed, 'file')})", fg="yellow")
     echo(f"writes to:  {shorten_path(folder) if folder else 'a temporary folder'}")
 
 

@@ -78,9 +78,8 @@ def run_place(study: xr.Dataset, labels: RunLabels) -> dict[str, int]:
 def select_run(tree: xr.DataTree, labels: RunLabels | tuple) -> xr.Dataset:
     """Select one run of a campaign dataset, with its steps and its spots.
 
-    Its attributes are those of its file: `incomplete` is why it failed, `beyond_model` why it
-    ended at the limit of its model, `failed_checks` which checks failed,
-    `applicability` why its model is not applicable.
+    Its attributes are those of its file. They give reasons: `incomplete` why it failed, `beyond_model` why it ended at
+    the limit of its model, `failed_checks` which checks failed, `applicability` why its model is not applicable.
 
     Raises
     ------
@@ -130,8 +129,7 @@ def variables_of_run(tree: xr.DataTree, labels: RunLabels | tuple) -> tuple[dict
     attrs = study.attrs | {"contact_model": labels.model}
     if int(status) in STATUS_ATTRIBUTES:
         attrs[STATUS_ATTRIBUTES[int(status)]] = failure.item()
-    if "applicability" in study.variables:  # campaigns of earlier versions do not have this variable
-        attrs["applicability"] = study.variables["applicability"].transpose(*LABELS)[place].item()
+    attrs["applicability"] = study.variables["applicability"].transpose(*LABELS)[place].item()
     return variables, attrs
 
 

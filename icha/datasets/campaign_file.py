@@ -8,6 +8,7 @@ From there they are read in the order of the dataset, one block of neighbouring 
 import itertools
 import math
 import os
+import pickle
 import tempfile
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -17,7 +18,7 @@ import netCDF4
 import numpy as np
 
 from icha.datasets.attributes import COLLECTED, combine_attributes
-from icha.datasets.campaign_runs import Arrangement, LabelledRun, arrange_runs, load_values, spool_runs
+from icha.datasets.campaign_runs import Arrangement, LabelledRun, arrange_runs, spool_runs
 from icha.datasets.files import (
     FLOAT_FILL,
     INTEGER_FILL,
@@ -268,11 +269,10 @@ def _write(group: Group, spool: BinaryIO) -> None:
             if column.along == LABELS
         }
         for entry, position in members:
+            spool.seek(entry.place)
             snapshots = [group.study.snapshots[each] for each in entry.snapshots]
             values = {
-                name: group.columns[name].pad(v)
-                for name, (_, v) in load_values(entry, spool).items()
-                if name in group.columns
+                name: group.columns[name].pad(v) for name, (_, v) in pickle.load(spool).items() if name in group.columns
             }
             for name, v in values.items():
                 column = group.columns[name]

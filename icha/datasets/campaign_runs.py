@@ -141,12 +141,6 @@ def spool_runs(
     return studies
 
 
-def load_values(entry: Entry, spool: BinaryIO) -> Values:
-    """Load the values of a run from the temporary file."""
-    spool.seek(entry.place)
-    return pickle.load(spool)
-
-
 def plain_labels(labels: RunLabels | tuple) -> RunLabels:
     """Return labels with numbers of Python's own types."""
     labels = RunLabels(*labels)

@@ -35,9 +35,8 @@ class Licence(NamedTuple):
 
     def page(self) -> str:
         """Write LICENSE.txt of a deposit whose data have this licence."""
-        name = self.identifier if self.name == self.identifier else f"{self.name} ({self.identifier})"
         statement = (
-            f"Data, figures and texts of this deposit: {name}\n{self.address}\n\n"
+            f"Data, figures and texts of this deposit: {self.name} ({self.identifier})\n{self.address}\n\n"
             f"The program in {SOURCE}/ has a licence of its own: {SOURCE}/LICENSE\n"
         )
         return f"{statement}\n{'-' * 72}\n\n{self.text}" if self.text else statement

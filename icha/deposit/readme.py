@@ -3,7 +3,6 @@
 import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from urllib.parse import quote
 
@@ -36,7 +35,6 @@ from icha.support import formatting
 _TEMPLATE = "README.md.jinja"
 # Number of entries after which a list is cut.
 _MOST_NAMES = 12
-_METADATA = "citation, licence and provenance for people and machines"
 # A web address within a text, without punctuation after it.
 _ADDRESS = re.compile(r"(https?://[^\s<>|`\\]*[^\s<>|`\\.,;:!?()\[\]*_~'\"])")
 # Characters with a meaning in Markdown: anywhere in a line, and at its beginning.
@@ -143,7 +141,6 @@ def _outcome(publication: Publication, dataset: xr.DataTree, checks: Sequence[Ch
             incomplete.append({"labels": labels, "reason": known.get(str(labels), ""), **facts})
     example = complete[0] if complete else incomplete[0]["labels"]
     study = dataset[example.study].to_dataset()
-    meaning = "0 if the run reached the end of its path, else 1"
     return {
         "designs": designs,
         "partial": [study["name"] for study in designs if study["status"][STATUS_MEANINGS[NOT_IN_DESIGN]]],
@@ -151,7 +148,7 @@ def _outcome(publication: Publication, dataset: xr.DataTree, checks: Sequence[Ch
         "beyond_model": sum(study["status"][STATUS_MEANINGS[BEYOND_MODEL]] for study in designs),
         "example": example,
         "slope_place": run_place(study, example)["rms_slope"],
-        "checks": [replace(each, description=meaning) if each.name == COMPLETED else each for each in worst(checks)],
+        "checks": worst(checks),
         "failed": [check for check in checks if not check.passed and check.name != COMPLETED],
         "known": known,
         "count": Counter(check.name for check in checks),
@@ -183,7 +180,7 @@ def _parts(sizes: Mapping[str, int]) -> list[dict]:
     rows = [(part if part in sizes else f"{part}/", part, content) for part, content in TABLES["contents"].items()]
     return [
         {"path": path, "content": content, "files": len(grouped[part]), "size": sum(grouped[part])}
-        for path, part, content in [*rows, (others, "", _METADATA)]
+        for path, part, content in [*rows, (others, "", "citation, licence and metadata for Zenodo")]
         if part in grouped
     ]
 

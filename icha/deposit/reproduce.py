@@ -17,12 +17,11 @@ from icha.configuration.load import INPUTS, load_configuration
 from icha.configuration.yaml_files import read_yaml
 from icha.datasets.attributes import why_no_result
 from icha.datasets.results import CONFIGURATION
-from icha.deposit.program import PROGRAM, program_files, version_differences
+from icha.deposit.program import version_differences
 from icha.deposit.verify import CHECKSUMS, SOURCE, files_of, read_text
 from icha.support.checksums import sha256_of
 from icha.support.formatting import format_count
 from icha.support.input_files import refuse_traps
-from icha.support.program import own_workflow
 from icha.support.values import NAME_PATTERN
 
 SMALLEST = "smallest"
@@ -65,15 +64,6 @@ def other_versions(deposit: Path) -> list[str]:
     if made_by != installed:
         wrong.insert(0, f"  icha: {installed} is installed, {made_by} made the deposit")
     return wrong
-
-
-def count_changed_files(deposit: Path) -> int:
-    """Count the files of package and workflow that differ between the deposit's source and what is installed."""
-    lines = read_text(deposit, CHECKSUMS).splitlines()
-    listed = {name.removeprefix(f"{SOURCE}/"): digest for digest, name in (line.split("  ", 1) for line in lines)}
-    theirs = {name: digest for name, digest in listed.items() if name == PROGRAM[0] or name.startswith(PROGRAM[1:])}
-    ours = {name: sha256_of(file) for name, file in program_files(own_workflow()).items()}
-    return sum(theirs.get(name) != ours.get(name) for name in {*theirs, *ours})
 
 
 def find_runs(only: Iterable[str], deposit: Path) -> list[str]:

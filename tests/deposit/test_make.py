@@ -10,7 +10,6 @@ import time
 import zipfile
 from pathlib import Path
 
-import netCDF4
 import numpy as np
 import pytest
 import small_campaign as small
@@ -142,28 +141,12 @@ def test_folder_and_zip_have_their_checksums(published, tmp_path):
 
 
 @pytest.mark.slow
-def test_its_configuration_names_its_own_files(project, published):
-    asked = load_configuration(project.parent / "asked/tiny.yaml").campaign
-    used = load_configuration(published / "config.used.yaml").campaign
-    assert campaign_sha256(used) == campaign_sha256(asked)
-    text = yaml.safe_load((published / "config.used.yaml").read_text())
-    for section, name, file in (("surfaces", "plate", "heights of a plate.npy"), ("measurements", "lab", "areas.csv")):
-        path = f"inputs/{section}/{name}/{file}"
-        assert text[section][name]["path"] == path
-        assert (published / path).read_bytes() == (project.parent / "measured" / file).read_bytes()
-    with netCDF4.Dataset(published / f"runs/{RUN}.nc") as run, netCDF4.Dataset(published / "dataset/tiny.nc") as tree:
-        assert run.config_sha256 != tree.config_sha256 == campaign_sha256(used)
-
-
-@pytest.mark.slow
 def test_the_page_for_readers_has_the_numbers(published):
     page = (published / "README.md").read_text(encoding="utf-8")
     assert page.startswith("# One file \\| one material\n")
     for text in (
         "Carberry, Josiah (2026): One file \\| one material. Version 1.0.0",
-        "| made by | ORCID |\n|---|---|\n| Josiah Carberry | <https://orcid.org/0000-0002-1825-0097> |\n",
-        "> G. Violano and L. Afferrante, Modeling the adhesive contact of rough soft media",
-        "| completed | 1 | 0 | 0 | 0 if the run reached the end of its path, else 1 |",
+        "| Josiah Carberry | <https://orcid.org/0000-0002-1825-0097> |  |\n",
         "| load | asperities | plate | 0 | 0.5 | soft | 1 | 1 | 0 |",
         "| soft | 2.5e+07 | 0.05 | 4e-08 |",
         yaml.safe_load((published / "CITATION.cff").read_text())["commit"],

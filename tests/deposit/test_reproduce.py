@@ -11,12 +11,10 @@ import netCDF4
 import numpy as np
 import pytest
 import typer
-from conftest import REPOSITORY
 from outside_validators import problems_with
 from typer.testing import CliRunner
 
 from icha.cli import app, deposits
-from icha.deposit.reproduce import count_changed_files
 
 SOFT, HARD = "load/plate/seed0/slope0.5/soft", "load/plate/seed0/slope0.5/hard"
 RUNS = (f"runs/{SOFT}.nc", f"runs/{HARD}.nc")
@@ -232,16 +230,6 @@ def test_a_deposit_that_does_not_fit_leaves_nothing_behind(deposit, reproduce, m
     monkeypatch.setattr("shutil.disk_usage", lambda path: SimpleNamespace(free=3))
     status, output = reproduce(packed.with_name("tiny.zip"))
     assert status == 1 and "3 B are free" in output and list((tmp_path / "temporary").iterdir()) == []
-
-
-def test_different_files_of_the_program_are_counted(tmp_path):
-    """In the package and in the workflow."""
-    ours = {"Snakefile", *(f"icha/{path.name}" for path in (REPOSITORY / "icha").glob("*.py"))}
-    (tmp_path / "SHA256SUMS").write_text(f"{64 * '0'}  source/docs/model.md\n{64 * '0'}  README.md\n")
-    everything = count_changed_files(tmp_path)
-    assert everything > len(ours)
-    (tmp_path / "SHA256SUMS").write_text(f"{64 * '0'}  source/Snakefile\n{64 * '0'}  source/workflow/scripts/more.py\n")
-    assert count_changed_files(tmp_path) == everything + 1
 
 
 @pytest.mark.slow

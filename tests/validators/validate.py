@@ -16,7 +16,6 @@ import io
 import json
 import logging
 import re
-import subprocess
 import sys
 import tempfile
 import traceback
@@ -54,18 +53,6 @@ class Outcome(NamedTuple):
     counted: str
     problems: list[str]
     remarks: tuple[str, ...] | list[str] = ()
-
-
-def check_checksums(folder: Path) -> Outcome:
-    """`sha256sum --check`: the files are those that the list names."""
-    listed = (folder / "SHA256SUMS").read_text(encoding="utf-8").splitlines()
-    done = subprocess.run(
-        ["sha256sum", "--check", "--strict", "--quiet", "SHA256SUMS"], cwd=folder, capture_output=True, text=True
-    )
-    problems = (done.stdout + done.stderr).splitlines()
-    if done.returncode and not problems:
-        problems = [f"status {done.returncode}"]
-    return Outcome(f"{len(listed)} files", problems)
 
 
 def check_crate(folder: Path) -> Outcome:
@@ -112,24 +99,6 @@ def _cache_contexts(path: Path) -> None:
     with CachedSession(str(path), backend="sqlite", expire_after=-1) as session:
         session.mount("https://", Shelf())
         session.get("https://w3id.org/ro/crate/1.1/context").raise_for_status()
-
-
-def check_actions(folder: Path) -> Outcome:
-    """runcrate: another reader of such crates can list what was run."""
-    from runcrate.report import dump_crate_actions
-
-    crate = folder / CRATE
-    expected = sum("CreateAction" in _types(entity) for entity in json.loads(crate.read_bytes())["@graph"])
-    text = io.StringIO()
-    dump_crate_actions(folder, text)
-    listed = sum(line.startswith("action: ") for line in text.getvalue().splitlines())
-    problems = [] if listed == expected > 0 else [f"{listed} of {expected} actions are listed"]
-    return Outcome(f"{listed} actions", problems)
-
-
-def _types(entity: dict) -> list[str]:
-    types = entity["@type"]
-    return types if isinstance(types, list) else [types]
 
 
 def check_citation(folder: Path) -> Outcome:
@@ -281,9 +250,7 @@ def stay_off_the_network() -> None:
 
 
 VALIDATORS: dict[str, Callable[[Path], Outcome]] = {
-    "sha256sum": check_checksums,
     "roc-validator": check_crate,
-    "runcrate": check_actions,
     "cffconvert": check_citation,
     "zenodo": check_zenodo,
     "compliance-checker": check_conventions,
