@@ -34,21 +34,19 @@ def check_campaign(tree: xr.DataTree, expected: Iterable[RunLabels | tuple] | No
     expected : labels of the runs of the campaign. Default: those that the dataset itself lists.
     """
     checks = []
-
-    def require_none(name, count, description, subject):
-        checks.append(Check(name, float(count), 0.0, bool(count == 0), description, subject))
-
     present = run_labels(tree)
     if expected is not None:
         lacking = sorted({str(RunLabels(*labels)) for labels in expected} - {str(labels) for labels in present})
         description = "number of requested runs that the campaign lacks"
-        require_none("all runs", len(lacking), description, ", ".join(lacking))
+        checks.append(compare_with_limit("all runs", len(lacking), 0, description, ", ".join(lacking)))
     for study, node in tree.children.items():
         missing = np.count_nonzero(node["status"].values == MISSING)
-        require_none("no run missing", missing, "number of requested runs that are missing", study)
+        description = "number of requested runs that are missing"
+        checks.append(compare_with_limit("no run missing", missing, 0, description, study))
         variables = node.to_dataset().variables.values()
         bare = sum("units" not in v.attrs or "long_name" not in v.attrs for v in variables)
-        require_none("described", bare, "number of variables without units or long name", study)
+        description = "number of variables without units or long name"
+        checks.append(compare_with_limit("described", bare, 0, description, study))
     for labels in present:
         variables, attrs = variables_of_run(tree, labels)
         # Nothing uses the values of a failed run, so they are not checked.
@@ -69,11 +67,11 @@ def check_solution(solution: xr.Dataset, subject: str = "") -> tuple[Check, ...]
     solution : a dataset as `icha.references.finite_range.finite_range_solution` returns it.
     subject : name of the solution in the findings.
     """
-    findings = _check_solution(solution)
-    return tuple(compare_with_limit(f"boundary elements: {name}", *rest, subject) for name, *rest in findings)
+    found = _findings(solution)
+    return tuple(compare_with_limit(f"boundary elements: {name}", *rest, subject) for name, *rest in found)
 
 
-def _check_solution(solution) -> Iterator[Finding]:
+def _findings(solution) -> Iterator[Finding]:
     """Yield findings on the solver, and on the identities between distributions, area and load."""
     values = (variable.values for variable in solution.variables.values())
     yield "finite", count_not_finite(values), 0, "number of values that are not finite"

@@ -284,8 +284,7 @@ def contact_of_spots(run: xr.Dataset, snapshot: int, grid: int) -> np.ndarray:
 
 def jaccard(one: np.ndarray, other: np.ndarray) -> float:
     """Return the Jaccard index: nodes in both maps over nodes in at least one; 1 if both maps are empty."""
-    either = np.count_nonzero(one | other)
-    return np.count_nonzero(one & other) / either if either else 1.0
+    return shared(one | other, one & other)
 
 
 def shared(one: np.ndarray, other: np.ndarray) -> float:

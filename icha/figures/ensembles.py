@@ -22,10 +22,7 @@ if TYPE_CHECKING:
 _MEAN_MARKERS = 8
 _SEED_LINE = {"ls": "-", "lw": 0.5, "alpha": 0.5, "zorder": 1.6}
 _SEED_DOT = {"ls": "none", "marker": ".", "ms": 5, "mew": 0, "alpha": 0.5, "zorder": 2.5}
-_BARS = {"elinewidth": 0.6, "capsize": 1.5}
 _CROSS = {"ls": "none", "marker": "x", "mew": 0.7, "label": FEWER_SEEDS}
-# Opacity of bands.
-_SHADE = 0.18
 
 
 def draw_members(axes: Axes, x: np.ndarray, members: np.ndarray, look: dict, *, positive: bool, asked: int = 0) -> None:
@@ -81,7 +78,7 @@ def _draw_scatter(axes, x, members, colour, *, positive):
         return
     limits = axes.dataLim.frozen()
     band = _break_lines(np.isfinite(members), x, *over.band(positive=positive))
-    axes.fill_between(*band, color=colour, alpha=_SHADE, lw=0, zorder=1.5)
+    axes.fill_between(*band, color=colour, alpha=0.18, lw=0, zorder=1.5)
     axes.dataLim.set(limits)
 
 
@@ -137,7 +134,8 @@ def draw_points(
     low, high = over.band(positive=positive)
     x, bars = ensemble(x).mean, np.where(enough, [over.mean - low, high - over.mean], np.nan)
     *points, below, above = _break_lines(known, x, over.mean, *bars)
-    handle = axes.errorbar(*points, yerr=[below, above] if enough.any() else None, **_BARS | look)
+    bars = {"yerr": [below, above] if enough.any() else None, "elinewidth": 0.6, "capsize": 1.5}
+    handle = axes.errorbar(*points, **bars | look)
     mark_fewer(axes, x, over.mean, known, look, asked)
     return handle
 

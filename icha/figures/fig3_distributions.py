@@ -88,13 +88,11 @@ def _finish(left, right, pressures, highest, load):
 def gap_densities(members: Sequence[tuple[xr.Dataset, int]]) -> tuple[np.ndarray, np.ndarray]:
     """Return u/h_rms (k,) and P(u) h_rms (members, k) of snapshots; bins with few cells are joined."""
     (first, _), *_ = members
-    edges = first["gap_bin_edges"].values
-    contents = np.array([run["gap_density"].values[at] * run["rms_height"].item() for run, at in members])
-    contents *= np.diff(edges) / float(first["rms_height"])
+    edges = first["gap_bin_edges"].values / float(first["rms_height"])
+    contents = np.array([run["gap_density"].values[at] * float(run["rms_height"]) for run, at in members])
+    contents *= np.diff(edges)
     # The first bin begins at zero, which a logarithmic axis does not show.
-    edges, densities = join_bins(
-        edges[1:] / float(first["rms_height"]), contents[:, 1:], _LEAST_CELLS / int(first["grid"]) ** 2
-    )
+    edges, densities = join_bins(edges[1:], contents[:, 1:], _LEAST_CELLS / int(first["grid"]) ** 2)
     return np.sqrt(edges[:-1] * edges[1:]), densities
 
 

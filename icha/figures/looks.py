@@ -211,8 +211,6 @@ FEWER_SEEDS = "crossed: mean over fewer seeds than requested"
 # Largest number of names in the larger font.
 _MANY_NAMES = 12
 _MOST_COLUMNS = 4
-# Labels of marks that every legend names if a panel has them.
-_MARKS = (FEWER_SEEDS, NOT_APPLICABLE)
 
 
 def legend_below(figure: Figure, handles: Mapping[str, object]) -> None:
@@ -220,8 +218,8 @@ def legend_below(figure: Figure, handles: Mapping[str, object]) -> None:
 
     The height of the figure grows by that of the legend. Therefore the legend is drawn last.
     """
-    marks = {name: handle for name, handle in named_handles(figure.axes).items() if name in _MARKS}
-    handles = dict(handles) | marks
+    marks = named_handles(figure.axes)
+    handles = dict(handles) | {name: marks[name] for name in (FEWER_SEEDS, NOT_APPLICABLE) if name in marks}
     look = {"loc": "outside lower center", "fontsize": 8 if len(handles) <= _MANY_NAMES else 7}
     for columns in range(_MOST_COLUMNS if handles else 0, 0, -1):
         legend = figure.legend(handles.values(), handles.keys(), ncols=columns, **look)

@@ -31,11 +31,10 @@ def figure_module(name: str) -> ModuleType:
     return importlib.import_module(f"icha.figures.{name}")
 
 
-_NAMES = [module.name for module in pkgutil.iter_modules(icha.figures.__path__) if _NUMBERED.match(module.name)]
+_MODULES = (module.name for module in pkgutil.iter_modules(icha.figures.__path__))
+_NAMES = sorted(filter(_NUMBERED.match, _MODULES), key=figure_number)
 # Declarations by the name of the figure, in the order of the numbers.
-DECLARATIONS: dict[str, Declaration] = {
-    name: figure_module(name).DECLARATION for name in sorted(_NAMES, key=figure_number)
-}
+DECLARATIONS: dict[str, Declaration] = {name: figure_module(name).DECLARATION for name in _NAMES}
 
 
 def draw_figure(

@@ -53,9 +53,6 @@ def marks(axes):
     return [line for line in axes.get_lines() if line.get_linestyle() == "None" and len(line.get_xdata())]
 
 
-# --- figure 13 --------------------------------------------------------------------------------------------------
-
-
 def test_fig13_draws_loading_unloading_and_the_pull_off():
     run = separate.run("sticky", 0.5)
     figure = fig13_loops.figure(one(), study="one")
@@ -125,12 +122,6 @@ def test_fig13_distinguishes_slopes_by_marks_and_many_by_panels(tree):
         assert f"{slope:g}" in figure.axes[2 * k + 1].get_title("right")
     assert len(legend(figure)) == 3 + 3
 
-    alone = separate.tree(separate.study("one", ("sticky",), slopes, seeds=(1,)))
-    figure = fig13_loops.figure(alone, study="one")
-    solid, _ = curves(figure.axes[0])
-    assert len(figure.axes) == 2 and len({line.get_color() for line in solid}) == 5
-    assert len(legend(figure)) == 5 + 3
-
 
 def test_fig13_enlarges_tension_that_is_small():
     run = separate.run("weak", 1.0, depth=1.5)
@@ -165,9 +156,6 @@ def test_fig13_draws_boundary_elements_over_their_run(tree, name, markers):
             np.testing.assert_array_equal(line.get_data(), [states[name].values for name in names])
             assert line.get_color() in {each.get_color() for each in curves(axes)[0]}
     assert {f"{name}, loading", f"{name}, unloading"} <= set(legend(figure))
-
-
-# --- figure 14 --------------------------------------------------------------------------------------------------
 
 
 def test_fig14_shows_means_and_scatter_over_the_seeds(tree):
@@ -224,9 +212,6 @@ def test_fig14_distinguishes_slopes_of_the_loads(tree):
     assert len(figure.axes[1].containers) == len(looks) == 4
     # Materials, slopes, and the seeds.
     assert len(legend(figure)) == 2 + 2 + 1
-
-
-# --- figure 15 --------------------------------------------------------------------------------------------------
 
 
 def test_a_straight_line_and_a_power_law_are_found_exactly():
@@ -319,9 +304,6 @@ def test_fig15_parts_are_of_either_sign_and_make_up_the_whole(tree):
     jump_in, jump_off = (sum(float(run[name]) for run in hard) for name in list(PARTS)[:2])
     tops = sorted(bar.get_y() + bar.get_height() for bar in figure.axes[1].patches)
     np.testing.assert_allclose(tops, [100 * jump_in / (jump_in + jump_off), 100])
-
-
-# --- figure 16 --------------------------------------------------------------------------------------------------
 
 
 def test_fig16_marks_where_and_counts_when(tree, surface):
