@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import pathlib
 from dataclasses import dataclass, replace
+from functools import cached_property
 from importlib.metadata import version
 
 import numpy as np
@@ -38,6 +39,8 @@ from icha.surfaces.surface import Surface
 _SMALLEST_OPENING = 1e-4
 # Largest change of a fraction of contact for which rates predict the next state.
 _LARGEST_PREDICTION = 0.25
+# Smallest work whose error a path bounds, divided by the surface energy: that of 0.1 % of the nominal area.
+_SMALLEST_WORK = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,10 +57,11 @@ class BoundaryElements(FullContactProblem):
         """Return 1: the model covers full contact."""
         return 1.0
 
-    @property
+    @cached_property
     def path_accuracy(self) -> PathAccuracy:
-        """Accuracy to which a path resolves its events."""
-        return MODELS[REFERENCE_MODEL].accuracy
+        """Accuracy to which a path resolves its events. Without adhesion nothing jumps, and nothing is lost."""
+        least_work = _SMALLEST_WORK * self.law.material.surface_energy
+        return replace(MODELS[REFERENCE_MODEL].accuracy, least_work=least_work, predicts_steps=self.adhesive)
 
     def untouched(self) -> CellState:
         """State in which the first summit, or a plateau without one, is about to make contact."""
@@ -81,8 +85,12 @@ class BoundaryElements(FullContactProblem):
             new = self._leave_full_contact(state, separation, control)
         else:
             new = self._next_equilibrium(state, separation, control)
-        events = self._events(state, new)
-        return replace(new, history=(*state.history, events) if len(events) else state.history)
+        return self.continue_from(new, state)
+
+    def continue_from(self, state: CellState, before: CellState) -> CellState:
+        """Return a state with the history of another one and the events since then."""
+        events = self._events(before, state)
+        return replace(state, history=(*before.history, events) if len(events) else before.history)
 
     def _next_equilibrium(self, state, separation, control):
         """Equilibrium from a state that is not full contact; arguments as of `equilibrium`."""

@@ -168,7 +168,7 @@ def bracket_loosely(
     contact, start, residual = problem.contact, bracket.before, _FIRST_RESIDUAL
     control_is_load = problem.control.quantity == PRESSURE
     close = _CLOSE * scale if contact.adhesive else problem.tolerance(scale)
-    trials = _MAX_TRIALS if contact.adhesive else 2 * _MAX_TRIALS
+    trials = _MAX_TRIALS // 2 if contact.adhesive else 2 * _MAX_TRIALS
     for _ in range(trials):
         trial, residual = problem.solve(start, separation, residual), _RESIDUAL
         error = problem.error(trial)

@@ -161,6 +161,12 @@ class ContactModel(Protocol[S]):
             If the contact spreads over the whole surface.
         """
 
+    def continue_from(self, state: S, before: S) -> S:
+        """Return a state with its events since another one than that from which it was found.
+
+        Only for models that predict steps.
+        """
+
     def pressure(self, state: S) -> float:
         """Return the force over the nominal area, Pa; negative in tension."""
 

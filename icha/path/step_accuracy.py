@@ -57,7 +57,7 @@ class StepAccuracy:
 
     def allows_twice_the_length(self, step: Step) -> bool:
         """Return whether a step of twice the length would be accurate: its error grows with the cube of its length."""
-        return 8 * step.integration_error <= _CURVED_WORK * self.total_work_after(step)
+        return 8 * step.unknown_work <= self.allowed_unknown_work(step)
 
     def is_work_known(self, state, step):
         """Return whether the work of a step is known well enough.
@@ -66,6 +66,8 @@ class StepAccuracy:
         uncertain; spots unite in a long step; or, in a step without events, the integral of the pressure is inaccurate
         and differs from the change of the stored energy. The last test is omitted for steps up to 1/256 of the longest.
         """
+        if self.contact.path_accuracy.predicts_steps:
+            return step.unknown_work <= self.allowed_unknown_work(step)
         length = abs(step.separation_change)
         if step.unresolved > self.allowed_unknown_work(step):
             return False
@@ -83,9 +85,11 @@ class StepAccuracy:
 
     def allowed_unknown_work(self, step):
         """Return the largest work that the events of a step may leave unknown, J/m^2."""
-        total_work = self.total_work_after(step)
+        total_work, accuracy = self.total_work_after(step), self.contact.path_accuracy
+        if accuracy.predicts_steps:
+            return accuracy.loss * max(total_work, accuracy.least_work)
         released = UNRESOLVED_LOSS * (self.jump_energy + step.jump_energy(self.contact))
-        return max(released, self.contact.path_accuracy.loss * total_work) if released else UNRESOLVED_WORK * total_work
+        return max(released, accuracy.loss * total_work) if released else UNRESOLVED_WORK * total_work
 
     def is_tension_known(self, start, state, step):
         """Return whether the largest tension of a step is known well enough.
@@ -93,7 +97,7 @@ class StepAccuracy:
         It is not if events may have hidden a larger tension.
         """
         contact = self.contact
-        if step.separation_change < 0 or not step.pressure_jump:
+        if step.separation_change < 0 or not step.has_jump:
             return True
         if contact.adhesive and contact.spot_count(start) and not contact.spot_count(state):
             return False  # the last contact breaks: found as sharply as possible
@@ -111,7 +115,7 @@ class StepAccuracy:
         contact = self.contact
         slope, end_slope = (-contact.stiffness(each) for each in (start, state))
         # Full contact is infinitely stiff, and its largest tension, at which it opens, is a state of the path.
-        if step.separation_change < 0 or step.pressure_jump or not -np.inf < slope < 0 < end_slope:
+        if step.separation_change < 0 or step.has_jump or not -np.inf < slope < 0 < end_slope:
             return None
         p, q = (contact.pressure(each) for each in (start, state))
         # The tangents meet below the curve.
