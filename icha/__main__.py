@@ -1,10 +1,10 @@
-"""The command `icha`, also as `python -m icha`; where only the library is installed, it says what else it needs."""
+"""Entry point of the command `icha`, also as `python -m icha`."""
 
 import sys
 
 
 def main() -> None:
-    """Entry point."""
+    """Run the command; if only the library is installed, exit with a message that names what to install."""
     try:
         from icha.cli import main as commands
 
@@ -13,7 +13,7 @@ def main() -> None:
         if not missing.name or missing.name.partition(".")[0] == __package__:
             raise
         sys.exit(
-            f"Error: {missing.name} is not installed: commands need more than the library does; needed: "
+            f"Error: {missing.name} is not installed. Commands need more packages than the library. Install them with "
             "pip install 'icha[workflow]'"
         )
 

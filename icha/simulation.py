@@ -1,4 +1,4 @@
-"""Simulate the contact of one surface and one material along a path, and return it as a labelled dataset."""
+"""Simulate the contact of one surface and one material along a path; the result is an xarray dataset."""
 
 import importlib
 import pathlib
@@ -41,7 +41,6 @@ from icha.path.targets import (
     LEAST_PRESSURE,
     MAX_AREA_FRACTION,
     MAX_REDUCED_PRESSURE,
-    MEAN_SEPARATION,
     RELATIVE_LOAD,
     Path,
     Target,
@@ -53,18 +52,19 @@ from icha.surfaces.surface import Surface
 
 # Largest relative excess of a contact area over its limit that is within the tolerance of the equilibria.
 _AREA_TOLERANCE = 1e-6
-# Largest mean separation of a snapshot, in h_rms; contact is far below it.
-_HIGHEST_SNAPSHOT = 20.0
 # Kind of the snapshot of the largest tension on unloading.
 PULL_OFF = "pull_off"
 _STICKINESS_PAPER = "L. Pastewka and M. O. Robbins, PNAS 111 (2014) 3298-3303, doi:10.1073/pnas.1320846111 (stickiness)"
 
 
 class ConvergenceError(RuntimeError):
-    """Error: the path could not be followed to its end, or leaves the range of the model."""
+    """Error: the path could not be followed to its end, or leaves the range of the model.
+
+    `dataset` contains the targets that were reached. Its attribute `incomplete` or `beyond_model` is the reason.
+    """
 
     def __init__(self, message: str, dataset: xr.Dataset):
-        """Store the dataset of the targets that were reached; `incomplete` or `beyond_model` in it is the reason."""
+        """Store the dataset of the targets that were reached."""
         super().__init__(message)
         self.dataset = dataset
 
@@ -83,13 +83,13 @@ def simulate(
     progress: Callable[[str], None] | None = None,
     kept: pathlib.Path | None = None,
 ) -> xr.Dataset:
-    """Press a surface against an elastic half-space along a path of loading and unloading.
+    """Press a surface against an elastic half-space along a path of loading and unloading; return all states.
 
     Parameters
     ----------
     surface : topography with its final rms slope.
-    material : modulus, energy and range of the interface.
-    path : loads, areas or separations to reach, in order, and the states of which fields and spots are stored.
+    material : contact modulus, work of adhesion, range of attraction and flaws of the contact.
+    path : loads, areas or separations to reach, and the snapshots, whose distributions and spots are stored.
     model : "asperities", or "boundary_elements" in the limit of a short range of attraction, which is slower and needs
         a periodic surface.
     seed : number that is recorded in the dataset; -1 for a surface without a seed.
@@ -102,13 +102,13 @@ def simulate(
     xarray.Dataset with dimensions step, snapshot, gap_bin, pressure_bin and spot; every variable has units and a long
     name. On a path that continues after the first loading, all equilibria are steps, and there is a dimension event.
     Boundary elements also have dimensions row and column. The attribute `contact_model` names the model.
-    `applicability` gives the reasons why the model is not applicable to this contact; it is empty if there is no such
-    reason. `failed_checks` exists only if the run fails checks (`icha.checks.run.check_run`), and lists them.
+    `applicability` gives the reasons why the model is not applicable to this contact, and is empty without a reason.
+    `failed_checks` lists the checks that the run fails (`icha.checks.run.check_run`); without any it does not exist.
 
     Warns
     -----
     UserWarning
-        If the run fails checks: do not use its numbers.
+        If the run fails checks; its numbers must not be used then.
 
     Raises
     ------
@@ -135,16 +135,17 @@ def simulate(
 
 
 def _compute(solver, surface, material, path, model, seed, progress, kept):
-    """Compute the dataset of a run, without its checks; raise `ConvergenceError` if it is incomplete."""
+    """Return the dataset of a run before its checks; raise `ConvergenceError` if it is incomplete.
+
+    solver : module of the model; all other arguments are those of `simulate`.
+    """
     # With one thread for linear algebra the order of sums, and so every bit of the result, is the same on all machines.
     with threadpool_limits(1):
         contact = solver.contact_of(surface, material)
         observables = contact.observables(surface)
         if kept is not None:
             contact = solver.resumable(contact, kept)
-        reachable = path
-        if MODELS[model].by_summits:
-            reachable = path.up_to(_is_within_asperity_range)
+        reachable = path.within_asperity_range() if MODELS[model].by_summits else path
         record = _record_path(contact, observables, path, reachable, progress)
         loading = [step["mean_separation"] for step in record.steps if step["leg"] == 0]
         reasons = observables.reasons_against(loading, record.pressed)
@@ -177,7 +178,11 @@ def empty_run(
 
 
 def _dataset(surface, material, path, name, seed, record, summits, reasons, of_contact):
-    """Build the dataset of a run without the summary of its loop."""
+    """Build the dataset of a run from the record of its path, without the summary of its loop.
+
+    name : name of the model; summits : summits of the surface.
+    reasons : reasons why the model does not represent the surface; of_contact : values that are the same in all states.
+    """
     table = RUN | FURTHER[name]
     values = {
         **_path_values(table, path, record, surface.grid),
@@ -205,7 +210,7 @@ def _dataset(surface, material, path, name, seed, record, summits, reasons, of_c
 def asperity_applicability(
     full_contact_energy_ratio: float, summit_reasons: Sequence[str] = (), contact_area_fraction: float = 0.0
 ) -> str:
-    """Return the reasons why the asperity model is not applicable; an empty text if it is.
+    """Return a text with the reasons why the asperity model is not applicable; it is empty if there are none.
 
     Parameters
     ----------
@@ -250,27 +255,17 @@ def _check_arguments(surface, material, path, by_summits):
                     f"{load} is beyond the range of the asperity model; expected a reduced pressure of at most "
                     f"{MAX_REDUCED_PRESSURE}"
                 )
-        if target.snapshot and target.kind == MEAN_SEPARATION and target.value > _HIGHEST_SNAPSHOT * surface.rms_height:
-            raise ValueError(
-                f"path: a snapshot at a mean separation of {target.value!r} m is far above any contact; expected at "
-                f"most {_HIGHEST_SNAPSHOT:g} rms heights ({_HIGHEST_SNAPSHOT * surface.rms_height:.4g} m)"
-            )
-
-
-def _is_within_asperity_range(target):
-    """Return whether a target is within the range of the asperity model."""
-    return target.kind not in ASPERITY_RANGES or target.value <= ASPERITY_RANGES[target.kind].most
 
 
 @dataclass
 class _PathRecord:
-    """Record of a path.
+    """Values of all steps, snapshots and events of a path, and the reason if it ends early.
 
     Attributes
     ----------
     failure : reason why the path ends early; empty for a complete path.
     beyond_model : whether it ends early because it leaves the range of the model.
-    steps, snapshots : one row of values for every step and snapshot, by the names of the variables.
+    steps, snapshots : one row of values, by the names of the variables, for every step and snapshot.
     events : events of every step.
     unattributed : loss that belongs to no kind of event, J/m^2.
     pressed : state of the first loading with the largest contact area.
@@ -286,7 +281,7 @@ class _PathRecord:
 
 
 def _count_uphill_jumps_in(record: _PathRecord) -> int:
-    """Count the jumps into contact that cost energy, by the law of a single spot or by the energy balance."""
+    """Return the number of jumps into contact that cost energy, by the law of a single spot or the energy balance."""
     gained = np.diff([step["dissipated_by_jump_in"] for step in record.steps], prepend=0.0) < 0
     return sum(
         int(np.count_nonzero((events.kind == JUMP_IN) & ((events.energy < 0) | uphill)))
@@ -295,10 +290,9 @@ def _count_uphill_jumps_in(record: _PathRecord) -> int:
 
 
 def _record_path(contact, observables, path, reachable, progress) -> _PathRecord:
-    """Follow a path and record its steps, snapshots and events.
+    """Follow a path and return the record of its steps, snapshots and events.
 
-    reachable : the path without targets beyond the range of the model. If it lacks any, loading ends after its last
-        one.
+    reachable : the path without targets above the range of the model; if there are any, the path ends before them.
     """
     left_out = [target for target in path.targets if target not in reachable.targets]
     remaining = len(reachable.targets)
@@ -306,6 +300,7 @@ def _record_path(contact, observables, path, reachable, progress) -> _PathRecord
     counts = np.zeros(len(EVENT_KINDS), int)
 
     def record_snapshot(target, state, step):
+        """Add a snapshot of a state to the record; `step` is the index of its step."""
         row = {"snapshot_step": step, "snapshot_kind": target.kind, "snapshot_target": target.value}
         record.snapshots.append(_require_finite(row | observables.of_snapshot(state)))
 
@@ -350,7 +345,7 @@ def _require_finite(values: dict) -> dict:
 
 
 def _step_values(contact: ContactModel, waypoint: Waypoint) -> dict:
-    """Return the values that every contact model has at an equilibrium, by the names of the variables."""
+    """Return the values of an equilibrium that every contact model has, by the names of the variables."""
     state, target, balance = waypoint.state, waypoint.target, waypoint.balance
     pressure = contact.pressure(state)
     row = {
@@ -376,7 +371,7 @@ def _step_values(contact: ContactModel, waypoint: Waypoint) -> dict:
 
 
 def _path_values(table: Table, path: Path, record: _PathRecord, grid: int) -> dict:
-    """Return the values of all steps, snapshots, spots and events as arrays."""
+    """Return the values of all steps, snapshots, spots and events as arrays, by the names of the variables."""
     sizes = {"gap_bin": len(GAP_BINS) - 1, "pressure_bin": len(PRESSURE_BINS) - 1, "row": grid, "column": grid}
     values = {"control": path.control}
     values |= stack_rows(table, record.steps, "step") | stack_rows(table, record.snapshots, "snapshot", sizes)
@@ -396,7 +391,7 @@ def _path_values(table: Table, path: Path, record: _PathRecord, grid: int) -> di
 
 
 def _describe_targets(table: Table, path: Path) -> Table:
-    """Describe the values of targets, with their unit on this path."""
+    """Return the descriptions of the variables `step_target` and `snapshot_target` with their units on this path."""
     steps = {target.kind for target in (*path.targets, *path.turning_points)} | ({BETWEEN} if path.cyclic else set())
     snapshots = {target.kind for target in path.targets if target.snapshot} | ({PULL_OFF} if path.unload else set())
     return {
@@ -406,7 +401,7 @@ def _describe_targets(table: Table, path: Path) -> Table:
 
 
 def _target_unit(kinds: set[str], named_by: str) -> dict:
-    """Return the unit of values of these kinds; if there are two units, also a comment that tells them apart."""
+    """Return the unit of targets of these kinds; for two units also a comment that states which kinds are in m."""
     metres = kinds.intersection(IN_METRES)
     if not metres or metres == kinds:
         return {"units": "m" if metres else "1"}
@@ -414,7 +409,7 @@ def _target_unit(kinds: set[str], named_by: str) -> dict:
 
 
 def _surface_values(surface: Surface, material: Material, seed: int) -> dict:
-    """Return the values of the surface and the material."""
+    """Return the values of the surface and the material, by the names of the variables."""
     moments, (skewness, kurtosis) = spectral_moments(surface), height_statistics(surface)
     complete = surface.complete_contact_pressure * material.contact_modulus
     return {
@@ -441,6 +436,7 @@ def _surface_values(surface: Surface, material: Material, seed: int) -> dict:
 
 
 def _attributes(surface, material, path, name):
+    """Return the global attributes of a run of the model `name`."""
     model = MODELS[name]
     attributes = file_attributes(
         f"Rough contact {'with' if material.surface_energy > 0 else 'without'} adhesion, {model.title}",
@@ -450,5 +446,5 @@ def _attributes(surface, material, path, name):
         COMPUTED,
         references=f"{model.references}; {_STICKINESS_PAPER}",
     )
-    # A campaign fills in those of its runs.
+    # A campaign fills in the empty attributes.
     return attributes | {"contact_model": name} | dict.fromkeys(("campaign", "study", "config_sha256", "license"), "")

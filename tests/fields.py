@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from icha.equilibrium.distributions import nodes_in_discs
+from icha.equilibrium.distributions import cover_grid
 from icha.half_space.grid_displacement import DisplacementField
 
 
@@ -25,4 +25,9 @@ def gap(law, surface, state):
 
 def covered_nodes(surface, spots):
     """Return whether each node lies inside a spot, (n, n) bool."""
-    return nodes_in_discs(surface.period, surface.grid, spots.position, spots.contact_radius, surface.free)
+    return cover_grid(surface.period, surface.grid, spots.position, spots.contact_radius, surface.free)[1]
+
+
+def contact_cover(surface, spots):
+    """Return the fraction of every node's cell that spots cover, (n, n) float."""
+    return cover_grid(surface.period, surface.grid, spots.position, spots.contact_radius, surface.free)[0]

@@ -136,6 +136,13 @@ def spectral_displacement(centres, a, R, modulus, energy, period, grid):
     return np.fft.irfft2(w, s=(grid, grid)) * grid**2
 
 
+def spot_of_asperity(state):
+    """Index of the spot to which each asperity belongs; -1 out of contact."""
+    index = np.full(len(state.sites) + 1, -1)
+    index[state.contact_index] = np.arange(len(state.spots))
+    return index[state.site_of_asperity]
+
+
 def all_pairs(position, period):
     """All ordered pairs of points and their distances in the periodic cell."""
     first, second = np.nonzero(~np.eye(len(position), dtype=bool))

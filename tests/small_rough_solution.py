@@ -1,6 +1,6 @@
-"""Small rough surface with and without adhesion, solved with boundary elements; digest of a solution."""
+"""Small rough surface with and without adhesion, solved with boundary elements; prints the digest of a solution."""
 
-import hashlib
+from digests import digest
 
 import icha
 from icha.references.finite_range import finite_range_solution
@@ -12,11 +12,6 @@ PRESSURE = 1e-2
 
 def surface():
     return ROUGH.realise(grid=48, seed=3)
-
-
-def digest(solution):
-    """SHA-256 of all values of a dataset."""
-    return hashlib.sha256(b"".join(solution[name].values.tobytes() for name in sorted(solution.variables))).hexdigest()
 
 
 if __name__ == "__main__":

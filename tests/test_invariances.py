@@ -1,9 +1,8 @@
 """Invariances of both models on random contacts: units, position and direction, range, steps, threads."""
 
-import hashlib
-
 import numpy as np
 import pytest
+from digests import digest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
@@ -73,16 +72,6 @@ def assert_same(one, other, bound, counts=COUNTS):
         np.testing.assert_array_equal(other[name], one[name], err_msg=name)
 
 
-def digest(run, without=()):
-    """All bytes of a run's values."""
-    total = hashlib.sha256()
-    for name, variable in run.drop_vars(without).variables.items():
-        values = variable.values
-        total.update(name.encode())
-        total.update(repr(values.tolist()).encode() if values.dtype == object else values.tobytes())
-    return total.hexdigest()
-
-
 def scaled(surface, material, length, stress):
     """The same contact with all lengths by one factor, the modulus by another, the energy by both."""
     energy = material.surface_energy * stress * length
@@ -107,12 +96,9 @@ def test_units_drop_out(model, data, lengths, pressures):
 @settings(max_examples=2)
 @given(contacts(DEFAULT_MODEL, ADHERING), st.floats(-4, 4), st.floats(-3, 3))
 def test_units_drop_out_of_a_loop(contact, lengths, pressures):
-    surface, material = contact
     length, stress = 10**lengths, 10**pressures
-    larger = Surface(surface.heights * length, PERIOD * length)
-    scaled = Material(MODULUS * stress, material.surface_energy * stress * length, material.interaction_range * length)
-    way = {"reduced_pressures": [3e-3], "unload": True, "max_step": 0.5}
-    one, other = (pressed(*each, DEFAULT_MODEL, **way) for each in ((surface, material), (larger, scaled)))
+    path = {"reduced_pressures": [3e-3], "unload": True, "max_step": 0.5}
+    one, other = (pressed(*each, DEFAULT_MODEL, **path) for each in (contact, scaled(*contact, length, stress)))
     assert ("hysteresis_loss" in one) == ("hysteresis_loss" in other)
     assume("hysteresis_loss" in one)
     jumps = int(one["jump_in_count"][-1] + one["jump_off_count"][-1])

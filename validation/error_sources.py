@@ -17,12 +17,10 @@ The last step changes the shape of the summits beyond their paraboloids. Three m
     icha_fine_grid            the model on a grid twice as fine;
     boundary_elements_coarse  boundary elements on a grid half as fine.
 
-Single patches show the shape of a summit beyond its paraboloid: on the profile r^2/(2R) - b r^4 a contact of radius a
-carries F = 4 E* a^3/(3R) (1 - 16/5 b R a^2) (I. N. Sneddon, Int. J. Eng. Sci. 3 (1965) 47-57,
-doi:10.1016/0020-7225(65)90019-4), with b the bi-Laplacian of the heights at the summit over 64.
+Single patches show the shape of a summit beyond its paraboloid.
 
 `python -m validation.error_sources` solves the middle of campaign validation in half an hour, saves the solutions in
-results/error_sources, and writes the tables and the figure of docs/error_sources.md.
+results/error_sources, and writes the tables of docs/error_sources.md.
 """
 
 import itertools
@@ -42,7 +40,7 @@ from icha.references.finite_range import NodalState, contact_state, perimeter_co
 from icha.surfaces.spectrum import SelfAffineSpectrum
 from icha.surfaces.summits import find_summits
 from icha.surfaces.surface import Surface
-from validation.paraboloids import circular_curvatures, fourth_order_terms, paraboloids, summit_curvatures
+from validation.paraboloids import circular_curvatures, paraboloids, summit_curvatures
 from validation.spot_by_spot import compare_single_spots
 from validation.without_unions import discs_apart, independent_discs, union_area_fraction
 
@@ -124,10 +122,7 @@ def error_sources(
         truth = solve(_REFINEMENT)
         keep("boundary_elements", map(_state_at_nodes, truth))
         if not contact.adhesive:
-            fourth = fourth_order_terms(surface, contact.asperities)
-            singles = [
-                compare_single_spots(contact, state, true, fourth) for state, true in zip(model, truth, strict=True)
-            ]
+            singles = [compare_single_spots(contact, state, true) for state, true in zip(model, truth, strict=True)]
     return _dataset(surface, material, pressures, states, singles).assign(seed=seed, refinement=_REFINEMENT)
 
 
@@ -203,14 +198,6 @@ def shape_ratio(sources: xr.Dataset) -> xr.DataArray:
     return sources["pair_patch_area"] / (np.pi * radius**2)
 
 
-def shape_ratio_of_fourth_order(sources: xr.Dataset) -> xr.DataArray:
-    """Return this ratio from the fourth-order term of the summit, (1 - 16/5 b R a^2)^(-2/3); NaN outside its range."""
-    reduction = (
-        3.2 / np.pi * sources["pair_fourth_order"] * sources["pair_curvature_radius"] * sources["pair_patch_area"]
-    )
-    return (1 - reduction.where(reduction < 1)) ** (-2 / 3)
-
-
 def relative_radius(sources: xr.Dataset) -> xr.DataArray:
     """Return the radius of the patch of each pair times the wave number sqrt(<q^4>/<q^2>) of the surface."""
     wave_number = sources["rms_curvature"] * np.sqrt(8 / 3) / sources["rms_slope"]
@@ -223,7 +210,7 @@ HARD, STICKY = Material(25e6, 0.0, 40e-9), Material(25e6, 0.05, 40e-9)
 
 
 def main() -> None:
-    """Solve all surfaces without a saved solution, and write tables and figure."""
+    """Solve all surfaces without a saved solution, and write the tables."""
     from validation.error_source_tables import write
 
     def solved(name, seed, material, reduced_pressures):

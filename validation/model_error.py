@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from icha.analysis.model_error import run_of_same_contact
+from icha.analysis.model_error import difference_of_contacts
 from icha.configuration.cases import loop_cases
 from icha.configuration.load import load_configuration
 from icha.contact.models import DEFAULT_MODEL, REFERENCE_MODEL
@@ -172,7 +172,7 @@ def loops_of_all_models(campaign: xr.DataTree, study: str, loops: Sequence[xr.Da
     rows = []
     runs = {labels: select_run(campaign, labels) for labels in run_labels(campaign) if labels.study == study}
     for solved in loops:
-        labels = run_of_same_contact(runs.items(), solved)
+        labels = next(labels for labels, run in runs.items() if not difference_of_contacts(run, solved))
         gamma = float(solved["surface_energy"])
         for name, one in (
             ("boundary elements, finite range", solved),

@@ -19,7 +19,7 @@ import numpy as np
 import scipy.fft
 import xarray as xr
 
-from icha.asperity.cohesive_zone import is_resolved, strength_number
+from icha.asperity.cohesive_zone import resolution_problem, strength_number
 from icha.asperity.jkr import JKR
 from icha.asperity.material import Material
 from icha.contact.model import PRESSURE, Control
@@ -42,7 +42,7 @@ _PULL_OFF = 1.5 * math.pi
 def resolving_grid(material: Material, period: float) -> int:
     """Return the least number of nodes along a period (m) that resolves the attraction and is fast to transform."""
     grid = _LEAST_GRID
-    while not is_resolved(material, period / grid):
+    while resolution_problem(material, period / grid):
         grid = scipy.fft.next_fast_len(grid + 1, real=True)
     return grid
 

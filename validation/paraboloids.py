@@ -1,4 +1,4 @@
-"""The paraboloids of the summits as a surface, and the shape of summits beyond their paraboloids."""
+"""The paraboloids of the summits as a surface."""
 
 import numpy as np
 import scipy.fft
@@ -20,12 +20,6 @@ def circular_curvatures(summits: Asperities) -> np.ndarray:
     """Return the second derivatives of paraboloids of revolution, (n, 3), 1/m."""
     curvature = -1 / summits.radius_of_curvature
     return np.stack([curvature, np.zeros(len(summits)), curvature], axis=1)
-
-
-def fourth_order_terms(surface: Surface, summits: Asperities) -> np.ndarray:
-    """Return b of the mean profile h0 - r^2/(2R) + b r^4 of the summits, their bi-Laplacian over 64, (n,), m^-3."""
-    xxxx, xxyy, yyyy = (_at(summits, one) for one in _derivatives(surface, ((4, 0), (2, 2), (0, 4))))
-    return (xxxx + 2 * xxyy + yyyy) / 64
 
 
 def _derivatives(surface, orders):

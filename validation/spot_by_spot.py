@@ -84,12 +84,9 @@ def _nodes_in_disc(centre, radius, grid, period):
 
 
 def compare_single_spots(
-    contact: InteractingAsperities, state: ContactState, truth: NodalState, fourth: np.ndarray
+    contact: InteractingAsperities, state: ContactState, truth: NodalState
 ) -> dict[str, np.ndarray]:
-    """Compare the single spots of one state without adhesion with their patches, by the names of the variables.
-
-    fourth : (n,) float, fourth-order terms of the summits, m^-3.
-    """
+    """Compare the single spots of one state without adhesion with their patches, by the names of the variables."""
     spots, law = state.spots, contact.law
     patches = contact_patches(truth)
     single, patch = match(spots.position, spots.contact_radius, spots.members > 1, patches, contact.asperities.period)
@@ -100,16 +97,4 @@ def compare_single_spots(
         "pair_patch_force": patches.force[patch],
         "pair_patch_nodes": patches.nodes[patch],
         "pair_curvature_radius": spots.radius_of_curvature[single],
-        "pair_fourth_order": fourth[_summit_of_spots(contact, state)[single]],
     }
-
-
-def _summit_of_spots(contact, state):
-    """Return the summit at the centre of each spot, (s,) int, or -1; a spot may also cover other summits."""
-    spots, asperities = state.spots, contact.asperities
-    owned = np.flatnonzero(state.spot_of_asperity >= 0)
-    position = np.mod(asperities.position[owned], asperities.period)
-    at_summit = np.all(spots.position[state.spot_of_asperity[owned]] == position, axis=1)
-    summit = np.full(len(spots), -1)
-    summit[state.spot_of_asperity[owned[at_summit]]] = owned[at_summit]
-    return summit

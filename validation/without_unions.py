@@ -9,7 +9,7 @@ from scipy.sparse.linalg import LinearOperator, gmres
 from icha.asperity.coalescence import covering_spot
 from icha.asperity.jkr import JKR
 from icha.contact.model import NotConverged
-from icha.equilibrium.distributions import contact_cover
+from icha.equilibrium.distributions import cover_grid
 from icha.half_space.ewald import PointHalfSpace
 from icha.half_space.interaction import Interaction, displacement_at
 from icha.surfaces.summits import Asperities
@@ -215,5 +215,6 @@ def union_area_fraction(discs: Discs, surface: Surface) -> float:
 
     Overlaps are subtracted cell by cell on a finer grid than that of the surface.
     """
-    cover = contact_cover(surface.refined(_DISC_REFINEMENT), discs)
+    grid = surface.grid * _DISC_REFINEMENT
+    cover, _ = cover_grid(surface.period, grid, discs.position, discs.contact_radius, surface.free)
     return float(np.mean(np.minimum(cover, 1.0)))

@@ -52,7 +52,7 @@ def refuse_superseded() -> None:
 
 
 def plan_without_collecting() -> None:
-    """Disable garbage collection until the first job, and for the rest at the end.
+    """Disable garbage collection until the first job starts, and again when the process ends.
 
     Almost nothing in the growing plan is garbage. Collection takes a third of the time for a plan of ten thousand runs.
     """
@@ -118,7 +118,7 @@ class CampaignResults:
             _warn(f"cannot write to {results}: missing results cannot be computed")
 
     def have_stale_made_again(self, paths: Iterable[str], rules: Iterable) -> None:
-        """Mark results as incomplete that do not match the present settings, if Snakemake does not detect it.
+        """Mark results that do not match the present settings as incomplete, unless Snakemake itself detects them.
 
         Snakemake compares the settings with its own records. These may be missing, or describe another file, after a
         result was restored from a backup. Of inputs it compares times, not contents.
@@ -199,7 +199,7 @@ class CampaignResults:
             note_versions(Path(self.results))
 
     def _claim(self) -> None:
-        """Record that the results belong to the configuration file, if this can be written."""
+        """Record that the results belong to the configuration file, if the record can be written."""
         with contextlib.suppress(OSError):
             claim(Path(self.results), *self._origin)
 
@@ -235,7 +235,7 @@ class _Wildcards(dict):
 
 
 def _present_settings(rules, path: str) -> str:
-    """Return the checksum of the parameters that the rule of a result has now."""
+    """Return the checksum of the present parameters of the job of a result."""
     rule = next(rule for rule in rules if any(output.match(path) for output in rule.output))
     wildcards = _Wildcards(rule.get_wildcards(path))
     values = (value(wildcards) if callable(value) else value for value in rule.params)
@@ -248,8 +248,10 @@ def _writing(folder: str):
     try:
         yield
     except OSError as error:
+        exists = isinstance(error, FileExistsError | NotADirectoryError)
+        reason = "instead of a folder there is a file, or a link to nowhere" if exists else error.strerror
         raise SystemExit(
-            f"{folder} cannot be written to: {error.strerror}. Nothing was computed. Free some space, change its "
+            f"{folder} cannot be written to: {reason}. Nothing was computed. Free some space, change its "
             f"permissions, or {ANOTHER_FOLDER}."
         ) from None
 
@@ -286,7 +288,7 @@ locks = []
 def hold_lock(path: str) -> str | None:
     """Hold a lock until this process ends; return the number of another process that holds it.
 
-    Snakemake's own lock is a file that a killed program leaves behind, and later calls then ask for `--unlock`.
+    Snakemake's own lock is a file. A killed program leaves this file behind, and later calls then require `--unlock`.
     """
     try:
         Path(path).parent.mkdir(parents=True, exist_ok=True)

@@ -105,7 +105,7 @@ def _module_file(name: str, missing_ok: bool = False) -> Path | None:
 
 @cache
 def _data_files(file: Path) -> list[Path]:
-    """Return the files in the folder of a module that its text names by their path, or by that of their folder."""
+    """Return the data files beside a module whose path, or the path of whose folder, is a text in the module."""
     files = set()
     for name in _syntax_of(file).names:
         path = file.parent / name
@@ -133,8 +133,8 @@ class _Syntax(NamedTuple):
     names: list[str]
 
 
-# Reading the syntax trees of all modules takes a second. So their content is cached beside Python's bytecode, by the
-# checksum of the text of the module, for this version of Python and of this module.
+# Reading the syntax trees of all modules takes a second. Therefore their content is cached beside Python's bytecode.
+# The key is the checksum of the text of the module; the file name depends on the versions of Python and of this module.
 _READER = hashlib.sha256(Path(__file__).read_bytes() + sys.version.encode()).hexdigest()[:16]
 _CACHE = Path(importlib.util.cache_from_source(__file__)).with_suffix(f".{_READER}.json")
 _syntaxes: dict[str, list] = {}

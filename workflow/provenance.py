@@ -30,7 +30,7 @@ def recorded_jobs(
     Raises
     ------
     ValueError
-        If there is no record of a result, or a result was made from a file that is not in the deposit.
+        If the record of a result is missing, or a result was made from a file that is not in the deposit.
     """
     places = {**made, **given}
     outputs: dict[str, list[str]] = {}
@@ -70,18 +70,18 @@ def recorded_parameters(records: Path, name: str) -> list[str]:
 
 def _record(records: Path, name: str) -> dict[str, Any]:
     """Read Snakemake's record of a file."""
-    problem = "there is no record"
+    problem = "is missing"
     try:
         record = json.loads(record_of(name, records).read_text(encoding="utf-8"))
         if all(record.get(key) for key in ("rule", "log", "code")) and not record.get("incomplete"):
             return record
-        problem = "there is no complete record"
+        problem = "is incomplete"
     except FileNotFoundError:
         pass
     except json.JSONDecodeError:
-        problem = "the record cannot be read"
+        problem = "cannot be read"
     raise ValueError(
-        f"{name}: {problem} of how it was made in {records}, so its origin cannot be published. Run "
+        f"{name}: its record in {records} {problem}, so its origin cannot be published. Run "
         "`icha run CONFIGURATION -- --touch --forceall` once, which records all results and computes nothing"
     )
 

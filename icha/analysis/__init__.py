@@ -1,1 +1,1 @@
-"""What is made of finished runs: comparisons at common loads, the model's error, checks."""
+"""Analysis of finished runs: comparison at common loads, error of the asperity model, checks, validity."""

@@ -1,4 +1,4 @@
-"""Checks of campaigns and of boundary-element solutions: identities and bounds, evaluated on the datasets alone."""
+"""Checks of campaigns and of boundary-element solutions: identities and bounds, computed from the datasets alone."""
 
 import json
 import os
@@ -24,34 +24,32 @@ COMPLETED = "completed"
 
 
 def check_campaign(tree: xr.DataTree, expected: Iterable[RunLabels | tuple] | None = None) -> tuple[Check, ...]:
-    """Check a campaign dataset: every run present and complete, every variable described, `check_run` for each run.
+    """Check that a campaign dataset has all runs and describes all variables, and check every run (`check_run`).
 
-    A run that is incomplete or failed its own checks has one check, which fails and has the reason as its description.
+    An incomplete run, or one that failed its own checks, has a single check. It fails; its description is the reason.
 
     Parameters
     ----------
     tree : the campaign dataset.
-    expected : labels of the runs of the campaign; by default those of the dataset's own design.
+    expected : labels of the runs of the campaign. Default: those that the dataset itself lists.
     """
     checks = []
-
-    def require_none(name, count, description, subject):
-        checks.append(Check(name, float(count), 0.0, bool(count == 0), description, subject))
-
     present = run_labels(tree)
     if expected is not None:
         lacking = sorted({str(RunLabels(*labels)) for labels in expected} - {str(labels) for labels in present})
-        description = "number of runs that the campaign asks for and lacks"
-        require_none("all runs", len(lacking), description, ", ".join(lacking))
+        description = "number of requested runs that the campaign lacks"
+        checks.append(compare_with_limit("all runs", len(lacking), 0, description, ", ".join(lacking)))
     for study, node in tree.children.items():
         missing = np.count_nonzero(node["status"].values == MISSING)
-        require_none("no run missing", missing, "number of runs of the design that are missing", study)
+        description = "number of requested runs that are missing"
+        checks.append(compare_with_limit("no run missing", missing, 0, description, study))
         variables = node.to_dataset().variables.values()
         bare = sum("units" not in v.attrs or "long_name" not in v.attrs for v in variables)
-        require_none("described", bare, "number of variables without units or long name", study)
+        description = "number of variables without units or long name"
+        checks.append(compare_with_limit("described", bare, 0, description, study))
     for labels in present:
         variables, attrs = variables_of_run(tree, labels)
-        # The values of a failed run are not used, so its reason is the only finding.
+        # Nothing uses the values of a failed run, so they are not checked.
         if reason := attrs.get("incomplete") or attrs.get("failed_checks"):
             checks.append(Check(COMPLETED, 1.0, 0.0, False, reason, str(labels)))
             continue
@@ -62,72 +60,44 @@ def check_campaign(tree: xr.DataTree, expected: Iterable[RunLabels | tuple] | No
 
 
 def check_solution(solution: xr.Dataset, subject: str = "") -> tuple[Check, ...]:
-    """Check a boundary-element solution: finite, converged, resolved, at its load, with consistent distributions.
+    """Check that a boundary-element solution is finite, converged, resolved, at its load, and consistent in itself.
 
     Parameters
     ----------
     solution : a dataset as `icha.references.finite_range.finite_range_solution` returns it.
     subject : name of the solution in the findings.
     """
-    findings = (*_check_solver(solution), *_check_identities(solution))
-    return tuple(compare_with_limit(f"boundary elements: {name}", *rest, subject) for name, *rest in findings)
+    found = _findings(solution)
+    return tuple(compare_with_limit(f"boundary elements: {name}", *rest, subject) for name, *rest in found)
 
 
-def _check_solver(solution) -> Iterator[Finding]:
-    """Yield findings on values, convergence, load and resolution."""
+def _findings(solution) -> Iterator[Finding]:
+    """Yield findings on the solver, and on the identities between distributions, area and load."""
     values = (variable.values for variable in solution.variables.values())
     yield "finite", count_not_finite(values), 0, "number of values that are not finite"
-    yield (
-        "converged",
-        float(solution["residual"]) / float(solution["tolerance"]),
-        1,
-        "error of the solver over the one at which it was to stop",
-    )
-    load_error = abs(float(solution["nominal_pressure"]) / _target_pressure(solution) - 1)
-    yield "load", load_error, LOAD_LIMIT, "mean traction against the load asked for"
-    yield (
-        "resolved",
-        float(solution["strength_number"]),
-        MAX_STRENGTH_NUMBER,
-        "sqrt(dgamma dx/E*)/range of the grid, 0 without adhesion",
-    )
-
-
-def _target_pressure(solution):
-    """Return the prescribed nominal pressure, Pa."""
+    converged = float(solution["residual"]) / float(solution["tolerance"])
+    yield "converged", converged, 1, "residual of the solver over its tolerance"
     unit = float(solution["contact_modulus"]) * float(solution["rms_slope"])
-    return float(solution["target_reduced_pressure"]) * unit
+    target, nominal = float(solution["target_reduced_pressure"]) * unit, float(solution["nominal_pressure"])
+    yield "load", abs(nominal / target - 1), LOAD_LIMIT, "relative error of the load"
+    strength = float(solution["strength_number"])
+    words = "sqrt(dgamma dx/E*) over the range of attraction, with the grid spacing dx; 0 without adhesion"
+    yield "resolved", strength, MAX_STRENGTH_NUMBER, words
 
-
-def _check_identities(solution) -> Iterator[Finding]:
-    """Yield the errors of the identities between distributions, area and load."""
     gaps = solution["gap_density"].values * np.diff(solution["gap_bin_edges"].values)
     pressures = solution["pressure_density"].values * np.diff(solution["pressure_bin_edges"].values)
-    loads = pressures * solution["pressure_bin_mean"].values
-    area, nominal = float(solution["contact_area_fraction_raw"]), float(solution["nominal_pressure"])
-    yield (
-        "P(u) complete",
-        abs(gaps.sum() + area - 1),
-        IDENTITY_LIMIT,
-        "integral of P(u) over u, plus the nodes in contact, against 1",
-    )
-    yield (
-        "area from P(p)",
-        abs(pressures.sum() - area) / max(area, np.finfo(float).tiny),
-        IDENTITY_LIMIT,
-        "integral of P(p) over p against the nodes in contact",
-    )
-    yield (
-        "load from P(p)",
-        abs(loads.sum() + float(solution["outside_pressure"]) - nominal)
-        / max(np.abs(loads).sum(), _target_pressure(solution)),
-        IDENTITY_LIMIT,
-        "integral of p P(p) over p, plus the traction outside contact, against F/A0, over the sum of both signs",
-    )
+    loads, area = pressures * solution["pressure_bin_mean"].values, float(solution["contact_area_fraction_raw"])
+    complete = abs(gaps.sum() + area - 1)
+    yield "P(u) complete", complete, IDENTITY_LIMIT, "integral of P(u) over u, plus the nodes in contact, against 1"
+    from_pressures = abs(pressures.sum() - area) / max(area, np.finfo(float).tiny)
+    yield "area from P(p)", from_pressures, IDENTITY_LIMIT, "integral of P(p) over p against the nodes in contact"
+    load = abs(loads.sum() + float(solution["outside_pressure"]) - nominal) / max(np.abs(loads).sum(), target)
+    words = "integral of p P(p) over p, plus the traction outside contact, against F/A0, over the sum of both signs"
+    yield "load from P(p)", load, IDENTITY_LIMIT, words
 
 
 def worst(checks: Iterable[Check]) -> tuple[Check, ...]:
-    """Select one check per name: a failed one if there is one, then the one with the largest value."""
+    """Return for each name the check with the largest value; a failed check comes before all that passed."""
     found: dict[str, Check] = {}
     for check in checks:
         best = found.get(check.name)
@@ -144,23 +114,23 @@ def describe_failure(check: Check) -> str:
 
 
 def refuse_unknown_failures(checks: Iterable[Check], known: Iterable[str]) -> None:
-    """Raise ValueError unless exactly the known subjects fail; it lists the others, and known ones that passed."""
+    """Raise ValueError if subjects other than the known ones failed, or if a known one passed; list them."""
     failed = [check for check in checks if not check.passed]
     known = list(known)
     passing = sorted(set(known) - {check.subject for check in failed})
     lines = [describe_failure(check) for check in failed if check.subject not in known]
-    lines += [f"{subject}: is listed as a known failure, but all of its checks passed" for subject in passing]
+    lines += [f"{subject}: is listed as a known failure, but all its checks passed" for subject in passing]
     if lines:
         raise ValueError("\n".join(lines))
 
 
 def write_checks(checks: Iterable[Check], path: str | os.PathLike) -> None:
-    """Write findings to a JSON file."""
+    """Write checks to a JSON file."""
     rows = [asdict(check) for check in checks]
     with whole_file(path) as temporary:
         temporary.write_text(json.dumps(rows, indent=1, ensure_ascii=False, allow_nan=False) + "\n", encoding="utf-8")
 
 
 def read_checks(path: str | os.PathLike) -> tuple[Check, ...]:
-    """Read findings from a JSON file."""
+    """Read checks from a JSON file."""
     return tuple(Check(**row) for row in json.loads(Path(path).read_text(encoding="utf-8")))

@@ -15,10 +15,8 @@ from icha.datasets.variables.campaign import COMPUTED_RUNS, LOADED_RUNS, MISSING
 from icha.datasets.variables.terms import TERMS, Variable
 from icha.support.statistics import ensemble
 
-# Loads at which curves are compared, per decade.
+# Number of loads per decade at which curves are compared.
 _POINTS_PER_DECADE = 8
-# Points of a mean loop on every leg.
-_LEG_POINTS = 200
 # Relative difference below which the loads of two seeds count as the same.
 _SAME_LOAD = 1e-6
 
@@ -37,7 +35,7 @@ _STATISTICS = {
 
 
 def interpolate(load, values, at, *, logarithmic: bool) -> np.ndarray:
-    """Interpolate a monotone curve at loads `at`, by monotone cubics in the logarithm of the load.
+    """Interpolate a monotone curve at given loads, by monotone cubic polynomials of the logarithm of the load.
 
     Parameters
     ----------
@@ -51,7 +49,8 @@ def interpolate(load, values, at, *, logarithmic: bool) -> np.ndarray:
         If a load lies outside the range of the curve.
     """
     load, first = np.unique(np.asarray(load, float), return_index=True)
-    # Targets of two kinds may be one state: loads that differ by rounding alone define no slope.
+    # Two targets of different kinds may be the same state. The slope between loads that differ only by rounding is
+    # meaningless.
     distinct = np.concatenate([[True], np.diff(load) > 1e-9 * load[1:]])
     load, values = load[distinct], np.asarray(values, float)[first][distinct]
     at = np.asarray(at, float)
@@ -66,38 +65,38 @@ def interpolate(load, values, at, *, logarithmic: bool) -> np.ndarray:
     return np.exp(curve(x)) if logarithmic else curve(x)
 
 
-def compare_runs(study: xr.Dataset, *, attrs: Mapping[str, str] = {}) -> xr.Dataset:
+def compare_runs(study: xr.Dataset) -> xr.Dataset:
     """Compare contact area and mean separation of all runs of a study at common loads.
 
     Parameters
     ----------
     study : one group of the campaign dataset (`icha.datasets.campaign.campaign_tree`).
-    attrs : further global attributes.
 
     Returns
     -------
-    Dataset on two grids of loads, `reduced_pressure` and `relative_load`. Each spans the range between targets of the
-    first loading that all runs cover, and is empty if there is no such range. On each grid, with the suffix
-    `_at_load` on the second:
+    Dataset on two grids of loads, `reduced_pressure` and `relative_load`. A grid spans the loads that the targets of
+    the first loading cover in all runs. It is empty if there are no such loads. Variables on the second grid have the
+    suffix `_at_load`. On each grid the dataset has
 
     - `contact_area_fraction` and `reduced_separation` along the labels of the runs;
-    - over the seeds, the mean, the standard deviation and half the width of the 95 % confidence interval of both
+    - the mean of both over the seeds, the standard deviation, and half the width of the 95 % confidence interval
       (`area_mean`, `area_deviation`, `area_confidence`, `separation_mean`, …; `icha.support.statistics`);
     - `material_spread` and `slope_spread`: the largest over the smallest area of all materials (slopes), minus one.
 
-    Incomplete runs (`status`) have no values and do not count; runs beyond the model count up to its limit. Runs to
-    which the asperity model is not applicable are in no mean. `seed_count` is the number of seeds in the means,
-    `asked_seed_count` the number of requested seeds. One seed alone has no deviation and no confidence interval.
+    Incomplete runs (`status`) have no values and are in no mean. Runs beyond the range of their model have values up to
+    its limit. Runs for which the asperity model is not applicable have values, but are in no mean. `seed_count` is the
+    number of seeds in the means, `asked_seed_count` the number of requested seeds. A single seed has no deviation and
+    no confidence interval.
     """
-    loaded = np.isin(study["status"].transpose(*LABELS).values, LOADED_RUNS)
+    status = study["status"].transpose(*LABELS).values
+    loaded, asked = np.isin(status, LOADED_RUNS), np.isin(status, (*COMPUTED_RUNS, MISSING))
     averaged = loaded & (study["applicability"].transpose(*LABELS).values == "")
-    asked = np.isin(study["status"].transpose(*LABELS).values, (*COMPUTED_RUNS, MISSING))
-    variables = {"status": study["status"]}
-    for name, description, counted in (
-        ("seed_count", _SEED_COUNT, averaged),
-        ("asked_seed_count", _ASKED_SEED_COUNT, asked),
-    ):
-        variables[name] = make_variable(description, counted.sum(axis=LABELS.index("seed")))
+    seeds = LABELS.index("seed")
+    variables = {
+        "status": study["status"],
+        "seed_count": make_variable(_SEED_COUNT, averaged.sum(axis=seeds)),
+        "asked_seed_count": make_variable(_ASKED_SEED_COUNT, asked.sum(axis=seeds)),
+    }
     coords = {label: study[label] for label in LABELS}
     for axis, load in _loads(study).items():
         suffix = "" if axis == "reduced_pressure" else "_at_load"
@@ -116,11 +115,11 @@ def compare_runs(study: xr.Dataset, *, attrs: Mapping[str, str] = {}) -> xr.Data
         [study.attrs],
     )
     kept = {name: study.attrs[name] for name in ("study", "license") if study.attrs.get(name)}
-    return xr.Dataset(variables, coords, described | kept | dict(attrs))
+    return xr.Dataset(variables, coords, described | kept)
 
 
 def _loads(study):
-    """Return the loads of all steps for both axes; NaN unless a step is a compressive target of the first loading."""
+    """Return the loads of all steps for both axes; NaN except at compressive targets of the first loading."""
     pressure = study["reduced_pressure"].transpose(*LABELS, "step").values
     slope = study["rms_slope"].broadcast_like(study["status"]).transpose(*LABELS).values[..., None]
     shown = loading_stops(study).transpose(*LABELS, "step").values & (pressure > 0)
@@ -129,7 +128,7 @@ def _loads(study):
 
 
 def _on_common_grid(study, load, loaded):
-    """Return loads that all loaded runs cover, and the curves of all runs at these loads, by name."""
+    """Return loads that all loaded runs cover, and by name the values of all runs at these loads."""
     curves = {
         "contact_area_fraction": study["contact_area_fraction"].transpose(*LABELS, "step").values,
         "reduced_separation": reduced_gap(study).transpose(*LABELS, "step").values,
@@ -190,49 +189,15 @@ def at_common_loads(
     return at, np.array([interpolate(load, values, at, logarithmic=logarithmic) for load, values in curves])
 
 
-def at_common_displacements(legs: Sequence[xr.Dataset]) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-    """Evaluate reduced pressure and contact area of an ensemble on one leg of a path, at common displacements.
-
-    Displacements are measured from the point of the largest load, so that the means of two legs meet where the legs
-    meet. Members that are apart have zero pressure and area. If the legs end in contact, all end where the shortest
-    ends.
-
-    Parameters
-    ----------
-    legs : the same leg of every member (`icha.figures.select.branches`).
-
-    Returns
-    -------
-    separations : means of the mean separations over the rms height, in the order of the leg.
-    values : `reduced_pressure` and `contact_area_fraction`, (members, separations).
-    """
-    separations = [leg["reduced_separation"].values for leg in legs]
-    closest = [float(separation.min()) for separation in separations]
-    falling = separations[0][-1] < separations[0][0]
-    apart = all(float(leg["contact_area_fraction"].values[0 if falling else -1]) == 0 for leg in legs)
-    reach = max if apart else min
-    at = np.linspace(0, reach(np.ptp(separation) for separation in separations), _LEG_POINTS)
-    found = {}
-    for name in ("reduced_pressure", "contact_area_fraction"):
-        members = []
-        for leg, separation, least in zip(legs, separations, closest, strict=True):
-            order = np.argsort(separation, kind="stable")
-            outside = 0.0 if apart else None
-            members.append(np.interp(least + at, separation[order], leg[name].values[order], right=outside))
-        found[name] = np.array(members)
-    order = slice(None, None, -1 if falling else 1)
-    return (at + np.mean(closest))[order], {name: values[:, order] for name, values in found.items()}
-
-
 def _spread(area, axis):
-    """Return the largest over the smallest area, minus 1; NaN without a complete run."""
+    """Return the largest over the smallest area along an axis, minus 1; NaN without a complete run."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)
         return np.nanmax(area, axis) / np.nanmin(area, axis) - 1
 
 
 def _common_grid(loads):
-    """Return loads that every run covers, with equal steps of the logarithm, from the positive loads of each run."""
+    """Return loads with equal steps of the logarithm, within the range that the positive loads of every run cover."""
     if not loads or not all(map(len, loads)):
         return np.empty(0)
     lowest = max(float(load.min()) for load in loads)
@@ -244,7 +209,7 @@ def _common_grid(loads):
 
 
 def compare_campaign(tree: xr.DataTree, *, attrs: Mapping[str, str] = {}) -> xr.DataTree:
-    """Apply `compare_runs` to every study of a campaign; return a tree of the same shape."""
+    """Compare the runs of every study of a campaign with `compare_runs`; return a tree with a group for each study."""
     groups = {f"/{name}": compare_runs(node.to_dataset()) for name, node in tree.children.items()}
     root = combine_attributes(
         "Comparison of the runs of every study",

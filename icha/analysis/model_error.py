@@ -1,12 +1,11 @@
-"""Error of the asperity model against boundary elements on the same topography, at the same load.
+"""Error of the asperity model, compared with boundary elements on the same topography at the same load.
 
-In the limit of a short range the reference is a run of the same study with the other model, with targets at the same
-loads. At finite ranges it is a solution of Tamaas.
+In the limit of a short range of attraction, the reference is a run of the same study with boundary elements. At finite
+ranges, the reference is a solution of the code Tamaas.
 """
 
 import contextlib
 import itertools
-import warnings
 from collections.abc import Iterable, Mapping
 from functools import cache
 
@@ -23,23 +22,24 @@ from icha.datasets.labels import LABELS, RunLabels, SolutionLabels, arrange_slop
 from icha.datasets.variables.campaign import COMPLETE, INCOMPLETE, NOT_IN_DESIGN, RAGGED, STATUS
 from icha.datasets.variables.model_error import ASKED, BINS, FINITE_RANGE, MODEL_ERROR, SHORT_RANGE
 from icha.datasets.variables.terms import MATERIAL, Variable
-from icha.equilibrium.distributions import nodes_in_discs
+from icha.equilibrium.distributions import cover_grid
 from icha.path.targets import REDUCED_PRESSURE
+from icha.support.statistics import ensemble
 
 _TITLE = "Error of the model against boundary elements"
 _SUMMARY = "The same topographies, loads and materials by the model and by boundary elements."
 
-# Labels of the runs without the model.
+# Labels of the runs except the model.
 _LABELS = tuple(label for label in LABELS if label != "model")
 AXES = (*_LABELS, "reduced_pressure")
 
-# Variables that a run and a solution must share, to this relative accuracy.
+# Variables that a run and its reference must share, and the relative accuracy to which they must.
 SHARED = ("period", "rms_height", "rms_slope", "contact_modulus", "surface_energy", "interaction_range")
 _ROUNDING = 1e-6
-# Smallest contact fraction of a cell that counts as in contact in a contact map.
+# Smallest contact fraction with which a cell of a contact map counts as in contact.
 _HALF = 0.5
 
-# Variables with mean and deviation over the seeds.
+# Variables with a mean and a standard deviation over the seeds.
 SUMMARISED = (
     "area_error",
     "energetic_area_error",
@@ -57,51 +57,46 @@ def model_error(
     runs: Iterable[tuple[RunLabels | tuple, xr.Dataset]] = (),
     attrs: Mapping[str, str] = {},
 ) -> xr.DataTree:
-    """Compare the runs with the asperity model with boundary elements, state by state.
+    """Compare the runs of the asperity model with boundary elements, load by load.
 
     Parameters
     ----------
-    campaign : the campaign dataset; its runs have a snapshot of kind `reduced_pressure` at the load of every solution.
-    solutions : at finite ranges: pairs of labels (entry, study, surface, seed, rms_slope, material, reduced_pressure)
-        and dataset (`icha.references.finite_range`), in any order.
-    runs : in the limit of a short range: pairs of labels and dataset of the boundary-element runs, with their maps, in
-        any order. States at targets of kind `reduced_pressure` of the first loading are compared; distributions and
-        maps where both models have a snapshot.
+    campaign : the campaign dataset. Its runs have a snapshot of kind `reduced_pressure` at the load of every solution.
+    solutions : pairs of labels and dataset (`icha.references.finite_range`), at finite ranges of attraction.
+    runs : pairs of labels and dataset of runs with boundary elements, in the limit of a short range. They have their
+        contact maps. Areas and separations are compared at the targets of kind `reduced_pressure` of the first
+        loading; distributions and maps are compared where both models have a snapshot.
     attrs : further global attributes.
 
     Returns
     -------
-    DataTree with a group for every study with boundary-element runs, named as the study, and for every entry of
-    solutions; the attribute `truth` tells them apart (`SHORT_RANGE`, `FINITE_RANGE`). Variables are along surface,
-    seed, rms_slope, material and reduced_pressure, the prescribed one:
+    DataTree with a group for every study of `runs`, which has the name of the study, and for every entry of
+    `solutions`. The attribute `truth` of a group names its reference (`SHORT_RANGE` or `FINITE_RANGE`). Variables are
+    along surface, seed, rms_slope, material and the target of the reduced pressure:
 
-    - those of `icha.datasets.variables.model_error`;
-    - `<name>_mean` over the seeds for names in `SUMMARISED`, and from two seeds on `<name>_deviation`, the standard
-      deviation;
-    - modulus, energy, range and Tabor parameter of the runs;
-    - `status(surface, seed, rms_slope, material)`: whether a combination of labels has solutions and a complete run;
-      without both, its values are missing.
+    - the variables of `icha.datasets.variables.model_error`;
+    - for each name in `SUMMARISED`, the mean over the seeds `<name>_mean`, and for two seeds or more the standard
+      deviation `<name>_deviation`;
+    - modulus, surface energy, range and Tabor parameter of the runs;
+    - `status(surface, seed, rms_slope, material)`: whether a run and its reference are complete. If they are not, the
+      values are missing.
 
     Raises
     ------
     ValueError
-        If a run is missing, has no snapshot at the pressure of a solution, or is another contact; if a contact lacks a
-        state that others of its entry have, or has one twice. The message names entry, run and pressure.
+        If a solution has no run, or its run has no snapshot at the load, or run and reference differ in topography or
+        material. The message names entry, run and load.
     """
     origins: dict[str, list[dict[str, str]]] = {}
     select = cache(lambda labels: select_run(campaign, labels))
-    entries = _short_range_entries(select, runs, origins)
-    short_range = set(entries)
-    for entry, states in _finite_range_entries(select, solutions, origins).items():
-        entries[entry] = entries.get(entry, {}) | states
-    if not entries:
-        raise ValueError("a model error needs at least one run or solution by boundary elements")
+    short_range = _short_range_entries(select, runs, origins)
+    finite_range = _finite_range_entries(select, solutions, origins)
     groups = {}
-    for entry, states in entries.items():
-        truth = SHORT_RANGE if entry in short_range else FINITE_RANGE
-        title = f"{_TITLE}, {'study' if entry in short_range else 'entry'} {entry}"
-        attributes = combine_attributes(title, _SUMMARY, DERIVED, origins.get(entry, [])) | {"truth": truth}
-        groups[f"/{entry}"] = _entry_dataset(campaign, entry, states).assign_attrs(attributes)
+    for truth, word, entries in ((SHORT_RANGE, "study", short_range), (FINITE_RANGE, "entry", finite_range)):
+        for entry, states in entries.items():
+            title = f"{_TITLE}, {word} {entry}"
+            attributes = combine_attributes(title, _SUMMARY, DERIVED, origins.get(entry, [])) | {"truth": truth}
+            groups[f"/{entry}"] = _entry_dataset(campaign, entry, states).assign_attrs(attributes)
     root = combine_attributes(_TITLE, _SUMMARY, DERIVED, itertools.chain(*origins.values()))
     return xr.DataTree.from_dict({"/": xr.Dataset(attrs=root | dict(attrs))} | groups)
 
@@ -112,14 +107,13 @@ def _short_range_entries(select, runs, origins):
     for labels, truth in runs:
         labels = RunLabels(*labels)
         run = select(labels._replace(model=DEFAULT_MODEL))
-        states = entries.setdefault(labels.study, {})
         try:
-            states |= _compare_stops(labels, run, truth)
+            entries.setdefault(labels.study, {}).update(_compare_stops(labels, run, truth))
         except ValueError as error:
             raise ValueError(f"{labels}: {error}") from None
         origins.setdefault(labels.study, []).extend((run.attrs, truth.attrs))
     for states in entries.values():
-        # None for states that a run lacks and others of the study have.
+        # None for loads at which a run has no state, and other runs of the study have one.
         loads = {labels.reduced_pressure for labels in states}
         for place in [labels._replace(reduced_pressure=load) for labels in states for load in loads]:
             states.setdefault(place, None)
@@ -132,8 +126,6 @@ def _finite_range_entries(select, solutions, origins):
     for labels, solution in solutions:
         labels = SolutionLabels(*labels)
         states = entries.setdefault(labels.entry, {})
-        if labels in states:
-            raise ValueError(f"{_name(labels)}: this solution is given twice")
         try:
             run = select(labels.run)
             if why_no_result(run.attrs):
@@ -142,65 +134,71 @@ def _finite_range_entries(select, solutions, origins):
             snapshot = find_snapshot(run, REDUCED_PRESSURE, labels.reduced_pressure)
             target = float(solution["target_reduced_pressure"])
             if not np.isclose(target, labels.reduced_pressure, rtol=1e-9):
-                raise ValueError(f"the solution is one of reduced pressure {target:g}")
+                raise ValueError(f"the solution is for reduced pressure {target:g}")
             states[labels] = compare_state(run, snapshot, solution)
         except ValueError as error:
-            raise ValueError(f"{_name(labels)}: {error}") from None
+            name = f"entry {labels.entry}, run {labels.run}, reduced pressure {labels.reduced_pressure:g}"
+            raise ValueError(f"{name}: {error}") from None
         origins.setdefault(labels.entry, []).extend((run.attrs, solution.attrs))
     return entries
 
 
 def compare_state(run: xr.Dataset, snapshot: int, solution: xr.Dataset) -> dict[str, float | np.ndarray]:
-    """Compare one snapshot of a run with a boundary-element solution of the same state: the variables of `MODEL_ERROR`.
+    """Return the variables of `MODEL_ERROR` for one snapshot of a run and the solution for the same state.
 
     Raises
     ------
     ValueError
-        If they are not the same contact, or the contact area or mean separation of the solution is not positive.
+        If run and solution differ in topography or material, or if the contact area or the mean separation of the
+        solution is not positive.
     """
-    check_same_contact(run, solution)
+    if difference := difference_of_contacts(run, solution):
+        raise ValueError(difference)
     return _amounts(state_of(run, snapshot), solution) | _shapes(run, snapshot, solution)
 
 
 def _compare_stops(labels, run, truth):
-    """Compare the states of both models, by label; None for a state that one of the runs lacks, or of full contact."""
-    check_same_contact(run, truth)
+    """Compare both models at each load; None where one of the runs has no state, or contact is full."""
+    if difference := difference_of_contacts(run, truth):
+        raise ValueError(difference)
     failed = why_no_result(run.attrs) or why_no_result(truth.attrs)
     found = {}
     stops, true_stops = _stops(run), _stops(truth)
     for load in dict.fromkeys((*stops, *true_stops)):
         state = None
         in_both = not failed and load in stops and load in true_stops
-        # Relative to the mean separation of full contact, which is zero, there is no error.
+        # The mean separation of full contact is zero, so that it has no relative error.
         if in_both and truth["mean_separation"].values[true_stops[load]] > 0:
             solution = _as_solution(truth, true_stops[load], load)
             state = _amounts(run.isel(step=stops[load]), solution)
-            if "contact" in solution and (snapshot := _snapshot_at(run, load)) is not None:
+            if "contact" in solution and (snapshot := snapshot_if_any(run, REDUCED_PRESSURE, load)) is not None:
                 state |= _shapes(run, snapshot, solution)
         found[SolutionLabels(labels.study, labels.study, *labels[2:], load)] = state
     return found
 
 
 def _stops(run):
-    """Return steps of the targets of kind `reduced_pressure` in the first loading, by their values."""
+    """Return the steps of the first loading at targets of kind `reduced_pressure`, by the value of the target."""
     targets = loading_stops(run) & (run["step_kind"] == REDUCED_PRESSURE)
     return {float(run["step_target"].values[step]): step for step in np.flatnonzero(targets.values).tolist()}
 
 
-def _snapshot_at(run, load):
-    """Return the snapshot of a run at a reduced pressure; None if there is no such snapshot."""
+def snapshot_if_any(run: xr.Dataset, kind: str, target: float) -> int | None:
+    """Return the position of the snapshot of a kind and target in a run; None if the run does not have it."""
     try:
-        return find_snapshot(run, REDUCED_PRESSURE, load)
+        return find_snapshot(run, kind, target)
     except ValueError:
         return None
 
 
 def _as_solution(run, step, load):
-    """Return a state of a boundary-element run in the form of a solution; a snapshot also has distributions and a map.
+    """Return a step of a run with boundary elements in the form of a solution at a finite range.
 
-    In the limit of a short range nothing acts outside contact, so that areas of all definitions are equal.
+    If the step has a snapshot, the distributions and the contact map are included. In the limit of a short range no
+    stress acts outside contact, so that the contact areas by all definitions are equal.
     """
-    state, snapshot = run.drop_dims([*RAGGED, "snapshot"], errors="ignore").isel(step=step), _snapshot_at(run, load)
+    state = run.drop_dims([*RAGGED, "snapshot"], errors="ignore").isel(step=step)
+    snapshot = snapshot_if_any(run, REDUCED_PRESSURE, load)
     if snapshot is not None:
         contact = run["contact_map"].isel(snapshot=snapshot).rename(row="y", column="x") >= _HALF
         state = state_of(run, snapshot).assign(contact=contact)
@@ -214,14 +212,14 @@ def _as_solution(run, step, load):
 
 
 def _amounts(state, solution):
-    """Compare areas and separations of a state and a solution; add residual and grid of the solution."""
+    """Compare the areas and separations of a state and a solution; add residual and grid of the solution."""
     area, truth = (float(each["contact_area_fraction"]) for each in (state, solution))
     separation, true_separation = (float(each["reduced_separation"]) for each in (state, solution))
     for name, value in (("contact area", truth), ("mean separation", true_separation)):
         if not value > 0:
-            raise ValueError(f"boundary elements have a {name} of {value:g}; a relative error needs a positive one")
-    # At a finite range the attraction also acts around the area of zero gap. As the range decreases, the energetic area
-    # approaches that of JKR sooner than the area of zero gap does.
+            raise ValueError(f"the {name} of boundary elements is {value:g}; expected a positive value")
+    # At a finite range, attraction also acts outside the area of zero gap. As the range decreases, the energetic area
+    # approaches the area of JKR theory faster than the area of zero gap does.
     adhesive = float(solution["surface_energy"]) > 0
     raw, energetic = float(solution["contact_area_fraction_raw"]), float(solution["energetic_area_fraction"])
     return {
@@ -242,13 +240,13 @@ def _amounts(state, solution):
 
 
 def _shapes(run, snapshot, solution):
-    """Compare distributions and contact map of a snapshot and a solution; add the densities of the solution."""
+    """Compare the distributions and contact maps of a snapshot and a solution; add the densities of the solution."""
     state, spots = state_of(run, snapshot), contact_of_spots(run, snapshot, solution.sizes["x"])
     contact = solution["contact"].transpose("y", "x").values == 1
     height, nominal = float(solution["rms_height"]), float(state["nominal_pressure"])
     pressure = float(solution["contact_modulus"]) * float(solution["rms_slope"])
     gaps = solution["gap_density"].values * height
-    # The last bin of a deep surface is wider than that of the others.
+    # On a deep surface, the last bin of the solution is wider than the last bin of the model error.
     gaps[-1] *= np.diff(solution["gap_bin_edges"].values)[-1] / np.diff(GAP_BINS * height)[-1]
     return {
         "gap_distribution_distance": distribution_distance("gap", state, solution) / height,
@@ -261,32 +259,18 @@ def _shapes(run, snapshot, solution):
     }
 
 
-def check_same_contact(run: xr.Dataset, solution: xr.Dataset) -> None:
-    """Raise ValueError unless a run and a solution are of the same topography, half-space and attraction."""
-    for name in SHARED:
+def difference_of_contacts(run: xr.Dataset, solution: xr.Dataset) -> str:
+    """Describe the first difference in topography or material between a run and a solution; "" if there is none."""
+    for name in (*SHARED, "seed"):
         value, expected = float(run[name]), float(solution[name])
         if not np.isclose(value, expected, rtol=_ROUNDING, atol=0):
             units = run[name].attrs.get("units", "1")
-            raise ValueError(f"{name} is {value:.7g} for the run, {expected:.7g} for the solution (in {units})")
-    if int(solution["seed"]) != int(run["seed"]):
-        raise ValueError(f"seed is {int(run['seed'])} for the run, {int(solution['seed'])} for the solution")
-
-
-def run_of_same_contact(runs: Iterable[tuple[RunLabels, xr.Dataset]], solution: xr.Dataset) -> RunLabels:
-    """Return the labels of the first run of the same contact as a solution; raise ValueError if there is none."""
-    for labels, run in runs:
-        try:
-            check_same_contact(run, solution)
-        except ValueError:
-            continue
-        return labels
-    names = ("contact_modulus", "surface_energy", "interaction_range", "rms_slope", "seed")
-    values = ", ".join(f"{name} {float(solution[name]):g}" for name in names)
-    raise ValueError(f"no run is of the same contact as the boundary elements of {values}")
+            return f"{name} is {value:.7g} for the run, {expected:.7g} for the solution (in {units})"
+    return ""
 
 
 def state_of(run: xr.Dataset, snapshot: int) -> xr.Dataset:
-    """Select the variables of a run at one snapshot, without spots and events."""
+    """Return the variables of a run at one snapshot, without spots and events."""
     step = int(run["snapshot_step"].values[snapshot])
     return run.drop_dims(RAGGED, errors="ignore").isel(snapshot=snapshot, step=step)
 
@@ -295,13 +279,12 @@ def contact_of_spots(run: xr.Dataset, snapshot: int, grid: int) -> np.ndarray:
     """Return whether each node lies inside a spot of a snapshot, (n, n) bool along y and x."""
     spots = spots_of(run, snapshot)
     centres = np.column_stack([spots["spot_x"].values, spots["spot_y"].values])
-    return nodes_in_discs(float(run["period"]), grid, centres, spots["spot_radius"].values)
+    return cover_grid(float(run["period"]), grid, centres, spots["spot_radius"].values)[1]
 
 
 def jaccard(one: np.ndarray, other: np.ndarray) -> float:
     """Return the Jaccard index: nodes in both maps over nodes in at least one; 1 if both maps are empty."""
-    either = np.count_nonzero(one | other)
-    return np.count_nonzero(one & other) / either if either else 1.0
+    return shared(one | other, one & other)
 
 
 def shared(one: np.ndarray, other: np.ndarray) -> float:
@@ -311,11 +294,11 @@ def shared(one: np.ndarray, other: np.ndarray) -> float:
 
 
 def distribution_distance(quantity: str, one: xr.Dataset, other: xr.Dataset) -> float:
-    """Return the first Wasserstein distance between two P(u), m, or two P(p), Pa, over the nominal area.
+    """Return the first Wasserstein distance between two distributions P(u), m, or P(p), Pa, over the nominal area.
 
-    This is the area between the cumulative distributions. The gap counts as zero in contact, and where surfaces overlap
-    outside contact; the value of a bin of gaps is the geometric mean of its edges. The pressure counts as zero outside
-    contact, even where there is attraction; the value of a bin of pressures is its mean pressure.
+    The distance is the area between the cumulative distributions. The gap counts as zero in contact, and where surfaces
+    overlap outside contact. The pressure counts as zero outside contact, also where attraction acts. A bin of gaps has
+    the geometric mean of its edges as its value, and a bin of pressures has its mean pressure.
 
     Parameters
     ----------
@@ -327,7 +310,7 @@ def distribution_distance(quantity: str, one: xr.Dataset, other: xr.Dataset) -> 
 
 
 def _values_and_weights(quantity, state):
-    """Return the values of all bins and their shares of the nominal area; the rest of the area has the value zero."""
+    """Return values and shares of the nominal area of all bins; the rest of the area has the value zero."""
     edges = state[f"{quantity}_bin_edges"].values
     content = state[f"{quantity}_density"].values * np.diff(edges)
     values = np.sqrt(edges[1:] * edges[:-1]) if quantity == "gap" else state["pressure_bin_mean"].values
@@ -335,20 +318,14 @@ def _values_and_weights(quantity, state):
     return np.concatenate([[0.0], values]), np.concatenate([[rest], content])
 
 
-def _name(labels):
-    return f"entry {labels.entry}, run {labels.run}, reduced pressure {labels.reduced_pressure:g}"
-
-
 def _entry_dataset(campaign, entry, states):
     """Arrange the states of one entry as a dataset along `AXES`; a failed state is None."""
-    studies = sorted({labels.study for labels in states})
-    if len(studies) > 1:
-        raise ValueError(f"entry {entry}: its solutions are of several studies: {', '.join(studies)}")
-    study = campaign[studies[0]].to_dataset()
+    name = next(labels.study for labels in states)
+    study = campaign[name].to_dataset()
     axes = _axes(study, states)
     slopes = axes["rms_slope"]
     coords = {
-        label: xr.Variable(
+        label: (
             slope_dims(slopes) if label == "rms_slope" else label,
             np.array(axes[label], dtype=study[label].dtype),
             study[label].attrs,
@@ -356,13 +333,9 @@ def _entry_dataset(campaign, entry, states):
         for label in _LABELS
     }
     coords["reduced_pressure"] = make_variable(ASKED, axes["reduced_pressure"])
-    shape = tuple(slopes.shape[-1] if label == "rms_slope" else len(values) for label, values in axes.items())
     labelled = xr.Dataset(coords=coords)
-    grid = [SolutionLabels(entry, studies[0], *labels_at(labelled, place, AXES)) for place in np.ndindex(shape)]
-    contacts = {labels.run for labels in states}
-    if missing := [labels for labels in grid if labels.run in contacts and labels not in states]:
-        raise ValueError(f"{_name(missing[0])}: no solution, nor of {len(missing) - 1} other states of this entry")
-
+    shape = tuple(labelled.sizes[axis] for axis in AXES)
+    grid = [SolutionLabels(entry, name, *labels_at(labelled, place, AXES)) for place in np.ndindex(shape)]
     # A contact is complete if it is complete at one load.
     statuses = [
         NOT_IN_DESIGN if labels not in states else INCOMPLETE if states[labels] is None else COMPLETE for labels in grid
@@ -373,15 +346,15 @@ def _entry_dataset(campaign, entry, states):
     variables |= _summarise_over_seeds(variables, applicability.values[..., None] == "")
     bins = describe_variables(BINS, bin_values("gap", GAP_BINS) | bin_values("pressure", PRESSURE_BINS))
     coords |= {name: bins.pop(name) for name in BINS if BINS[name].coordinate}
-    result = xr.Dataset(variables | bins, coords, {"entry": entry, "study": studies[0]})
-    for name in MATERIAL:
-        result[name] = study[name].sel(material=axes["material"])
+    result = xr.Dataset(variables | bins, coords, {"entry": entry, "study": name})
+    for quantity in MATERIAL:
+        result[quantity] = study[quantity].sel(material=axes["material"])
     result["tabor_parameter"] = _of_asperities(study["tabor_parameter"], labelled)
     return result.assign(applicability=applicability)
 
 
 def _of_asperities(quantity, labelled):
-    """Return a quantity of the asperity runs at all labels of a dataset; missing where there is no run."""
+    """Return a quantity of the asperity runs along the labels of a dataset; missing where there is no run."""
     none = "" if quantity.dtype.kind in "OSU" else np.nan
     values = np.full([labelled.sizes[label] for label in _LABELS], none, object if none == "" else float)
     for place in np.ndindex(values.shape):
@@ -392,7 +365,7 @@ def _of_asperities(quantity, labelled):
 
 
 def _axes(study, states):
-    """Return the values of `AXES` in the states of an entry; rms slopes as `arrange_slopes` returns them."""
+    """Return the values of `AXES` in the states of an entry; `arrange_slopes` arranges the rms slopes."""
     asked = {axis: {getattr(labels, axis) for labels in states} for axis in AXES}
     axes = {
         label: [value for value in study[label].values.tolist() if value in asked[label]]
@@ -405,7 +378,7 @@ def _axes(study, states):
 
 
 def _arrange(shape, states):
-    """Arrange the variables of all states as arrays of a shape along `AXES`; missing where a state is None."""
+    """Return the variables of all states as arrays of a shape along `AXES`; missing where a state is None."""
     bins = {"gap_bin": len(GAP_BINS) - 1, "pressure_bin": len(PRESSURE_BINS) - 1}
     variables = {}
     for name, description in MODEL_ERROR.items():
@@ -426,18 +399,12 @@ def _summarise_over_seeds(variables, applicable):
     found = {}
     for name in SUMMARISED:
         values, long_name = np.where(applicable, variables[name].values, np.nan), MODEL_ERROR[name].long_name
+        over_seeds = ensemble(values, seeds)
         further = {"missing": "where no run counts"} | MODEL_ERROR[name].further
         mean = Variable(others, "1", f"mean over the seeds: {long_name}", further=further)
-        # NumPy warns where no run is complete; the mean is missing there.
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", RuntimeWarning)
-            found[f"{name}_mean"] = make_variable(mean, np.nanmean(values, axis=seeds))
-            if values.shape[seeds] > 1:
-                deviation = Variable(
-                    others,
-                    "1",
-                    f"standard deviation over the seeds: {long_name}",
-                    further={"missing": "where fewer than two runs are complete"},
-                )
-                found[f"{name}_deviation"] = make_variable(deviation, np.nanstd(values, axis=seeds, ddof=1))
+        found[f"{name}_mean"] = make_variable(mean, over_seeds.mean)
+        if values.shape[seeds] > 1:
+            further = {"missing": "where fewer than two runs are complete"}
+            deviation = Variable(others, "1", f"standard deviation over the seeds: {long_name}", further=further)
+            found[f"{name}_deviation"] = make_variable(deviation, over_seeds.deviation)
     return found

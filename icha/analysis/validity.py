@@ -1,7 +1,7 @@
-"""Validity of the models for a campaign: where their parts were verified, and how large their errors are.
+"""Validity of the models for a campaign: where the models were verified, and how large their errors are.
 
-Checks verify that equations were solved; these statements describe what the solutions are worth. They are short lines,
-printed before a campaign runs and after it, and at the top of its report.
+Checks verify that equations were solved. The statements of this module describe how accurate the solutions are. They
+are short lines, which are printed before and after a campaign runs, and at the top of its report.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ from icha.surfaces.moments import RESOLVED_CELLS, cells_per_short_wave, error_of
 if TYPE_CHECKING:
     import xarray as xr
 
-# Errors of the asperity model in per cent, smallest and largest mean over the seeds, with adhesion and without: the
-# summary of docs/validation.md, which campaign `validation` computes; a test compares them.
+# Errors of the asperity model in per cent with adhesion (True) and without (False): lowest and highest mean over the
+# seeds. Campaign `validation` computes them for docs/validation.md; a test compares the two.
 VALIDATION = {
     True: {"contact area": (-25.3, -8.1), "mean separation": (-36.1, -0.8)},
     False: {"contact area": (-21.4, -4.9), "mean separation": (-36.4, -0.8)},
@@ -34,15 +34,15 @@ VALIDATION = {
 _VALIDATED = "on seven self-affine surfaces, p* from 0.001 to 0.1 (page on validation)"
 
 _RATIO = "full_contact_energy_ratio"
-# Of a case, where they are known: pressure for complete contact, strength of the interface with and without its flaw,
-# largest tension that the grid resolves, Pa; size of its cells, m.
+# Facts that are not known of every case: pressure for complete contact, strength of the interface with and without its
+# flaw, largest tension that the grid resolves, Pa; size of the grid cells, m.
 COMPLETE, STRENGTH, THEORETICAL = "complete_contact_pressure", "interface_strength", "theoretical_strength"
 RESOLVED, SPACING = "resolved_tension", "spacing"
 _OF_FULL_CONTACT = (COMPLETE, STRENGTH, THEORETICAL, RESOLVED)
 
-# Share of single spots outside the range of Wu's formula above which a case is named; every surface has some.
+# Share of single spots outside the range of Wu's formula, above which a case is named. Every surface has some.
 _FEW = 0.05
-# Most cases that a statement names.
+# Largest number of cases that a statement names.
 _MOST_NAMES = 4
 
 
@@ -53,46 +53,39 @@ class Range(NamedTuple):
     ----------
     words : name of the quantity in messages.
     least, most : smallest and largest value.
-    reason : text that replaces the value in a message; empty to print the value.
     """
 
     words: str
     least: float
     most: float
-    reason: str = ""
-
-    @property
-    def shown(self) -> str:
-        """The range as messages print it."""
-        if self.most == math.inf:
-            return f"{self.least:g} and more"
-        return f"{self.least:g} to {self.most:g}"
 
 
-# Surfaces and materials of study `short_range` of campaign `validation`, rounded outwards; a test compares them.
+# Ranges of the surfaces and materials in study `short_range` of campaign `validation`, rounded outwards. A test
+# compares them with the campaign.
 VALIDATED = {
-    # Exactly 1 in the validation, whose spectra fix the amplitudes; random amplitudes scatter up to 1.2.
+    # 1 in the validation, because its spectra have fixed amplitudes. Random amplitudes give up to 1.2.
     "slope_anisotropy": Range("anisotropy of slopes", 1.0, 1.2),
     "height_skewness": Range("skewness of heights", -0.2, 0.2),
     "height_kurtosis": Range("kurtosis of heights", 2.3, 3.5),
-    # The validation begins at 3.3. Narrower spectra have fewer unions of spots; isotropic surfaces have 1.5 or more.
+    # The validation begins at 3.3. Smaller values are included, because narrow spectra have fewer unions of spots.
+    # Isotropic surfaces have 1.5 or more.
     "nayak_parameter": Range("Nayak's parameter", 1.5, 47.0),
-    # In the validation at most one in two hundred.
+    # At most 0.005 in the validation.
     "unsupported_summits": Range("share of unsupported summits", 0.0, 0.01),
-    # Better resolution and less adhesion are not harder, so the upper end is open.
+    # There is no upper limit, because a finer grid or less adhesion does not increase the error.
     "nodes_per_short_wave": Range("nodes per shortest wave", 5.8, math.inf),
     "full_contact_energy_ratio": Range("U_full/dgamma", 76.0, math.inf),
     # 1 for a single square, 0 for a periodic surface.
-    "free_edges": Range("free edges", 0, 0, "free edges, which boundary elements cannot have: give `boundary: window`"),
+    "free_edges": Range("free edges (0 with `boundary: window`)", 0, 0),
 }
 
 
 def outside_validation(facts: Mapping[str, float]) -> list[str]:
-    """List the quantities outside the validation with values and ranges; `facts` are by the names of `VALIDATED`."""
+    """List the facts outside the range of the validation, with value and range; keys are those of `VALIDATED`."""
     return [
-        known.reason or f"{known.words} {facts[name]:.2g}, validated: {known.shown}"
-        for name, known in VALIDATED.items()
-        if name in facts and not known.least <= facts[name] <= known.most
+        f"{words} {facts[name]:.2g}, validated: {least:g} {'and more' if most == math.inf else f'to {most:g}'}"
+        for name, (words, least, most) in VALIDATED.items()
+        if name in facts and not least <= facts[name] <= most
     ]
 
 
@@ -103,7 +96,7 @@ class Statement(NamedTuple):
     ----------
     about : subject of the line.
     text : the statement.
-    good : whether the campaign is within the verified range.
+    good : whether the campaign is within the verified range; if not, the line is a warning.
     """
 
     about: str
@@ -112,13 +105,12 @@ class Statement(NamedTuple):
 
 
 class Case(NamedTuple):
-    """A run and the quantities on which the validity of its model depends.
+    """A run, and the facts on which the validity of its model depends.
 
     Attributes
     ----------
     model, surface, material : names.
-    facts : values by the names of `VALIDATED`, with the ratio of energies; values of full contact and the spacing of
-        the grid where they are known.
+    facts : values for the keys of `VALIDATED`; also values of full contact and the spacing of the grid, if known.
     """
 
     model: str
@@ -138,14 +130,15 @@ def statements(
     outside: str | None = None,
     sticky: Collection[str] = (),
 ) -> list[Statement]:
-    """State what is known of the validity of the models of a campaign, one line per subject.
+    """State the validity of the models of a campaign, one line for each subject.
 
     Parameters
     ----------
     models : names of the models of each study.
     cases : the runs.
-    outside : cases whose jumps into contact are outside the verified range, as text; None if nothing jumps.
-    sticky : materials on surfaces that stick without load, as `describe_sticky` names them.
+    outside : text that names the cases whose jumps into contact are outside the verified range, "" if none is; None
+        without adhesion.
+    sticky : result of `describe_sticky`.
     """
     cases = list(cases)
     found = [Statement("models", _used(models)), *_full_contact(cases)]
@@ -163,7 +156,7 @@ def statements(
 
 
 def _full_contact(cases):
-    """Yield the statement on the energy of full contact if there is adhesion."""
+    """Yield the statement on full contact if a case has adhesion; it describes the case with the strongest adhesion."""
     adhesive = [case for case in cases if case.ratio < math.inf]
     if not adhesive:
         return
@@ -187,7 +180,7 @@ def _full_contact(cases):
 
 
 def _unresolved_strength(facts):
-    """Describe the grid that would resolve the strength of the interface at the edge of contact; "" if it does."""
+    """Describe the tension that the grid resolves, if it is less than the strength of the interface; else return ""."""
     if not 0 < facts.get(RESOLVED, math.inf) < facts[STRENGTH]:
         return ""
     needed = facts[SPACING] * (facts[RESOLVED] / facts[STRENGTH]) ** 2
@@ -198,7 +191,7 @@ def _unresolved_strength(facts):
 
 
 def _resolution(cases):
-    """Yield the statement on boundary elements with few grid cells per shortest wave."""
+    """Yield the statement on surfaces for which boundary elements have few grid cells per shortest wave."""
     few = {
         case.surface: cells
         for case in cases
@@ -214,9 +207,9 @@ def _resolution(cases):
 
 
 def _accuracy(cases, measured):
-    """State the error of the asperity model, which is known for surfaces and materials within the validation.
+    """State the error of the asperity model, which is known only within the range of the validation.
 
-    cases : the runs of asperities; measured : whether the campaign also has runs of boundary elements.
+    cases : runs of the asperity model; measured : whether the campaign also has runs with boundary elements.
     """
     unknown, adhesive = {}, set()
     for case in cases:
@@ -239,26 +232,24 @@ def _accuracy(cases, measured):
 
 
 def join_first(cases: Iterable[str], between: str = ", ") -> str:
-    """Join the first cases and append the number of the others."""
+    """Join the first cases to one text, and append the number of the others."""
     cases = list(cases)
     more = len(cases) - _MOST_NAMES
     return between.join(cases[:_MOST_NAMES]) + (f" and {more} more" if more > 0 else "")
 
 
 def statements_on_dataset(campaign: xr.DataTree) -> list[Statement]:
-    """State the validity of a campaign dataset; incomplete runs count up to where they ended.
+    """State the validity of the models for a campaign dataset; incomplete runs count up to where they ended.
 
-    Only a few variables are read of a dataset that is open in its file.
+    Of a dataset that is open in its file, only a few variables are read.
     """
     models, cases, shares, sticky = {}, [], {}, {}
     for name, node in campaign.children.items():
         study = node.to_dataset()
         models[name] = [str(model) for model in study["model"].values]
         cases += _cases(study)
-        if DEFAULT_MODEL not in models[name]:
-            continue
-        for surface, material, share in _outside(study):
-            if share is not None:
+        if DEFAULT_MODEL in models[name]:
+            for (surface, material), share in _shares_outside(study).items():
                 shares[surface, material] = max(share, shares.get((surface, material), 0.0))
                 found = study["stickiness"].sel(surface=surface, material=material)
                 sticky[surface, material] = max(float(found.max()), sticky.get((surface, material), 0.0))
@@ -267,7 +258,7 @@ def statements_on_dataset(campaign: xr.DataTree) -> list[Statement]:
 
 
 def _not_applicable(campaign):
-    """Yield the statement on the runs to which their model is not applicable."""
+    """Yield the statement on the runs for which the asperity model is not applicable."""
     reasons = sum(map(reasons_not_applicable, campaign.children.values()), Counter())
     if reasons:
         text = (
@@ -277,7 +268,7 @@ def _not_applicable(campaign):
 
 
 def _cases(study):
-    """Yield the cases of the computed runs of a study."""
+    """Yield a case for every computed run of a study."""
     measured = [name for name in (*VALIDATED, *_OF_FULL_CONTACT) if name in study]
     status = study["status"].transpose(*LABELS)
     values = {
@@ -298,7 +289,7 @@ def _cases(study):
 
 
 def describe_sticky(stickiness: Mapping[tuple[str, str], float]) -> list[str]:
-    """Describe the cases whose stickiness (`icha.asperity.stickiness`) exceeds 1; keys are surface and material."""
+    """Describe the surfaces and materials (the keys) whose stickiness (`icha.asperity.stickiness`) exceeds 1."""
     return [
         f"{material} on {surface} (stickiness {value:.2g})"
         for (surface, material), value in stickiness.items()
@@ -307,7 +298,7 @@ def describe_sticky(stickiness: Mapping[tuple[str, str], float]) -> list[str]:
 
 
 def _describe_shares(shares):
-    """Describe the cases with many single spots outside the range of Wu's formula, the worst first."""
+    """Describe the cases with many single spots outside the range of Wu's formula, those with most spots first."""
     cases = [
         f"{material} on {surface} ({100 * share:.0f} % of single spots)"
         for (surface, material), share in sorted(shares.items(), key=lambda item: -item[1])
@@ -316,27 +307,22 @@ def _describe_shares(shares):
     return f"outside: {join_first(cases)}" if cases else ""
 
 
-def _outside(study):
-    """Yield, for each surface and material, the largest share of single spots outside the range of Wu's formula.
+def _shares_outside(study):
+    """Return the largest share of single spots outside the range of Wu's formula, by surface and material.
 
-    The share is taken at the end of the first loading; it is the largest over seeds and slopes. Without adhesion no
-    spot jumps, and the share is None.
+    The share is taken at the end of the first loading; the largest value is over seeds and slopes. Materials without
+    adhesion are left out, because their spots do not jump.
     """
-    runs = study[["status", "leg", "outside_wu_fraction", "surface_energy"]].sel(model=DEFAULT_MODEL)
-    status = runs["status"].transpose(*LABELS[1:]).values
-    share, leg = (runs[name].transpose(*LABELS[1:], "step").values for name in ("outside_wu_fraction", "leg"))
-    energy = runs["surface_energy"].values
-    for s, surface in enumerate(runs["surface"].values):
-        for m, material in enumerate(runs["material"].values):
-            computed = np.isin(status[s, ..., m], COMPUTED_RUNS)
-            loadings = zip(share[s, ..., m, :][computed], leg[s, ..., m, :][computed] == 0, strict=True)
-            ends = [values[loading][-1] for values, loading in loadings if loading.any()]
-            if ends:
-                yield str(surface), str(material), float(max(ends)) if energy[m] > 0 else None
+    runs = study[["status", "leg", "outside_wu_fraction", "surface_energy"]].sel(model=DEFAULT_MODEL).load()
+    end = (runs["leg"] == 0).sum("step") - 1
+    counted = runs["status"].isin(COMPUTED_RUNS) & (end >= 0) & (runs["surface_energy"] > 0)
+    shares = runs["outside_wu_fraction"].isel(step=end.clip(min=0)).where(counted).max(("seed", "rms_slope"))
+    shares = shares.transpose("surface", "material").to_series().dropna()
+    return {tuple(map(str, case)): share for case, share in shares.items()}
 
 
 def _used(models):
-    """Describe which models compute which studies."""
+    """List the studies that each model computes."""
     studies: dict[str, list[str]] = {}
     for study, names in models.items():
         for model in names:
@@ -345,14 +331,10 @@ def _used(models):
 
 
 def _error(adhesive):
-    """Describe the errors against boundary elements; `adhesive` contains True for runs with adhesion, False without."""
-
-    def describe(quantity):
-        ranges = [VALIDATION[each][quantity] for each in sorted(adhesive, reverse=True)]
-        first, *others = (f"{-high:.0f} to {-low:.0f} %" for low, high in ranges)
-        if not others or others == [first]:
-            return f"{first} too small"
-        return f"{first} too small with adhesion and {others[0]} without"
-
-    quantities = ", ".join(f"{name} {describe(name)}" for name in VALIDATION[True])
-    return f"{quantities}, compared with boundary elements"
+    """Describe the errors of runs with adhesion, if `adhesive` contains True, and without, if it contains False."""
+    found = []
+    for quantity in VALIDATION[True]:
+        ranges = (VALIDATION[each][quantity] for each in sorted(adhesive, reverse=True))
+        first, *others = dict.fromkeys(f"{-high:.0f} to {-low:.0f} %" for low, high in ranges)
+        found.append(f"{quantity} {first} too small" + (f" with adhesion and {others[0]} without" if others else ""))
+    return f"{', '.join(found)}, compared with boundary elements"

@@ -11,20 +11,17 @@ from icha.surfaces.square import periodic_difference
 
 
 def overlapping_pairs(position, a, first, second, r):
-    """Return the pairs of spots that overlap, r_ij < a_i + a_j.
+    """Return the pairs (k, 2) of spots that overlap, r_ij < a_i + a_j, sorted by the depth of their overlap.
+
+    The deepest overlap a_i + a_j - r_ij is the first one. Pairs of equal depth are sorted by their positions, so that
+    the result does not depend on the order of the input.
 
     Parameters
     ----------
     position : (n, 2) float, centres, m.
     a : (n,) float, contact radii, m.
-    first, second : (p,) int, spots of near pairs, each pair in both orders; the order with the larger spot first
-        counts.
+    first, second : (p,) int, indices of the spots of pairs; a pair counts only with the larger spot first.
     r : (p,) float, distances of the pairs, m.
-
-    Returns
-    -------
-    (k, 2) int, with the deepest overlap a_i + a_j - r_ij first. Pairs of equal depth are in the order of their
-    positions, so that the result does not depend on the order of the input.
     """
     depth = a[first] + a[second] - r
     larger = (a[second] < a[first]) | ((a[second] == a[first]) & (second > first))
@@ -39,7 +36,7 @@ def overlapping_pairs(position, a, first, second, r):
 
 
 def disjoint_pairs(pairs):
-    """Select pairs, in order of precedence, so that every spot is in one pair at most."""
+    """Select from pairs (k, 2) of spots, the first ones first, so that every spot is in one pair at most."""
     taken, chosen = set(), []
     for i, j in pairs.tolist():
         if i not in taken and j not in taken:
@@ -49,7 +46,7 @@ def disjoint_pairs(pairs):
 
 
 def equivalent_spots(law: JKR, position_i, a_i, R_i, position_j, a_j, R_j, period):
-    """Return centre (k, 2), contact radius and radius of curvature (k,) of the spots that replace pairs i, j, m."""
+    """Return centres (k, 2), contact radii and radii of curvature (k,), m, of the spots that replace k pairs i, j."""
     a, R, fraction = law.union(a_i, R_i, a_j, R_j)
     offset = periodic_difference(position_j, position_i, period)
     centre = np.mod(position_i + fraction[:, None] * offset, period)
@@ -58,7 +55,7 @@ def equivalent_spots(law: JKR, position_i, a_i, R_i, position_j, a_j, R_j, perio
 
 
 def covering_spot(points, position, a, period, larger_than=None):
-    """Return the spot that covers each point deepest, (k,) int; -1 where no spot covers it.
+    """Return the index of the spot that covers each point deepest, (k,) int; -1 where no spot covers it.
 
     Parameters
     ----------
@@ -79,5 +76,5 @@ def covering_spot(points, position, a, period, larger_than=None):
         inside &= (a[j] > larger_than[i]) | ((a[j] == larger_than[i]) & (j < i))
     i, j, depth = i[inside], j[inside], depth[inside]
     order = np.lexsort((-j, depth))
-    covering[i[order]] = j[order]  # the deepest cover comes last and replaces the others
+    covering[i[order]] = j[order]  # the deepest cover is the last one and replaces the others
     return covering

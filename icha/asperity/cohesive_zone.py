@@ -1,15 +1,15 @@
 """Resolution of a range of attraction on a grid: the cohesive zone around an adhesive contact must span its cells.
 
 The traction at a gap u is (dgamma/rho) exp(-u/rho). Two dimensionless numbers decide: the spacing over the length of
-the cohesive zone, and the step by which a single node jumps into contact over the range rho (A. Wang, Y. Zhou and
-M. H. Müser, Lubricants 9 (2021) 17, doi:10.3390/lubricants9020017).
+the cohesive zone; and the distance over which a single node jumps into contact, relative to the range rho (A. Wang,
+Y. Zhou and M. H. Müser, Lubricants 9 (2021) 17, doi:10.3390/lubricants9020017).
 """
 
 import math
 
 from icha.asperity.material import Material
 
-# Smallest strength number that is refused: nodes jump into contact one at a time there.
+# Smallest strength number at which nodes jump into contact one at a time, so that the grid is refused.
 MAX_STRENGTH_NUMBER = 0.5
 
 
@@ -25,20 +25,15 @@ def strength_number(material: Material, spacing: float) -> float:
     return math.sqrt(material.adhesion_length * spacing) / material.interaction_range
 
 
-def is_resolved(material: Material, spacing: float) -> bool:
-    """Return whether a grid of this spacing, m, resolves the attraction; always true without adhesion."""
-    return spacing <= longest_spacing(material) and strength_number(material, spacing) < MAX_STRENGTH_NUMBER
-
-
 def shortest_range(material: Material, spacing: float) -> float:
-    """Return the range of attraction, m, above which a grid of this spacing, m, resolves it."""
+    """Return the shortest range of attraction, m, that a grid of this spacing, m, resolves."""
     zone = math.sqrt(3 * math.pi * material.adhesion_length * spacing / 8)
     return max(zone, math.sqrt(material.adhesion_length * spacing) / MAX_STRENGTH_NUMBER)
 
 
 def resolution_problem(material: Material, spacing: float) -> str | None:
-    """Return why a grid of this spacing, m, does not resolve the attraction, with all numbers; None if it does."""
-    if is_resolved(material, spacing):
+    """Return the reason why a grid of this spacing, m, does not resolve the attraction; None if it does."""
+    if spacing <= longest_spacing(material) and strength_number(material, spacing) < MAX_STRENGTH_NUMBER:
         return None
     return (
         f"a range of {material.interaction_range:.4g} m is not resolved by a grid of spacing {spacing:.4g} m: "

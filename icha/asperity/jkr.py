@@ -12,7 +12,7 @@ from scipy.special import beta
 
 from icha.asperity.material import WU_HOLDS_FROM, Material
 
-# Largest number of Newton steps for the contact radius.
+# Largest number of Newton steps in the search for a contact radius.
 _MAX_NEWTON_STEPS = 200
 
 
@@ -20,12 +20,10 @@ _MAX_NEWTON_STEPS = 200
 class JKR:
     """Contact of one paraboloid with an elastic half-space.
 
-    The solver of many spots needs no more of a law than the methods of this class.
+    The solver of many spots uses no other properties of a law than the methods of this class.
     """
 
     material: Material
-
-    # --- one asperity ---------------------------------------------------------------------------------------
 
     def force(self, a, R):
         """Return the contact force F, N, eq. (1): 4 E* a^3/(3R) - sqrt(8 pi E* gamma a^3)."""
@@ -50,17 +48,14 @@ class JKR:
         )
 
     def approach_derivative(self, a, R):
-        """Return d(delta)/da = 2a/R - sqrt(pi gamma/(2 E* a)); eq. (7) of the paper lacks the 2 under the root.
-
-        With adhesion `a` must be positive.
-        """
+        """Return d(delta)/da = 2a/R - sqrt(pi gamma/(2 E* a)) for a > 0; eq. (7) of the paper lacks the 2."""
         slope = 2 * a / R
         if self.material.surface_energy > 0:
             slope = slope - np.sqrt(np.pi * self.material.adhesion_length / (2 * a))
         return slope
 
     def radius_derivative(self, a, R):
-        """Return da/d(delta) for a > 0, bounded close to jump-off, where it is infinite."""
+        """Return da/d(delta) for a > 0, limited near jump-off, where it is infinite."""
         return 1 / np.maximum(self.approach_derivative(a, R), 1e-3 * (a / R))
 
     def contact_radius(self, approach, R):
@@ -88,7 +83,7 @@ class JKR:
         return a_unit * x**2
 
     def energy(self, a, R):
-        """Return the stored energy, elastic less adhesive, J: the work integral of F d(delta) from no contact.
+        """Return the elastic energy minus the energy of adhesion, J: the integral of F d(delta) from a = 0.
 
         8 E* a^5/(15 R^2) - (8/3) sqrt(pi E* gamma/2) a^(7/2)/R + pi gamma a^2, from eqs. (1) and (2).
         """
@@ -96,10 +91,8 @@ class JKR:
         hertz = 8 / 15 * E * a**5 / R**2
         return hertz - 8 / 3 * np.sqrt(np.pi * E * gamma / 2) * a**3.5 / R + np.pi * gamma * a**2
 
-    # --- instabilities --------------------------------------------------------------------------------------
-
     def jump_off_radius(self, R):
-        """Return the contact radius where contact breaks at given displacement, (pi gamma R^2/(8 E*))^(1/3), m."""
+        """Return the contact radius at the smallest approach, where contact breaks, (pi gamma R^2/(8 E*))^(1/3), m."""
         return np.cbrt(np.pi / 8 * self.material.adhesion_length * np.asarray(R, float) ** 2)
 
     def jump_off_approach(self, R):
@@ -109,8 +102,8 @@ class JKR:
     def jump_in_approach(self, R):
         """Return the approach at which contact forms, (1 - 2.641 mu^(3/7)) epsilon, eq. (3), m; negative for a gap.
 
-        The formula gives less than the jump-off approach, where no JKR state exists, for mu below about 1.06, and more
-        than zero for very small mu. The result is clipped to this interval. It is zero without adhesion.
+        For mu below about 1.06 the formula gives less than the jump-off approach, where no JKR state exists. For very
+        small mu it gives more than zero. The result is limited to this interval. It is zero without adhesion.
         """
         if self.material.surface_energy == 0:
             return np.zeros(np.shape(R))
@@ -118,10 +111,8 @@ class JKR:
         return np.clip(wu, self.jump_off_approach(R), 0.0)
 
     def is_jump_in_verified(self, R):
-        """Return whether Wu's formula holds at the Tabor parameter of these paraboloids."""
+        """Return whether Wu's formula is accurate for these radii: whether the Tabor parameter is 1 or more."""
         return self.material.tabor_parameter(R) >= WU_HOLDS_FROM
-
-    # --- the half-space around the spot ---------------------------------------------------------------------
 
     def displacement(self, r, a, R):
         """Return the normal displacement of the half-space at distance r from the centre of the spot, m.
@@ -147,7 +138,7 @@ class JKR:
         """Return the derivative of `displacement` with respect to a, for a > 0.
 
         The adhesive part, sqrt(a)/sqrt(r^2 - a^2), is singular at the edge. Within 2.5 % of the radius from the edge it
-        is constant: in equilibrium no centre of another spot is so close, and a Newton step needs no steeper slope.
+        is kept constant. In equilibrium no centre of another spot is so close to the edge.
         """
         outside = r > a
         arc = np.arcsin(np.where(outside, a / np.maximum(r, a), 1.0))
@@ -159,9 +150,9 @@ class JKR:
         return value
 
     def second_moment(self, a, R):
-        """Return a quarter of the integral of p r^2 over the spot, N m^2, the second term of its far field.
+        """Return 1/4 of the integral of p r^2 over the spot, N m^2: the strength of the second term of its far field.
 
-        Hertz's pressure has the mean square radius 2a^2/5, the flat punch's 2a^2/3.
+        The mean of r^2 is 2a^2/5 for Hertz's pressure and 2a^2/3 for that of the flat punch.
         """
         return a**2 * (self.repulsive_force(a, R) / 10 - self.adhesive_force(a) / 6)
 
@@ -170,9 +161,9 @@ class JKR:
         return a * (self.repulsive_force(a, R) / 2 - self.adhesive_force(a) * (3.5 / 6))
 
     def fourth_moment(self, a, R):
-        """Return 9/64 of the integral of p r^4 over the spot, N m^4, the third term of its far field.
+        """Return 9/64 of the integral of p r^4 over the spot, N m^4: the strength of the third term of its far field.
 
-        Hertz's pressure has the mean fourth power 8a^4/35, the flat punch's 8a^4/15.
+        The mean of r^4 is 8a^4/35 for Hertz's pressure and 8a^4/15 for that of the flat punch.
         """
         return a**4 * (self.repulsive_force(a, R) * (9 / 280) - self.adhesive_force(a) * (3 / 40))
 
@@ -183,31 +174,24 @@ class JKR:
     def moments(self, a, R, count):
         """Return the integrals of p (r/a)^(2k), k = 0 ... count-1, over spots a, R (m,): (m, count), N."""
         order = np.arange(count)
-        # Means over Hertz's and over the flat punch's pressure.
+        # Means of (r/a)^(2k), weighted with Hertz's pressure and with that of the flat punch.
         hertz, punch = 1.5 * beta(order + 1, 1.5), 0.5 * beta(order + 1, 0.5)
         return self.repulsive_force(a, R)[:, None] * hertz - self.adhesive_force(a)[:, None] * punch
 
-    # --- the pressure inside the spot -----------------------------------------------------------------------
-
     def pressure_amplitudes(self, a, R):
-        """Return P and B of eq. (8), p(r) = P sqrt(1-r^2/a^2) - B/sqrt(1-r^2/a^2), Pa."""
+        """Return P and B (Pa) of the pressure in eq. (8), p(r) = P sqrt(1-r^2/a^2) - B/sqrt(1-r^2/a^2)."""
         peak = 2 * self.material.contact_modulus * a / (np.pi * R)
         neck = np.sqrt(2 * self.material.contact_modulus * self.material.surface_energy / (np.pi * a))
         return peak, neck
 
-    def largest_pressure(self, a, R):
-        """Return the pressure in the centre of the spot, P - B, Pa."""
-        peak, neck = self.pressure_amplitudes(a, R)
-        return peak - neck
-
     def pressure(self, r, a, R):
-        """Return the contact pressure at r < a, eq. (8), Pa."""
+        """Return the contact pressure at the distance r < a from the centre of the spot, eq. (8), Pa."""
         peak, neck = self.pressure_amplitudes(a, R)
         s = np.sqrt(1 - (r / a) ** 2)
         return peak * s - neck / s
 
     def pressure_distribution(self, p, a, R):
-        """Return the area of the spot with pressure up to p (m^2), and the force on this area (N).
+        """Return the area of the spot where the pressure is at most p, Pa, and the force on this area: m^2 and N.
 
         The pressure rises with s = sqrt(1 - r^2/a^2); the area up to s is pi a^2 s^2 and its force
         2 pi a^2 (P s^3/3 - B s).
@@ -220,32 +204,30 @@ class JKR:
         s = np.minimum(s, 1.0)
         return np.pi * a**2 * s**2, 2 * np.pi * a**2 * (peak * s**3 / 3 - neck * s)
 
-    # --- unions of two spots -----------------------------------------------------------------------------------
-
     def union(self, a_i, R_i, a_j, R_j):
         """Return contact radius and radius of curvature of the union of two spots, m, and the position of its centre.
 
-        a^2 = a_i^2 + a_j^2 and R^2 = R_i^2 + R_j^2. The centre is the centroid of the volumes of the caps, pi a^4/(4R),
-        as a fraction of the distance from the first spot to the second.
+        a^2 = a_i^2 + a_j^2 and R^2 = R_i^2 + R_j^2. The centre is the centroid of the cap volumes pi a^4/(4R). Its
+        position is a fraction of the distance from the first spot to the second.
         """
         volume_i, volume_j = a_i**4 / R_i, a_j**4 / R_j
         return np.hypot(a_i, a_j), np.hypot(R_i, R_j), volume_j / (volume_i + volume_j)
 
 
 def wu_gap(tabor_parameter: np.ndarray | float) -> np.ndarray | float:
-    """Return Wu's gap at the jump into contact over the range of attraction, 2.641 mu^(3/7), eq. (3)."""
+    """Return the gap at the jump into contact over the range of attraction, 2.641 mu^(3/7), Wu's formula in eq. (3)."""
     return 2.641 * tabor_parameter ** (3 / 7)
 
 
 class MaterialUnits:
-    """Properties of a contact that follow from the law of a spot and the rms slope of the surface."""
+    """Base class with the properties of a contact that follow from its law and the rms slope of the surface."""
 
     law: JKR
     rms_slope: float
 
     @property
     def adhesive(self) -> bool:
-        """True if contact forms and breaks in jumps."""
+        """True with adhesion: contact forms and breaks in jumps."""
         return self.law.material.surface_energy > 0
 
     @property

@@ -1,33 +1,33 @@
-"""Material: composite modulus, energy of adhesion and range of attraction."""
+"""Material of a contact: composite modulus, work of adhesion, range of attraction, and size of flaws."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
-from icha.asperity.full_contact import flaw_strength, theoretical_strength
 from icha.support.rules import ADHESION_LENGTH, CONTACT_MODULUS, LENGTH, SURFACE_ENERGY
 
-# From this Tabor parameter on Wu's distance of the jump into contact is within 0.5 % of the exact one, which
-# validation.jump_in computes.
+# Smallest Tabor parameter for which Wu's distance of the jump into contact is within 0.5 % of the exact distance
+# (`validation/jump_in.py`).
 WU_HOLDS_FROM = 1.0
 
 
 @dataclass(frozen=True)
 class Material:
-    """Composite elastic modulus, adhesion energy and range of attraction of an interface.
+    """Composite elastic modulus, work of adhesion, range of attraction and largest flaw of an interface.
 
     Parameters
     ----------
     contact_modulus : E*, composite elastic modulus, Pa, in [1e-9, 1e15].
-    surface_energy : energy of adhesion per unit area, J/m^2; zero, which is adhesionless contact, or in (0, 1e24] and,
-        over the modulus, in [1e-40, 1e9] m.
+    surface_energy : work of adhesion dgamma (gamma in the paper), J/m^2, at most 1e24; zero for contact without
+        adhesion, otherwise the ratio to the modulus is in [1e-40, 1e9] m.
     interaction_range : range of the attractive forces (epsilon in eq. 3 of Violano & Afferrante), m, in [1e-24, 1e9].
     flaw_radius : radius of the largest flaw of the interface, m, in [1e-24, 1e9]; 0 for an interface without flaws.
 
     Raises
     ------
     ValueError
-        Naming the parameter whose value is not allowed.
+        If a value is out of range; the message names the parameter.
     """
 
     contact_modulus: float
@@ -37,31 +37,35 @@ class Material:
 
     def __post_init__(self):
         """Check the values."""
-        object.__setattr__(self, "contact_modulus", CONTACT_MODULUS.validate("contact_modulus", self.contact_modulus))
-        object.__setattr__(self, "surface_energy", SURFACE_ENERGY.validate("surface_energy", self.surface_energy))
-        object.__setattr__(self, "interaction_range", LENGTH.validate("interaction_range", self.interaction_range))
-        if self.flaw_radius != 0:
-            object.__setattr__(self, "flaw_radius", LENGTH.validate("flaw_radius", self.flaw_radius))
+        rules = {"contact_modulus": CONTACT_MODULUS, "surface_energy": SURFACE_ENERGY, "interaction_range": LENGTH}
+        rules |= {"flaw_radius": LENGTH} if self.flaw_radius != 0 else {}
+        for name, rule in rules.items():
+            object.__setattr__(self, name, rule.validate(name, getattr(self, name)))
         if self.surface_energy:
             ADHESION_LENGTH.validate("surface_energy over contact_modulus", self.adhesion_length)
 
     @property
     def adhesion_length(self) -> float:
-        """Surface energy over contact modulus, m: the elasto-adhesive length."""
+        """Surface energy over contact modulus, the elasto-adhesive length, m."""
         return self.surface_energy / self.contact_modulus
 
     @property
     def theoretical_strength(self) -> float:
-        """Largest tension of the attraction, Pa."""
-        return theoretical_strength(self.surface_energy, self.interaction_range)
+        """Largest tension of a Lennard-Jones attraction, 16/(9 sqrt(3)) dgamma/epsilon, Pa."""
+        return 16 / (9 * math.sqrt(3)) * self.surface_energy / self.interaction_range
 
     @property
     def interface_strength(self) -> float:
-        """Tension at which closed contact opens, Pa: the theoretical strength, or that of the flaw if it is lower."""
+        """Tension at which closed contact opens, Pa: the theoretical strength, or that of the flaw if it is lower.
+
+        A penny-shaped crack of radius a grows at the tension sigma = sqrt(pi E* dgamma/(2 a)). Its stress intensity
+        K = 2 sigma sqrt(a/pi) then has the energy release rate K^2/(2 E*) = dgamma, because one of the two bodies is
+        rigid (I. N. Sneddon, Proc. R. Soc. A 187 (1946) 229-260).
+        """
         if not self.flaw_radius:
             return self.theoretical_strength
-        of_flaw = flaw_strength(self.contact_modulus, self.surface_energy, self.flaw_radius)
-        return min(self.theoretical_strength, of_flaw)
+        flaw_strength = math.sqrt(math.pi * self.contact_modulus * self.surface_energy / (2 * self.flaw_radius))
+        return min(self.theoretical_strength, flaw_strength)
 
     def tabor_parameter(self, R: np.ndarray | float) -> np.ndarray:
         """Return the Tabor parameter (gamma^2 R/E*^2)^(1/3)/epsilon for radii of curvature R, m; see eq. (3)."""

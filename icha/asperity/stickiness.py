@@ -1,4 +1,4 @@
-"""Stickiness of rough surfaces: attraction over repulsion where they touch."""
+"""Stickiness of rough surfaces: ratio of the attractive to the repulsive force where they touch."""
 
 import numpy as np
 
@@ -10,27 +10,21 @@ REPULSIVE_AREA_SLOPE = 2.0
 
 
 def stickiness(moments: SpectralMoments, material: Material) -> float:
-    r"""Return the ratio of attraction to repulsion in contact; surfaces above 1 stick, and without adhesion it is 0.
+    r"""Return the ratio of the attractive to the repulsive force in contact; above 1 the surface is sticky.
 
-    L. Pastewka and M. O. Robbins, PNAS 111 (2014) 3298-3303, doi:10.1073/pnas.1320846111. The contact, of area A, feels
-    the mean repulsive pressure h' E*/kappa with kappa = 2. Around it lies the area of a gap less than the range r of
-    the attraction, of the stress dgamma/r; by Hertz's gap beside a contact of mean diameter d = 4 h'/h'' that area is
+    L. Pastewka and M. O. Robbins, PNAS 111 (2014) 3298-3303, doi:10.1073/pnas.1320846111. On the contact area A acts
+    the mean repulsive pressure h' E*/kappa with kappa = 2. Around the contact, where the gap is less than the range r
+    of attraction of the material, acts the stress dgamma/r. By Hertz's gap beside a contact of mean diameter
+    d = 4 h'/h'' the attractive area is
 
         A_att/A = pi [3 h'' r/(16 h'^2)]^(2/3).
 
-    The ratio of the two forces is kappa/kappa_att in their notation. It exceeds 1 where their criterion for sticking
-    holds,
+    Here h' is the rms slope and h'' the rms Laplacian. The ratio is kappa/kappa_att in their notation. It exceeds 1
+    where their criterion for sticking holds, (h' r E*/(kappa dgamma)) [h' d/(4 r)]^(2/3) < pi (3/16)^(2/3) = 1.03. The
+    criterion needs an attraction of so short a range that A_att is small compared with A: J. M. Monti, A. Sanner and
+    L. Pastewka, Tribol. Lett. 69 (2021), doi:10.1007/s11249-021-01454-6. Without adhesion the ratio is 0.
 
-        (h' r E*/(kappa dgamma)) [h' d/(4 r)]^(2/3) < pi (3/16)^(2/3) = 1.03.
-
-    Here h' is the rms slope, h'' the rms Laplacian. The criterion needs an attraction of short range,
-    whose area stays small compared with A: J. M. Monti, A. Sanner and L. Pastewka, Tribol. Lett. 69 (2021),
-    doi:10.1007/s11249-021-01454-6. Here r is the range of the material.
-
-    Parameters
-    ----------
-    moments : of the surface, at its own rms slope.
-    material : contact modulus, surface energy and range of attraction.
+    moments : spectral moments of the surface at its own rms slope.
     """
     slope, reach = moments.rms_slope, material.interaction_range
     attractive_area = np.pi * np.cbrt(3 * moments.rms_laplacian * reach / (16 * slope**2)) ** 2

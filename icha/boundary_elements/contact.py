@@ -81,11 +81,8 @@ class BoundaryElements(FullContactProblem):
         """
         if let_go:
             raise NotConverged("boundary elements cannot let go of single patches")
-        if self.is_full(state):
-            new = self._leave_full_contact(state, separation, control)
-        else:
-            new = self._next_equilibrium(state, separation, control)
-        return self.continue_from(new, state)
+        find = self._leave_full_contact if self.is_full(state) else self._next_equilibrium
+        return self.continue_from(find(state, separation, control), state)
 
     def continue_from(self, state: CellState, before: CellState) -> CellState:
         """Return a state with the history of another one and the events since then."""
@@ -107,12 +104,12 @@ class BoundaryElements(FullContactProblem):
         """Equilibrium from full contact, which opens at the weakest place; arguments as of `equilibrium`."""
         if control is None and separation <= 0:
             return self.full_contact(self.closing_pressure)
-        if control is not None and control.quantity == PRESSURE and control.target >= self.opening_pressure:
-            return self.full_contact(control.target)
-        if control is not None and control.quantity == AREA_FRACTION and control.target >= 1:
-            return state
         if control is None and self.pressure(state) > self.opening_pressure + ROUNDING * self.contact_modulus:
             return self.full_contact(self.opening_pressure)
+        if control and control.quantity == PRESSURE and control.target >= self.opening_pressure:
+            return self.full_contact(control.target)
+        if control and control.quantity == AREA_FRACTION and control.target >= 1:
+            return state
         separation = max(separation, self.smallest_gap)
         return self._next_equilibrium(self.open_weakest(separation), separation, control)
 
@@ -122,8 +119,7 @@ class BoundaryElements(FullContactProblem):
 
     def relax_region(self, region: np.ndarray, separation: float) -> CellState:
         """Relax a contact of a given region, (n, n) of bool, to equilibrium at a separation (m)."""
-        cells = np.flatnonzero(region)
-        nothing = np.zeros(len(cells))
+        cells, nothing = np.flatnonzero(region), np.zeros(np.count_nonzero(region))
         return self.equilibrium(CellState(separation, cells, nothing + 1, nothing, nothing), separation)
 
     def pressure(self, state: CellState) -> float:

@@ -220,8 +220,7 @@ def relax_front(
                 relaxation.step(active)
         except Stagnation as failure:
             if active.residual > TOLERANCES.stagnation:
-                message = f"{failure} (residual of sqrt(G/dgamma): {active.residual:.1e})"
-                raise NotConverged(message) from None
+                raise NotConverged(f"{failure} (residual of sqrt(G/dgamma): {active.residual:.1e})") from None
             if not relaxation.refine(TOLERANCES.displacement):
                 return relaxation.state
     if max_steps or active.residual <= TOLERANCES.stagnation:

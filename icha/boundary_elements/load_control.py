@@ -136,6 +136,7 @@ def solve_at_control(problem: ControlProblem, state: CellState, separation: floa
     whole = bracket = Bracket(np.sign(-problem.error(state)) or 1.0, same, state)
     if separation <= 0:
         separation = 0.5 * state.separation
+    reason = ""
     try:
         for _ in range(_MAX_ATTEMPTS):
             trial, bracket = bracket_loosely(problem, bracket, separation, scale)
@@ -153,8 +154,6 @@ def solve_at_control(problem: ControlProblem, state: CellState, separation: floa
         reason = ": the contact closes over the whole surface"
     except NotConverged as failure:
         reason = f": {failure}"
-    else:
-        reason = ""
     raise NotConverged(f"a {control.quantity.replace('_', ' ')} of {control.target:g} is not met from here{reason}")
 
 

@@ -27,20 +27,19 @@ UNION_LIMIT = 1e-3
 
 # Meanings of the checks by name. Energies are relative to the largest work of the run.
 LOOP_CHECKS = {
-    "events": "number of events that are counted and not logged, or logged only",
+    "events": "number of events that are only in the counts or only in the log",
     "loss adds up": "hysteresis loss against its parts, over the largest work",
     "loss is the work": "hysteresis loss against the work done up to complete separation, over the largest work",
     "loop loses energy": "energy gained in the whole loop, over the largest work",
     "jumps lose energy": "energy gained in jumps into and out of contact together, over the largest work",
     "jumps off lose energy": "energy gained in jumps out of contact, over the largest work",
-    "unions lose energy": "energy gained in unions of spots and their undoing, over the largest work",
+    "unions lose energy": "energy gained in coalescence and splitting of spots, over the largest work",
     "load jumps lose energy": "energy gained in jumps at constant load, over the largest work",
     "separated: spots": "number of spots left in contact at the end of unloading",
     "separated: pressure": "nominal pressure left at the end of unloading, in Pa",
     "pull-off pressure": "pull-off pressure against the largest tension of the last unloading, over the largest "
     "pressure there",
-    "loop closes": "hysteresis loss without adhesion or union by rule, where nothing is irreversible, over the largest "
-    "work",
+    "loop closes": "hysteresis loss without adhesion and coalescence, which must be zero, over the largest work",
 }
 
 
@@ -74,7 +73,7 @@ def check_loop(run) -> Iterator[tuple]:
 
 def _has_united(run):
     """Return whether spots have united by a rule, which may cost or gain a little energy."""
-    return model_of(run.attrs).unites and int(run["coalescence_count"][-1]) > 0
+    return model_of(run.attrs).by_summits and int(run["coalescence_count"][-1]) > 0
 
 
 def _check_losses(run, scale):
@@ -102,8 +101,8 @@ def _check_losses(run, scale):
 def count_unshared_separations(run) -> int:
     """Count the separations of later legs that the first loading does not have.
 
-    At such a separation two steps of the later leg correspond to one of the first loading, each with an error of its
-    work.
+    At such a separation, two steps of the later leg correspond to one step of the first loading. The work of each step
+    has an error.
     """
     first, later = (np.unique(run["mean_separation"][run["leg"] == 0]), run["mean_separation"][run["leg"] > 0])
     same = 10 * RESIDUAL_TOLERANCE * float(run["rms_height"])
@@ -121,7 +120,7 @@ def work_error(run) -> float:
     """Bound the error of the work of a path by the tolerances of its equilibria, J/m^2.
 
     An error of the separation causes an error of the pressure that is larger by the factor of the stiffness. An error
-    of the stiffness changes the cubic through both ends of a step, whose integral is the work.
+    of the stiffness changes the cubic through both ends of a step; the work is the integral of this cubic.
     """
     width, stiffness = np.abs(np.diff(run["mean_separation"])), finite_stiffness(run)
     ends = np.abs(stiffness[1:]) + np.abs(stiffness[:-1])

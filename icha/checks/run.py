@@ -111,11 +111,6 @@ def _check_loading(run) -> Iterator[tuple]:
         yield "stiffness", np.count_nonzero(run["contact_stiffness"] < 0), 0
 
 
-def _largest_fall(values):
-    """Return the largest fall from one value to the next; 0 if no value falls."""
-    return float(np.max(-np.diff(values), initial=0.0))
-
-
 def _largest_fall_in_loading(loading, name):
     """Return the largest fall of a variable from target to target and from step to step, over its largest magnitude.
 
@@ -124,15 +119,16 @@ def _largest_fall_in_loading(loading, name):
     """
     values, at_targets = loading[name], loading["step_kind"] != BETWEEN
     united = np.cumsum(np.diff(loading["coalescence_count"], prepend=0) != 0)
-    parts = [values[at_targets], *(values[united == part] for part in np.unique(united))]
-    return max(map(_largest_fall, parts)) / (float(np.max(np.abs(values))) or 1.0)
+    parts = [values[at_targets], *(values[united == count] for count in np.unique(united))]
+    fall = max(float(np.max(-np.diff(part), initial=0.0)) for part in parts)
+    return fall / (float(np.max(np.abs(values))) or 1.0)
 
 
 def _largest_rises_of_separation(loading):
     """Return the largest rise of the mean separation in a step, m, where no spots unite, and where spots unite.
 
-    At targets of the area the separation may rise: if the area jumps past a target, the target is met on the branch
-    after the jump. Such steps do not count.
+    Steps to targets of the area do not count, because there the separation may rise: if the area jumps past a target,
+    the path meets the target on the branch after the jump.
     """
     rise = np.diff(loading["mean_separation"])
     given_area = (loading["step_kind"][1:] == AREA_FRACTION) & (np.diff(loading["contact_area_fraction"]) > 0)
@@ -141,7 +137,7 @@ def _largest_rises_of_separation(loading):
 
 
 def _target_error(run):
-    """Return the largest relative error of a target; from areas counted in cells, their tolerance is subtracted."""
+    """Return the largest relative error of a target; the tolerance of areas counted in cells is subtracted."""
     scale = float(run["contact_modulus"])
     reached = {
         "reduced_pressure": run["reduced_pressure"],

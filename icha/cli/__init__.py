@@ -12,7 +12,6 @@ from icha.cli.new import new
 from icha.cli.project import echo, reports_errors
 from icha.cli.run import run
 from icha.cli.show import show
-from icha.cli.simulate import simulate
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -40,13 +39,14 @@ def icha(
 ) -> None:
     """Adhesive contact of rough surfaces: campaigns of runs from one YAML file.
 
-    Start with `icha new NAME`, look at it with `icha describe NAME`, compute it with `icha run NAME`.
+    Write a campaign with `icha new NAME`. See what it will compute with `icha describe NAME`. Compute it with
+    `icha run NAME`.
 
-    Exit status: 0 on success, 1 if something failed, 2 if the call or the configuration is wrong.
+    Exit status: 0 on success, 1 if a job, a check or a file has failed, 2 if the call or the configuration is wrong.
     """
 
 
-for command in (new, describe, run, simulate, show, explore, check, verify, reproduce, upload):
+for command in (new, describe, run, show, explore, check, verify, reproduce, upload):
     app.command()(reports_errors(command))
 
 

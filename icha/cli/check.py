@@ -12,7 +12,7 @@ from icha.support.formatting import format_count, printable
 def check(
     files: Annotated[list[Path], typer.Argument(help="Runs, surfaces, campaign datasets or other results.")],
 ) -> None:
-    """Check files: documented names, dimensions, units and attributes, and the physics of every result.
+    """Check files: names, dimensions, units and attributes of their variables, and the physics of the results.
 
     The command checks all files, also after a problem, and prints all problems. Exit status: 0 if no file has problems,
     1 if a file has problems, 2 if ICHA cannot read a file.

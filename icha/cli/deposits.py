@@ -6,7 +6,6 @@ import re
 import shutil
 import sys
 import tempfile
-import textwrap
 from collections.abc import Iterator
 from importlib.metadata import version
 from pathlib import Path
@@ -39,18 +38,12 @@ def verify(deposit: Deposit, large: Large = False) -> None:
         with _intact(deposit, large) as folder:
             echo(f"{printable(deposit)}: intact: {_contents(folder)}")
     except _Damaged as damaged:
-        echo(damaged.problems)
-        echo(f"{printable(deposit)}: damaged: {format_count(damaged.count, 'problem')}", err=True, fg="red")
+        echo(damaged, err=True, fg="red")
         raise typer.Exit(FAILED) from None
 
 
 class _Damaged(UserError):
-    """A damaged deposit; `problems` lists what is wrong, and `count` is the number of problems."""
-
-    def __init__(self, deposit: Path, problems: tuple[str, ...]):
-        more = [f"… and {len(problems) - MOST_PROBLEMS:,} more"] if len(problems) > MOST_PROBLEMS else []
-        self.count, self.problems = len(problems), "\n".join([*problems[:MOST_PROBLEMS], *more])
-        super().__init__(f"{printable(deposit)}: the deposit is damaged:\n{self.problems}")
+    """A damaged deposit."""
 
 
 @contextlib.contextmanager
@@ -64,7 +57,10 @@ def _intact(deposit: Path, large: bool) -> Iterator[Path]:
         with whole_deposit(deposit, large=large) as folder:
             yield folder
     except DamagedDeposit as damaged:
-        raise _Damaged(deposit, damaged.args) from None
+        problems = damaged.args
+        more = [f"… and {len(problems) - MOST_PROBLEMS:,} more"] if len(problems) > MOST_PROBLEMS else []
+        heading = f"{printable(deposit)}: the deposit is damaged: {format_count(len(problems), 'problem')}"
+        raise _Damaged("\n".join([heading, *problems[:MOST_PROBLEMS], *more])) from None
 
 
 def _contents(folder: Path) -> str:
@@ -138,28 +134,16 @@ def reproduce(
 
 
 def _introduce(deposit: Path, original: Path, folder: Path | None) -> None:
-    """Print what a deposit contains and its metadata; refuse it if it was made with other versions."""
-    from icha.deposit.metadata import read_zenodo_metadata, summary_of
-    from icha.deposit.reproduce import RerunError, count_changed_files, other_versions
-    from icha.deposit.verify import ZENODO
+    """Print the size of a deposit and what computes it again; refuse it if it was made with other versions."""
+    from icha.deposit.reproduce import RerunError, other_versions
 
-    try:
-        metadata = summary_of(read_zenodo_metadata(original)) if (original / ZENODO).is_file() else {}
-    except ValueError as error:
-        raise RerunError(str(error)) from None
     echo(f"deposit:    {printable(deposit)}, {_contents(original)}")
-    echo("its metadata, which ICHA cannot verify:" if metadata else "it has no metadata on title and authors")
-    for name, text in metadata.items():
-        if text:
-            echo(f"  {name + ':':<10}{printable(textwrap.shorten(text, 200, placeholder=' …'))}")
     if differences := other_versions(original):
         raise RerunError(
             "was made with other versions than those installed; expected the same versions. Run `make environment` in "
             "a clone of that version, or in a copy of the deposit's source:\n" + "\n".join(differences)
         )
     echo(f"program:    the installed ICHA {version('icha')}; nothing in the deposit is executed")
-    if changed := count_changed_files(original):
-        echo(f"            (the deposit's source differs from it in {format_count(changed, 'file')})", fg="yellow")
     echo(f"writes to:  {shorten_path(folder) if folder else 'a temporary folder'}")
 
 
@@ -228,7 +212,13 @@ def upload(
         server = Zenodo(address, _token(address))
         with _intact(archive, large) as folder:
             metadata = read_zenodo_metadata(folder)
-            _refuse_foreign_doi(metadata, draft)
+            # Zenodo has reserved such a DOI for one draft, and all files of the deposit contain it.
+            reserved = re.fullmatch(r"10\.\d+/zenodo\.(\d+)", str(metadata.get("doi")))
+            if reserved and int(reserved[1]) != draft:
+                raise UserError(
+                    f"the deposit has the DOI {metadata['doi']}, which is reserved for draft {reserved[1]}; use "
+                    f"--draft {reserved[1]}, or make the deposit without publication.doi"
+                )
             files = [archive, folder / README, folder / CRATE]
             rows = {"to": f"{address}, {f'draft {draft}' if draft else 'new draft'}", **summary_of(metadata)}
             for path in files:
@@ -254,16 +244,6 @@ def _token(address: str) -> str:
             f"{address}/account/settings/applications/tokens/new/"
         )
     return token
-
-
-def _refuse_foreign_doi(metadata: dict, draft: int | None) -> None:
-    """Refuse a DOI that Zenodo has reserved for another draft, since all files of the deposit name it."""
-    found = re.fullmatch(r"10\.\d+/zenodo\.(\d+)", str(metadata.get("doi")))
-    if found and int(found[1]) != draft:
-        raise UserError(
-            f"the deposit has the DOI {metadata['doi']}, which is reserved for draft {found[1]}; use --draft "
-            f"{found[1]}, or make the deposit without publication.doi"
-        )
 
 
 def _send(server, files, metadata, number) -> None:

@@ -1,5 +1,6 @@
 """The command `icha describe`: what a campaign computes, what exists, and what the rest costs."""
 
+import statistics
 import sys
 from pathlib import Path
 from typing import Annotated
@@ -137,38 +138,40 @@ def _print_sums(console, items) -> None:
     """Print a table with a row for each kind of result."""
     from rich.table import Table
 
-    from icha.planning.plan import overhead, total
+    from icha.planning.costs import WORKFLOW
+    from icha.planning.plan import DONE, FAILED, start_up
+
+    def cells(items, further=0.0):
+        left = [item for item in items if item.to_do]
+        states = [item.state for item in items]
+        counts = len(items), states.count(DONE), states.count(FAILED), len(left)
+        each = formatting.duration(statistics.median(item.cost.seconds for item in items))
+        work = formatting.duration(sum(item.work for item in left) + further) if left else ""
+        memory, disk = max(item.cost.memory for item in items), sum(item.cost.disk for item in items)
+        return [*(str(count or "") for count in counts), each, work, formatting.size(memory), formatting.size(disk)]
 
     table = Table(box=None, pad_edge=False, header_style="dim", show_footer=True)
-    every, around = total(items), overhead(items)
-    footers = {"": "all", "files": str(every.count), "done": str(every.done), "failed": str(every.failed or "")}
-    footers |= {"to do": str(every.to_do), "each": "", "core time": formatting.duration(every.work + around)}
-    footers |= {"memory": formatting.size(every.memory), "disk": formatting.size(every.disk)}
-    for heading, footer in footers.items():
+    table.add_column("", footer="all", overflow="fold")
+    further = start_up(items) + WORKFLOW.job * sum(item.to_do for item in items)
+    headings = ("files", "done", "failed", "to do", "each", "core time", "memory", "disk")
+    for heading, footer in zip(headings, cells(items, further), strict=True):
         # A narrow terminal breaks the names, not the numbers.
-        table.add_column(
-            heading, footer=footer, justify="right" if heading else "left", no_wrap=bool(heading), overflow="fold"
-        )
+        table.add_column(heading, footer="" if heading == "each" else footer, justify="right", no_wrap=True)
     for kind in dict.fromkeys(item.part for item in items):
-        sums = total(item for item in items if item.part == kind)
-        counts = (str(count or "") for count in (sums.count, sums.done, sums.failed, sums.to_do))
-        work = formatting.duration(sums.work) if sums.to_do else ""
-        sizes = formatting.size(sums.memory), formatting.size(sums.disk)
-        table.add_row(kind, *counts, formatting.duration(sums.typical), work, *sizes)
-    if around:
-        table.add_row("starting and scheduling", "", "", "", "", "", formatting.duration(around))
+        table.add_row(kind, *cells([item for item in items if item.part == kind]))
+    if further:
+        table.add_row("starting and scheduling", *[""] * 5, formatting.duration(further))
     console.print(table)
     console.print()
 
 
 def _print_cost(console, items, cores: int, damaged) -> None:
-    from icha.planning.plan import memory_on, time_on, total
+    from icha.planning.plan import memory_on, time_on
 
     runs = [item for item in items if item.is_run]
-    every = total(items)
-    if every.to_do or damaged:
+    if damaged or any(item.to_do for item in items):
         time, memory = formatting.duration(time_on(items, cores)), formatting.size(memory_on(items, cores))
-        disk = formatting.size(every.disk)
+        disk = formatting.size(sum(item.cost.disk for item in items))
         console.print(
             f"{format_count(len(runs), 'run')}, {sum(item.to_do for item in runs)} to do: about [bold]{time}[/] and "
             f"{memory} of memory on {format_count(cores, 'core')}; {disk} of disk for all results."

@@ -23,21 +23,16 @@ def explore(
     """Write a page on which a slider moves along the loading paths of a campaign.
 
     On the page, choose a contact and a model. The slider changes the spots or patches on the topography, the marked
-    point on the curves, and the distributions. The page is one file and needs no network. Contacts that do not fit on
-    the page are omitted and counted.
+    point on the curves, and the distributions. The page is one file and needs no network. If the page has no room for
+    all contacts, the command prints how many it has omitted.
     """
     from icha.datasets.results import EXPLORER
     from icha.deposit.verify import CHECKSUMS
     from icha.report.explorer import write_explorer
 
-    if not results.is_dir():
-        problem = "is a file" if results.exists() else "no such folder"
-        raise UserError(f"{results}: {problem}; expected the results of a campaign, results/<campaign>")
     if output is None and (results / CHECKSUMS).is_file():
         raise UserError(f"{results}: is a deposit, which must not change; choose another file with --output")
     page = output or results / EXPLORER
-    if page.is_dir():
-        raise UserError(f"--output {page}: is a folder; expected the name of an HTML file")
     choices = {"study": study, "surface": surface, "material": material, "seed": seed}
     only = {name: values for name, values in choices.items() if values}
     try:

@@ -14,30 +14,14 @@ from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
-from icha.datasets.results import CHECKS, MODEL_ERROR, REPORT
+from icha.cli.project import TARGETS
 from icha.support import formatting
 from icha.support.formatting import printable
 
-# Rules without a job of their own: they collect files of other rules.
-TARGET_RULES = ("all", "surfaces", "runs", "references", "dataset", "figures", "report", "publish")
 # Measured times outweigh expected ones once the jobs have taken this long, in s.
 PRIOR_SECONDS = 5.0
-# Expected core-seconds of a job without an estimate, which writes a few lines.
+# Expected core-seconds of a job that the plan does not list. Such a job writes a few lines.
 DEFAULT_SECONDS = 0.1
-# Rule of an output file by the beginning of its path in the folder of results; the first match counts.
-RULES = {
-    "surfaces/": "surface",
-    "runs/": "run",
-    "references/boundary_elements/": "boundary_elements",
-    "references/loops/": "boundary_element_loop",
-    "references/": "reference",
-    "dataset/": "campaign_dataset",
-    MODEL_ERROR: "model_error",
-    "aggregated/": "comparison",
-    CHECKS: "checks",
-    "figures/": "figure",
-    REPORT: "report_page",
-}
 MOST_JOBS = 8  # running jobs in the live view
 MOST_ERROR_LINES = 3  # of a failed job in the view
 
@@ -48,27 +32,22 @@ class JobRecord:
 
     Attributes
     ----------
-    rule : its rule.
+    rule : name of its rule in Snakemake.
     title : the message of the rule.
     outputs : paths of its results.
-    logs : paths of its logs.
+    log : path of its log; empty without a log.
     started : time in s.
-    ended : time in s; None while the job runs.
+    seconds : duration in s; 0 while the job runs.
     threads : number of cores that it uses.
     """
 
     rule: str
     title: str
     outputs: tuple[str, ...]
-    logs: tuple[str, ...]
+    log: str
     started: float
-    ended: float | None = None
+    seconds: float = 0.0
     threads: int = 1
-
-    @property
-    def seconds(self) -> float:
-        """Duration in s; 0 while the job runs."""
-        return (self.ended or self.started) - self.started
 
 
 @dataclass
@@ -79,7 +58,7 @@ class Progress:
 
     Attributes
     ----------
-    expected : expected core-seconds of the job of an output file, by the path of the file.
+    expected : rule and expected core-seconds of the job of an output file, by the path of the file.
     clock : function that returns the time in s.
     total : number of jobs by rule.
     running : running jobs by their number.
@@ -90,7 +69,7 @@ class Progress:
     called : time of the call of `icha run` in s.
     """
 
-    expected: Mapping[str, float] = field(default_factory=dict)
+    expected: Mapping[str, tuple[str, float]] = field(default_factory=dict)
     clock: Callable[[], float] = time.monotonic
     total: dict[str, int] = field(default_factory=dict)
     running: dict[int, JobRecord] = field(default_factory=dict)
@@ -106,26 +85,25 @@ class Progress:
         with self.lock:
             match event["event"]:
                 case "run_info":
-                    self.total = {
-                        rule: count for rule, count in event["stats"].items() if rule not in (*TARGET_RULES, "total")
-                    }
-                    self.started = self.clock() if self.started is None else self.started
+                    # Rules of targets have no job of their own: they collect files of other rules.
+                    self.total = {name: n for name, n in event["stats"].items() if name not in (*TARGETS, "total")}
+                    self.started = self.started or self.clock()
                 case "resources_info" if event.get("cores") or event.get("nodes"):
                     self.cores = int(event.get("cores") or event["nodes"])
-                case "job_info" if event["rule_name"] not in TARGET_RULES:
+                case "job_info" if event["rule_name"] not in TARGETS:
                     self.running[event["jobid"]] = JobRecord(
                         event["rule_name"],
                         printable(event["rule_msg"] or event["rule_name"]),
                         tuple(event["output"] or ()),
                         # Snakemake adds remarks in brackets to the path.
-                        tuple(log.split(" (")[0] for log in event["log"] or ()),
+                        next(iter(event["log"] or ()), "").split(" (")[0],
                         self.clock(),
                         threads=event.get("threads") or 1,
                     )
                 case "job_finished" | "job_error" as name:
                     jobs, key = (self.done, "job_id") if name == "job_finished" else (self.failed, "jobid")
                     if job := self.running.pop(event[key], None):
-                        job.ended = self.clock()
+                        job.seconds = self.clock() - job.started
                         jobs.append(job)
                         return job
         return None
@@ -140,16 +118,10 @@ class Progress:
         """Number of jobs that succeeded or failed."""
         return len(self.done) + len(self.failed)
 
-    def counts(self) -> list[tuple[str, int, int, int, int]]:
-        """Return each rule with its numbers of jobs: done, running, failed, all; in the order of the plan."""
-        done, failed = (Counter(job.rule for job in jobs) for jobs in (self.done, self.failed))
-        running = Counter(job.rule for job in self.running.values())
-        return [(rule, done[rule], running[rule], failed[rule], total) for rule, total in self.total.items()]
-
     def seconds_left(self) -> float | None:
         """Estimate the time until all jobs are done, from expected and measured times; None before the first plan.
 
-        Jobs that cannot run because another one failed count as if they were still to run.
+        A job that cannot run because another one failed counts as a job that is still to run.
         """
         if self.started is None:
             return None
@@ -164,7 +136,7 @@ class Progress:
 
     def _expected_work(self, job: JobRecord) -> float:
         """Return the core-seconds that a job is expected to take."""
-        return max((self.expected.get(output, 0.0) for output in job.outputs), default=0.0) or DEFAULT_SECONDS
+        return max((self.expected[each][1] for each in job.outputs if each in self.expected), default=DEFAULT_SECONDS)
 
     def _waiting_work(self, begun: list[JobRecord]) -> float:
         """Return the expected core-seconds of the jobs that have not begun.
@@ -173,9 +145,9 @@ class Progress:
         """
         outputs = {output for job in begun for output in job.outputs}
         expected: dict[str, list[float]] = {}
-        for output, seconds in self.expected.items():
+        for output, (rule, seconds) in self.expected.items():
             if output not in outputs:
-                expected.setdefault(find_rule(output), []).append(seconds)
+                expected.setdefault(rule, []).append(seconds)
         waiting = Counter(self.total) - Counter(job.rule for job in begun)
         means = {rule: sum(seconds) / len(seconds) for rule, seconds in expected.items()}
         return sum(count * means.get(rule, DEFAULT_SECONDS) for rule, count in waiting.items())
@@ -186,21 +158,13 @@ class Progress:
         return "time left unknown" if seconds is None else f"about {formatting.duration(seconds)} left"
 
 
-def find_rule(output: str) -> str:
-    """Return the rule that makes a file under `results/<campaign>/`."""
-    path = "/".join(Path(output).parts[2:])
-    return next((rule for beginning, rule in RULES.items() if path.startswith(beginning)), "")
-
-
 def _complete_lines(job: JobRecord, folder: Path) -> list[str]:
-    """Read the complete lines in the log of a job; none if there is no log."""
-    for log in job.logs:
-        try:
-            text = (folder / log).read_text(encoding="utf-8", errors="replace")
-        except OSError:
-            continue
-        return [printable(line) for line in text.split("\n")[:-1]]
-    return []
+    """Read the complete lines in the log of a job; return an empty list without a log."""
+    try:
+        text = (folder / job.log).read_text(encoding="utf-8", errors="replace")
+    except OSError:
+        return []
+    return [printable(line) for line in text.split("\n")[:-1]]
 
 
 def read_error(job: JobRecord, folder: Path) -> list[str]:
@@ -245,7 +209,7 @@ class View:
         self._console.print(Text(printable(text), style=style), soft_wrap=True)
 
     def print_job(self, job: JobRecord, failed: bool) -> None:
-        """Print the number of finished jobs, a finished job, and why it failed; with a table, only failed jobs."""
+        """Print a finished job and the number of finished jobs; if there is a table, print only failed jobs."""
         if self._is_live and not failed:
             return
         progress, total = self._progress, str(self._progress.job_count)
@@ -272,7 +236,10 @@ class View:
         table = Table(box=None, pad_edge=False, header_style="dim")
         for heading in ("", "done", "running", "failed", "of", ""):
             table.add_column(heading, justify="right" if heading else "left")
-        for rule, done, running, failed, total in self._progress.counts():
+        states = (self._progress.done, self._progress.running.values(), self._progress.failed)
+        counts = [Counter(job.rule for job in jobs) for jobs in states]
+        for rule, total in self._progress.total.items():
+            done, running, failed = (count[rule] for count in counts)
             style = "red" if failed else "green" if done == total else "bold" if running else "dim"
             cells = [str(number or "") for number in (done, running, failed)]
             bar = ProgressBar(total=total, completed=done + failed, width=20)

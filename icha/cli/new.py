@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from icha.cli.project import CAMPAIGNS, UserError, echo, find_workflow, list_campaigns, option, project, shorten_path
-from icha.cli.scans import MeasuredSection, describe_scan, read_measured_section
+from icha.cli.scans import describe_scan, read_measured_section
 
 TEMPLATE = Path(__file__).parent / "templates/campaign.yaml"
 # Explanations of the keys of a configuration, for editors and for people.
@@ -78,12 +78,10 @@ def _schema() -> Path:
     return copies[0]
 
 
-def _print_section(section: MeasuredSection) -> None:
+def _print_section(section: dict) -> None:
     """Print what is known of a scan, and the keys to fill in."""
-    to_scale = not section.to_fill_in.keys() - {"boundary"}
-    for line in describe_scan(section.name, section.scan, to_scale=to_scale):
+    to_scale = not section["to_fill_in"].keys() - {"boundary"}
+    for line in describe_scan(section["name"], section["scan"], to_scale=to_scale):
         echo(line)
-    if not to_scale:
-        echo(f"{section.name}: `icha describe` analyses its spectrum once units and size are known")
-    for key, reason in section.to_fill_in.items():
-        echo(f"to fill in: surfaces.{section.name}.{key} ({reason})", fg="yellow")
+    for key, reason in section["to_fill_in"].items():
+        echo(f"to fill in: surfaces.{section['name']}.{key} ({reason})", fg="yellow")

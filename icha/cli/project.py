@@ -16,6 +16,7 @@ from icha.support.program import own_workflow
 
 CAMPAIGNS = Path("config/campaigns")
 DEFAULT = Path("config/config.yaml")
+TARGETS = ("all", "surfaces", "runs", "references", "figures", "dataset", "report", "publish")
 # Exit statuses.
 FAILED, WRONG = 1, 2
 DEFAULT_CORES = 2  # of profiles/default
@@ -66,8 +67,6 @@ def reports_errors(command: Callable) -> Callable:
             return command(*args, **kwargs)
         except UserError as error:
             fail(error, WRONG)
-        except UnicodeEncodeError as error:
-            fail(f"{error.object!r} contains bytes that are not UTF-8; expected text", WRONG)
         except BrokenPipeError:  # `icha describe --runs | head`
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             raise typer.Exit(FAILED) from None

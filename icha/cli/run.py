@@ -1,6 +1,7 @@
 """The command `icha run`: start Snakemake, show its progress, and report the outcome."""
 
 import contextlib
+import itertools
 import json
 import os
 import re
@@ -19,6 +20,7 @@ from icha.cli.project import (
     DEFAULT,
     DEFAULT_CORES,
     FAILED,
+    TARGETS,
     Anyway,
     Config,
     Cores,
@@ -34,13 +36,11 @@ from icha.cli.project import (
     shorten_path,
 )
 from icha.support import formatting
-from icha.support.atomic_files import find_obstacle
 from icha.support.formatting import format_count
 
-TARGETS = ("all", "surfaces", "runs", "references", "figures", "dataset", "report", "publish")
 STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 MOST_LINES = 12  # printed of the reason of a failure
-# Snakemake prints these lines in any case, before the reason why it ends.
+# Snakemake always prints these lines, before the reason why it ends.
 PREAMBLE = r"Using workflow specific profile|Assuming unrestricted|host: |Building DAG of jobs|total +\d+$"
 
 
@@ -85,10 +85,12 @@ def run(
     folder = (folder or project()).resolve()
     results = folder / "results" / campaign.name
     profile_folder = _profile_folder(profile, workflow)
+    names = itertools.takewhile(lambda target: not target.startswith("-"), targets)
+    if unknown := [name for name in names if name not in TARGETS and not name.startswith(f"results/{campaign.name}/")]:
+        expected = f"{', '.join(TARGETS)}, or a file under results/{campaign.name}/"
+        raise UserError(f"{', '.join(unknown)}: not a target; expected {expected}")
     if reason := find_conflict(shorten_path(results), campaign.name, path, workflow):
         raise UserError(f"{reason} Nothing was started")
-    if obstacle := find_obstacle(shorten_path(folder / ".snakemake")):
-        raise UserError(f"{obstacle}: Snakemake needs this folder for its records. Remove it or repair it")
     command = [
         # -P: a file in the working directory must not replace a module of the same name.
         *(sys.executable, "-P", "-m", "snakemake", *targets),
@@ -99,14 +101,15 @@ def run(
         *(["--workflow-profile", str(profile_folder)] if profile else []),
     ]
     if dry_run:
-        jobs = _dry_run([*command, "--dry-run"], workflow, campaign, targets)
+        jobs = _dry_run([*command, "--dry-run"], workflow)
         print_plan(path, campaign, workflow, folder, cores or DEFAULT_CORES, profile=profile_folder)
         echo(jobs)
         return
     from rich.console import Console
 
     from icha.cli.live import Progress, View
-    from icha.planning.plan import expected_seconds, plan, time_on
+    from icha.planning.costs import WORKFLOW
+    from icha.planning.plan import plan
     from icha.planning.validity import expected_validity
 
     items = plan(campaign, results)
@@ -114,19 +117,12 @@ def run(
         _refuse_if_too_large(items, targets, cores or DEFAULT_CORES, results, read_profile(profile_folder))
     if not set(targets) - set(TARGETS):
         _print_validity(expected_validity(campaign))
-    progress = Progress(expected_seconds(items, f"results/{campaign.name}"))
+    expected = {f"results/{campaign.name}/{item.path}": (item.rule, item.work + WORKFLOW.job) for item in items}
+    progress = Progress(expected)
     view = View(progress, campaign.name, folder, Console(highlight=False))
     log = _log_file(folder, campaign.name)
     status, stopped = _run_snakemake([*command, "--logger", "icha"], workflow, log, progress, view)
-    if status and progress.started is None and not stopped:
-        try:
-            _refuse_unknown_targets(_read(log), targets, campaign)
-        except UserError:
-            log.unlink(missing_ok=True)
-            raise
-    # The estimate of `icha describe` is for all targets, and for this machine.
-    expected = None if profile or set(targets) - {"all"} else time_on(items, cores or DEFAULT_CORES)
-    _print_outcome(status, stopped, progress, campaign, folder, log, expected)
+    _print_outcome(status, stopped, progress, campaign, folder, log)
     if status:
         raise typer.Exit(FAILED)
     if not set(targets) - {"all", "report", "publish"}:
@@ -149,9 +145,7 @@ def _refuse_if_too_large(items, targets: list[str], cores: int, results: Path, p
     """Raise `UserError` if memory or disk space is probably too small."""
     from icha.planning.requirements import find_shortages
 
-    if "surfaces" in targets:
-        items = [item for item in items if item.part == "surfaces"]
-    elif any(target.startswith("results/") for target in targets):
+    if any(target.startswith("results/") for target in targets):
         return  # the cost of single files is unknown
     # Resources of the command line precede those of the profile.
     resources = [each for each in targets if "=" in each] + profile.get("resources", [])
@@ -160,13 +154,12 @@ def _refuse_if_too_large(items, targets: list[str], cores: int, results: Path, p
         raise UserError(f"{lines}\nNothing was started; use --anyway to start nevertheless")
 
 
-def _dry_run(command: list[str], workflow: Path, campaign, targets: list[str]) -> str:
+def _dry_run(command: list[str], workflow: Path) -> str:
     """Let Snakemake plan; return how many jobs of which kind would run, or exit with its reason."""
     done = subprocess.run(command, cwd=workflow, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
     if done.returncode == 0:
         return _planned_jobs(done.stdout)
-    _refuse_unknown_targets(done.stdout, targets, campaign)
-    _print_failure("Snakemake could not start:", None, _reason_in(done.stdout))
+    _print_failure("Snakemake could not start:", _reason_in(done.stdout), fg="red")
     raise typer.Exit(FAILED)
 
 
@@ -183,18 +176,6 @@ def _planned_jobs(output: str) -> str:
     if outdated:
         return "\n".join([*outdated, "and all results that depend on these"])
     return "Nothing would run: all requested results exist and are up to date."
-
-
-def _refuse_unknown_targets(output: str, targets: list[str], campaign) -> None:
-    """Raise `UserError` if Snakemake ended because of an unknown target."""
-    unknown = re.findall(r"^No rule to produce (.+) \(if you use", output, re.MULTILINE)
-    if "\nInputFunctionException" in output:  # a file that a rule could make, but not of this campaign
-        unknown = [name for name in targets if name not in TARGETS and not name.startswith("-")]
-    if any(name in targets for name in unknown):
-        raise UserError(
-            f"{', '.join(unknown)}: not a target, and not a file of campaign {campaign.name}; expected "
-            f"{', '.join(TARGETS)}, or one of its files under results/{campaign.name}/"
-        )
 
 
 def _reason_in(output: str) -> list[str]:
@@ -277,10 +258,6 @@ def _run_snakemake(command: list[str], workflow: Path, log: Path, progress, view
     return status, bool(stopped)
 
 
-def _read(log: Path) -> str:
-    return log.read_text(encoding="utf-8", errors="replace")
-
-
 def _listen(reading: int, progress, view, stopped: list) -> None:
     """Read the events of Snakemake, one JSON object per line, until it ends."""
     from icha.cli.live import read_error
@@ -298,8 +275,8 @@ def _listen(reading: int, progress, view, stopped: list) -> None:
                 view.print_job(job, failed)
 
 
-def _print_outcome(status: int, stopped: bool, progress, campaign, folder: Path, log: Path, expected) -> None:
-    """Print the numbers of finished jobs, the reasons of failures, and the paths of results and log; `expected`: s."""
+def _print_outcome(status: int, stopped: bool, progress, campaign, folder: Path, log: Path) -> None:
+    """Print the numbers of finished jobs, the reasons of failures, and the paths of results and log."""
     from icha.support.atomic_files import probe_folder
 
     results = folder / "results" / campaign.name
@@ -309,14 +286,11 @@ def _print_outcome(status: int, stopped: bool, progress, campaign, folder: Path,
     if status == 0 and progress.started is None:
         echo("Nothing to do: all requested results exist and are up to date.")
     elif ended:
-        text = f"{len(progress.done)} of {format_count(progress.job_count, 'job')} done in "
-        text += formatting.duration(progress.clock() - progress.called)
-        if expected and ended == progress.job_count:
-            text += f"; expected about {formatting.duration(expected)}"
-        echo(text)
+        duration = formatting.duration(progress.clock() - progress.called)
+        echo(f"{len(progress.done)} of {format_count(progress.job_count, 'job')} done in {duration}")
     _print_failures(status, stopped, progress, campaign, folder, log)
     if status and results.is_dir() and (reason := probe_folder(results)):
-        # Logs are in this folder, so jobs may have been unable to report it.
+        # The logs are in this folder, too, so the jobs may have been unable to report the error.
         echo(
             f"cannot write to {shorten_path(results)}: {reason.strerror}. Repair this and repeat the command", fg="red"
         )
@@ -324,7 +298,7 @@ def _print_outcome(status: int, stopped: bool, progress, campaign, folder: Path,
         echo("Stopped before the end. Repeat the command to continue.", fg="red")
     elif status and not progress.failed:
         heading = "Snakemake could not continue:" if ended else "Snakemake could not start:"
-        _print_failure(heading, None, _reason_in(_read(log)))
+        _print_failure(heading, _reason_in(log.read_text(encoding="utf-8", errors="replace")), fg="red")
     elif status and progress.job_count > ended:
         echo(f"{format_count(progress.job_count - ended, 'job')} not run, since they need results of failed jobs")
     if ended or not status:  # otherwise the existing files are those of an earlier call
@@ -346,25 +320,21 @@ def _print_failures(status: int, stopped: bool, progress, campaign, folder: Path
     if incomplete:
         echo(f"{format_count(len(incomplete), 'run')} without a result:", fg="red")
         for path, reason in incomplete.items():
-            _print_failure(None, path, [reason])
+            _print_failure(f"  {path}", [reason], bold=True)
     failed = [job for job in progress.failed if not stopped or read_error(job, folder)]
     if failed:
         echo(f"{format_count(len(failed), 'job')} failed:", fg="red")
         for job in failed:
-            logs = ", ".join(str(shorten_path(folder / name)) for name in job.logs)
-            # The verdict repeats the runs without a result.
+            # The message of the job "Verdict on the checks" repeats the runs without a result.
             reason = [line for line in read_error(job, folder) if not any(line.startswith(path) for path in incomplete)]
-            unknown = f"it ended without a message, perhaps killed (out of memory?); see {logs or log}"
-            _print_failure(None, job.title, reason or [unknown])
-            if logs:
-                echo(f"    log: {logs}")
+            unknown = f"it ended without a message, perhaps because memory was exhausted; see {job.log or log}"
+            _print_failure(f"  {job.title}", reason or [unknown], bold=True)
+            if job.log:
+                echo(f"    log: {shorten_path(folder / job.log)}")
 
 
-def _print_failure(heading: str | None, name: str | None, lines: list[str]) -> None:
-    if heading:
-        echo(heading, fg="red")
-    if name:
-        echo(f"  {name}", bold=True)
+def _print_failure(heading: str, lines: list[str], **style) -> None:
+    echo(heading, **style)
     for line in lines[:MOST_LINES]:
         echo(f"    {line}")
     if len(lines) > MOST_LINES:
@@ -373,16 +343,19 @@ def _print_failure(heading: str | None, name: str | None, lines: list[str]) -> N
 
 def _print_checks(campaign, results: Path) -> None:
     """Print whether the checks passed, and whether the models are applicable."""
+    import xarray as xr
+
     from icha.analysis.checks import read_checks
+    from icha.analysis.validity import statements_on_dataset
     from icha.planning.results import campaign_files
-    from icha.planning.validity import found_validity
 
     files = campaign_files(campaign)
     checks = read_checks(results / files.checks)
     passed = sum(check.passed for check in checks)
     echo(f"checks:  {passed if passed < len(checks) else 'all'} of {len(checks)} passed: the equations are solved")
     echo("Applicability of the models, which is a separate question:")
-    _print_validity(found_validity(results / files.dataset))
+    with xr.open_datatree(results / files.dataset, engine="netcdf4") as tree:
+        _print_validity(statements_on_dataset(tree))
 
 
 def _print_validity(statements) -> None:

@@ -6,7 +6,6 @@ import json
 import os
 import re
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -41,12 +40,11 @@ def describe_scan(name: str, scan, *, to_scale: bool = True, models: Iterable[Mo
 
 def _reading(scan) -> Iterator[str]:
     """Yield lines on the format of the file, missing points, and opposite edges that do not fit."""
-    filled = f"{format_count(scan.filled, 'point')} without height {'was' if scan.filled == 1 else 'were'} filled"
+    share = formatting.share(scan.filled, scan.points)
+    filled = f"{format_count(scan.filled, 'point')} without height filled ({share} of all points)"
     array = f", `data: {printable(scan.data)}` of several" if scan.data else ""
-    yield f"read as {scan.format}{array}, {filled if scan.filled else 'no point is missing'}"
+    yield f"read as {scan.format}{array}, {filled if scan.filled else 'all points have a height'}"
     yield scan.reading.partition(", ")[2]
-    if scan.filled:
-        yield f"{formatting.share(scan.filled, scan.points)} of the points are filled"
     if scan.filled > MOST_FILLED * scan.points:
         yield (
             f"warning: more than {100 * MOST_FILLED:.0f} % of the points are filled by interpolation, which is smooth; "
@@ -72,8 +70,8 @@ def _resolution(scan, to_scale: bool, models: list[Model]) -> Iterator[str]:
     )
     if unsupported := len(scan.asperities.unsupported_height):
         yield (
-            f"the asperity model excludes {unsupported} of these summits, which the nodes around do not support, as at "
-            "steps, spikes, pits and plateaus"
+            f"the asperity model excludes {unsupported} of these summits, because the nodes around them do not support "
+            "them, as at steps, spikes, pits and plateaus"
         )
     reasons = scan.reasons_against_asperities
     if reasons and (not models or any(model.by_summits for model in models)):
@@ -114,30 +112,17 @@ def format_advice(advice: Mapping[str, float | int]) -> dict[str, str]:
     return {key: formatting.length(value) if key == "cutoff" else str(value) for key, value in advice.items()}
 
 
-@dataclass(frozen=True)
-class MeasuredSection:
-    """Section of a scan in a new campaign.
+def read_measured_section(path: Path, data: str | None, folder: Path) -> dict[str, Any]:
+    """Read a measured topography and return its section for a configuration in a folder.
 
-    Attributes
-    ----------
+    Returns
+    -------
     name : name of the surface.
     path : its file, relative to the configuration.
     lines : keys that the file determines, and keys to fill in.
     to_fill_in : reason for each key to fill in.
     advice : recommended keys, as written in a configuration.
     scan : its `icha.surfaces.measured.resolution.ScanResolution`.
-    """
-
-    name: str
-    path: str
-    lines: list[str]
-    to_fill_in: dict[str, str]
-    advice: dict[str, str]
-    scan: Any
-
-
-def read_measured_section(path: Path, data: str | None, folder: Path) -> MeasuredSection:
-    """Read a measured topography and return its section for a configuration in a folder.
 
     Raises
     ------
@@ -174,8 +159,9 @@ def read_measured_section(path: Path, data: str | None, folder: Path) -> Measure
     advice = {} if missing else format_advice(resolution.advice)
     name = re.sub("[^a-z0-9_-]+", "_", path.stem.lower()).strip("_") or "measured"
     missing["boundary"] = "what surrounds the scan: free, window, mirror or periodic"
-    path = Path(os.path.relpath(path.resolve(), folder.resolve())).as_posix()
-    return MeasuredSection(name, path, lines, missing, advice, resolution)
+    relative = Path(os.path.relpath(path.resolve(), folder.resolve())).as_posix()
+    section = {"name": name, "path": relative, "lines": lines}
+    return section | {"to_fill_in": missing, "advice": advice, "scan": resolution}
 
 
 def _load(path: Path, data: str | None):

@@ -9,8 +9,6 @@ from icha.cli.project import UserError, echo
 from icha.datasets.attributes import reasons_not_applicable, why_no_result
 from icha.support.formatting import format_count, format_quantity, printable
 
-BARS = " ▁▂▃▄▅▆▇█"
-MOST_BARS = 60  # of a sparkline
 MOST_ROWS = 12  # of the table of steps
 CURVES = {"contact_area_fraction": "A/A0", "reduced_pressure": "p*", "reduced_separation": "u/h_rms"}
 COLUMNS = ("reduced_pressure", "contact_area_fraction", "reduced_separation", "spot_count")
@@ -24,7 +22,7 @@ def show(file: Annotated[Path, typer.Argument(help="A run, surface or campaign d
         kind, data = identify_file(file)
     except UnknownFile as error:
         raise UserError(str(error)) from None
-    printers = {RUN: print_run, SURFACE: _print_surface, CAMPAIGN: _print_campaign}
+    printers = {RUN: _print_run, SURFACE: _print_surface, CAMPAIGN: _print_campaign}
     if kind not in printers:
         raise UserError(f"{file}: {kind}; expected a run, a surface or a campaign dataset. Try `ncdump -h`")
     try:
@@ -33,7 +31,7 @@ def show(file: Annotated[Path, typer.Argument(help="A run, surface or campaign d
         raise UserError(f"{file}: {kind} of another format ({error!r}); `icha check` lists the problems") from None
 
 
-def print_run(run, file: Path) -> None:
+def _print_run(run, file: Path) -> None:
     """Print the model, material and surface of a run, and its results."""
     import numpy as np
 
@@ -67,7 +65,7 @@ def print_run(run, file: Path) -> None:
     if str(run["boundary"].values) == "free":
         curves["gap/h_rms"] = (run["mean_gap"] / run["rms_height"]).values
     for label, values in curves.items():
-        echo(f"{label:>10} {sparkline(values)} {values.min():.3g} to {values.max():.3g}")
+        echo(f"{label:>10} {values.min():.3g} to {values.max():.3g}")
     if "gap/h_rms" in curves:
         echo("          u: mean separation from the half-space far away; gap: mean gap between the surfaces")
     if "hysteresis_loss" in run:
@@ -100,8 +98,7 @@ def _print_surface(surface, file: Path) -> None:
             echo(printable(f"{variable.attrs.get('long_name', name)}: {text}"))
     heights = surface["height"].values
     low, high = (format_quantity(float(height) * scale, "m") for height in (heights.min(), heights.max()))
-    echo(f"heights from {low} to {high}, as {'stored' if scale == 1 else 'measured'}; profile through the centre:")
-    echo(f"  {sparkline(heights[len(heights) // 2])}")
+    echo(f"heights from {low} to {high}, as {'stored' if scale == 1 else 'measured'}")
 
 
 def _print_campaign(tree, file: Path) -> None:
@@ -134,17 +131,3 @@ def _print_campaign(tree, file: Path) -> None:
             for index in zip(*((failure != "") & failed).nonzero(), strict=True):
                 labels = ", ".join(map(str, labels_at(study, index, LABELS)))
                 echo(f"  failed: {printable(labels)}: {printable(failure[index])}", fg="red")
-
-
-def sparkline(values) -> str:
-    """Return a row of bars whose heights represent values."""
-    import numpy as np
-
-    values = np.asarray(values, dtype=float)
-    values = values[np.isfinite(values)]
-    if not values.size:
-        return ""
-    if values.size > MOST_BARS:
-        values = values[np.linspace(0, values.size - 1, MOST_BARS).round().astype(int)]
-    span = np.ptp(values) or 1.0
-    return "".join(BARS[1 + round((value - values.min()) / span * 7)] for value in values)

@@ -1,7 +1,7 @@
 """A campaign: surfaces, materials, and studies that press the surfaces into half-spaces of the materials.
 
-Values are in SI units. `icha.configuration.load` makes these objects from the text of a configuration file,
-`icha.configuration.errors` words its errors, and `icha.configuration.schema` generates the JSON schema from them.
+Values are in SI units. `icha.configuration.load` makes a campaign from the text of a configuration file,
+`icha.configuration.errors` words the errors, and `icha.configuration.schema` generates the JSON schema of the file.
 """
 
 from __future__ import annotations
@@ -13,19 +13,19 @@ from typing import Annotated, Any, NamedTuple
 
 from pydantic import AfterValidator, Field, PrivateAttr
 
-from icha.configuration.boundary_elements import BesideStudy, BoundaryElementLoops, BoundaryElements
 from icha.configuration.figures import Figures, Measurement
-from icha.configuration.publication import Publication
-from icha.configuration.studies import MEASURED, Study
+from icha.configuration.publication import Line, Prose, Publication
+from icha.configuration.studies import MEASURED, BesideStudy, BoundaryElementLoops, BoundaryElements, Study
 from icha.configuration.surfaces import AnySurface, MaterialSection
 from icha.contact.models import MODELS
+from icha.support.input_files import read_columns
 from icha.support.values import ROUNDING, Name, Problem, Section, Text, distinct
 
-# Sections whose entries belong to a study.
+# Sections with entries that belong to a study.
 BESIDE_STUDIES = ("finite_range", "boundary_element_loops")
-# Limit of the entries of a section, because the check of an entry goes through all runs of its study.
+# Largest number of entries in a section; it is small because the check of an entry goes through all runs of its study.
 _FEW = Field(max_length=100)
-# Cells per shortest wavelength: the fewest without a warning, and those to recommend.
+# Cells per shortest wavelength: the fewest without a warning, and the recommended number.
 _LEAST_CELLS, _ADVISABLE_CELLS = 4, 8
 
 
@@ -45,10 +45,10 @@ class Topography(NamedTuple):
     ----------
     grid : nodes along a side.
     period : side, m.
-    rms_slope : None if no study asks for it.
+    rms_slope : measured slope; None if no study uses it.
     sha256 : checksum of the file.
     full_contact_energy : U_full/E* at rms slope 1, m.
-    complete_contact_pressure : pressure over E* for complete contact at rms slope 1.
+    complete_contact_pressure : pressure over E* at which contact is complete, at rms slope 1.
     """
 
     grid: int
@@ -60,7 +60,7 @@ class Topography(NamedTuple):
 
 
 class Defaults(Section):
-    """Default values for the entries of a section."""
+    """Default values for the entries of sections."""
 
     surfaces: dict[str, Any] = {}
     """Default values of keys of surfaces. A surface takes only the keys that its kind has."""
@@ -75,15 +75,15 @@ class Campaign(Section):
 
     name: Name
     """Name of the campaign; results go to `results/<name>/`."""
-    title: Text
+    title: Line
     """Title of the campaign, one line."""
-    summary: Text
+    summary: Prose
     """A few sentences for readers of datasets and report."""
-    license: Text
+    license: Line
     """Licence of the data, as an SPDX identifier such as `CC-BY-4.0`."""
     confirmed: Annotated[list[Text], AfterValidator(distinct)] = []
     """Keys of unusual values that you intend, such as `materials.soft.contact_modulus`. For an entry of a list, give
-    the key of the list. Unusual values without such a confirmation are refused."""
+    the key of the list. Unusual values that you do not confirm are refused."""
     defaults: Defaults = Defaults()
     """Default values for all surfaces, materials or studies."""
     surfaces: Annotated[dict[Name, AnySurface], Field(min_length=1)]
@@ -93,16 +93,16 @@ class Campaign(Section):
     studies: Annotated[dict[Name, Study], Field(min_length=1)]
     """Studies by name."""
     finite_range: Annotated[dict[Name, BoundaryElements], _FEW] = {}
-    """Solutions by boundary elements at a finite range of attraction, by name, to compare with the runs of a study."""
+    """Boundary elements at a finite range of attraction, by name, to compare with the runs of a study."""
     boundary_element_loops: Annotated[dict[Name, BoundaryElementLoops], _FEW] = {}
     """Loading and unloading with boundary elements at a finite range of attraction, by name, to compare with the runs
     of a study that unloads."""
     measurements: Annotated[dict[Name, Measurement], _FEW] = {}
-    """Your measurements by name, drawn over figure 5. ICHA itself has no measurements."""
+    """Your own measurements by name, to draw over figure 5."""
     figures: Figures = Figures()
     """Figures and their options."""
     publication: Publication = Publication()
-    """Metadata of a deposit. They do not change any result."""
+    """Metadata of a deposit. They change no result."""
 
     _contacts: dict[str, tuple[Contact, ...]] = PrivateAttr(default={})
     _topographies: dict[str, Topography] = PrivateAttr(default={})
@@ -125,7 +125,7 @@ class Campaign(Section):
         return list(self._contacts[study])
 
     def with_contacts(self, contacts: Mapping[str, Iterable[Contact]]) -> Campaign:
-        """Return the campaign with these contacts; the lists of each study become those of its contacts."""
+        """Return the campaign with these contacts; the lists of each study become the values in its contacts."""
         contacts = {study: tuple(dict.fromkeys(runs)) for study, runs in contacts.items()}
         studies = {}
         for label, study in self.studies.items():
@@ -148,11 +148,11 @@ class Campaign(Section):
         return campaign
 
     def topography(self, surface: str) -> Topography | None:
-        """Return the facts of a topography from a file; None for a random one."""
+        """Return the facts of a topography from a file; None for a random topography."""
         return self._topographies.get(surface)
 
     def origin(self, section: str, name: str) -> str:
-        """Return the entry of a section (surfaces, materials) of which `name` is a variant, or `name` itself."""
+        """Return the entry of a section (surfaces, materials) of which `name` is a variant; else return `name`."""
         return self._origins.get((section, name), name)
 
     def is_free(self, surface: str) -> bool:
@@ -160,7 +160,7 @@ class Campaign(Section):
         return getattr(self.surfaces[surface], "boundary", None) == "free"
 
     def grid(self, surface: str) -> int | None:
-        """Return the nodes along a side of a surface; None for a file that was not inspected."""
+        """Return the number of nodes along a side of a surface; None for a file that was not inspected."""
         return getattr(self.topography(surface) or self.surfaces[surface], "grid", None)
 
     def period(self, surface: str) -> float:
@@ -168,7 +168,7 @@ class Campaign(Section):
         return (self.topography(surface) or self.surfaces[surface]).period
 
     def snapshots_of(self, study: str) -> list[tuple[str, float]] | None:
-        """Return kind and value of all states that the runs of a study save; None if they save their last one.
+        """Return kind and value of all states that the runs of a study save; None if each saves only its last state.
 
         The result includes the loads at which the section `finite_range` solves the surfaces of this study.
         """
@@ -180,7 +180,7 @@ class Campaign(Section):
         return snapshots + [state for p in loads if (state := ("reduced_pressure", p)) not in known]
 
     def contacts_beside(self, entry: BesideStudy) -> list[Contact]:
-        """Return the contacts of its study that an entry of `finite_range` or `boundary_element_loops` solves."""
+        """Return the contacts that an entry of `finite_range` or `boundary_element_loops` solves."""
         lists = (entry.surfaces, entry.seeds, entry.rms_slopes, entry.materials)
         asked = [None if values is None else set(values) for values in lists]
 
@@ -197,34 +197,36 @@ class Campaign(Section):
     def problems(self) -> Iterator[Problem]:
         """Yield the reasons why the campaign cannot run, although each single value is valid.
 
-        Problems that depend on measured slopes or on grids of files are left out until these are known.
+        Problems that depend on measured slopes or on the grids of files are left out until these are known.
         """
         unknown_slopes = any(MEASURED in study.rms_slopes for study in self.studies.values())
         for location, value, reason in self._problems():
             if not (unknown_slopes and any(str(key).startswith("rms_slope") for key in location)):
                 yield location, value, reason
         if not unknown_slopes:
-            # Slopes are part of the names of runs.
+            # The names of runs contain slopes.
             yield from _within(("publication",), self.publication.problems(self))
 
     def _problems(self):
         for label, study in self.studies.items():
             yield from _within(("studies", label), study.problems(self.snapshots_of(label)))
             yield from _within(("studies", label), self._model_problems(study))
-        for section in (*BESIDE_STUDIES, "measurements"):
-            for label, entry in getattr(self, section).items():
+        sections = {section: getattr(self, section) for section in (*BESIDE_STUDIES, "measurements")}
+        for section, entries in (sections | {"figures": self.figures.by_name()}).items():
+            for label, entry in entries.items():
                 yield from _within((section, label), entry.problems(self))
         for label in self.finite_range:
             if label in self.studies and self.compares_models(label):
                 reason = "is the name of a study that has boundary elements itself; expected another name"
                 yield ("finite_range", label), label, reason
-        for label, figure in self.figures.by_name().items():
-            yield from _within(("figures", label), figure.problems(self))
 
     def measurement_problems(self) -> Iterator[Problem]:
         """Report tables of measurements that cannot be read."""
         for label, entry in self.measurements.items():
-            yield from _within(("measurements", label), entry.table_problems())
+            try:
+                read_columns(entry.path, entry.columns)
+            except ValueError as error:
+                yield ("measurements", label, "path"), entry.path, str(error)
 
     def _model_problems(self, study: Study) -> Iterator[Problem]:
         """Report surfaces of a study that its models do not support."""
@@ -232,41 +234,33 @@ class Campaign(Section):
             surface, model = self.surfaces[name], MODELS[label]
             least = model.least_cells
             if model.periodic_only and self.is_free(name):
-                yield (
-                    ("models", index),
-                    label,
-                    f"need a periodic surface, and {name!r} is a square with free edges; expected asperities, or "
-                    "another `boundary`, which makes the surface periodic",
-                )
+                reason = f"need a periodic surface, and {name!r} is a square with free edges; expected asperities, or "
+                yield ("models", index), label, f"{reason}another `boundary`, which makes the surface periodic"
             if surface.cells_per_short_wave < least * (1 - ROUNDING):
+                enough, better = surface.grid_of_cells(least), surface.grid_of_cells(_ADVISABLE_CELLS)
                 yield (
                     ("models", index),
                     label,
                     f"need at least {least} grid cells per shortest wavelength, and {name!r} has "
-                    f"{surface.cells_per_short_wave:.3g}; expected asperities, or a `grid` of "
-                    f"{surface.grid_of_cells(least)} or more for {name!r} (better "
-                    f"{surface.grid_of_cells(_ADVISABLE_CELLS)})",
+                    f"{surface.cells_per_short_wave:.3g}; expected asperities, or a `grid` of {enough} or more for "
+                    f"{name!r} (better {better})",
                 )
 
     def warnings(self) -> list[str]:
-        """Return warnings about valid but coarse grids."""
-        found, studies = [], self.studies.values()
-        models = [(name, MODELS[model]) for each in studies for name in each.surfaces for model in each.models]
-        by_cells = {name for name, model in models if model.by_cells}
-        for name in dict.fromkeys(name for name, _ in models if self.surfaces[name].random):
+        """Return warnings about grids of random surfaces that are valid but coarse."""
+        expected: dict[str, int] = {}
+        for study in self.studies.values():
+            least = _ADVISABLE_CELLS if any(MODELS[model].by_cells for model in study.models) else _LEAST_CELLS
+            expected |= {name: max(least, expected.get(name, 0)) for name in study.surfaces}
+        found = []
+        for name, least in expected.items():
             surface, origin = self.surfaces[name], self.origin("surfaces", name)
-            cells, variant = surface.cells_per_short_wave, "" if origin == name else f" (variant {name})"
-            start = f"surfaces.{origin}.grid: {surface.grid!r} gives"
-            if cells < _LEAST_CELLS * (1 - ROUNDING):
+            if surface.random and surface.cells_per_short_wave < least * (1 - ROUNDING):
+                variant = "" if origin == name else f" (variant {name})"
                 found.append(
-                    f"{start} {cells:.3g} grid cells per shortest wavelength{variant}; expected at least "
-                    f"{_LEAST_CELLS}, better {_ADVISABLE_CELLS}"
-                )
-            elif cells < _ADVISABLE_CELLS * (1 - ROUNDING) and name in by_cells:
-                found.append(
-                    f"{start} boundary elements {cells:.3g} cells per shortest wavelength{variant}, with which areas "
-                    f"have errors of a few per cent; expected a grid of at least "
-                    f"{surface.grid_of_cells(_ADVISABLE_CELLS)}"
+                    f"surfaces.{origin}.grid: {surface.grid!r} gives {surface.cells_per_short_wave:.3g} grid cells per "
+                    f"shortest wavelength{variant}, so areas have errors of some per cent; expected a grid of at least "
+                    f"{surface.grid_of_cells(least)}, better {surface.grid_of_cells(_ADVISABLE_CELLS)}"
                 )
         return found
 
@@ -285,6 +279,6 @@ class Campaign(Section):
 
 
 def _within(location: tuple, problems: Iterable[Problem]) -> Iterator[Problem]:
-    """Prefix the locations of the problems of a section with its own."""
+    """Prepend the location of a section to the locations of its problems."""
     for inner, value, reason in problems:
         yield (*location, *inner), value, reason

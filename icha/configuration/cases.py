@@ -6,8 +6,8 @@ import json
 from collections.abc import Callable
 from functools import partial
 
-from icha.configuration.boundary_elements import BesideStudy
 from icha.configuration.campaign import Campaign
+from icha.configuration.studies import BesideStudy
 from icha.configuration.surfaces import MeasuredSurface
 from icha.contact.models import DEFAULT_MODEL
 from icha.datasets.labels import ContactLabels, RunLabels, SolutionLabels
@@ -46,7 +46,7 @@ def loop_cases(campaign: Campaign) -> list[ContactLabels]:
 
 
 def surface_settings(campaign: Campaign, name: str) -> dict:
-    """Return the settings of a topography, without its seed and file, in SI units."""
+    """Return the settings of a topography in SI units, without its seed and file."""
     surface = campaign.surfaces[name]
     if surface.random:
         return surface.model_dump(exclude_none=True)
@@ -56,7 +56,7 @@ def surface_settings(campaign: Campaign, name: str) -> dict:
 
 
 def run_settings(campaign: Campaign, case: RunLabels) -> dict:
-    """Return the settings that determine the numbers of a run, in SI units, without unused ones."""
+    """Return the settings that determine the numbers of a run, in SI units."""
     return {
         "material": campaign.materials[case.material].model_dump(exclude_none=True),
         "path": campaign.studies[case.study].path_settings(campaign.snapshots_of(case.study)),
@@ -66,13 +66,13 @@ def run_settings(campaign: Campaign, case: RunLabels) -> dict:
 
 
 def solution_settings(campaign: Campaign, case: SolutionLabels) -> dict:
-    """Return the settings of a boundary-element solution, without its topography, in SI units."""
+    """Return the settings of a boundary-element solution in SI units, without its topography."""
     entry = campaign.finite_range[case.entry]
     return _solver_settings(campaign, entry, case) | {"reduced_pressure": case.reduced_pressure}
 
 
 def loop_settings(campaign: Campaign, case: ContactLabels) -> dict:
-    """Return the settings of a loop of boundary elements, without its topography, in SI units."""
+    """Return the settings of a loop of boundary elements in SI units, without its topography."""
     entry = campaign.boundary_element_loops[case.entry]
     return _solver_settings(campaign, entry, case) | {
         "largest_reduced_pressure": campaign.studies[entry.study].targets.last[1],
@@ -111,8 +111,7 @@ def run_sha256(campaign: Campaign, case: RunLabels) -> str:
 def campaign_sha256(campaign: Campaign, of_run: Callable[[RunLabels], str] | None = None) -> str:
     """Compute the checksum of everything that determines the runs of a campaign, without its figures and title.
 
-    If the checksums of the runs are known already, pass `of_run`, a function that returns the checksum of a run.
-    Without `of_run`, `run_sha256` computes the checksums.
+    `of_run` returns the checksum of a run, if it is known already; by default `run_sha256` computes the checksums.
     """
     of_run = of_run or partial(run_sha256, campaign)
     return _sha256({case.path: of_run(case) for case in run_cases(campaign)})

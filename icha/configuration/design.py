@@ -1,7 +1,8 @@
 """The design of a campaign: the runs of each study, as combinations of surfaces, seeds, slopes and materials.
 
-All lists of a study are combined, except for groups that are combined one by one (`zip`); an explicit list (`cases`)
-replaces them. Every varied parameter makes a new entry of its surface or material with a name such as `rough-hurst0.6`.
+All lists of a study are combined with each other, except for groups that are combined one by one (`zip`); an explicit
+list (`cases`) replaces them. Every varied parameter makes a new surface or material, a variant, with a name such as
+`rough-hurst0.6`.
 """
 
 import hashlib
@@ -27,14 +28,14 @@ MAX_RUNS = 100_000
 _MAX_TARGETS = 5_000_000
 # Lists of a study, and the key of one of their entries in a case.
 _LISTS = {"surfaces": "surface", "seeds": "seed", "rms_slopes": "rms_slope", "materials": "material"}
-# Order of the lists of a study, of which the last one changes first from run to run.
+# Order of the lists of a study. From run to run, the last list changes first.
 _OF_MATERIAL = MaterialSection.model_fields
 _ORDER = ("surface", *(name for name in SCALARS if name not in _OF_MATERIAL), "seed", "rms_slope", "material")
 _ORDER += tuple(_OF_MATERIAL)
 _SYMBOLS = {"m": "m", "Pa": "Pa", "J/m^2": "J"}
 _PREFIXES = {-15: "f", -12: "p", -9: "n", -6: "u", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 
-# A value of a point of the design, after its location in the configuration.
+# A value in the design, and its location in the configuration.
 _Located = tuple[tuple, Any]
 
 
@@ -48,8 +49,8 @@ def expand_design(campaign: Campaign, content: Mapping) -> tuple[Campaign, list[
 
     Returns
     -------
-    The expanded campaign, and the problems that prevented the expansion. `Campaign.with_topographies` replaces slopes
-    that are `measured`.
+    The expanded campaign, and the problems that prevented the expansion. `Campaign.with_topographies` later replaces
+    the slopes that are `measured`.
     """
     problems = itertools.chain.from_iterable(
         _study_problems(campaign, label, study) for label, study in campaign.studies.items()
@@ -66,12 +67,11 @@ def expand_design(campaign: Campaign, content: Mapping) -> tuple[Campaign, list[
     sections = {name: getattr(campaign, name) | derived for name, derived in variants.derived.items()}
     expanded = campaign.model_copy(update=sections).with_contacts(contacts)
     expanded._origins = variants.origin
-    expanded = _replace_varied_names(expanded)
     return expanded, list(_too_many_solutions(expanded))
 
 
 def _lists(label: str, study: Study) -> dict[str, list[_Located]]:
-    """Return the lists and varied parameters of a study that are combined; the surfaces come first."""
+    """Return the lists and varied parameters of a study, which are combined; the surfaces come first."""
 
     def located(values, *keys):
         return [(("studies", label, *keys, index), value) for index, value in enumerate(values)]
@@ -83,7 +83,7 @@ def _lists(label: str, study: Study) -> dict[str, list[_Located]]:
 
 
 def _points(label: str, study: Study) -> Iterator[dict[str, _Located]]:
-    """Return the values of each run, with their locations."""
+    """Yield the values of each run, with their locations."""
     lists = _lists(label, study)
     for index, given in enumerate(_cases(study)):
         fixed = {name: (("studies", label, "cases", index, name), value) for name, value in given.items()}
@@ -96,12 +96,12 @@ def _points(label: str, study: Study) -> Iterator[dict[str, _Located]]:
 
 
 def _cases(study: Study) -> list[dict[str, Any]]:
-    """Return the values that each case of a study fixes; a study without cases has one that fixes none."""
+    """Return the values that each case of a study fixes; a study without `cases` has a single case without values."""
     return [{}] if study.cases is None else [case.model_dump(exclude_none=True) for case in study.cases]
 
 
 def _axes(study: Study, lists: Mapping, fixed: Mapping) -> Iterator[list[str]]:
-    """Return the groups of lists to combine; the lists of a group are combined one by one."""
+    """Yield the groups of lists to combine; the lists of a group are combined one by one."""
     groups = [[_LISTS.get(name, name) for name in group] for group in study.zip]
     done = set(fixed)
     for name in lists:
@@ -114,37 +114,29 @@ def _axes(study: Study, lists: Mapping, fixed: Mapping) -> Iterator[list[str]]:
 
 def _too_many_runs(campaign: Campaign) -> Iterator[Problem]:
     """Report too many runs or targets, before they are expanded."""
-    runs = {label: _run_count(label, study) for label, study in campaign.studies.items()}
-    targets = {}
+    runs = targets = 0
     for label, study in campaign.studies.items():
-        states = {*study.targets.states, *(campaign.snapshots_of(label) or ())}
-        targets[label] = runs[label] * (len(states) + len(study.turning_points))
+        count, states = _run_count(label, study), {*study.targets.states, *(campaign.snapshots_of(label) or ())}
+        runs, targets = runs + count, targets + count * (len(states) + len(study.turning_points))
     yield from _excess("studies", runs, "runs", MAX_RUNS)
-    yield from _excess("studies", targets, "targets of all its runs", _MAX_TARGETS)
+    yield from _excess("studies", targets, "targets of all runs", _MAX_TARGETS)
 
 
 def _too_many_solutions(campaign: Campaign) -> Iterator[Problem]:
-    """Report too many solutions beside the expanded runs."""
+    """Report too many solutions in the sections beside the studies, after the runs are expanded."""
     for section in BESIDE_STUDIES:
-        counts = {
-            label: len(campaign.contacts_beside(entry)) * len(getattr(entry, "reduced_pressures", [0]))
-            for label, entry in getattr(campaign, section).items()
-            if entry.study in campaign.studies
-        }
-        yield from _excess(section, counts, "solutions", MAX_RUNS)
+        entries = [entry for entry in getattr(campaign, section).values() if entry.study in campaign.studies]
+        counts = (len(campaign.contacts_beside(e)) * len(getattr(e, "reduced_pressures", [0])) for e in entries)
+        yield from _excess(section, sum(counts), "solutions", MAX_RUNS)
 
 
-def _excess(section: str, counts: Mapping[str, int], what: str, most: int) -> Iterator[Problem]:
-    """Yield a problem if an entry of a section, or all entries together, request more than `most`."""
-    large = {label: count for label, count in counts.items() if count > most}
-    for label, count in large.items():
-        yield (section, label), NOTHING, f"asks for {count} {what}; expected at most {most}"
-    if not large and sum(counts.values()) > most:
-        yield (section,), NOTHING, f"ask for {sum(counts.values())} {what} together; expected at most {most}"
+def _excess(section: str, count: int, what: str, most: int) -> Iterator[Problem]:
+    if count > most:
+        yield (section,), NOTHING, f"asks for {count} {what}; expected at most {most}"
 
 
 def _run_count(label: str, study: Study) -> int:
-    """Count the runs of a study with all its models, equal ones included."""
+    """Count the runs of a study with all its models, including equal runs."""
     lists = _lists(label, study)
     counts = (math.prod(len(lists[group[0]]) for group in _axes(study, lists, given)) for given in _cases(study))
     return len(study.models) * sum(counts)
@@ -155,7 +147,7 @@ def _study_problems(campaign: Campaign, label: str, study: Study) -> Iterator[Pr
     lists, cases = _lists(label, study), study.cases or []
 
     def values(one):
-        """Return the values of a list with their locations, and the values of the cases that replace its entries."""
+        """Return the values of a list and the values of the cases that replace it, with their locations."""
         located = (((*prefix, "cases", index, one), getattr(case, one)) for index, case in enumerate(cases))
         return [*lists[one], *((location, value) for location, value in located if value is not None)]
 
@@ -198,7 +190,7 @@ def _zip_problems(prefix, study, lists) -> Iterator[Problem]:
 
 
 class _Variants:
-    """Surfaces and materials with varied parameters; each combination of values exists once."""
+    """The variants: surfaces and materials with varied parameters, one for each combination of values."""
 
     def __init__(self, campaign: Campaign, content: Mapping):
         self._campaign, self._content = campaign, content
@@ -209,7 +201,7 @@ class _Variants:
         self.problems: dict[tuple, Problem] = {}
 
     def contact(self, point: Mapping[str, _Located]) -> Contact:
-        """Return the contact of a point of the design, after making its surface and material."""
+        """Return the contact of a run, after making its surface and material."""
         surface, material = point["surface"][1], point["material"][1]
         fields = type(self._campaign.surfaces[surface]).model_fields
         varied = {name: point[name] for name in point if name in SCALARS}
@@ -229,7 +221,7 @@ class _Variants:
         )
 
     def _variant(self, section: str, base: str, changes: Mapping[str, _Located]) -> str:
-        """Return the name of a surface or material with changed values, after making it if it is new."""
+        """Return the name of the variant of a surface or material with changed values; make it if it is new."""
         key = (section, base, *((name, repr(value)) for name, (_, value) in changes.items()))
         if changes and key not in self._names:
             self._names[key] = self._make(section, base, changes)
@@ -251,28 +243,21 @@ class _Variants:
         if hasattr(variant, "path"):
             variant = variant.model_copy(update={"path": entries[base].path})
         name = "-".join([base, *(f"{key}{value_label(variant, key)}" for key in changes)])
-        problem = ""
-        if name in entries:
-            problem = f"variant named {name!r}, but this name is taken. Rename that entry"
-        elif len(name) > LONGEST_LABEL:
-            problem = (
-                f"variant with a name of {len(name)} letters, too long for a file; expected at most {LONGEST_LABEL}"
-            )
-        if problem:
-            self.problems[section, name] = (*next(iter(changes.values())), f"gives {base!r} a {problem}")
+        if name in entries or len(name) > LONGEST_LABEL:
+            reason = f"gives {base!r} a variant with the name {name!r}; expected a name without another entry, and with"
+            reason += f" at most {LONGEST_LABEL} letters. Rename an entry"
+            self.problems[section, name] = (*next(iter(changes.values())), reason)
         self.derived[section][name] = variant
         self.origin[section, name] = base
         return name
 
 
 def value_label(section, name: str) -> str:
-    """Format the value of a parameter for names of files: `hurst0.6`, `interaction_range40nm`."""
+    """Format the value of a parameter for file names, such as 0.6 of `hurst0.6` and 40nm of `interaction_range40nm`."""
     value = getattr(section, name)
-    if isinstance(value, bool):
-        return str(value).lower()
     if not isinstance(value, float):
         text = str(value)
-        # Some texts, such as names of channels, cannot be part of a file name.
+        # Some texts, such as names of channels, cannot be part of a file name; their checksum replaces them.
         return text if re.fullmatch(r"[A-Za-z0-9_.+-]{1,40}", text) else hashlib.sha256(text.encode()).hexdigest()[:8]
     unit = next((each.unit for each in type(section).model_fields[name].metadata if isinstance(each, FloatRange)), None)
     if unit is None:
@@ -282,28 +267,3 @@ def value_label(section, name: str) -> str:
     power = min(max(power, min(_PREFIXES)), max(_PREFIXES))
     digits = format(exact.scaleb(-power).normalize(), "f")
     return f"{digits}{_PREFIXES[power]}{_SYMBOLS[unit]}"
-
-
-def _replace_varied_names(campaign: Campaign) -> Campaign:
-    """Replace names of varied surfaces and materials by their variants, in the sections besides studies."""
-
-    def variants(section, study, name):
-        names = getattr(campaign.studies[study], section) if study in campaign.studies else []
-        return [name] if name in names else [each for each in names if campaign.origin(section, each) == name] or [name]
-
-    def with_variants(entry):
-        update = {}
-        for section in ("surfaces", "materials"):
-            one = section.removesuffix("s")  # a figure shows one surface or material
-            if names := getattr(entry, section, None):
-                update[section] = [each for name in names for each in variants(section, entry.study, name)]
-            elif name := getattr(entry, one, None):
-                update[one] = variants(section, entry.study, name)[0]
-        return entry.model_copy(update=update)
-
-    update: dict[str, Any] = {
-        section: {label: with_variants(entry) for label, entry in getattr(campaign, section).items()}
-        for section in BESIDE_STUDIES
-    }
-    figures = {name: with_variants(figure) for name, figure in campaign.figures.by_name().items()}
-    return campaign.model_copy(update=update | {"figures": campaign.figures.model_copy(update=figures)})

@@ -1,7 +1,9 @@
-"""Error messages of a configuration: file, key, value, what is wrong with it and what is expected."""
+"""Error messages of a configuration: file, key, value, what is wrong with the value, and what is expected."""
 
 import difflib
-from collections.abc import Mapping
+import itertools
+import re
+from collections.abc import Iterable, Mapping
 from types import UnionType
 from typing import Annotated, Any, Union, get_args, get_origin
 
@@ -14,29 +16,19 @@ from icha.support.values import NAME_PATTERN, NOTHING, Problem
 
 # Largest number of problems in one message.
 MOST_PROBLEMS = 50
-# Reasons against keys of older versions, by the model of their section.
+# Reasons against keys that had another name or were removed, by the model of their section.
 _FORMER_KEYS = {
-    ("Campaign", "boundary_elements"): "is now `finite_range`; expected the same section by that name (`models: "
+    ("Campaign", "boundary_elements"): "was renamed; expected the same section with the name `finite_range` (`models: "
     "[boundary_elements]` of a study keeps its name)",
-    ("Study", "united_until"): "is no longer a choice: united spots split where their two parts would not overlap "
-    "(keeping them until detachment was farther from boundary elements in 8 of 9 losses). Remove the key",
-    ("Campaign", "error_sources"): "is no longer a section. Use `make error-sources` in a clone",
-    ("Campaign", "one_asperity"): "is no longer a section. Use `python -m validation.one_asperity` in a clone",
-    ("Figures", "fig12_error_sources"): "is no longer a figure of campaigns. Use `make error-sources` in a clone",
+    ("Study", "united_until"): "was removed: united spots split where their two parts would not overlap. Keeping them "
+    "until detachment was farther from boundary elements in 8 of 9 losses. Remove the key",
 }
-# Reasons by the type of pydantic's error.
-_EMPTY = "is empty; expected at least one entry"
-_TOO_LONG = "is too long; expected at most {max_length} {unit}"
-_NO_SECTION = "is not a section; expected a mapping of keys to values"
+# Reasons by the type of pydantic's error, where the words of pydantic are those of programmers.
+_NOT_A_SECTION = "is not a section; expected a mapping of keys to values"
 _REASONS = {
-    "too_short": _EMPTY,
-    "string_too_short": _EMPTY,
-    "too_long": _TOO_LONG,
-    "string_too_long": _TOO_LONG,
-    "model_type": _NO_SECTION,
-    "model_attributes_type": _NO_SECTION,
-    "literal_error": "is not a choice; expected {expected}",
-    "list_type": "is not a list; expected a list, such as [a, b]",
+    "model_type": _NOT_A_SECTION,
+    "model_attributes_type": _NOT_A_SECTION,
+    "bool_type": "is neither true nor false; expected true or false",
     "dict_type": "is not a mapping; expected names with their sections",
     "string_type": "is not text; expected text (in quotes if it looks like a number)",
 }
@@ -46,8 +38,23 @@ class ConfigurationError(ValueError):
     """A configuration that cannot be run; the message has a line for each problem."""
 
 
+def refuse(origin: str, problems: Iterable[Problem], implausible: Iterable[Problem] = ()) -> None:
+    """Raise ConfigurationError if there are problems; the message also lists implausible values, a possible cause.
+
+    `origin` is the name of the file.
+    """
+    found = list(itertools.islice(problems, MOST_PROBLEMS + 1))
+    if not found:
+        return
+    found += itertools.islice(implausible, MOST_PROBLEMS + 1)
+    lines = list(dict.fromkeys(format_problem(origin, *problem) for problem in found))
+    if len(lines) > MOST_PROBLEMS:
+        lines[MOST_PROBLEMS:] = [f"{origin}: there are more problems; correct these first"]
+    raise ConfigurationError("\n".join(lines))
+
+
 def format_problem(origin: str, location: tuple, value: Any, reason: str) -> str:
-    """Format a problem as a line that is safe to print, since a stranger may have written the file."""
+    """Format a problem as one line that is safe to print, because a stranger may have written the file."""
     keys = [f"[{entry}]" if isinstance(entry, int) else f".{_cut(str(entry), 80)}" for entry in location]
     key = "".join(keys).lstrip(".") or "top level"
     shown = "" if value is NOTHING else " (empty)" if value is None else f" {_cut(repr(value), 80)}"
@@ -59,11 +66,11 @@ def _cut(text: str, most: int) -> str:
 
 
 def problem_of(details: Mapping) -> Problem:
-    """Translate an error of pydantic into location, value and reason."""
+    """Translate the details of a pydantic error into location, value and reason."""
     location, value, kind = _without_tags(details["loc"]), details["input"], details["type"]
     context = details.get("ctx", {})
     if kind == "value_error":
-        # The error of a whole section names its keys itself.
+        # The error of a whole section contains the keys and values already.
         return location, NOTHING if isinstance(value, Mapping | BaseModel) else value, str(context["error"])
     if kind in ("extra_forbidden", "missing"):
         return location, NOTHING, _reason_for_key(kind, details["loc"])
@@ -72,9 +79,9 @@ def problem_of(details: Mapping) -> Problem:
         return (*location, "kind"), given, f"is not a kind of surface; expected one of {', '.join(SURFACE_KINDS)}"
     if kind == "string_pattern_mismatch" and context.get("pattern") == NAME_PATTERN:
         return location, value, "is not a name; expected lower-case letters, digits, '_' and, but not first, '-'"
-    if kind not in _REASONS:
-        return location, value, details["msg"].lower()
-    return location, value, _REASONS[kind].format(unit="characters" if isinstance(value, str) else "entries", **context)
+    # Such as "List should have at least 1 item after validation, not 0".
+    expected = re.sub(r"^\w+ should (be|have) | after validation.*", "", details["msg"])
+    return location, value, _REASONS.get(kind, f"is not valid; expected {expected}")
 
 
 def _reason_for_key(kind: str, location: tuple) -> str:
@@ -90,14 +97,14 @@ def _reason_for_key(kind: str, location: tuple) -> str:
 
 
 def _without_tags(location: tuple) -> tuple:
-    """Remove what pydantic adds to a location: the kind of a surface, and the mark of a key."""
+    """Remove the parts that pydantic adds to a location: the kind of a surface, and the mark of a key."""
     if len(location) > 2 and location[0] == "surfaces" and location[2] in SURFACE_KINDS:
         location = (*location[:2], *location[3:])
     return location[:-1] if location[-1:] == ("[key]",) else location
 
 
 def _section_at(location: tuple) -> type[BaseModel]:
-    """Return the model of the section at a location of pydantic, which contains the kind of a surface."""
+    """Return the model of the section at a location of pydantic; such a location contains the kind of a surface."""
     model: Any = Campaign
     for key in location:
         if model in SURFACE_KINDS.values() and key in SURFACE_KINDS:

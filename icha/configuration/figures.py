@@ -1,37 +1,17 @@
-"""Section `figures`, one key for every figure, and `measurements`, measured contact areas to draw over them."""
+"""Section `figures`, with one key for every figure, and `measurements`, measured contact areas for figure 5."""
 
 from collections.abc import Iterator
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, Field, create_model, model_validator
+from pydantic import Field, create_model, model_validator
 
-from icha.datasets.results import ResultFiles
-from icha.figures.declaration import Campaign, FigureOptions, Inputs
+from icha.figures.declaration import FigureOptions
 from icha.figures.registry import DECLARATIONS
-from icha.support.input_files import read_columns
 from icha.support.values import File, Name, Positive, Problem, Section, Text, conversion_factor, unknown
 
 
-def _drawable(value: str) -> str:
-    """Refuse labels with formulas that matplotlib cannot draw."""
-    if "$" not in value:
-        return value
-    # Imports matplotlib, which other labels do not need.
-    from matplotlib.cbook import is_math_text
-    from matplotlib.mathtext import MathTextParser
-
-    try:
-        if is_math_text(value):
-            MathTextParser("path").parse(value)
-    except Exception as error:  # from its parser, or from Python for a thousand braces
-        last = (str(error).strip().splitlines() or [type(error).__name__])[-1]
-        expected = r"expected formulas between two $ as matplotlib reads them, or \$ for the sign"
-        raise ValueError(f"holds a formula that cannot be drawn ({last}); {expected}") from None
-    return value
-
-
 def _factor(unit: str, si_unit: str) -> float | None:
-    """Return the factor from a unit to an SI unit; None for other units."""
+    """Return the factor from a unit to an SI unit; None if the unit is of another quantity."""
     try:
         return float(conversion_factor(unit, si_unit))
     except ValueError:
@@ -52,25 +32,25 @@ class Measurement(Section):
 
     path: File
     """CSV file with a line of headings, relative to the configuration file."""
-    label: Annotated[Text, Field(max_length=200), AfterValidator(_drawable)]
+    label: Text
     """Name in the legend; formulas stand between two `$`."""
     citation: Text
-    """Source of the numbers, which the report prints."""
+    """Source of the numbers; the report prints it."""
     study: Name
     """Name of the study to compare with."""
     load: Column
-    """Load: reduced pressures p/(E* h'rms) (unit `1`) or nominal pressures (unit `kPa`, …), which need material and
-    rms_slope."""
+    """Load: reduced pressures p/(E* h'rms) (unit `1`), or nominal pressures (unit `kPa`, …), for which `material` and
+    `rms_slope` are required."""
     area: Column
     """Contact area fraction A/A0 (unit `1` or `percent`)."""
     material: Name | None = None
-    """Material of the measurement. Needed if the loads are nominal pressures."""
+    """Material of the measurement. Required if the loads are nominal pressures."""
     rms_slope: Positive | None = None
-    """Rms slope of the measured surface. Needed if the loads are nominal pressures."""
+    """Rms slope of the measured surface. Required if the loads are nominal pressures."""
 
     @property
     def load_is_pressure(self) -> bool:
-        """Whether the load column holds nominal pressures."""
+        """True if the column of the load contains nominal pressures."""
         return _factor(self.load.unit, "1") is None
 
     @property
@@ -86,8 +66,6 @@ class Measurement(Section):
             raise ValueError(f"load: unit {load!r}; expected '1' or a unit of pressure, such as 'kPa'")
         if _factor(area, "1") is None:
             raise ValueError(f"area: unit {area!r}; expected '1' or 'percent'")
-        if self.load.column == self.area.column:
-            raise ValueError(f"area: column {self.area.column!r} is that of the load; expected another one")
         if self.load_is_pressure and (self.material is None or self.rms_slope is None):
             raise ValueError(f"load in {load!r} without material and rms_slope; expected both, or loads of unit '1'")
         return self
@@ -98,30 +76,11 @@ class Measurement(Section):
         if self.material is not None:
             yield from unknown(("material",), self.material, campaign.materials)
 
-    def table_problems(self) -> Iterator[Problem]:
-        """Report a table that cannot be read."""
-        try:
-            read_columns(self.path, self.columns)
-        except ValueError as error:
-            yield ("path",), self.path, str(error)
-
 
 class _Drawn(Section):
     def by_name(self) -> dict[str, FigureOptions]:
-        """Return the figures to draw, by name."""
+        """Return the options of the figures to draw, by name."""
         return {name: getattr(self, name) for name in type(self).model_fields if getattr(self, name) is not None}
-
-    def inputs(self, name: str, campaign: Campaign, files: ResultFiles) -> Inputs:
-        """Return the input files of a figure, by the arguments of the function that draws it."""
-        return DECLARATIONS[name].inputs(campaign, getattr(self, name), files)
-
-    def arguments(self, name: str, campaign: Campaign) -> dict[str, Any]:
-        """Return the other arguments of the function that draws a figure."""
-        return getattr(self, name).arguments(campaign)
-
-    def studies_of(self, name: str, campaign: Campaign) -> tuple[str, ...]:
-        """Return the studies whose runs a figure shows."""
-        return getattr(self, name).studies_of(campaign)
 
 
 Figures = create_model(

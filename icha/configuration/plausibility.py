@@ -1,6 +1,6 @@
-"""Unusual values, most of which have a wrong unit.
+"""Find unusual values, most of which have a wrong unit.
 
-An unusual value is refused unless the list `confirmed` of the campaign has its key; then it gives a warning.
+An unusual value is refused, unless the list `confirmed` of the campaign contains its key; then it causes a warning.
 """
 
 from collections.abc import Collection, Iterator, Mapping
@@ -11,7 +11,7 @@ from icha.configuration.campaign import Campaign
 from icha.configuration.surfaces import SelfAffineSurface
 from icha.contact.models import DEFAULT_MODEL
 from icha.support import formatting
-from icha.support.values import Problem, list_names, to_number, to_si
+from icha.support.values import Problem, to_number, to_si
 from icha.surfaces.moments import self_affine_full_contact_energy
 
 CONFIRMED = "confirmed"
@@ -20,7 +20,7 @@ _SECTIONS = ("defaults", "surfaces", "materials", "studies")
 
 
 class Usual(NamedTuple):
-    """The usual values of a key, and the reason for the bounds."""
+    """The range of the usual values of a key, and the reason for its bounds."""
 
     si_unit: str
     least: str
@@ -29,7 +29,7 @@ class Usual(NamedTuple):
     or_zero: bool = False
 
     def contains(self, value: Any) -> bool:
-        """Tell whether a value, as it is written, is usual; also if it is invalid, which other checks report."""
+        """Return whether a written value is usual. Invalid values count as usual, because other checks report them."""
         try:
             number = self._read(value)
         except ValueError:
@@ -40,7 +40,7 @@ class Usual(NamedTuple):
         return to_number(value) if self.si_unit == "1" else to_si(value, self.si_unit)
 
     def __str__(self):
-        """Return the range and its reason for messages."""
+        """Return the range and its reason, for messages."""
         return f"{'0 or ' if self.or_zero else ''}{self.least} to {self.most} ({self.why})"
 
 
@@ -49,7 +49,7 @@ _WAVE = Usual("m", "0.1 nm", "1 m", "from an atom to a machine part")
 _SLOPE = Usual("1", "1e-4", "5", "from superpolished mirrors, 1e-3, to fracture surfaces, about 1")
 _OF_ENERGY = "van der Waals forces give 10 to 200 mJ/m^2, clean metals 1 to 3 J/m^2"
 _OF_RANGE = "chemical bonds reach less than 1 nm, van der Waals forces some nm, what grids resolve some 100 nm"
-# Usual values by key: wide enough for every reasonable value, while most wrong prefixes of units are outside.
+# Usual values by key. The ranges contain every reasonable value and exclude most values with a wrong unit prefix.
 USUAL = {
     "contact_modulus": Usual("Pa", "1 kPa", "2000 GPa", "from soft gels to diamond against something rigid, 1150 GPa"),
     "surface_energy": Usual("J/m^2", "0.001 mJ/m^2", "3 J/m^2", _OF_ENERGY, or_zero=True),
@@ -70,7 +70,7 @@ class Unusual(NamedTuple):
     Attributes
     ----------
     location : location in the configuration.
-    source : origin of a value that is not written in the configuration, with a blank before it.
+    source : origin of a value that is not in the configuration, with a blank before it.
     """
 
     location: tuple
@@ -80,12 +80,12 @@ class Unusual(NamedTuple):
 
     @property
     def key(self) -> str:
-        """Key to write into `confirmed`; for an entry of a list, this is the key of the whole list."""
+        """Key for the list `confirmed`; for an entry of a list, the key of the whole list."""
         return ".".join(entry for entry in self.location if isinstance(entry, str))
 
 
 def unusual_values(written: Mapping) -> list[Unusual]:
-    """Return all unusual values of a configuration, as it was written."""
+    """Find all unusual values in a configuration as it was written."""
     return [found for section in _SECTIONS for found in _unusual((section,), written.get(section))]
 
 
@@ -101,13 +101,13 @@ def _unusual(location: tuple, value: Any) -> Iterator[Unusual]:
 
 
 def unusual_topography(location: tuple, section: Any, period: float, rms_slope: float | None) -> Iterator[Unusual]:
-    """Return the unusual values of a topography from a file.
+    """Find the unusual values of a topography from a file.
 
     Parameters
     ----------
     location, section : location and section of the surface in the configuration.
     period : side of the square, m.
-    rms_slope : measured slope; None if no study asks for it.
+    rms_slope : measured slope; None if no study uses it.
     """
     if getattr(section, "size", section) is None and not _SIDE.contains(f"{period!r} m"):
         yield Unusual((*location, "size"), formatting.length(period), _SIDE, " in the file")
@@ -116,26 +116,14 @@ def unusual_topography(location: tuple, section: Any, period: float, rms_slope: 
         yield Unusual((*location, "height_unit"), f"rms slope {rms_slope:.3g}", _SLOPE, source)
 
 
-def plausibility_problems(unusual: Collection[Unusual], confirmed: Any) -> Iterator[Problem]:
-    """Report unusual values that are not confirmed; `confirmed` is the list as it is written."""
-    keys = set(_keys(confirmed))
+def plausibility_problems(
+    unusual: Collection[Unusual], confirmed: Any, addition: str = f"`{CONFIRMED}: [{{}}]` at the top level"
+) -> Iterator[Problem]:
+    """Report unusual values whose keys are not in the list `confirmed`; `addition` states how to confirm a key {}."""
     for each in unusual:
-        if each.key not in keys:
-            reason = f"is unusual{each.source}; expected {each.usual}. Correct it, or add `{CONFIRMED}: [{each.key}]`"
-            yield each.location, each.value, f"{reason} at the top level if it is intended"
-
-
-def needless_confirmations(unusual: Collection[Unusual], confirmed: Any) -> Iterator[Problem]:
-    """Report confirmed keys without unusual values."""
-    keys = dict.fromkeys(each.key for each in unusual)
-    for index, key in enumerate(_keys(confirmed)):
-        if key not in keys:
-            expected = f"expected one of {list_names(keys)}" if keys else "all values are usual. Remove it"
-            yield (CONFIRMED, index), key, f"is not the key of an unusual value; {expected}"
-
-
-def _keys(confirmed):
-    return [key for key in confirmed if isinstance(key, str)] if isinstance(confirmed, list) else []
+        if not (isinstance(confirmed, list) and each.key in confirmed):
+            reason = f"is unusual{each.source}; expected {each.usual}. Correct it, or add {addition.format(each.key)}"
+            yield each.location, each.value, f"{reason} if it is intended"
 
 
 _RATIO = Usual(
@@ -147,23 +135,19 @@ _RATIO = Usual(
 )
 
 
-def full_contact_energy(campaign: Campaign, surface: str) -> float:
-    """Return U_full/E* of a surface at rms slope 1, m."""
-    section = campaign.surfaces[surface]
-    if isinstance(section, SelfAffineSurface):
-        return self_affine_full_contact_energy(*section.lengths_and_hurst)
-    return campaign.topography(surface).full_contact_energy
-
-
 def energy_ratio(campaign: Campaign, contact) -> float:
-    """Return U_full/dgamma of a contact: a case with its surface, rms slope and material."""
-    material = campaign.materials[contact.material]
-    energy = full_contact_energy(campaign, contact.surface) * contact.rms_slope**2
+    """Return U_full/dgamma of a contact, which has a surface, an rms slope and a material."""
+    surface, material = campaign.surfaces[contact.surface], campaign.materials[contact.material]
+    if isinstance(surface, SelfAffineSurface):
+        energy = self_affine_full_contact_energy(*surface.lengths_and_hurst)
+    else:
+        energy = campaign.topography(contact.surface).full_contact_energy
+    energy *= contact.rms_slope**2
     return full_contact_energy_ratio(energy, material.contact_modulus, material.surface_energy)
 
 
 def sticky_runs(campaign: Campaign) -> Iterator[Unusual]:
-    """Return, for every study, the stickiest asperity run in which full contact has the lower energy."""
+    """Find the stickiest asperity run of every study, if full contact has the lower energy in it."""
     for name, study in campaign.studies.items():
         if DEFAULT_MODEL not in study.models:
             continue

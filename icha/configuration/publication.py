@@ -30,7 +30,7 @@ _FROM_CROCKFORD = str.maketrans("0123456789abcdefghjkmnpqrstvwxyz", "0123456789a
 
 
 def _line(value: str) -> str:
-    """Refuse text with line breaks or tabs, or without a visible character."""
+    """Refuse a text with line breaks or tabs, or without a visible character."""
     if "\n" in value or "\t" in value:
         raise ValueError(
             "holds a line break or a tab; expected text of one line (in YAML, >- and |- end it without one)"
@@ -39,112 +39,82 @@ def _line(value: str) -> str:
 
 
 def _prose(value: str) -> str:
-    """Refuse text without a visible character."""
+    """Refuse a text without a visible character."""
     if not any(char.isprintable() and not char.isspace() for char in value):
         raise ValueError("is blank; expected text")
     return value
 
 
-def _orcid(value: Any) -> str:
-    """Return the ORCID in a text or a web address; refuse others and wrong check digits (ISO 7064 mod 11-2)."""
-    plain = re.sub(r"^https?://orcid\.org/", "", str(value))
-    if re.fullmatch(r"([0-9]{4}-){3}[0-9]{3}[0-9X]", plain):
-        digits = [10 if digit == "X" else int(digit) for digit in reversed(plain.replace("-", ""))]
-        if sum(digit * 2**power for power, digit in enumerate(digits)) % 11 == 1:
-            return plain
-    raise ValueError("is not an ORCID, or its check digit is wrong; expected one such as '0000-0002-1825-0097'")
-
-
-def _ror(value: Any) -> str:
-    """Return the address of a ROR identifier; refuse others and wrong check digits (ISO 7064 mod 97-10)."""
-    found = re.fullmatch(r"(?:https?://ror\.org/)?(0([0-9a-hjkmnp-tv-z]{6})([0-9]{2}))", str(value).lower())
-    if found and int(found[3]) == 98 - int(found[2].translate(_FROM_CROCKFORD), 32) * 100 % 97:
-        return f"https://ror.org/{found[1]}"
-    raise ValueError(
-        "is not a ROR identifier, or its check digits are wrong; expected one of https://ror.org, such as "
-        "'https://ror.org/03yrm5c26'"
-    )
-
-
-def _plain_doi(value: Any) -> str | None:
-    """Return the DOI in a text or an address of doi.org; None if it is not a DOI."""
-    plain = re.sub(r"(?i)^(https?://(dx\.)?doi\.org/|doi:)", "", str(value))
-    return plain if re.fullmatch(rf"10\.[0-9]{{4,9}}/{_ADDRESS}", plain) else None
-
-
-def _doi(value: Any) -> str:
-    if doi := _plain_doi(value):
-        return doi
-    raise ValueError("is not a DOI; expected a DOI such as '10.1007/s11249-017-0900-2'")
-
-
-def _identifier(value: Any) -> str:
-    if doi := _plain_doi(value):
-        return doi
-    if isinstance(value, str) and re.fullmatch(rf"{_ARXIV}|https?://[^\s/]+\.{_ADDRESS}", value):
-        return value
-    raise ValueError(
-        "is not an identifier; expected a DOI such as '10.1007/s11249-017-0900-2', 'arXiv:1234.56789', or a web address"
-    )
-
-
-def _date(value: Any) -> str:
-    """Refuse values that are not a date from 1900 to 2199; the YAML reader may have converted the text to a date."""
-    value = value.isoformat() if isinstance(value, datetime.date) else str(value)
-    try:
-        if not re.fullmatch(r"(19|20|21)[0-9]{2}-[0-9]{2}-[0-9]{2}", value):
-            raise ValueError
-        datetime.date.fromisoformat(value)
-    except ValueError:
-        raise ValueError("is not a date; expected year, month and day from 1900 to 2199, such as 2026-01-31") from None
-    return value
-
-
-def _example(check: Callable[[Any], str], example: str):
-    """Make the type of a text with a check, and with an example for the schema."""
-    return Annotated[str, BeforeValidator(check), WithJsonSchema({"type": "string", "examples": [example]})]
-
-
-def _matching(pattern: str, problem: str, example: str):
-    """Make the type of a text that matches a pattern."""
-
-    def check(value: Any) -> str:
-        if not isinstance(value, str) or not re.fullmatch(pattern, value):
-            raise ValueError(problem)
-        return value
-
-    return _example(check, example)
-
-
-Orcid = _example(_orcid, "0000-0002-1825-0097")
-Ror = _example(_ror, "https://ror.org/03yrm5c26")
-Doi = _example(_doi, "10.1007/s11249-017-0900-2")
-Identifier = _example(_identifier, "10.1007/s11249-017-0900-2")
-FunderId = _example(lambda value: _plain_doi(value) or _ror(value), "https://ror.org/00k4n6c32")
-Date = _example(_date, "2026-01-31")
-Community = _matching(
-    r"[a-z0-9_-]+",
-    "is not a community of Zenodo; expected the end of its address: lower-case letters, digits, - and _",
-    "contact-mechanics",
-)
-# Part of the name of a folder. YAML reads 1.10 without quotes as the number 1.1.
-Version = _matching(
-    r"[0-9A-Za-z]([0-9A-Za-z.+_-]{0,38}[0-9A-Za-z])?",
-    "is not a version; expected letters, digits and . + - _ between them, in quotes if it looks like a number, such as "
-    "'1.0.0'",
-    "1.0.0",
-)
 Line = Annotated[Text, AfterValidator(_line)]
 Prose = Annotated[Text, AfterValidator(_prose)]
 
 
-class _Entry(Section):
-    def __repr__(self):
-        """Return the keys that the configuration contains, for messages."""
-        return self.model_dump_json(exclude_none=True)
+def _orcid(value: str) -> str | None:
+    """Return the ORCID in a text or a web address, if its check digit is right (ISO 7064 mod 11-2)."""
+    plain = re.sub(r"^https?://orcid\.org/", "", value)
+    if not re.fullmatch(r"([0-9]{4}-){3}[0-9]{3}[0-9X]", plain):
+        return None
+    digits = [10 if digit == "X" else int(digit) for digit in reversed(plain.replace("-", ""))]
+    return plain if sum(digit * 2**power for power, digit in enumerate(digits)) % 11 == 1 else None
 
 
-class Author(_Entry):
+def _ror(value: str) -> str | None:
+    """Return the address of a ROR identifier, if its check digits are right (ISO 7064 mod 97-10)."""
+    found = re.fullmatch(r"(?:https?://ror\.org/)?(0([0-9a-hjkmnp-tv-z]{6})([0-9]{2}))", value.lower())
+    right = found and int(found[3]) == 98 - int(found[2].translate(_FROM_CROCKFORD), 32) * 100 % 97
+    return f"https://ror.org/{found[1]}" if right else None
+
+
+def _doi(value: str) -> str | None:
+    """Return the DOI in a text or an address of doi.org."""
+    plain = re.sub(r"(?i)^(https?://(dx\.)?doi\.org/|doi:)", "", value)
+    return plain if re.fullmatch(rf"10\.[0-9]{{4,9}}/{_ADDRESS}", plain) else None
+
+
+def _date(value: str) -> str | None:
+    """Return the date in a text, as year-month-day."""
+    try:
+        return datetime.date.fromisoformat(value).isoformat()
+    except ValueError:
+        return None
+
+
+def _matching(pattern: str) -> Callable[[str], str | None]:
+    """Make a function that returns a text if it matches a pattern."""
+    return lambda value: value if re.fullmatch(pattern, value) else None
+
+
+def _checked(read: Callable[[str], str | None], what: str, example: str):
+    """Make the type of a text; `read` returns its plain form, or None if the text is wrong."""
+
+    def check(value: Any) -> str:
+        # The YAML reader turns a date into a `datetime.date`, and a version such as 1.10 into the number 1.1.
+        plain = read(str(value)) if isinstance(value, str | datetime.date) else None
+        if plain is None:
+            raise ValueError(f"is not valid; expected {what}, such as {example!r}")
+        return plain
+
+    return Annotated[str, BeforeValidator(check), WithJsonSchema({"type": "string", "examples": [example]})]
+
+
+_ROR, _DOI = "https://ror.org/03yrm5c26", "10.1007/s11249-017-0900-2"
+_web = _matching(rf"{_ARXIV}|https?://[^\s/]+\.{_ADDRESS}")
+Orcid = _checked(_orcid, "an ORCID with the right check digit", "0000-0002-1825-0097")
+Ror = _checked(_ror, "a ROR identifier with the right check digits", _ROR)
+Doi = _checked(_doi, "a DOI", _DOI)
+Identifier = _checked(lambda value: _doi(value) or _web(value), "a DOI, arXiv:1234.56789 or a web address", _DOI)
+FunderId = _checked(lambda value: _doi(value) or _ror(value), "a ROR identifier, or a DOI", "https://ror.org/00k4n6c32")
+Date = _checked(_date, "year, month and day", "2026-01-31")
+Community = _checked(_matching(r"[a-z0-9_-]+"), "the end of the address of a community of Zenodo", "contact-mechanics")
+# Part of the name of a folder.
+Version = _checked(
+    _matching(r"[0-9A-Za-z]([0-9A-Za-z.+_-]{0,38}[0-9A-Za-z])?"),
+    "letters and digits, with . + - _ between them, in quotes if it looks like a number",
+    "1.0.0",
+)
+
+
+class Author(Section):
     """An author of the data: a person with `family_names` and `given_names`, or an organisation with `name`."""
 
     family_names: Line | None = None
@@ -174,7 +144,7 @@ class Author(_Entry):
 
     @property
     def is_person(self) -> bool:
-        """Whether the author is a person."""
+        """True if the author is a person."""
         return self.name is None
 
     @property
@@ -193,13 +163,13 @@ class Author(_Entry):
         return self.name or f"{self.family_names}, {self.given_names}"
 
 
-class Funding(_Entry):
+class Funding(Section):
     """A source of funding."""
 
     funder: Line
     """Name of the funder."""
     funder_id: FunderId | None = None
-    """Identifier of the funder: of ROR (`https://ror.org/…`), or a DOI of the funder registry."""
+    """Identifier of the funder: a ROR identifier (`https://ror.org/…`), or a DOI of the funder registry."""
     award_number: Line | None = None
     """Number of the grant."""
     award_title: Line | None = None
@@ -208,8 +178,8 @@ class Funding(_Entry):
     """Web address or DOI of the grant."""
 
 
-class RelatedIdentifier(_Entry):
-    """A work that the deposit is related to, such as the paper that it supplements, or data that it uses."""
+class RelatedIdentifier(Section):
+    """A work with a relation to the deposit, such as the paper that it supplements, or data that it uses."""
 
     identifier: Identifier
     """A DOI, `arXiv:…`, or a web address."""
@@ -219,24 +189,24 @@ class RelatedIdentifier(_Entry):
     """Type of the other work, by DataCite's names, such as `JournalArticle`."""
 
 
-class KnownFailure(_Entry):
+class KnownFailure(Section):
     """A run with a failed check that is nevertheless published, with an explanation."""
 
     run: Line
-    """Name of the run in the verdict, such as `study/surface/seed1/slope1/material`."""
+    """Name of the run as in `verdict.txt`, such as `study/surface/seed1/slope1/material`."""
     reason: Prose
-    """Explanation for readers: why the check failed, and why the data are published nevertheless."""
+    """Explanation for readers: the reason why the check failed, and the reason to publish the data nevertheless."""
 
 
 class Publication(Section):
-    """Metadata of a deposit. Only `publish` needs them."""
+    """Metadata of a deposit. Only the target `publish` needs them."""
 
     version: Version | None = None
-    """Version of the data, such as `1.0.0`; needed to publish."""
+    """Version of the data, such as `1.0.0`; required to publish."""
     date: Date | None = None
-    """Day of publication, such as `2026-01-31`; needed to publish."""
+    """Day of publication, such as `2026-01-31`; required to publish."""
     authors: Annotated[list[Author], AfterValidator(distinct)] = []
-    """Authors of the data; at least one is needed to publish."""
+    """Authors of the data; at least one is required to publish."""
     title: Line | None = None
     """Title of the deposit. Default: that of the campaign."""
     summary: Prose | None = None
@@ -248,7 +218,7 @@ class Publication(Section):
     funding: Annotated[list[Funding], AfterValidator(distinct)] = []
     """Sources of funding."""
     related_identifiers: Annotated[list[RelatedIdentifier], AfterValidator(distinct)] = []
-    """Papers, data and programs that the deposit is related to."""
+    """Papers, data and programs with a relation to the deposit."""
     doi: Doi | None = None
     """DOI of this version, if one is reserved."""
     communities: Annotated[list[Community], AfterValidator(distinct)] = []
@@ -257,7 +227,7 @@ class Publication(Section):
     """Runs with failed checks that are nevertheless published."""
 
     def problems(self, campaign: Any) -> Iterator[Problem]:
-        """Report known failures of runs that its `icha.configuration.campaign.Campaign` does not have."""
+        """Report known failures of runs that the `icha.configuration.campaign.Campaign` does not have."""
         if not self.known_failures:
             return
         runs = {
@@ -273,21 +243,6 @@ class Publication(Section):
 
 
 def missing_metadata(publication: Publication) -> list[str]:
-    """Return a line for each key that a deposit needs and the section lacks."""
-    needed = {
-        "version": "the version of the data, such as '1.0.0'",
-        "date": "the day of publication, such as 2026-01-31",
-        "authors": "at least one, with family_names and given_names, or name",
-    }
-    found = [
-        f"publication.{key}: is missing; expected {what}"
-        for key, what in needed.items()
-        if not getattr(publication, key)
-    ]
-    # Those of the campaign, which are the defaults, have not been checked yet.
-    for key, check in {"title": _line, "summary": _prose}.items():
-        try:
-            check(getattr(publication, key))
-        except ValueError as error:
-            found.append(f"{key}: {getattr(publication, key)!r} {error}")
-    return found
+    """Return a line for each key that a deposit needs and that is missing in the section."""
+    missing = [key for key in ("version", "date", "authors") if not getattr(publication, key)]
+    return [f"publication.{key}: is missing; expected: {Publication.model_fields[key].description}" for key in missing]

@@ -1,6 +1,6 @@
-"""The JSON schema of configuration files and the tables of their keys, generated from the model.
+"""The JSON schema of configuration files and the tables of their keys, generated from the sections.
 
-`python -m icha.configuration.schema` writes both where they belong.
+`python -m icha.configuration.schema` writes both to their files.
 """
 
 import json
@@ -17,10 +17,10 @@ MARK = "<!-- generated from the model: make schema -->\n"
 
 
 def json_schema() -> str:
-    """Return the schema, with which editors check and complete a configuration."""
+    """Return the schema that editors use to check and complete a configuration."""
     schema = _schema()
     for name in (*(kind.__name__ for kind in SURFACE_KINDS.values()), "Material", "Study"):
-        # Required keys may stand among the defaults.
+        # A required key may be among the defaults instead.
         schema["$defs"][name].pop("required", None)
     schema["$schema"] = "https://json-schema.org/draft/2020-12/schema"
     return json.dumps(schema, indent=2, ensure_ascii=False) + "\n"
@@ -28,7 +28,7 @@ def json_schema() -> str:
 
 def _schema() -> dict:
     text = json.dumps(Campaign.model_json_schema())
-    # Sections have the names of the configuration; descriptions have no line breaks.
+    # Rename the section as in the configuration, and remove line breaks from descriptions.
     return json.loads(re.sub(r"\\n *", " ", text.replace("MaterialSection", "Material")))
 
 
@@ -59,7 +59,7 @@ def _table(heading: str, section: dict) -> str:
     lines = [f"### {heading}", "", section.get("description", ""), "", "| key | default | meaning |", "|---|---|---|"]
     for key, value in section["properties"].items():
         default = value.get("default")
-        # The default of a section is no section.
+        # The default of a section means that the section is missing.
         shown = "none" if default is None or isinstance(default, dict) else f"`{json.dumps(default)}`"
         lines.append(f"| `{key}` | {'required' if key in required else shown} | {value['description']} |")
     return "\n".join([*lines, ""])

@@ -5,7 +5,6 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import BeforeValidator, ConfigDict, Field, WithJsonSchema, field_validator, model_validator
 
-from icha.support import formatting
 from icha.support.rules import GRID, HURST, LENGTH, FloatRange, IntegerRange
 from icha.support.values import (
     PATTERN,
@@ -31,17 +30,17 @@ class MaterialSection(Section):
     contact_modulus: Modulus
     """Composite elastic modulus E*."""
     surface_energy: SurfaceEnergy
-    """Energy of adhesion Δγ per area; `0 J/m^2` is adhesionless."""
+    """Work of adhesion Δγ per area; `0 J/m^2` means no adhesion."""
     interaction_range: Length
-    """Range ε of the attraction, which sets the separation at which asperities jump into contact. The Tabor parameter
-    of a surface with rms curvature 1/R is μ = (RΔγ²/E*²)^(1/3)/ε."""
+    """Range ε of the attraction, which determines when asperities jump into contact. The Tabor parameter of a surface
+    with rms curvature 1/R is μ = (RΔγ²/E*²)^(1/3)/ε."""
     flaw_radius: Length | None = None
     """Radius a of the largest flaw of the interface. Full contact then opens at √(πE*Δγ/(2a)), the tension at which a
     penny-shaped crack grows, if this is less than the theoretical strength 1.03 Δγ/ε. Default: no flaw."""
 
 
 def _unit_of_length(value: Any) -> float:
-    """Read a unit such as `um`, or a multiple of one such as `0.1 mm`, in metres."""
+    """Return a unit such as `um`, or a multiple of a unit such as `0.1 mm`, in metres."""
     expected = "expected a unit of length, such as 'um', or a multiple of one, such as '0.1 mm'"
     if not isinstance(value, str):
         raise ValueError(f"is not a unit; {expected}")
@@ -87,18 +86,15 @@ class Crop(Section):
     side: Length
     """Side of the square."""
 
-    def __repr__(self):
-        """Describe the square for messages."""
-        side, x, y = map(formatting.length, (self.side, self.x, self.y))
-        return f"a square of {side} at x = {x}, y = {y}"
 
-
-class MeasuredSurface(Section):
-    """A measured topography and its preparation. The mean height is always removed."""
-
+class _SurfaceFromFile(Section):
     random: ClassVar[bool] = False
     # The waves of a file are not known.
     cells_per_short_wave: ClassVar[float] = math.inf
+
+
+class MeasuredSurface(_SurfaceFromFile):
+    """A measured topography and its preparation. The mean height is always removed."""
 
     kind: Literal["measured"]
     """A topography from a measurement."""
@@ -110,7 +106,7 @@ class MeasuredSurface(Section):
     SurfaceTopography can read). `auto` chooses by the ending of the file name and, for text, by the number of
     columns."""
     columns: Annotated[list[integer(IntegerRange(1))], Field(min_length=3, max_length=3)] | None = None
-    """Columns of a text with x, y and z, counted from 1, such as `[1, 2, 3]`. Needed if a line has more than three
+    """Columns of x, y and z in a text, counted from 1, such as `[1, 2, 3]`. Required if a line has more than three
     numbers."""
     data: Text | None = None
     """Array or channel to use if the file has several: name of the variable (netcdf), path of the dataset (hdf5), name
@@ -119,14 +115,14 @@ class MeasuredSurface(Section):
     """First axis of the array in npy, netcdf, hdf5 and matrix files: `y` if a row of the array is a line along x, else
     `x`. ICHA ignores this key if the dimensions in the file are named x and y."""
     height_unit: UnitOfLength | None = None
-    """Unit of the heights, such as `nm` or `0.1 mm`. Needed unless the file states it. It takes precedence over the
-    unit in the file."""
+    """Unit of the heights, such as `nm` or `0.1 mm`. Required unless the file contains it. If you give it, the unit in
+    the file is not used."""
     lateral_unit: UnitOfLength | None = None
     """Unit of the coordinates x and y; with `format: fourier`, unit of 1/q. Default: the unit in the file, else the
     unit of the heights."""
     size: Sides | None = None
     """Size of the whole scan: one length, or two lengths, along x and y. The pixel size is the size of the scan divided
-    by the number of pixels. Needed unless the file states the size. It takes precedence over the size in the file."""
+    by the number of pixels. Required unless the file contains it. If you give it, the size in the file is not used."""
     touches_first: Literal["high", "low"] = "high"
     """Points that touch first: those with the largest numbers in the file (`high`), or with the smallest (`low`)."""
     missing: Literal["refuse", "fill"] = "refuse"
@@ -135,8 +131,8 @@ class MeasuredSurface(Section):
     crop: Crop | None = None
     """The square to use. Default: the largest one, in the middle."""
     detrend: Literal["none", "tilt", "curvature"] | None = None
-    """Trend to remove besides the mean height: `none`, the mean plane (`tilt`), or the best paraboloid (`curvature`).
-    Default: `tilt`, or `none` for a periodic topography."""
+    """Trend to remove besides the mean height: `none`, the mean plane (`tilt`), or the paraboloid that fits best
+    (`curvature`). Default: `tilt`; for a periodic topography `none`."""
     cutoff: Length | None = None
     """Cut-off wavelength (nesting index) of a Gaussian S-filter (ISO 25178-3, areal filter of ISO 16610-61). The filter
     removes shorter waves and halves the amplitude of waves of this length, before the edges are treated. At least 4
@@ -146,7 +142,7 @@ class MeasuredSurface(Section):
     mean towards the edges, and the topography repeats. `mirror`: the topography and its mirror images form a periodic
     cell of twice the side. `free`: one square on a half-space that extends beyond the square."""
     taper: number(FloatRange(above=0, most=0.5)) | None = None
-    """With `boundary: window`: width of the strip along each edge in which the heights fall to their mean, as a
+    """Only with `boundary: window`: width of the strip along each edge in which the heights fall to their mean, as a
     fraction of the side. Default: 0.1."""
     grid: integer(GRID) | None = None
     """Nodes along a side of the prepared surface, which is resampled by Fourier interpolation. A coarser grid loses the
@@ -158,24 +154,18 @@ class MeasuredSurface(Section):
             raise ValueError(
                 f"detrend: {self.detrend!r} would break the periodicity; expected none, or another boundary"
             )
-        if self.boundary == "periodic" and self.crop is not None:
-            raise ValueError("crop: a square of a periodic topography is not periodic; expected another boundary")
         if self.taper is not None and self.boundary != "window":
-            raise ValueError(f"taper: applies only to boundary window, not to {self.boundary}. Remove it")
-        if self.format == "fourier" and self.boundary != "periodic":
-            raise ValueError(f"boundary: {self.boundary!r} for a Fourier series; expected periodic")
-        if self.format == "fourier" and self.missing == "fill":
-            raise ValueError("missing: a Fourier series has no missing points. Remove it")
+            raise ValueError(f"taper: applies only to boundary window, not to {self.boundary}. Remove the key")
         return self
 
     @property
     def preparation(self) -> dict:
-        """Arguments of `icha.surfaces.measured.settings.Preparation`: all keys but kind and path, in SI units."""
+        """Arguments of `icha.surfaces.measured.settings.Preparation`: all keys except kind and path, in SI units."""
         settings = self.model_dump(exclude={"kind", "path"})
         settings["detrend"] = self.detrend or ("none" if self.boundary == "periodic" else "tilt")
         settings["taper"] = (self.taper or 0.1) if self.boundary == "window" else None
         if self.cutoff is None:
-            # Results of earlier versions, which had no such key, stay valid.
+            # Results of earlier versions, which did not have this key, stay valid.
             del settings["cutoff"]
         if self.columns is None:
             del settings["columns"]
@@ -183,7 +173,7 @@ class MeasuredSurface(Section):
 
 
 class SelfAffineSurface(Section):
-    """A random periodic surface, self-affine with roll-off, made by spectral synthesis."""
+    """A random periodic surface from spectral synthesis, self-affine with roll-off."""
 
     random: ClassVar[bool] = True
 
@@ -215,7 +205,7 @@ class SelfAffineSurface(Section):
         return self.grid * self.short_wavelength / self.period
 
     def grid_of_cells(self, cells: int) -> int:
-        """Return the smallest grid with a number of cells per shortest wavelength."""
+        """Return the smallest grid that has `cells` cells per shortest wavelength."""
         return math.ceil(cells * self.period / self.short_wavelength * (1 - ROUNDING))
 
     @field_validator("rolloff_wavelength", "short_wavelength", "grid")
@@ -239,12 +229,8 @@ class SelfAffineSurface(Section):
         return value
 
 
-class FileSurface(Section):
+class FileSurface(_SurfaceFromFile):
     """A periodic height map from a file, for example a published surface."""
-
-    random: ClassVar[bool] = False
-    # The waves of a file are not known.
-    cells_per_short_wave: ClassVar[float] = math.inf
 
     kind: Literal["file"]
     """A height map from a file."""
@@ -257,6 +243,6 @@ class FileSurface(Section):
     """Side L of the periodic cell."""
 
 
-# Models of surfaces by their key `kind`.
+# Sections of surfaces, by their key `kind`.
 SURFACE_KINDS = {"self_affine": SelfAffineSurface, "file": FileSurface, "measured": MeasuredSurface}
 AnySurface = Annotated[SelfAffineSurface | FileSurface | MeasuredSurface, Field(discriminator="kind")]

@@ -1,17 +1,17 @@
-"""Topographies from files: their facts, for a campaign, and `icha.read_scan`, for scripts."""
+"""Read topographies from files: their facts for campaigns, and `icha.read_scan` for scripts."""
 
 from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Collection, Iterable
+from collections.abc import Collection
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pydantic import ValidationError
 
 from icha.configuration.campaign import Campaign, Topography
-from icha.configuration.errors import ConfigurationError, format_problem, problem_of
+from icha.configuration.errors import problem_of, refuse
 from icha.configuration.studies import MEASURED
 from icha.configuration.surfaces import FileSurface, MeasuredSurface
 from icha.support.checksums import sha256_of
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 def inspect_topographies(campaign: Campaign) -> tuple[dict[str, Topography], list[Problem]]:
-    """Return facts of every topography from a file that a study uses, and the problems with these files."""
+    """Return the facts of every topography from a file that a study uses, and the problems with these files."""
     contacts = [each for study in campaign.studies for each in campaign.contacts(study)]
     of_measured_slope = {each.surface for each in contacts if each.rms_slope == MEASURED}
     facts, problems = {}, []
@@ -30,11 +30,10 @@ def inspect_topographies(campaign: Campaign) -> tuple[dict[str, Topography], lis
         surface = campaign.surfaces[name]
         try:
             facts[name] = inspect_file(surface)
-        except (ValueError, MemoryError) as error:
+        except ValueError as error:
             key, origin = getattr(error, "key", "path"), campaign.origin("surfaces", name)
+            key = key if hasattr(surface, key) else "path"  # surfaces of kind `file` have fewer keys
             variant = "" if origin == name else f"of variant {name!r}: "
-            if isinstance(error, MemoryError):
-                error = f"does not fit into the memory of this machine ({error}); expected a smaller topography"
             problems.append((("surfaces", origin, key), getattr(surface, key, NOTHING), f"{variant}{error}"))
             continue
         if name not in of_measured_slope:
@@ -47,7 +46,7 @@ _KNOWN: dict[tuple, Topography] = {}
 
 
 def inspect_file(section: MeasuredSurface | FileSurface) -> Topography:
-    """Return facts of a topography from a file, which is read again only if it has changed."""
+    """Return the facts of a topography from a file, which is read again only if it has changed."""
     try:
         stat = os.stat(section.path)
         version = stat.st_mtime_ns, stat.st_size
@@ -71,7 +70,7 @@ def inspect_file(section: MeasuredSurface | FileSurface) -> Topography:
 
 def read_surface(section: MeasuredSurface | FileSurface) -> Surface:
     """Read and prepare the surface of a file, as its section of the configuration describes."""
-    # These imports load SciPy, which campaigns without such a surface do not need.
+    # These modules import SciPy, which takes time; campaigns without such a surface do not need it.
     if isinstance(section, MeasuredSurface):
         from icha.surfaces.measured.topography import prepared_topography
 
@@ -88,49 +87,37 @@ def read_scan(path: str | os.PathLike, *, confirmed: Collection[str] = (), **key
     Parameters
     ----------
     path : file of the topography.
-    confirmed : names of keywords with unusual values that are intended; "height_unit" also confirms the slope.
+    confirmed : names of the keywords with unusual values that you intend; "height_unit" also confirms the slope.
     keywords : keys of a measured surface in a configuration, with values in the same form, such as `size="32 um"`,
-        `height_unit="nm"` and `boundary="window"`. `boundary` is needed; `size` and `height_unit` are needed unless the
-        file has them.
+        `height_unit="nm"` and `boundary="window"`. `boundary` is required; `size` and `height_unit` are required unless
+        the file contains them.
 
     Raises
     ------
     ConfigurationError
-        A ValueError, if a key is missing or wrong, the file cannot be read or prepared as asked, or a size or slope
-        is unusual and not confirmed.
+        A ValueError, if a key is missing or wrong, if the file cannot be read or prepared with these keys, or if a
+        size or slope is unusual and not confirmed.
     """
-    from icha.configuration.plausibility import unusual_topography, unusual_values
+    from icha.configuration.plausibility import plausibility_problems, unusual_topography, unusual_values
     from icha.surfaces.measured.settings import UnfitTopography
     from icha.surfaces.surface import MISFIT_OF_EDGES, EdgeWarning, edges_fit
 
+    def unconfirmed(unusual):
+        unusual = [each._replace(location=each.location[2:]) for each in unusual]
+        return plausibility_problems(unusual, list(confirmed), "`confirmed=[{!r}]`")
+
     section = {"kind": "measured", "path": os.fspath(path), **keywords}
-    where = ("surfaces", "scan")
-    unusual = unusual_values({"surfaces": {"scan": section}})
     try:
         measured = MeasuredSurface.model_validate(section)
-        _refuse(_unconfirmed(unusual, confirmed))
+        refuse("read_scan", unconfirmed(unusual_values({"surfaces": {"scan": section}})))
         surface = read_surface(measured)
     except ValidationError as error:
-        problems = [problem_of({**details, "loc": (*where, "measured", *details["loc"])}) for details in error.errors()]
-        _refuse((location[2:], value, reason) for location, value, reason in problems)
+        problems = [{**details, "loc": ("surfaces", "scan", "measured", *details["loc"])} for details in error.errors()]
+        refuse("read_scan", [(location[2:], value, reason) for location, value, reason in map(problem_of, problems)])
     except UnfitTopography as error:
-        _refuse([((error.key,), section.get(error.key, NOTHING), str(error))])
-    _refuse(_unconfirmed(unusual_topography(where, measured, surface.period, surface.rms_slope), confirmed))
+        refuse("read_scan", [((error.key,), section.get(error.key, NOTHING), str(error))])
+    unusual = unusual_topography(("surfaces", "scan"), measured, surface.period, surface.rms_slope)
+    refuse("read_scan", unconfirmed(unusual))
     if not surface.free and not edges_fit(surface.heights):
         warnings.warn(MISFIT_OF_EDGES, EdgeWarning, stacklevel=2)
     return surface
-
-
-def _unconfirmed(unusual, confirmed) -> list[Problem]:
-    """Return the problems with unusual values of a scan that are not confirmed."""
-    reason = "is unusual{}; expected {}. Correct it, or add `confirmed=[{!r}]` if it is intended"
-    found = [(each.location[2], each) for each in unusual]
-    return [
-        ((key,), each.value, reason.format(each.source, each.usual, key)) for key, each in found if key not in confirmed
-    ]
-
-
-def _refuse(problems: Iterable[Problem]) -> None:
-    """Raise ConfigurationError if there are problems with a scan."""
-    if lines := [format_problem("read_scan", *problem) for problem in problems]:
-        raise ConfigurationError("\n".join(lines))

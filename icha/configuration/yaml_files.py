@@ -19,13 +19,7 @@ _MOST_BYTES, _MOST_VALUES, _DEEPEST, _LONGEST_NUMBER = 10**6, 10**6, 50, 100
 
 
 def read_yaml(path: Path) -> dict:
-    """Read a YAML file that holds a mapping and no key twice.
-
-    Raises
-    ------
-    ConfigurationError
-        If the file is missing, empty, not YAML, or holds anything else.
-    """
+    """Read a YAML file that contains a mapping; raise ConfigurationError if it does not, or if it has a key twice."""
     text, line, problem = _read_text(path), 0, ""
     try:
         content = yaml.load(text, Loader=_Loader)
@@ -58,11 +52,8 @@ def _read_text(path: Path) -> str:
     try:
         return content.decode("utf-8")
     except UnicodeDecodeError as error:
-        line, byte = content.count(b"\n", 0, error.start) + 1, f"0x{content[error.start]:02x}"
-        raise ConfigurationError(
-            f"{path}, line {line}: byte {byte} is not UTF-8, so this is text in another encoding, such as Latin-1 or "
-            "UTF-16, or not a text; expected a YAML file saved in UTF-8"
-        ) from None
+        line = content.count(b"\n", 0, error.start) + 1
+        raise ConfigurationError(f"{path}, line {line}: is not UTF-8; expected a YAML file saved in UTF-8") from None
 
 
 _TOO_DEEP = f"the file has more than {_DEEPEST} nested sections or lists"
@@ -71,8 +62,8 @@ _TOO_DEEP = f"the file has more than {_DEEPEST} nested sections or lists"
 def excessive_size(content: Any) -> str:
     """Describe why a configuration is too large to be checked; empty if it is not.
 
-    Aliases count with all of their values, because a few lines of aliases of aliases can have billions. So do defaults
-    that have been filled into all entries.
+    Aliases count with all of their values, because a few lines of nested aliases can have billions of values. Defaults
+    count once for every entry that they fill.
     """
     for count, depth in enumerate(_depths(content)):
         if depth > _DEEPEST:
@@ -90,19 +81,13 @@ def _depths(content: Any, depth: int = 1) -> Iterator[int]:
 
 
 class _Loader(yaml.SafeLoader):
-    """A loader that refuses tags and repeated keys, and reads numbers as their authors mean them."""
-
-    def compose_node(self, parent, index):
-        event = self.peek_event()
-        if getattr(event, "tag", None) is not None:
-            raise yaml.composer.ComposerError(None, None, "a tag", event.start_mark)
-        return super().compose_node(parent, index)
+    """A YAML loader that refuses repeated keys, and reads numbers as their authors mean them."""
 
     def construct_unless_text(self, node, construct):
-        """Construct the value of a scalar; return its text if that fails, which the section then checks.
+        """Construct the value of a scalar; if this fails, return its text, which the section then checks.
 
-        Examples of scalars that fail: `0b_` looks like a number, 30 February looks like a date, and Python refuses
-        integers of thousands of digits.
+        Construction fails for `0b_`, which looks like a number, for 30 February, which looks like a date, and for
+        integers of thousands of digits, which Python refuses.
         """
         text = self.construct_scalar(node)
         # YAML 1.1 would read a time such as 1:30 as a number of base 60.
@@ -134,7 +119,7 @@ for _kind in ("int", "float", "timestamp"):
 
 
 def dump_yaml(content: Mapping, origin: str) -> str:
-    """Return the text of a configuration in its order, with a line for each value.
+    """Return the text of a configuration, with its keys in their order and a line for each value.
 
     Raises ConfigurationError, which names the file `origin`, if the text is too long to be read again.
     """
@@ -148,7 +133,7 @@ def dump_yaml(content: Mapping, origin: str) -> str:
 
 
 def merge(content: Mapping, overrides: Mapping) -> dict:
-    """Return `content` with the values of `overrides`, which replace lists as a whole."""
+    """Return `content` with the values of `overrides`. A list replaces the whole former list."""
     result = dict(content)
     for key, value in overrides.items():
         inside = result.get(key)
@@ -158,7 +143,7 @@ def merge(content: Mapping, overrides: Mapping) -> dict:
 
 
 def _find_defaults(content: Mapping) -> Iterator[tuple[str, Mapping, Mapping]]:
-    """Yield sections with their defaults and entries, if both are mappings; the model refuses others."""
+    """Yield every section that has defaults, with its defaults and entries, if both are mappings."""
     defaults = content.get("defaults")
     for section in Defaults.model_fields if isinstance(defaults, Mapping) else ():
         given, entries = defaults.get(section), content.get(section)
@@ -167,7 +152,7 @@ def _find_defaults(content: Mapping) -> Iterator[tuple[str, Mapping, Mapping]]:
 
 
 def apply_defaults(content: Mapping) -> dict:
-    """Return `content` with its `defaults` filled into the entries; a surface gets only those that its kind has."""
+    """Return `content` with its `defaults` filled into the entries; a surface gets only the keys that its kind has."""
     filled = {
         section: {
             name: _fill_in(entry or {}, given) if isinstance(entry, Mapping | None) else entry
@@ -179,17 +164,15 @@ def apply_defaults(content: Mapping) -> dict:
 
 
 def _fill_in(entry: Mapping, given: Mapping) -> dict:
-    """Return an entry with its defaults, except the keys that only surfaces of other kinds have."""
-    kind = entry.get("kind", given.get("kind"))
-    other_keys: set[str] = set()
-    if isinstance(kind, str) and kind in SURFACE_KINDS:
-        other_keys = {key for section in SURFACE_KINDS.values() for key in section.model_fields}
-        other_keys -= set(SURFACE_KINDS[kind].model_fields)
-    return {key: value for key, value in given.items() if key not in other_keys} | dict(entry)
+    """Return an entry with its defaults, without the keys that only surfaces of other kinds have."""
+    kinds = [section.model_fields for section in SURFACE_KINDS.values()]
+    kind = SURFACE_KINDS.get(str(entry.get("kind", given.get("kind"))))
+    others = set().union(*kinds).difference(kind.model_fields) if kind else set()
+    return {key: value for key, value in given.items() if key not in others} | dict(entry)
 
 
 def location_in_defaults(location: tuple, written: Mapping) -> tuple:
-    """Return where the value at `location` was written: in its entry, or in the defaults of its section."""
+    """Return the location at which a value was written: in its entry, or in the defaults of its section."""
     for section, given, entries in _find_defaults(written):
         if len(location) > 2 and location[0] == section:
             entry = entries.get(location[1]) or {}

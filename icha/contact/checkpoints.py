@@ -13,40 +13,40 @@ import zipfile
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Generic
+from typing import Any
 
 import numpy as np
 
-from icha.contact.model import ContactModel, Control, FullContact, NotConverged, S
+from icha.contact.model import Control, FullContact, NotConverged
 from icha.support.atomic_files import whole_file
 
 _FAILURES = {kind.__name__: kind for kind in (NotConverged, FullContact)}
-# File that names the contact of the checkpoints of a folder.
+# File with the text that identifies the contact of all checkpoints in a folder.
 _OF = "of.txt"
 
 
 @dataclass(frozen=True, eq=False)
-class CheckpointedContact(Generic[S]):
-    """Contact model that loads an equilibrium from its checkpoint, and solves for it only if there is no checkpoint.
+class CheckpointedContact:
+    """Contact model that loads an equilibrium from its checkpoint, or solves for it and saves a checkpoint.
 
     Attributes
     ----------
-    contact : contact model.
+    contact : `icha.contact.model.ContactModel`.
     of : text that identifies the contact.
     folder : folder of the checkpoints, one file each.
-    packed : function that returns the arrays, by name, of a new state and of the state before it.
-    unpacked : function that restores the new state from these arrays and the state before it.
+    packed : function of a new state and of the state before it that returns arrays by name.
+    unpacked : function of these arrays and of the state before that returns the new state.
     """
 
-    contact: ContactModel[S]
+    contact: Any
     of: str
     folder: Path
-    packed: Callable[[S, S], dict[str, np.ndarray]]
-    unpacked: Callable[[dict[str, np.ndarray], S], S]
+    packed: Callable[[Any, Any], dict[str, np.ndarray]]
+    unpacked: Callable[[dict[str, np.ndarray], Any], Any]
     _solves: Any = field(default_factory=hashlib.sha256)
 
-    def equilibrium(self, state: S, separation: float, control: Control | None = None, *, let_go: int = 0) -> S:
-        """Load the equilibrium from its checkpoint, or find it as the contact does and save it."""
+    def equilibrium(self, state: Any, separation: float, control: Control | None = None, *, let_go: int = 0) -> Any:
+        """Load the equilibrium from its checkpoint, or find it and save it; see `ContactModel.equilibrium`."""
         target = control and (control.quantity, float(control.target))
         self._solves.update(repr((float(separation), target, let_go)).encode())
         file = self.folder / f"{self.of}-{self._solves.hexdigest()[:32]}.npz"
@@ -69,14 +69,9 @@ class CheckpointedContact(Generic[S]):
 
 
 def prepare_checkpoints(folder: Path, of: str) -> Path:
-    """Remove the checkpoints of other contacts from a folder, and return the folder.
+    """Remove the folder of checkpoints if it belongs to another contact, create it, and return its path.
 
-    of : text that identifies surface, material, path and code.
-
-    Raises
-    ------
-    OSError
-        If other checkpoints cannot be removed, or the folder is not writable.
+    of : text that identifies surface, material, path and code. Raise `OSError` if the folder is not writable.
     """
     written = folder / _OF
     if not written.exists() or written.read_text(encoding="utf-8", errors="replace") != of:
@@ -88,7 +83,7 @@ def prepare_checkpoints(folder: Path, of: str) -> Path:
 
 
 def _read(file):
-    """Return the arrays of a file; None if it does not exist or is damaged, so that the contact solves again."""
+    """Return the arrays of a checkpoint by name; None if the file does not exist or is damaged."""
     try:
         with np.load(file) as arrays:
             return dict(arrays)
@@ -97,5 +92,6 @@ def _read(file):
 
 
 def _write(file, arrays):
+    """Write arrays, by name, to a checkpoint; an interrupted write leaves no file."""
     with whole_file(file) as part, part.open("wb") as stream:
         np.savez(stream, **arrays)

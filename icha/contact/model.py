@@ -1,10 +1,10 @@
-"""Interface of a contact model: what a path needs to follow it, and what a run records of its states."""
+"""Interface of contact models: what a path needs of them, and what a run records of their states."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -36,7 +36,7 @@ class NotConverged(Exception):
 
 
 class BeyondModel(NotConverged):
-    """Error: the next target is beyond the range of the model; the path up to there is a result."""
+    """Error: the next target is outside the range of the model. The path up to there is a valid result."""
 
 
 class FullContact(NotConverged):
@@ -57,7 +57,7 @@ class Events:
     kind : (k,) int8, JUMP_IN: a spot forms. JUMP_OFF: a spot or a union breaks contact. COALESCENCE: two spots unite.
         SPLIT: a union becomes two spots again.
     position : (k, 2) float, m.
-    members : (k,) int, number of first contacts that are united in the spot.
+    members : (k,) int, number of first contacts, or asperities, that are united in the spot.
     energy : (k,) float, energy that a jump would release if the spot were alone, J; zero for unions and splits.
     """
 
@@ -80,21 +80,22 @@ class Events:
 
     @classmethod
     def concatenate(cls, parts) -> Events:
-        """Concatenate several records of events."""
+        """Return the events of several `Events` in one."""
         parts = [cls(np.empty(0, np.int8), np.empty((0, 2)), np.empty(0, int), np.empty(0)), *parts]
         return cls(*(np.concatenate([getattr(part, name) for part in parts]) for name in cls.__match_args__))
 
 
 class State(Protocol):
-    """Equilibrium, immutable; each model adds attributes of its own."""
+    """Equilibrium of a contact; each model adds attributes of its own. A state never changes.
 
-    @property
-    def separation(self) -> float:
-        """Mean separation u, m."""
+    Attributes
+    ----------
+    separation : mean separation u, m.
+    history : events of the path up to this state, one entry for each equilibrium with events.
+    """
 
-    @property
-    def history(self) -> tuple[Events, ...]:
-        """Events of the path up to this state, one entry for each equilibrium with events."""
+    separation: float
+    history: tuple[Events, ...]
 
 
 def events_between(before: State, after: State) -> Events:
@@ -102,112 +103,92 @@ def events_between(before: State, after: State) -> Events:
     return Events.concatenate(after.history[len(before.history) :])
 
 
-S = TypeVar("S", bound=State)
-S_in = TypeVar("S_in", bound=State, contravariant=True)
+class ContactModel(Protocol):
+    """Contact of one surface and one material; a path computes each equilibrium from the one before.
 
+    Attributes
+    ----------
+    adhesive : whether there is adhesion, so that contact forms and breaks in jumps.
+    contact_modulus : E*, the unit of relative loads, Pa.
+    pressure_unit : E* h'_rms, the unit of reduced pressures, Pa.
+    rms_height : rms height h_rms of the surface, the unit of separations, m.
+    asperities : summits of the surface; there may be none if the model does not need them.
+    area : nominal contact area A0, m^2.
+    largest_area_fraction : contact area over nominal area above which the model is not valid.
+    path_accuracy : accuracy to which a path resolves its events.
+    """
 
-class ContactModel(Protocol[S]):
-    """Contact of one surface and one material; a path computes each equilibrium from the one before. Immutable."""
+    adhesive: bool
+    contact_modulus: float
+    pressure_unit: float
+    rms_height: float
+    asperities: Asperities
+    area: float
+    largest_area_fraction: float
+    path_accuracy: PathAccuracy
 
-    @property
-    def adhesive(self) -> bool:
-        """True if contact forms and breaks in jumps."""
-
-    @property
-    def contact_modulus(self) -> float:
-        """E*, the unit of relative loads, Pa."""
-
-    @property
-    def pressure_unit(self) -> float:
-        """E* h'_rms, the unit of reduced pressures, Pa."""
-
-    @property
-    def rms_height(self) -> float:
-        """Rms height h_rms of the surface, the unit of separations, m."""
-
-    @property
-    def asperities(self) -> Asperities:
-        """Summits of the surface; there may be none if the model does not need them."""
-
-    @property
-    def area(self) -> float:
-        """Nominal contact area A0, m^2."""
-
-    @property
-    def largest_area_fraction(self) -> float:
-        """Contact area over nominal area above which the model is not valid."""
-
-    @property
-    def path_accuracy(self) -> PathAccuracy:
-        """Accuracy to which a path resolves its events."""
-
-    def untouched(self) -> S:
+    def untouched(self) -> State:
         """Return the state without contact at the separation of first contact."""
 
-    def equilibrium(self, state: S, separation: float, control: Control | None = None, *, let_go: int = 0) -> S:
+    def equilibrium(self, state: State, separation: float, control: Control | None = None, *, let_go: int = 0) -> State:
         """Find the equilibrium at another mean separation, load or area, starting from a state.
+
+        Raise `NotConverged` if it is not found, and `FullContact` if the contact spreads over the whole surface.
 
         Parameters
         ----------
         separation : mean separation, or its first guess if there is a `control`, m.
         control : load or area that is prescribed instead of the separation.
         let_go : number of spots, those closest to jump-off, whose contact is broken before the search.
-
-        Raises
-        ------
-        NotConverged
-            If the equilibrium is not found.
-        FullContact
-            If the contact spreads over the whole surface.
         """
 
-    def continue_from(self, state: S, before: S) -> S:
+    def continue_from(self, state: State, before: State) -> State:
         """Return a state with its events since another one than that from which it was found.
 
         Only for models that predict steps.
         """
 
-    def pressure(self, state: S) -> float:
+    def pressure(self, state: State) -> float:
         """Return the force over the nominal area, Pa; negative in tension."""
 
-    def area_fraction(self, state: S) -> float:
+    def area_fraction(self, state: State) -> float:
         """Return the contact area over the nominal area."""
 
-    def mean_gap(self, state: S) -> float:
+    def mean_gap(self, state: State) -> float:
         """Return the mean gap over the nominal area, m; on a periodic surface the mean separation."""
 
-    def spot_count(self, state: S) -> int:
+    def spot_count(self, state: State) -> int:
         """Return the number of contact spots."""
 
-    def stiffness(self, state: S) -> float:
+    def stiffness(self, state: State) -> float:
         """Return the contact stiffness -dp/du of the present spots, Pa/m."""
 
-    def slope(self, quantity: str, state: S) -> float:
+    def slope(self, quantity: str, state: State) -> float:
         """Return the derivative of PRESSURE or AREA_FRACTION with respect to the mean separation, without events."""
 
-    def stored_energy(self, state: S) -> float:
+    def stored_energy(self, state: State) -> float:
         """Return elastic energy minus energy of adhesion, over the nominal area, J/m^2; zero without contact."""
 
-    def is_unstable(self, state: S) -> bool:
+    def is_unstable(self, state: State) -> bool:
         """Return whether a spot approaches as the surfaces move apart, which happens only on an unstable branch."""
 
-    def observables(self, surface: Surface) -> Observables[S]:
-        """Return the observables of the states on a surface."""
+    def observables(self, surface: Surface) -> Observables:
+        """Return the object that computes what a run records of a state."""
 
 
-class Observables(Protocol[S_in]):
-    """Observables of a contact, by the names of the variables of a run (`icha.datasets.variables.run`)."""
+class Observables(Protocol):
+    """Values that a run records of a contact, by the names of its variables (`icha.datasets.variables.run`)."""
 
     def of_contact(self) -> dict[str, Any]:
         """Return the values that are the same in all states."""
 
-    def of_step(self, state: S_in) -> dict[str, Any]:
+    def of_step(self, state: State) -> dict[str, Any]:
         """Return the values that a run records of every state."""
 
-    def of_snapshot(self, state: S_in) -> dict[str, Any]:
+    def of_snapshot(self, state: State) -> dict[str, Any]:
         """Return the distributions of gap and pressure, and the spots."""
 
-    def reasons_against(self, separations: Iterable[float], pressed: S_in | None) -> list[str]:
+    def reasons_against(self, separations: Iterable[float], pressed: State | None) -> list[str]:
         """Return the reasons why the model does not represent the surface in the first loading.
 
         Parameters
@@ -229,9 +210,9 @@ PRESSURE_BINS = np.concatenate([-np.logspace(8, 0, 161)[:-1], np.linspace(-1, 5,
 def gap_bins(surface: Surface) -> np.ndarray:
     """Return the edges of the bins of the gap on a surface, m.
 
-    The largest gap, when the surface just touches, is the height from the deepest pit to the highest peak. If it is
-    more than 31.6 h_rms, the last bin ends there. By Chebyshev's inequality less than 0.2 % of a surface lies so deep,
-    so that one bin is enough for it.
+    When the surfaces just touch, the largest gap is the height from the deepest pit to the highest peak. If it is more
+    than 31.6 h_rms, the last bin ends there. By Chebyshev's inequality less than 0.2 % of a surface lies so deep, so
+    that one bin is enough.
     """
     edges = GAP_BINS * surface.rms_height
     edges[-1] = max(edges[-1], np.ptp(surface.heights))

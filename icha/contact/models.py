@@ -11,10 +11,10 @@ from typing import NamedTuple
 
 # Largest error of an equilibrium of asperities, in h_rms.
 RESIDUAL_TOLERANCE = 1e-9
-# With adhesion a load is the difference of repulsion and attraction. If it is less than this fraction of them, the
-# error of the load is relative to this fraction of them, not to the load.
+# With adhesion a load is the difference of repulsion and attraction. If it is below this fraction of the repulsion, its
+# error is relative to this fraction of the repulsion, not to the load.
 SMALLEST_LOAD = 1e-4
-# Largest error of a prescribed area without adhesion where contact is counted in whole cells: in cells, and relative to
+# Largest error of a prescribed area without adhesion if contact is counted in whole cells: in cells, and relative to
 # the area.
 AREA_TOLERANCE_CELLS, AREA_TOLERANCE_PART = 2.0, 0.1
 
@@ -50,13 +50,14 @@ MODEL_PAPER = Paper(
 
 @dataclass(frozen=True)
 class PathAccuracy:
-    """Accuracy to which a path resolves what a model does between two equilibria.
+    """Accuracy to which a path locates events, and knows work and largest tension, between two equilibria.
 
     Attributes
     ----------
-    event : separation within which an event that changes the pressure is located, in h_rms.
-    loss : largest unknown work of one step with events, relative to the work so far.
-    balance : largest difference between work and change of energy in a long step without events, likewise.
+    event : length of a step in which an event that changes the pressure counts as located, in h_rms.
+    loss : largest uncertainty of the work of one step with events, relative to the work so far.
+    balance : largest difference between work and change of energy in a long step without events, relative to the work
+        so far.
     tension : largest error of the largest tension between two equilibria without an event, relative to it.
     least_work : works below it are as uncertain as this one, J/m^2.
     predicts_steps : whether the length of a step follows from the error of its work, which then counts in every step:
@@ -85,10 +86,9 @@ class Model:
     folder : folder of its runs beside those of the default model; ends with a slash unless it is empty.
     variables : variables that only its runs have: dimensions, unit, long name and type by name.
     stiffness_error : largest relative error of the contact stiffness.
-    by_summits : whether summits represent the surface.
+    by_summits : whether summits represent the surface. Spots then unite by a rule, which may cost or gain some energy.
     by_cells : whether contact is counted in cells of the grid; its runs then have a map of the contact.
-    unites : whether spots unite by a rule, which may cost or gain a little energy.
-    periodic_only : whether it cannot press a square with free edges.
+    periodic_only : whether the model cannot press a square with free edges.
     least_cells : smallest number of grid cells per shortest wavelength; 0 for any number.
     accuracy : accuracy to which a path resolves its events.
     resumable : whether a run saves checkpoints (`resumable(contact, folder)` of its module).
@@ -104,7 +104,6 @@ class Model:
     stiffness_error: float = 1e-6
     by_summits: bool = False
     by_cells: bool = False
-    unites: bool = False
     periodic_only: bool = False
     least_cells: int = 0
     accuracy: PathAccuracy = PathAccuracy()
@@ -125,7 +124,6 @@ MODELS = {
         f"L. Afferrante, G. Carbone and G. Demelio, Wear 278-279 (2012) 28-33, doi:10.1016/j.wear.2011.12.013; {_WU}",
         module="icha.equilibrium.interacting_asperities",
         by_summits=True,
-        unites=True,
     ),
     REFERENCE_MODEL: Model(
         words="boundary elements",
@@ -172,10 +170,10 @@ MODELS = {
 
 
 def model_of(attributes: Mapping[str, str]) -> Model:
-    """Return the model of a run with these global attributes."""
+    """Return the record of the model that computed a run with these global attributes."""
     return MODELS[attributes.get("contact_model", DEFAULT_MODEL)]
 
 
 def first_model(models: Iterable[str]) -> str:
-    """Return the first of some models in the order of `MODELS`, for places that show only one model."""
+    """Return that of some models that comes first in `MODELS`, for places that show only one model."""
     return min(models, key=list(MODELS).index)

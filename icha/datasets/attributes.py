@@ -28,9 +28,7 @@ def why_no_result(attrs: Mapping) -> str:
 
 
 def reasons_not_applicable(study: Mapping) -> Counter[str]:
-    """Count the runs of a study to which their model is not applicable, by reason; none in earlier versions."""
-    if "applicability" not in study:
-        return Counter()
+    """Count the runs of a study to which their model is not applicable, by reason."""
     return Counter(filter(None, study["applicability"].values.ravel().astype(str).tolist()))
 
 

@@ -14,11 +14,11 @@ from icha.datasets.labels import LABELS, RunLabels, labels_at, place_of, slopes_
 from icha.datasets.variables.campaign import (
     BEYOND_MODEL,
     COMPUTED_RUNS,
-    FAILED_CHECKS,
     INCOMPLETE,
     MISSING,
     NOT_IN_DESIGN,
     RAGGED,
+    STATUS_ATTRIBUTES,
 )
 from icha.datasets.variables.run import FURTHER
 from icha.path.targets import BETWEEN
@@ -78,9 +78,8 @@ def run_place(study: xr.Dataset, labels: RunLabels) -> dict[str, int]:
 def select_run(tree: xr.DataTree, labels: RunLabels | tuple) -> xr.Dataset:
     """Select one run of a campaign dataset, with its steps and its spots.
 
-    Its attributes are those of its file: `incomplete` is why it failed, `beyond_model` why it
-    ended at the limit of its model, `failed_checks` which checks failed,
-    `applicability` why its model is not applicable.
+    Its attributes are those of its file. They give reasons: `incomplete` why it failed, `beyond_model` why it ended at
+    the limit of its model, `failed_checks` which checks failed, `applicability` why its model is not applicable.
 
     Raises
     ------
@@ -128,11 +127,9 @@ def variables_of_run(tree: xr.DataTree, labels: RunLabels | tuple) -> tuple[dict
             variable = xr.Variable(variable.dims, numbers, variable.attrs)
         variables[name] = variable
     attrs = study.attrs | {"contact_model": labels.model}
-    attribute = {INCOMPLETE: "incomplete", BEYOND_MODEL: "beyond_model", FAILED_CHECKS: "failed_checks"}
-    if int(status) in attribute:
-        attrs[attribute[int(status)]] = failure.item()
-    if "applicability" in study.variables:  # campaigns of earlier versions do not have this variable
-        attrs["applicability"] = study.variables["applicability"].transpose(*LABELS)[place].item()
+    if int(status) in STATUS_ATTRIBUTES:
+        attrs[STATUS_ATTRIBUTES[int(status)]] = failure.item()
+    attrs["applicability"] = study.variables["applicability"].transpose(*LABELS)[place].item()
     return variables, attrs
 
 

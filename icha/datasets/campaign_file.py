@@ -8,6 +8,7 @@ From there they are read in the order of the dataset, one block of neighbouring 
 import itertools
 import math
 import os
+import pickle
 import tempfile
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -17,15 +18,14 @@ import netCDF4
 import numpy as np
 
 from icha.datasets.attributes import COLLECTED, combine_attributes
-from icha.datasets.campaign_runs import Arrangement, LabelledRun, arrange_runs, load_values, spool_runs
+from icha.datasets.campaign_runs import Arrangement, LabelledRun, arrange_runs, spool_runs
 from icha.datasets.files import (
     FLOAT_FILL,
     INTEGER_FILL,
     characters,
     coordinates_of,
     define_dimensions,
-    define_numbers,
-    define_text,
+    define_variable,
     is_text,
 )
 from icha.datasets.labels import LABELS, RunLabels
@@ -38,6 +38,8 @@ from icha.support.atomic_files import whole_file
 _RUNS_IN_BLOCK = 256
 VALUES_IN_BLOCK = 2**18
 _VALUES_IN_CHUNK = 2**16
+# Relative difference below which values that runs share are the same.
+_SAME = 1e-9
 
 _LAYOUT = (
     "Variables of the runs along model, surface, seed, rms_slope and material. Spots and events of all runs, in this "
@@ -133,10 +135,8 @@ def define_group(group: netCDF4.Dataset, study: Arrangement, attrs: Mapping[str,
         """Define a variable along labels and its own dimensions; one of texts has a width, in bytes."""
         options = _storage(sizes, block, along, dims, width or 1)
         attributes = {**attributes, **({"coordinates": coordinates[name]} if name in coordinates else {})}
-        if width:
-            return define_text(group, name, along + dims, width, attributes, **options)
-        options |= {} if fill is None else {"fill_value": fill}
-        return define_numbers(group, name, along + dims, dtype, attributes, **options)
+        options |= {} if width or fill is None else {"fill_value": fill}
+        return define_variable(group, name, along + dims, dtype, attributes, width, **options)
 
     columns, known = {}, []
     for name in (name for name in study.variables if name not in sizes):
@@ -145,7 +145,7 @@ def define_group(group: netCDF4.Dataset, study: Arrangement, attrs: Mapping[str,
         lacks, width = study.lacks(name), 0
         fill: float | int | bytes = FLOAT_FILL if dtype.kind == "f" else INTEGER_FILL if lacks else 0
         if is_text(dtype):
-            width, fill = study.widths[name], b""
+            dtype, width, fill = np.dtype("S1"), max(entry.widths.get(name, 1) for entry in study.entries), b""
         elif dtype.kind != "f":
             # 32 bits, which every netCDF tool reads, or flags.
             dtype = np.dtype(np.int8 if dtype == np.int8 and not lacks else np.int32)
@@ -211,33 +211,26 @@ def write_campaign(
     settings: Mapping[RunLabels | tuple, str] = {},
     attrs: Mapping[str, str] = {},
 ) -> None:
-    """Write all runs of a campaign to one netCDF-4 file: a group per study, full arrays along the labels of the runs.
+    """Write all runs of a campaign to one netCDF-4 file: one group for each study, arrays along the labels of the runs.
 
-    The groups have the dimensions model, surface, seed, rms_slope and material, and those of the run dataset; the maps
-    of boundary elements stay in the files of the runs. Beyond the `step_count` steps of a run, numbers are missing and
-    texts empty. Spots and events of all runs stand one after the other along `spot` and `event`; `spot_snapshot`,
-    `spot_model`, `event_model` and so on are positions along these dimensions, from 0. For every combination of labels,
-    `status` is complete, incomplete, missing, not in the design, failed checks or beyond the model; `failure` is why a
-    run is incomplete or beyond its model, or which checks failed, `applicability` why its model is not
-    applicable. Values that an incomplete run, a missing run or a run of another model does not have are missing.
+    `docs/howto/dataset.md` describes the file. The maps of boundary elements stay in the files of the runs.
 
     Parameters
     ----------
     runs : pairs of labels (study, model, surface, seed, rms_slope, material) and run dataset, or its file. Names keep
-        the order in which they appear in the design, seeds and slopes are sorted. A run is incomplete if it has an
-        attribute `incomplete`, with the reason, if it did not converge, or if it lacks snapshots of its study.
-    path : the file, which appears whole or not at all. The same runs give the same bytes.
-    design : labels of the runs of the campaign; those of `runs` if left out. Other combinations of their labels are not
-        in the design.
-    settings : expected checksums of the settings of runs (their attribute `config_sha256`), by their labels.
+        the order of the design; seeds and slopes are sorted. A run is incomplete if its attribute `incomplete` states
+        the reason, or if it lacks snapshots of its study.
+    path : the file, which is complete or does not exist. The same runs give the same bytes.
+    design : labels of the runs of the campaign; without `design`, those of `runs`. Other combinations of these labels
+        are not in the design.
+    settings : expected checksums of the settings of runs (their attribute `config_sha256`), by the labels of the runs.
     attrs : global attributes of the file (title, summary, campaign, license, …).
 
     Raises
     ------
     ValueError
-        Naming the run: if it is given twice, is not in the design, has other labels than its dataset, was computed with
-        other settings than it should, holds a value that is not finite, or does not fit its study's other runs; if a
-        study has no run; if a file cannot be read.
+        Naming the run: if it is given twice, is not in the design, was computed with other settings than it should, or
+        if a value that it shares with other runs differs from theirs; if a file cannot be read.
     """
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -258,10 +251,10 @@ def _write(group: Group, spool: BinaryIO) -> None:
     """Write all values of a group; the values of the runs are read from the temporary file, block by block."""
     for variable, values in group.known:
         variable[...] = values
-    ragged = [_RaggedVariables(dim, variables) for dim, variables in group.ragged.items()]
     along_ragged = {name for variables in group.ragged.values() for name in variables}
+    written = dict.fromkeys(group.ragged, 0)
     shared = {
-        name: _SharedVariable(name, column)
+        name: np.full(column.variable.shape, column.fill, column.variable.dtype)
         for name, column in group.columns.items()
         if column.along != LABELS and name not in along_ragged
     }
@@ -276,94 +269,59 @@ def _write(group: Group, spool: BinaryIO) -> None:
             if column.along == LABELS
         }
         for entry, position in members:
+            spool.seek(entry.place)
             snapshots = [group.study.snapshots[each] for each in entry.snapshots]
             values = {
-                name: group.columns[name].pad(v)
-                for name, (_, v) in load_values(entry, spool).items()
-                if name in group.columns
+                name: group.columns[name].pad(v) for name, (_, v) in pickle.load(spool).items() if name in group.columns
             }
             for name, v in values.items():
-                slots = group.columns[name].slots(snapshots, v)
+                column = group.columns[name]
+                slots = column.slots(snapshots, v)
                 if name in block:
                     block[name][*(position - start), ...][slots] = v
                 elif name in shared:
-                    shared[name].put(entry.labels, position, slots, v)
-            for each in ragged:
-                each.add(position, values, snapshots)
+                    index = (*(position[LABELS.index(label)] for label in column.along), *slots)
+                    _put_shared(name, column, shared[name], index, v, entry.labels)
+            for dim, variables in group.ragged.items():
+                written[dim] += _write_ragged(dim, variables, written[dim], position, values, snapshots)
         for name, values in block.items():
             group.columns[name].variable[box] = values
-    for each in ragged:
-        each.flush()
-    for each in shared.values():
-        each.column.variable[...] = each.values
+    for name, values in shared.items():
+        group.columns[name].variable[...] = values
 
 
-class _SharedVariable:
-    """A variable that several runs share: the first of them gives its values, the others must have the same.
+def _write_ragged(
+    dim: str,
+    variables: Mapping[str, netCDF4.Variable],
+    begin: int,
+    position: np.ndarray,
+    values: Mapping[str, np.ndarray],
+    snapshots: list[int],
+) -> int:
+    """Write the values of a run along a ragged dimension, from index `begin` on; return their number.
 
-    Attributes
-    ----------
-    name, column : the variable.
-    values : its values for all runs; few enough to stay in memory.
-    known : True where labels, and snapshots, have values.
+    Spots are sorted by the positions of their snapshots.
     """
-
-    def __init__(self, name: str, column: Column):
-        """Begin without values."""
-        self.name, self.column = name, column
-        shape, snapshot = column.variable.shape, column.dims[:1] == ("snapshot",)
-        self.values = np.full(shape, column.fill, column.variable.dtype)
-        self.known = np.zeros(shape[: len(column.along) + snapshot], bool)
-
-    def put(self, labels: RunLabels, position: np.ndarray, slots: tuple, values: np.ndarray) -> None:
-        """Store the values of a run; if other runs gave these values already, check that both are equal."""
-        index = (*(position[LABELS.index(label)] for label in self.column.along), *slots)
-        known, present = self.known[index[: self.known.ndim]], self.values[index]
-        if np.all(known) and np.array_equal(present, values):
-            return
-        same = present == values if values.dtype.kind == "S" else np.isclose(present, values, rtol=1e-9, atol=0)
-        if np.any(known & ~np.reshape(same, (*np.shape(known), -1)).all(axis=-1)):
-            shared = ", ".join(self.column.along) or "the study"
-            raise ValueError(f"{labels}: {self.name} differs between runs that share {shared}")
-        if not np.all(known):
-            self.values[index] = values
-            self.known[index[: self.known.ndim]] = True
+    found = {name: values[name] for name in variables if name in values}
+    count = len(next(iter(found.values()), ()))
+    found |= {f"{dim}_{label}": np.full(count, k) for label, k in zip(LABELS, position, strict=True)}
+    if "spot_snapshot" in found and count:
+        found["spot_snapshot"] = np.asarray(snapshots, np.int32)[found["spot_snapshot"]]
+        order = np.argsort(found["spot_snapshot"], kind="stable")
+        found = {name: v[order] for name, v in found.items()}
+    for name, v in found.items():
+        variables[name][begin : begin + count] = v
+    return count
 
 
-class _RaggedVariables:
-    """The variables along one ragged dimension, to which the values of the runs are appended.
-
-    Attributes
-    ----------
-    dim, variables : the dimension and its variables, by name.
-    runs, pending : values of the runs that are not yet written, and their number.
-    written : number of values along the dimension that are written.
-    """
-
-    def __init__(self, dim: str, variables: Mapping[str, netCDF4.Variable]):
-        """Begin with nothing written."""
-        self.dim, self.variables = dim, variables
-        self.runs, self.pending, self.written = [], 0, 0
-
-    def add(self, position: np.ndarray, values: Mapping[str, np.ndarray], snapshots: list[int]) -> None:
-        """Store the values of a run at a position; its spots are sorted by the positions of their snapshots."""
-        found = {name: values[name] for name in self.variables if name in values}
-        count = len(next(iter(found.values()), ()))
-        if "spot_snapshot" in found and count:
-            found["spot_snapshot"] = np.asarray(snapshots, np.int32)[found["spot_snapshot"]]
-            order = np.argsort(found["spot_snapshot"], kind="stable")
-            found = {name: v[order] for name, v in found.items()}
-        found |= {f"{self.dim}_{label}": np.full(count, k) for label, k in zip(LABELS, position, strict=True)}
-        self.runs.append(found)
-        self.pending += len(found) * count
-        if self.pending > VALUES_IN_BLOCK:
-            self.flush()
-
-    def flush(self) -> None:
-        """Write the values that were added since the last call."""
-        begin = self.written
-        for name, variable in self.variables.items():
-            values = np.concatenate([np.empty(0, variable.dtype), *(run[name] for run in self.runs if name in run)])
-            variable[begin : begin + len(values)] = values
-            self.written = begin + len(values)
-        self.runs, self.pending = [], 0
+def _put_shared(
+    name: str, column: Column, stored: np.ndarray, index: tuple, values: np.ndarray, run: RunLabels
+) -> None:
+    """Store a run's values of a variable that several runs share; values of earlier runs stay, and must be the same."""
+    present = stored[index]
+    unknown = present == column.fill
+    equal = present == values if values.dtype.kind == "S" else abs(present - values) <= _SAME * abs(values)
+    if not np.all(unknown | equal):
+        shared = ", ".join(column.along) or "the study"
+        raise ValueError(f"{run}: {name} differs between runs that share {shared}")
+    stored[index] = np.where(unknown, values, present)

@@ -5,15 +5,14 @@ from __future__ import annotations
 import itertools
 import os
 import pickle
-import re
 from collections.abc import Hashable, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, BinaryIO, NamedTuple
 
 import numpy as np
 import xarray as xr
 
-from icha.datasets.files import characters, check_is_run, is_refused, is_text, not_finite, read_run, readable
+from icha.datasets.files import characters, check_is_run, is_text, read_run, readable
 from icha.datasets.labels import LABELS, RunLabels, arrange_slopes, slope_dims
 from icha.datasets.variables.campaign import (
     BEYOND_MODEL,
@@ -23,6 +22,7 @@ from icha.datasets.variables.campaign import (
     MISSING,
     NOT_IN_DESIGN,
     RAGGED,
+    STATUS_ATTRIBUTES,
     VARIES_WITH,
 )
 from icha.datasets.variables.run import CELLS, CYCLE, LOOP, OF_MODELS, RUN
@@ -34,10 +34,8 @@ Values = dict[str, tuple[tuple[str, ...], np.ndarray]]
 LabelledRun = tuple[RunLabels | tuple, xr.Dataset | str | os.PathLike]
 
 _DIMS = {name: description.dims for name, description in (RUN | OF_MODELS | CYCLE | LOOP).items()}
-# HDF5 lists dimensions among the variables. The name of a dimension of texts contains the number of characters.
-_DIMENSION = re.compile("|".join([*sorted({dim for dims in _DIMS.values() for dim in dims}), r"string\d+"]))
 _ENDED_EARLY = (INCOMPLETE, BEYOND_MODEL)
-_ATTRIBUTES = ("contact_model", "config_sha256", "incomplete", "failed_checks", "beyond_model", "applicability")
+_ATTRIBUTES = ("contact_model", "config_sha256", "applicability", *STATUS_ATTRIBUTES.values())
 
 
 def read_run_values(path: str | os.PathLike) -> tuple[Values, dict[str, str]]:
@@ -52,24 +50,15 @@ def read_run_values(path: str | os.PathLike) -> tuple[Values, dict[str, str]]:
     from h5py import h5d, h5s
 
     with readable(path), h5py.File(path) as file:
-        names = [name for name in file if name in _DIMS or not _DIMENSION.fullmatch(name)]
-        check_is_run(names, path)
-        if unknown := set(names) - set(_DIMS):
-            raise ValueError(f"{path}: not a run dataset, it has a variable {min(unknown)!r}")
+        check_is_run(file, path)
         values: Values = {}
-        for name in names:
-            if not set(CELLS) & set(_DIMS[name]):
+        for name, dims in _DIMS.items():
+            if name in file and not set(CELLS) & set(dims):
                 # The low-level interface of h5py takes less than half the time.
                 variable = h5d.open(file.id, name.encode())
-                values[name] = _DIMS[name], np.empty(variable.shape, variable.dtype)
+                values[name] = dims, np.empty(variable.shape, variable.dtype)
                 variable.read(h5s.ALL, h5s.ALL, values[name][1])
-        attrs = {name: text(file.attrs[name]) for name in _ATTRIBUTES if name in file.attrs}
-    sizes: dict[str, int] = {}
-    for name, (dims, v) in values.items():
-        shape = v.shape[:-1] if v.dtype.kind == "S" else v.shape
-        if len(shape) != len(dims) or any(sizes.setdefault(dim, n) != n for dim, n in zip(dims, shape, strict=True)):
-            raise ValueError(f"{path}: not a run dataset, {name!r} does not have the dimensions ({', '.join(dims)})")
-    return values, attrs
+        return values, {name: text(file.attrs[name]) for name in _ATTRIBUTES if name in file.attrs}
 
 
 class Entry(NamedTuple):
@@ -78,9 +67,11 @@ class Entry(NamedTuple):
     Attributes
     ----------
     labels : the labels of the run.
+    source : its dataset, or the file of its dataset.
     place : where its values begin in the temporary file, in bytes.
     names : names of its variables.
     sizes : sizes of its dimensions, by name.
+    widths : bytes of the longest text of each variable of texts.
     snapshots : kind and target of its snapshots.
     status : its status, if it has all snapshots of its study.
     failure : why it is not complete; an empty text if it is.
@@ -88,35 +79,26 @@ class Entry(NamedTuple):
     """
 
     labels: RunLabels
+    source: xr.Dataset | str | os.PathLike
     place: int
     names: frozenset[str]
     sizes: dict[str, int]
+    widths: dict[str, int]
     snapshots: tuple[tuple[bytes, float], ...]
     status: int
     failure: str
     applicability: str
 
-
-@dataclass
-class Members:
-    """The runs of a study that were read so far.
-
-    Attributes
-    ----------
-    entries : one for each run, by its labels.
-    widths : bytes of the longest text of each variable.
-    samples : for every model, the run with the most variables and steps, after the rank by which it was chosen.
-    """
-
-    entries: dict[RunLabels, Entry] = field(default_factory=dict)
-    widths: dict[str, int] = field(default_factory=dict)
-    samples: dict[str, tuple[tuple[bool, int], xr.Dataset | str | os.PathLike]] = field(default_factory=dict)
+    @property
+    def extent(self) -> tuple[bool, int]:
+        """Whether the run did not end early, and its number of steps; a run with the largest has all variables."""
+        return self.status not in _ENDED_EARLY, self.sizes.get("step", 0)
 
 
 def spool_runs(
     runs: Iterable[LabelledRun], spool: BinaryIO, settings: Mapping[RunLabels | tuple, str] = {}
-) -> dict[str, Members]:
-    """Append the values of every run to a temporary file; return the facts of all runs, by study.
+) -> dict[str, dict[RunLabels, Entry]]:
+    """Append the values of every run to a temporary file; return the facts of all runs, by study and labels.
 
     Parameters
     ----------
@@ -126,16 +108,15 @@ def spool_runs(
     Raises
     ------
     ValueError
-        Naming the run: if it is given twice, has other labels than its dataset, was computed with other settings than
-        expected, or holds a value that is not finite; if no run is given.
+        Naming the run: if it is given twice, or was computed with other settings than expected.
     """
-    studies: dict[str, Members] = {}
-    # Most runs have the same variables, sizes and snapshots. Each combination is stored only once.
+    studies: dict[str, dict[RunLabels, Entry]] = {}
+    # Most runs have the same variables and snapshots. Each combination is stored only once.
     stored: dict[Hashable, Any] = {}
     for labels, source in runs:
         labels = plain_labels(labels)
-        members = studies.setdefault(labels.study, Members())
-        if labels in members.entries:
+        entries = studies.setdefault(labels.study, {})
+        if labels in entries:
             raise ValueError(f"{labels}: this run is given twice")
         values, attrs = _values_of(source) if isinstance(source, xr.Dataset) else read_run_values(source)
         if attrs.get("config_sha256") != settings.get(labels, attrs.get("config_sha256")):
@@ -144,35 +125,20 @@ def spool_runs(
                 f"{file}: this run was computed with other settings than the configuration's. Remove it and repeat the "
                 "command, which computes it"
             )
-        _refuse_wrong_values(labels, values, attrs)
-        sizes = {dim: n for dims, v in values.values() for dim, n in zip(dims, v.shape, strict=False)}
         names, snapshots = frozenset(values), _snapshots_of(values)
-        members.entries[labels] = Entry(
+        entries[labels] = Entry(
             labels,
+            source,
             spool.tell(),
             stored.setdefault(names, names),
-            stored.setdefault(tuple(sorted(sizes.items())), sizes),
+            {dim: n for dims, v in values.values() for dim, n in zip(dims, v.shape, strict=False)},
+            {name: v.shape[-1] for name, (_, v) in values.items() if is_text(v.dtype)},
             stored.setdefault(snapshots, snapshots),
-            *_status_and_failure(values, attrs),
+            *_status_and_failure(attrs),
             str(attrs.get("applicability", "")),
         )
         pickle.dump(values, spool, protocol=5)
-        for name, (_, v) in values.items():
-            if is_text(v.dtype):
-                members.widths[name] = max(members.widths.get(name, 1), v.shape[-1])
-        # A run that ended early may lack the variables that describe the end of its path.
-        rank = (not {"incomplete", "beyond_model"} & set(attrs), sizes.get("step", 0))
-        if labels.model not in members.samples or rank > members.samples[labels.model][0]:
-            members.samples[labels.model] = rank, source
-    if not studies:
-        raise ValueError("a campaign dataset needs at least one run")
     return studies
-
-
-def load_values(entry: Entry, spool: BinaryIO) -> Values:
-    """Load the values of a run from the temporary file."""
-    spool.seek(entry.place)
-    return pickle.load(spool)
 
 
 def plain_labels(labels: RunLabels | tuple) -> RunLabels:
@@ -190,30 +156,10 @@ def _values_of(run: xr.Dataset) -> tuple[Values, dict]:
     return values, run.attrs
 
 
-def _status_and_failure(values: Values, attrs: Mapping) -> tuple[int, str]:
+def _status_and_failure(attrs: Mapping) -> tuple[int, str]:
     """Return the status of a run, and why it is not complete; an empty text if it is."""
-    by_attribute = {"incomplete": INCOMPLETE, "beyond_model": BEYOND_MODEL, "failed_checks": FAILED_CHECKS}
-    for name, status in by_attribute.items():
-        if name in attrs:
-            return status, str(attrs[name])
-    failed = int(np.sum(values["converged"][1] != 1)) if "converged" in values else 0
-    return (INCOMPLETE, f"{failed} of its steps did not converge") if failed else (COMPLETE, "")
-
-
-def _refuse_wrong_values(labels: RunLabels, values: Values, attrs: Mapping) -> None:
-    """Refuse a dataset of another run, and values that are not finite."""
-    if attrs.get("contact_model", labels.model) != labels.model:
-        raise ValueError(f"{labels}: the dataset's model is {attrs['contact_model']}")
-    for label, tolerance in (("rms_slope", 1e-6), ("seed", 0)):
-        if label in values:
-            value, expected = float(values[label][1]), float(getattr(labels, label))
-            if abs(value - expected) > tolerance * abs(expected):
-                raise ValueError(f"{labels}: the dataset's {label} is {value:g}")
-    for name, (dims, v) in values.items():
-        if v.dtype.kind == "f" and not np.isfinite(v).all():
-            bad = is_refused(v, RUN[name].further if name in RUN else {})
-            if bad.any():
-                raise ValueError(f"{labels}: variable {not_finite(name, dims, bad)}")
+    found = [(status, str(attrs[name])) for status, name in STATUS_ATTRIBUTES.items() if name in attrs]
+    return (*found, (COMPLETE, ""))[0]
 
 
 def _snapshots_of(values: Values) -> tuple[tuple[bytes, float], ...]:
@@ -235,7 +181,6 @@ class Arrangement:
     variables : the variables of all models, each from one run.
     coordinates : names of those that are coordinates.
     origins : global attributes of a run of every model.
-    widths : bytes of the longest text of each variable.
     sizes : sizes of the dimensions that runs have in common.
     snapshots : position of every snapshot, by kind and target.
     entries : the computed runs, in the order of the axes.
@@ -247,7 +192,6 @@ class Arrangement:
     variables: dict[str, xr.Variable]
     coordinates: set[str]
     origins: list[dict]
-    widths: dict[str, int]
     sizes: dict[str, int]
     snapshots: dict[tuple[bytes, float], int]
     entries: list[Entry]
@@ -280,44 +224,46 @@ class Arrangement:
         return not filled.all() or any((_sizes(self.entries, dim)[having] != self.sizes[dim]).any() for dim in dims)
 
 
-def arrange_runs(studies: dict[str, Members], design: Iterable[RunLabels | tuple] | None) -> list[Arrangement]:
+def arrange_runs(
+    studies: dict[str, dict[RunLabels, Entry]], design: Iterable[RunLabels | tuple] | None
+) -> list[Arrangement]:
     """Arrange the runs of every study, in the order of the design.
 
     Raises
     ------
     ValueError
-        Naming the run: if it is not in the design, or does not fit its study's other runs; if a study has no run.
+        Naming the run: if it is not in the design.
     """
-    given = [labels for members in studies.values() for labels in members.entries]
+    given = [labels for entries in studies.values() for labels in entries]
     asked: dict[str, dict[RunLabels, None]] = {}
     for labels in given if design is None else map(plain_labels, design):
         asked.setdefault(labels.study, {})[labels] = None
     for labels in given:
         if labels not in asked.get(labels.study, ()):
             raise ValueError(f"{labels}: this run is not in the design")
-    for name in asked:
-        if name not in studies:
-            raise ValueError(f"study {name}: it has no run")
     return [_arrange_study(name, studies[name], list(labels)) for name, labels in asked.items()]
 
 
-def _arrange_study(name: str, members: Members, design: list[RunLabels]) -> Arrangement:
+def _arrange_study(name: str, found: dict[RunLabels, Entry], design: list[RunLabels]) -> Arrangement:
     axes: dict[str, Any] = {label: list(dict.fromkeys(getattr(each, label) for each in design)) for label in LABELS}
     axes["seed"].sort()
     axes["rms_slope"] = arrange_slopes((labels.surface, labels.rms_slope) for labels in design)
     position = _positions(axes, design)
-    samples = {model: _sample(members.samples[model][1]) for model in axes["model"] if model in members.samples}
-    variables: dict[str, xr.Variable] = {}
-    for sample in samples.values():
-        variables = {**variables, **{key: v for key, v in sample.variables.items() if key not in variables}}
     # In the order of the design, whatever the order in which they were given.
-    entries = [members.entries[labels] for labels in position if labels in members.entries]
+    entries = [found[labels] for labels in position if labels in found]
+    # For every model, a run that has all its variables.
+    samples = [
+        _sample(max(of_model, key=lambda entry: entry.extent).source)
+        for model in axes["model"]
+        if (of_model := [entry for entry in entries if entry.labels.model == model])
+    ]
+    variables: dict[str, xr.Variable] = {}
+    for sample in samples:
+        variables |= {key: variable for key, variable in sample.variables.items() if key not in variables}
     snapshots = _snapshots(entries)
     sizes = {dim: n for v in variables.values() for dim, n in v.sizes.items() if dim not in RAGGED}
     longest = {"snapshot": len(snapshots), "step": int(_sizes(entries, "step").max())}
     sizes |= {dim: size for dim, size in longest.items() if dim in sizes}
-    _refuse_unequal(entries, samples, sizes)
-
     entries = sorted(entries, key=lambda entry: position[entry.labels])
     positions = np.array([position[entry.labels] for entry in entries])
     shape = tuple(len(axes[label]) if label != "rms_slope" else axes[label].shape[-1] for label in LABELS)
@@ -327,13 +273,13 @@ def _arrange_study(name: str, members: Members, design: list[RunLabels]) -> Arra
         array[tuple(positions.T)] = list(values)
         return array
 
-    found = [
+    outcomes = [
         (INCOMPLETE, f"{len(entry.snapshots)} of {len(snapshots)} snapshots")
         if entry.status in (COMPLETE, FAILED_CHECKS) and len(entry.snapshots) != len(snapshots)
         else (entry.status, entry.failure)
         for entry in entries
     ]
-    status = spread((status for status, _ in found), NOT_IN_DESIGN, np.int8)
+    status = spread((status for status, _ in outcomes), NOT_IN_DESIGN, np.int8)
     asked = np.zeros(shape, bool)
     asked[tuple(np.transpose(list(position.values())))] = True
     status[asked & (status == NOT_IN_DESIGN)] = MISSING
@@ -343,13 +289,12 @@ def _arrange_study(name: str, members: Members, design: list[RunLabels]) -> Arra
         | {
             "status": status,
             "step_count": spread(_sizes(entries, "step"), 0, np.int32),
-            "failure": spread((failure for _, failure in found), "", object),
+            "failure": spread((failure for _, failure in outcomes), "", object),
             "applicability": spread((entry.applicability for entry in entries), "", object),
         },
         variables={key: variable for key, variable in variables.items() if key not in LABELS},
-        coordinates={*next(iter(samples.values())).coords, *LABELS},
-        origins=[each.attrs for each in samples.values()],
-        widths=members.widths,
+        coordinates={*samples[0].coords, *LABELS},
+        origins=[sample.attrs for sample in samples],
         sizes=sizes,
         snapshots=snapshots,
         entries=entries,
@@ -386,20 +331,6 @@ def _snapshots(entries: list[Entry]) -> dict[tuple[bytes, float], int]:
 
     Runs may meet their stops, and take their snapshots, in different orders (a load and an area, for instance).
     """
-    longest = max(entries, key=lambda entry: (entry.status not in _ENDED_EARLY, entry.sizes.get("step", 0)))
+    longest = max(entries, key=lambda entry: entry.extent)
     known = dict.fromkeys(itertools.chain(longest.snapshots, *(entry.snapshots for entry in entries)))
     return {each: k for k, each in enumerate(known)}
-
-
-def _refuse_unequal(entries: list[Entry], samples: Mapping[str, xr.Dataset], sizes: Mapping[str, int]) -> None:
-    """Refuse runs with other variables than their model's, or of other size along a common dimension."""
-    ragged = {n for each in samples.values() for n, v in each.variables.items() if set(RAGGED) & set(v.dims)}
-    names = {model: ragged | set(sample.variables) for model, sample in samples.items()}
-    for entry in entries:
-        expected = names[entry.labels.model]
-        if unequal := (entry.names - expected) | ((ragged if entry.status in _ENDED_EARLY else expected) - entry.names):
-            listed = ", ".join(sorted(unequal))
-            raise ValueError(f"{entry.labels}: variables differ from those of the study's other runs: {listed}")
-        for dim, size in sizes.items():
-            if dim not in ("step", "snapshot") and (own := entry.sizes.get(dim, 0)) != size:
-                raise ValueError(f"{entry.labels}: {own} along {dim}, {size} of the study's other runs")

@@ -68,7 +68,8 @@ def _define(group: netCDF4.Dataset, dataset: xr.Dataset) -> list[tuple[netCDF4.V
         attrs = variable.attrs | ({"coordinates": coordinates[name]} if name in coordinates else {})
         if is_text(variable.dtype):
             values = characters(variable.values)
-            defined.append((define_text(group, name, variable.dims, values.shape[-1], attrs), values))
+            width = values.shape[-1]
+            defined.append((define_variable(group, name, variable.dims, values.dtype, attrs, width), values))
             continue
         values, storage = variable.values, {}
         if variable.dtype.kind == "f" and np.isnan(values).any():
@@ -81,7 +82,7 @@ def _define(group: netCDF4.Dataset, dataset: xr.Dataset) -> list[tuple[netCDF4.V
             storage |= COMPRESSION | {"chunksizes": (*[1] * (variable.ndim - 2), *variable.shape[-2:])}
         elif variable.size in COMPRESSED_SIZES:
             storage |= COMPRESSION
-        defined.append((define_numbers(group, name, variable.dims, values.dtype, attrs, **storage), values))
+        defined.append((define_variable(group, name, variable.dims, values.dtype, attrs, **storage), values))
     return defined
 
 
@@ -98,11 +99,9 @@ def _refuse_values_not_finite(dataset: xr.Dataset, where: str) -> None:
         if excused is not None and set(variable.dims) & set(excused.dims):
             # A value that several runs share may be missing if all these runs are missing.
             may_lack = excused.all([dim for dim in excused.dims if dim not in variable.dims]).variable
-            may_lack = may_lack.set_dims(dict(zip(variable.dims, variable.shape, strict=True))).values
             if "step" in variable.dims:
-                padding = dataset["step"] >= dataset["step_count"]
-                may_lack = may_lack | padding.transpose(*variable.dims).values
-            bad &= ~(may_lack & np.isnan(variable.values))
+                may_lack = may_lack | (dataset["step"] >= dataset["step_count"]).variable
+            bad &= ~(may_lack & np.isnan(variable)).transpose(*variable.dims).values
         if bad.any():
             raise ValueError(f"{where}: variable {not_finite(name, variable.dims, bad)}")
 
@@ -189,20 +188,17 @@ def define_dimensions(group: netCDF4.Dataset, sizes: Mapping[Hashable, int]) -> 
         group.createDimension(name, size)
 
 
-def define_text(
-    group: netCDF4.Dataset, name: str, dims: tuple[str, ...], width: int, attrs: Mapping, **storage
+def define_variable(
+    group: netCDF4.Dataset, name: str, dims: tuple[str, ...], dtype: np.dtype, attrs: Mapping, width=0, **storage
 ) -> netCDF4.Variable:
-    """Define a variable of texts of at most `width` bytes, stored as characters."""
-    along = f"string{width}"
-    if along not in group.dimensions:
-        group.createDimension(along, width)
-    return define_numbers(group, name, (*dims, along), "S1", {**attrs, **TEXT}, **storage)
+    """Define a variable of numbers, or of texts of at most `width` bytes, which are stored as characters.
 
-
-def define_numbers(
-    group: netCDF4.Dataset, name: str, dims: tuple[str, ...], dtype: np.dtype | str, attrs: Mapping, **storage
-) -> netCDF4.Variable:
-    """Define a variable of numbers; `storage` as `netCDF4.Dataset.createVariable` takes it."""
+    `storage` are options of `netCDF4.Dataset.createVariable`.
+    """
+    if width:
+        dims, attrs = (*dims, f"string{width}"), {**attrs, **TEXT}
+        if dims[-1] not in group.dimensions:
+            group.createDimension(dims[-1], width)
     variable = group.createVariable(name, dtype, dims, **storage)
     variable.setncatts(dict(attrs))
     # Values are written and read without conversion.

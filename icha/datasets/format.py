@@ -5,6 +5,7 @@ variables; they also have units and a long name.
 """
 
 import os
+import re
 from collections.abc import Iterator
 
 import numpy as np
@@ -30,6 +31,8 @@ _OTHERS = {
     "boundary-element loop at a finite range": "dissipated",
 }
 
+# Names of attributes that a file must not have, because the same input gives the same bytes.
+_REFUSED = re.compile("user|host|mail|date|time")
 # Largest relative difference by rounding between values that must be equal.
 _ROUNDING = 1e-9
 # The unit of a target is that of its quantity, if all targets have the same one.
@@ -93,13 +96,18 @@ def problems_with_file(kind: str, data: xr.Dataset | xr.DataTree) -> list[str]:
     ----------
     kind, data : as `identify_file` returns them.
     """
+    problems = [
+        f"attribute {name}: states who made the file, where or when; expected no such attribute"
+        for name in data.attrs
+        if _REFUSED.search(name)
+    ]
     if kind == CAMPAIGN:
         studies = {name: node.to_dataset() for name, node in data.children.items()}
-        return [
+        return problems + [
             f"{name}: {each}" for name, study in studies.items() for each in _problems_with_variables(study, _STUDY)
         ]
     of_kind = _problems_with_run if kind == RUN else _problems_with_surface
-    return [*of_kind(data), *_problems_with_numbers(data)]
+    return [*problems, *of_kind(data), *_problems_with_numbers(data)]
 
 
 def _problems_with_run(run: xr.Dataset) -> Iterator[str]:
@@ -114,6 +122,9 @@ def _problems_with_run(run: xr.Dataset) -> Iterator[str]:
     if "snapshot" in run.dims:
         yield from _outside("snapshot_step", run["snapshot_step"].values, 0, run.sizes["step"] - 1)
         yield from _outside("spot_snapshot", run["spot_snapshot"].values, 0, run.sizes["snapshot"] - 1)
+        for name in ("gap_bin_edges", "pressure_bin_edges"):
+            if not np.all(np.diff(run[name].values) > 0):
+                yield f"{name}: the edges do not increase; expected edges in ascending order"
     unit = run["contact_modulus"] * run["rms_slope"]
     for name, expected, formula in (
         ("reduced_pressure", run["nominal_pressure"] / unit, "nominal_pressure over contact_modulus and rms_slope"),

@@ -57,7 +57,7 @@ def write_surface(
     if spectrum is not None:
         values |= get_values(spectrum, "rolloff_wavelength", "short_wavelength", "hurst")
     if measured is not None:
-        values["measured_rms_slope"] = measured.rms_slope
+        values["measured_rms_slope"] = measured.surface.rms_slope
     kind, origin = "Self-affine surface" if spectrum is not None else "Surface from a file", {}
     if measured is not None:
         kind = "Measured topography"
@@ -94,11 +94,7 @@ def read_surface(path: str | os.PathLike) -> Surface:
     ValueError
         If the file cannot be read, lacks heights or period, or its heights are not finite, not square or flat.
     """
-    return surface_of(read_dataset(path), path)
-
-
-def surface_of(dataset: xr.Dataset, path: str | os.PathLike) -> Surface:
-    """Return the topography in the dataset of a surface file; errors as `read_surface`."""
+    dataset = read_dataset(path)
     for name in ("height", "period"):
         if name not in dataset:
             raise ValueError(f"{path}: not a surface file, it has no variable {name!r}")
@@ -115,10 +111,7 @@ def read_spectral_moments(path: str | os.PathLike) -> SpectralMoments:
     Raises
     ------
     ValueError
-        If the file cannot be read or does not hold them.
+        If the file cannot be read.
     """
-    names = [f"spectral_moment_{order}" for order in (0, 2, 4)]
     with readable(path), xr.open_dataset(path, engine="netcdf4") as dataset:
-        if missing := [name for name in names if name not in dataset]:
-            raise ValueError(f"{path}: not a surface file, it has no variable {missing[0]!r}")
-        return SpectralMoments(*(float(dataset[name]) for name in names))
+        return SpectralMoments(*(float(dataset[f"spectral_moment_{order}"]) for order in (0, 2, 4)))

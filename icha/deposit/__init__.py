@@ -1,1 +1,1 @@
-"""From results to a deposit: metadata, provenance, checksums; and back, from a deposit to the same results."""
+"""Make deposits of results, with metadata, provenance and checksums; verify, reproduce and upload deposits."""

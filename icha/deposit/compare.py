@@ -10,10 +10,10 @@ have a tolerance:
 - Two residuals of a solver are the same if they differ by at most the largest residual that the solver accepts
   (`NOISE`): all digits of a residual are rounding errors.
 
-Everything else has to be equal: integers, text, places of missing values, dimensions, types, attributes. Storage
-(chunks, compression, order in the file) is not compared. Figures and the report are drawn from the compared values, by
-libraries and fonts that may differ. If only figures or the report differ, the comparison makes a remark and counts no
-difference.
+Everything else must be equal: integers, text, places of missing values, dimensions, types, attributes. Storage
+(chunks, compression, order in the file) is not compared. Figures and the report are drawn from the compared values.
+They may differ because other machines have other fonts and libraries. If only figures or the report differ, the
+comparison prints a remark and counts no difference.
 """
 
 import os
@@ -36,9 +36,9 @@ VERDICTS = ("identical", "within tolerance", "different", "missing", "extra")
 IDENTICAL, WITHIN, DIFFERENT, MISSING, EXTRA = VERDICTS
 TOLERANCE = 1e-6
 FLOOR = 1e-6
-# Allowed differences of the variables with these names.
+# Absolute differences that are within tolerance, by the name of the variable.
 NOISE = {"residual": RESIDUAL_LIMIT, "gap_residual": RESIDUAL_LIMIT, "front_residual": FRONT_LIMIT}
-# Endings of files that are made from the data, whose differences are remarks.
+# Endings of the names of files that are made from the data; differences of these files are remarks.
 _DERIVED = (".png", ".pdf", ".html", "checks.json")
 # Largest number of variables in a table.
 _MOST_LINES = 20
@@ -47,14 +47,14 @@ _LONGEST_ERROR, _LONGEST_VALUE = 300, 60
 
 
 class Difference(NamedTuple):
-    """A difference between two files.
+    """A difference between a file of the deposit and the same file of the rerun.
 
     Attributes
     ----------
-    name : the variable, group or dimension; empty if it is about the file as a whole.
-    verdict : one of `VERDICTS` but the first.
-    detail : what differs, with the deposit's value first.
-    deviation : largest relative difference of numbers; infinite where something else differs.
+    name : the variable, group or dimension that differs; empty if the file as a whole differs.
+    verdict : one of `VERDICTS` except `identical`.
+    detail : what differs; the value in the deposit comes first.
+    deviation : largest relative difference of the numbers; infinite if something else differs.
     """
 
     name: str
@@ -71,7 +71,7 @@ class File(NamedTuple):
 
     @property
     def verdict(self) -> str:
-        """One of `VERDICTS`."""
+        """Verdict on the whole file, one of `VERDICTS`."""
         verdicts = {each.verdict for each in self.differences}
         if self.differences and not self.differences[0].name:
             return self.differences[0].verdict
@@ -79,23 +79,23 @@ class File(NamedTuple):
 
     @property
     def kind(self) -> str:
-        """The part of the results that it belongs to, such as `runs`."""
+        """Part of the results that contains the file, such as `runs`."""
         return self.path.partition("/")[0]
 
     @property
     def is_remark(self) -> bool:
-        """True for a file that is made from the data and only differs in its bytes."""
+        """True for a file that is made from the data and differs only in its bytes."""
         return self.verdict == DIFFERENT and self.path.endswith(_DERIVED)
 
 
 class Comparison(NamedTuple):
-    """All files, sorted by path."""
+    """Comparison of all files, sorted by path."""
 
     files: tuple[File, ...]
 
     @property
     def verdict(self) -> str:
-        """`identical`, `within tolerance` or `different`, without regard to remarks."""
+        """Verdict on all files: `identical`, `within tolerance` or `different`; remarks do not count."""
         if any(file.verdict in (DIFFERENT, MISSING, EXTRA) and not file.is_remark for file in self.files):
             return DIFFERENT
         return IDENTICAL if all(file.verdict == IDENTICAL for file in self.files) else WITHIN
@@ -108,8 +108,8 @@ def compare_folders(
 
     Parameters
     ----------
-    deposit, rerun : folders with `dataset/`, `runs/`, … in them.
-    paths : the files to compare, relative to both; if left out, everything computed (`COMPUTED`) in either folder.
+    deposit, rerun : folders that contain `dataset/`, `runs/`, ….
+    paths : the files to compare, relative to both folders; without `paths`, all computed files (`COMPUTED`).
     """
     deposit, rerun = Path(deposit), Path(rerun)
     if paths is None:
@@ -118,10 +118,10 @@ def compare_folders(
 
 
 def _compare_files(deposit: Path, rerun: Path, path: str) -> File:
-    """Compare two files; one that cannot be read is different."""
+    """Compare two files; a file that cannot be read is different."""
     try:
         return File(path, tuple(_differences(deposit, rerun)))
-    except Exception as error:  # whatever the content of a file may lead to
+    except Exception as error:  # a file from an unknown maker may cause any error
         reason = textwrap.shorten(repr(error), _LONGEST_ERROR, placeholder=" …")
         return File(path, (Difference("", DIFFERENT, f"cannot be compared: {reason}"),))
 
@@ -160,7 +160,7 @@ def _compare_groups(a: netCDF4.Dataset, b: netCDF4.Dataset, path: str) -> Iterat
 
 
 def _paired(a: Mapping, b: Mapping) -> Iterator[tuple]:
-    """Pair the values of two mappings by their keys, with None for a missing value."""
+    """Return the keys of two mappings with both values; a missing value is None."""
     return ((key, a.get(key), b.get(key)) for key in dict.fromkeys([*a, *b]))
 
 
@@ -170,12 +170,21 @@ def _compare_variables(a: netCDF4.Variable, b: netCDF4.Variable, name: str) -> I
         if one != other:
             yield Difference(name, DIFFERENT, f"{quantity}: {_shown(one)} and {_shown(other)}")
             return
-    for variable in (a, b):
-        variable.set_auto_scale(False)
-    found = compare_values(np.ma.asarray(a[...]), np.ma.asarray(b[...]), noise=NOISE.get(name.rpartition("/")[2], 0.0))
+    noise = NOISE.get(name.rpartition("/")[2], 0.0)
+    found = compare_values(_values(a), _values(b), noise=noise)
     if found:
         yield found._replace(name=name)
     yield from _compare_attributes(a, b, name)
+
+
+def _values(variable: netCDF4.Variable) -> np.ndarray:
+    """Return the values of a variable; missing numbers are NaN."""
+    variable.set_auto_maskandscale(False)
+    values = np.asarray(variable[...])
+    if values.dtype.kind == "f":
+        fill = getattr(variable, "_FillValue", netCDF4.default_fillvals[values.dtype.str[1:]])
+        values = np.where(values == fill, np.nan, values)
+    return values
 
 
 def _compare_attributes(a, b, name: str) -> Iterator[Difference]:
@@ -185,18 +194,16 @@ def _compare_attributes(a, b, name: str) -> Iterator[Difference]:
 
 
 def compare_values(a: np.ndarray, b: np.ndarray, *, noise: float = 0.0) -> Difference | None:
-    """Compare two arrays of one shape and type; None if they are identical.
+    """Compare two arrays with the same shape and type; return None if they are identical.
 
     Parameters
     ----------
-    a, b : values of the deposit and of the rerun; masked values and NaN are missing.
-    noise : a difference that is allowed in any case.
+    a, b : values of the deposit and of the rerun; NaN is a missing value.
+    noise : absolute difference that is always within tolerance.
     """
     if a.dtype.kind != "f":
-        a, b = np.ma.getdata(a), np.ma.getdata(b)
         unequal = np.asarray(a != b)
         return Difference("", DIFFERENT, f"not equal: {_places(a, b, unequal)}") if unequal.any() else None
-    a, b = (np.ma.filled(np.ma.asarray(each, float), np.nan) for each in (a, b))
     missing = np.isnan(a)
     if (missing != np.isnan(b)).any():
         return Difference("", DIFFERENT, f"missing in other places: {_places(a, b, missing != np.isnan(b))}")
@@ -207,7 +214,7 @@ def compare_values(a: np.ndarray, b: np.ndarray, *, noise: float = 0.0) -> Diffe
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
         deviation = np.asarray(abs(a - b) / np.maximum(size, max(FLOOR * largest, noise / TOLERANCE)))
     deviation[missing | (a == b)] = 0.0
-    deviation[np.isnan(deviation)] = np.inf  # infinite in one of them, or of the other sign
+    deviation[np.isnan(deviation)] = np.inf  # only one value is infinite, or both with opposite signs
     most = float(deviation.max())
     detail = f"largest relative deviation {most:.2g}, {_place(a, b, np.argmax(deviation))}"
     if most <= TOLERANCE:
@@ -231,9 +238,10 @@ def _shown(value: object) -> str:
 
 
 def format_comparison(comparison: Comparison) -> str:
-    """Write the result as text: a line for every kind of file, and one for every variable that is not identical.
+    """Write the result as text: one line for each kind of file, and one for each variable that is not identical.
 
-    Variables with the largest deviations come first: at most `_MOST_LINES` that differ, and as many within tolerance.
+    The largest deviations come first. At most `_MOST_LINES` variables that differ are listed, and as many variables
+    within tolerance.
     """
     kinds = sorted({file.kind for file in comparison.files}, key=COMPUTED.index)
     width = max(map(len, kinds), default=0)
@@ -254,7 +262,7 @@ def format_comparison(comparison: Comparison) -> str:
 
 
 def _lines(comparison: Comparison, within: bool) -> list[str]:
-    """Return a line for each variable of each kind of file that is within tolerance, or that differs more."""
+    """Return one line for each variable, either of those within tolerance (`within`) or of those that differ more."""
     grouped = defaultdict(list)
     for file in comparison.files:
         for each in file.differences:

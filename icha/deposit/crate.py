@@ -1,7 +1,7 @@
-"""The deposit as a Provenance Run RO-Crate: what every file is, and which job made it from what.
+"""The deposit as a Workflow Run RO-Crate: what every file is, and which job made it from which files.
 
-Profiles: RO-Crate 1.1 (https://w3id.org/ro/crate/1.1) and Provenance Run Crate 0.5
-(https://w3id.org/ro/wfrun/provenance/0.5), with the profiles on which they build.
+Profiles: RO-Crate 1.1 (https://w3id.org/ro/crate/1.1) and Workflow Run Crate 0.5
+(https://w3id.org/ro/wfrun/workflow/0.5), with the profiles on which they build.
 
 The crate contains neither the times of jobs nor the person who ran them. So the same data always have the same crate.
 """
@@ -9,7 +9,6 @@ The crate contains neither the times of jobs nor the person who ran them. So the
 import hashlib
 import json
 from collections.abc import Iterable, Mapping, Sequence
-from graphlib import TopologicalSorter
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -27,21 +26,21 @@ from icha.deposit.verify import CRATE, README, SOURCE
 _PROGRAM = f"{SOURCE}/"
 _WORKFLOW = f"{_PROGRAM}Snakefile"
 _LICENCE = f"{_PROGRAM}LICENSE"
-# Files of the source that the crate shows, besides the scripts of the jobs.
+# Files of the source that the crate lists, besides the scripts of the jobs.
 _SHOWN = {_WORKFLOW, f"{_PROGRAM}uv.lock", _LICENCE}
 
 _WORKFLOW_PROFILE = "https://w3id.org/workflowhub/workflow-ro-crate/1.0"
-# The term of run crates that is used here (https://w3id.org/ro/terms/workflow-run/context).
+# Term of run crates for a checksum (https://w3id.org/ro/terms/workflow-run/context).
 _TERMS = {"sha256": "https://w3id.org/ro/terms/workflow-run#sha256"}
 
 
 class Job(NamedTuple):
-    """One job of the workflow; files are named as they lie in the deposit.
+    """One job of the workflow; paths of files are those in the deposit.
 
     Attributes
     ----------
     rule : name of the rule of the workflow.
-    inputs, outputs : files read and written; at least one is written.
+    inputs, outputs : files that the job read and wrote; it wrote at least one file.
     parameters : names and values of its settings.
     description : what its script does.
     script : the script that the job ran.
@@ -68,22 +67,14 @@ def write_crate(
 
     Parameters
     ----------
-    folder : the deposit; all files of `checksums` are there.
+    folder : the deposit, which contains all files of `checksums`.
     publication : metadata of the deposit; complete.
-    jobs : those that made the results, in any order.
-    campaign : its name.
-    revision : the state of the program, the source of which is in `source/`.
+    jobs : the jobs that made the results, in any order; the deposit contains all their files.
+    campaign : name of the campaign.
+    revision : revision of the program whose source is in `source/`.
     checksums : sha256 of every file, hexadecimal, by its path in the deposit.
-
-    Raises
-    ------
-    ValueError
-        If a job names a file that is not in the deposit.
     """
     jobs = sorted(jobs, key=lambda job: job.outputs)
-    for job in jobs:
-        if missing := {*job.inputs, *job.outputs, job.script} - set(checksums):
-            raise ValueError(f"{min(missing)}: a file of rule {job.rule} ({job.outputs[0]}) is not in the deposit")
     crate = ROCrate()
     crate.metadata.extra_terms.update(_TERMS)
     crate.metadata["conformsTo"] = [{"@id": crate.metadata.PROFILE}, {"@id": _WORKFLOW_PROFILE}]
@@ -103,23 +94,13 @@ def write_crate(
     _set(crate.add(Dataset(crate, dest_path=_PROGRAM)), name="Source of the workflow and of its program", **facts)
     number = version("snakemake")
     _set(crate.dereference("#snakemake"), name=f"Snakemake {number}", version=number)
-    _describe_workflow(crate, files, revision, _steps(jobs))
+    _describe_workflow(crate, files, revision, jobs)
     _add_jobs(crate, jobs, files, f"Campaign {campaign}", publication.title)
     _set(crate.root_dataset, mainEntity=files[_WORKFLOW])
     _set(files[README], about=crate.root_dataset)
     content = json.dumps(crate.metadata.generate(), indent=1, ensure_ascii=False)
     (folder / CRATE).write_text(f"{content}\n", encoding="utf-8")
     (folder / CRATE).chmod(0o644)
-
-
-def _steps(jobs: Sequence[Job]) -> list[Job]:
-    """Return one job of every rule, in an order in which the rules can run."""
-    maker = {path: job for job in jobs for path in job.outputs}
-    before = {job.outputs[0]: {maker[path].outputs[0] for path in job.inputs if path in maker} for job in jobs}
-    # All jobs of a level, which depend on earlier levels alone, come before those of the next one.
-    latest = {maker[output].rule: k for k, output in enumerate(TopologicalSorter(before).static_order())}
-    first = {job.rule: job for job in reversed(jobs)}
-    return [first[rule] for rule in sorted(latest, key=latest.get)]
 
 
 def _describe(crate: ROCrate, publication: Publication, campaign: str) -> None:
@@ -137,69 +118,51 @@ def _describe(crate: ROCrate, publication: Publication, campaign: str) -> None:
         conformsTo=[_add(crate, address, "CreativeWork", **known) for address, known in TABLES["profiles"].items()],
         keywords=publication.keywords,
         identifier=publication.doi and web_address(publication.doi),
-        citation=_add_paper(crate),
+        citation=_add(crate, MODEL_PAPER.address, "ScholarlyArticle", name=MODEL_PAPER.line),
     )
 
 
 def _add_author(crate: ROCrate, author: Author) -> Entity:
     if not author.is_person:
         return _add_organisation(crate, author.name, author.ror)
-    person = _add_person(crate, author.given_names, author.family_names, author.orcid_address)
-    if author.affiliation:
-        _set(person, affiliation=_add_organisation(crate, author.affiliation, author.ror))
-    return person
-
-
-def _add_person(crate: ROCrate, given: str, family: str, address: str | None = None) -> Entity:
-    """Return a person, who may be an author of the data and of the paper."""
-    name = f"{given} {family}"
-    key = address or f"#person/{quote(name)}"
-    return crate.dereference(key) or _add(crate, key, "Person", name=name, givenName=given, familyName=family)
-
-
-def _add_paper(crate: ROCrate) -> Entity:
-    """Add the paper of the model."""
-    people = [_add_person(crate, *names) for names in MODEL_PAPER.authors]
-    described = {"name": MODEL_PAPER.title, "author": people, "datePublished": str(MODEL_PAPER.year)}
-    return _add(crate, MODEL_PAPER.address, "ScholarlyArticle", **described)
+    return _add(
+        crate,
+        author.orcid_address or f"#person/{quote(author.full_name)}",
+        "Person",
+        name=author.full_name,
+        givenName=author.given_names,
+        familyName=author.family_names,
+        affiliation=author.affiliation and _add_organisation(crate, author.affiliation, author.ror),
+    )
 
 
 def _add_organisation(crate: ROCrate, name: str, address: str | None) -> Entity:
     return _add(crate, address or f"#organisation/{quote(name)}", "Organization", name=name, url=address)
 
 
-def _describe_workflow(crate: ROCrate, files: Mapping[str, File], revision: str, steps: Sequence[Job]) -> None:
-    """Describe scripts and workflow, which are programs as well as files, and the steps of the workflow."""
+def _describe_workflow(crate: ROCrate, files: Mapping[str, File], revision: str, jobs: Sequence[Job]) -> None:
+    """Describe the workflow and its scripts, which are programs as well as files."""
     configuration = crate.dereference("#configuration")
     _set(files[CONFIGURATION], exampleOfWork=configuration)
-    tools = {job.script: files[job.script] for job in steps}
-    how_to = []
-    for position, job in enumerate(steps, 1):
-        facts = {
-            "description": job.description,
-            "version": revision,
-            "programmingLanguage": crate.dereference("#python"),
-        }
-        _set(tools[job.script], ["File", "SoftwareSourceCode"], name=job.rule, **facts)
-        facts = {"position": str(position), "workExample": tools[job.script]}
-        how_to.append(_add(crate, f"{_WORKFLOW}#{job.rule}", "HowToStep", name=job.rule, **facts))
+    tools = {job.script: job for job in jobs}
+    for script, job in tools.items():
+        facts = {"version": revision, "programmingLanguage": crate.dereference("#python")}
+        _set(files[script], ["File", "SoftwareSourceCode"], name=job.rule, description=job.description, **facts)
     _set(
         files[_WORKFLOW],
-        ["File", "SoftwareSourceCode", "ComputationalWorkflow", "HowTo"],
+        ["File", "SoftwareSourceCode", "ComputationalWorkflow"],
         name="ICHA: adhesive rough contact by interacting and coalescing asperities",
         version=revision,
         conformsTo={"@id": "https://bioschemas.org/profiles/ComputationalWorkflow/1.0-RELEASE"},
         license=files[_LICENCE],
         programmingLanguage=crate.dereference("#snakemake"),
-        hasPart=list(tools.values()),
-        step=how_to,
+        hasPart=[files[script] for script in tools],
         input=[configuration],
     )
 
 
 def _add_jobs(crate: ROCrate, jobs: Sequence[Job], files: Mapping[str, File], campaign: str, description: str) -> None:
-    """Add the run of the workflow, every job in it, and the step of the workflow that started each job."""
-    engine = crate.dereference("#snakemake")
+    """Add the run of the workflow, and every job in it."""
     made = {path for job in jobs for path in job.outputs}
     given = {path for job in jobs for path in job.inputs} - made | {CONFIGURATION}
     run = _add_action(
@@ -211,30 +174,23 @@ def _add_jobs(crate: ROCrate, jobs: Sequence[Job], files: Mapping[str, File], ca
         object=[files[path] for path in sorted(given)],
         result=[files[path] for path in sorted(made)],
     )
-    actions, controls = [], []
-    for job in jobs:
-        name = quote(job.outputs[0])
-        settings = [_add_value(crate, job, *each) for each in job.parameters]
-        action = _add_action(
+    actions = [
+        _add_action(
             crate,
-            f"#job/{name}",
+            f"#job/{quote(job.outputs[0])}",
             name=f"{job.rule}: {job.outputs[0]}",
             description=job.description,
             instrument=files[job.script],
-            object=[*(files[path] for path in job.inputs), *settings],
+            object=[*(files[path] for path in job.inputs), *(_add_value(crate, job, *each) for each in job.parameters)],
             result=[files[path] for path in job.outputs],
         )
-        actions.append(action)
-        facts = {"instrument": {"@id": f"{_WORKFLOW}#{job.rule}"}, "object": action}
-        title = f"step {job.rule}: {job.outputs[0]}"
-        controls.append(_add_action(crate, f"#control/{name}", "ControlAction", name=title, **facts))
-    name = f"{campaign}, organised by {engine['name']}"
-    _add_action(crate, "#organised", "OrganizeAction", name=name, instrument=engine, object=controls, result=run)
+        for job in jobs
+    ]
     crate.root_dataset.append_to("mentions", [run, *actions])
 
 
-def _add_action(crate: ROCrate, key: str, kind: str = "CreateAction", **properties: Any) -> Entity:
-    return _add(crate, key, kind, **properties, actionStatus="http://schema.org/CompletedActionStatus")
+def _add_action(crate: ROCrate, key: str, **properties: Any) -> Entity:
+    return _add(crate, key, "CreateAction", **properties, actionStatus="http://schema.org/CompletedActionStatus")
 
 
 def _add_value(crate: ROCrate, job: Job, name: str, value: str) -> Entity:

@@ -1,4 +1,4 @@
-"""Make a deposit, as a folder and a zip: results, and what others need to understand, verify and reproduce them.
+"""Make a deposit, as a folder and as a zip: results, and what others need to understand, verify and reproduce them.
 
 The same results and the same revision of the program always give exactly the same files. A deposit contains no times
 and no names of people, machines or folders, except those that the results, the configuration and the source contain.
@@ -18,31 +18,21 @@ from icha.configuration.campaign import Campaign
 from icha.configuration.cases import campaign_sha256, run_sha256
 from icha.datasets.files import read_campaign
 from icha.deposit.crate import Job, write_crate
-from icha.deposit.metadata import citation_cff, datacite_metadata, find_licence, zenodo_metadata
+from icha.deposit.metadata import citation_cff, find_licence, zenodo_metadata
 from icha.deposit.program import Source
-from icha.deposit.readme import data_dictionary, dictionary_csv, readme
+from icha.deposit.readme import readme
 from icha.deposit.verify import CHECKSUMS, CRATE, README, SOURCE, ZENODO, files_of, problem_with_name
 from icha.planning.costs import Cost
-from icha.planning.plan import read_attributes
+from icha.planning.plan import DONE, FAILED, run_state
 from icha.planning.results import campaign_files
 from icha.support.atomic_files import moving, sync_folder, whole_file
 from icha.support.checksums import is_whole, recorded_hash, sha256_of, stale
 
 _BLOCK = 2**20
-# The time of every file in a zip, the earliest possible one.
+# Time of every file in a zip: the earliest time that a zip can contain.
 _NO_TIME = (1980, 1, 1, 0, 0, 0)
-# Number by which a zip states that its modes of files are those of Unix.
+# Number in an entry of a zip which means that the modes of files are those of Unix.
 _UNIX = 3
-
-
-def _refuse_changed(results: Path, files: list[str]) -> None:
-    """Raise `ValueError` if results are not what their jobs wrote; the message lists them."""
-    if changed := [f"  {results / file}" for file in files if not is_whole(results, file, thorough=True)]:
-        listed = "\n".join(changed)
-        raise ValueError(
-            "not published, because these files are not what their jobs wrote. Remove them, and run the campaign "
-            f"again:\n{listed}"
-        )
 
 
 def make_deposit(
@@ -56,11 +46,11 @@ def make_deposit(
     jobs: Sequence[Job],
     cost: Cost,
 ) -> None:
-    """Write a deposit to `folder` and, as a zip, to `archive`, replacing what is there; whole, or not at all.
+    """Write a deposit to `folder` and its zip to `archive`; a complete deposit replaces an earlier one.
 
     Parameters
     ----------
-    folder, archive : paths to write to. The folder in the archive has the name of `folder`.
+    folder, archive : the deposit and its zip. The folder in the zip has the name of `folder`.
     results : the campaign's folder of results.
     files : paths of the published results in that folder: at least config.used.yaml, checks.json and the campaign
         dataset.
@@ -72,13 +62,18 @@ def make_deposit(
     Raises
     ------
     ValueError
-        If a file is not what its job wrote or has a name that some systems refuse, or if the failed checks are not
-        exactly the known failures.
+        If a file has changed since its job wrote it, if some systems refuse the name of a file, or if the failed checks
+        are not exactly the known failures.
     """
     folder, archive, results = Path(folder), Path(archive), Path(results)
     files, publication = sorted(files), campaign.deposit_metadata()
     refuse_unknown_failures(read_checks(results / "checks.json"), [each.run for each in publication.known_failures])
-    _refuse_changed(results, files)
+    if changed := [f"  {results / file}" for file in files if not is_whole(results, file, thorough=True)]:
+        listed = "\n".join(changed)
+        raise ValueError(
+            "not published, because these files have changed since their jobs wrote them. Remove them, and run the "
+            f"campaign again:\n{listed}"
+        )
     staging = folder.with_name(f".{folder.name}.part")
     shutil.rmtree(staging, ignore_errors=True)
     try:
@@ -89,8 +84,8 @@ def make_deposit(
         source.export(staging / SOURCE)
         if wrong := [f"  {file!r} {why}" for file in files_of(staging) if (why := problem_with_name(file))]:
             listed = "\n".join(wrong)
-            raise ValueError(f"not published, because of names of files. Rename these:\n{listed}")
-        _describe(staging, files, campaign, source.revision, cost)
+            raise ValueError(f"not published, because some systems refuse these names. Rename the files:\n{listed}")
+        _describe(staging, campaign, source.revision, cost)
         checksums = {path: sha256_of(staging / path) for path in files_of(staging)}
         write_crate(staging, publication, jobs, campaign=campaign.name, revision=source.revision, checksums=checksums)
         checksums[CRATE] = sha256_of(staging / CRATE)
@@ -99,9 +94,8 @@ def make_deposit(
             _write_zip(temporary, staging, folder.name)
             sync_folder(staging)
             with moving():
-                # Remove an earlier deposit at once, with its checksums.
                 archive.unlink(missing_ok=True)
-                _remove(folder)
+                shutil.rmtree(folder, ignore_errors=True)
                 staging.rename(folder)
     finally:
         shutil.rmtree(staging, ignore_errors=True)
@@ -120,18 +114,18 @@ def refuse_mixed(results: Path, campaign: Campaign, recorded: Mapping[str, str])
     Raises
     ------
     ValueError
-        Naming each of them and the reason.
+        If there are such results; the message lists them with the reason.
     """
     files = campaign_files(campaign)
     expected = {path: run_sha256(campaign, case) for path, case in files.runs.items()}
     expected[files.dataset] = campaign_sha256(campaign)
     wrong = dict(stale(results, recorded))
     for path, sha256 in expected.items():
-        if (read_attributes(results / path) or {}).get("config_sha256") != sha256:
-            wrong[path] = "it was not computed with the settings of this campaign"
+        if run_state(results / path, sha256)[0] not in (DONE, FAILED):
+            wrong[path] = "this file was not computed with the settings of the campaign"
     for path, asked in recorded.items():
         if asked != recorded_hash(results, path):
-            wrong.setdefault(path, "the workflow has recorded another job for it")
+            wrong.setdefault(path, "the workflow has recorded another job for this file")
     if wrong:
         raise ValueError(
             "not published, because these results do not belong together. Remove them, and repeat the command:\n"
@@ -139,14 +133,12 @@ def refuse_mixed(results: Path, campaign: Campaign, recorded: Mapping[str, str])
         )
 
 
-def _describe(staging: Path, files: Sequence[str], campaign: Campaign, revision: str, cost: Cost) -> None:
-    """Write licence, citation, metadata, data dictionary and page of the deposit."""
+def _describe(staging: Path, campaign: Campaign, revision: str, cost: Cost) -> None:
+    """Write licence, citation, metadata and page of the deposit."""
     publication = campaign.deposit_metadata()
     _write(staging / "LICENSE.txt", find_licence(publication.license).page())
     _write(staging / "CITATION.cff", citation_cff(publication, revision))
-    for name, metadata in ((ZENODO, zenodo_metadata(publication)), ("datacite.json", datacite_metadata(publication))):
-        _write(staging / name, json.dumps(metadata, indent=1, ensure_ascii=False, allow_nan=False) + "\n")
-    _write(staging / "data_dictionary.csv", dictionary_csv(data_dictionary(staging, files)))
+    _write(staging / ZENODO, json.dumps(zenodo_metadata(publication), indent=1, ensure_ascii=False) + "\n")
     error = staging / "aggregated/model_error.nc"
     # Opened and not loaded, because the dataset may be large and the page shows little of it.
     with xr.open_datatree(staging / f"dataset/{campaign.name}.nc", engine="netcdf4") as dataset:
@@ -167,17 +159,11 @@ def _write(path: Path, text: str) -> None:
     path.chmod(0o644)
 
 
-def _remove(folder: Path) -> None:
-    """Remove a folder. It is renamed first, so that no incomplete folder has its name at any time."""
-    if folder.is_dir():
-        old = folder.with_name(f".{folder.name}.old")
-        shutil.rmtree(old, ignore_errors=True)
-        folder.rename(old)
-        shutil.rmtree(old)
-
-
 def _write_zip(path: Path, folder: Path, name: str) -> None:
-    """Write a folder to a zip, under the given name; without compression, because versions of zlib differ."""
+    """Write a folder to a zip, in which the folder has the given name.
+
+    The zip is not compressed, because versions of zlib differ.
+    """
     with zipfile.ZipFile(path, "w", zipfile.ZIP_STORED) as archive:
         for file in files_of(folder):
             status = (folder / file).stat()

@@ -1,4 +1,4 @@
-"""Metadata of a deposit: licence, citation (CITATION.cff), Zenodo, DataCite, and attributes of the campaign dataset."""
+"""Metadata of a deposit: licence, citation (CITATION.cff), Zenodo, and attributes of the campaign dataset."""
 
 import json
 import re
@@ -10,13 +10,12 @@ import yaml
 from packaging.licenses import InvalidLicenseExpression, canonicalize_license_expression
 
 from icha.configuration.campaign import Campaign
-from icha.configuration.publication import Author, Funding, Publication, RelatedIdentifier
+from icha.configuration.publication import Author, Funding, Publication
 from icha.contact.models import MODEL_PAPER
 from icha.deposit.verify import SOURCE, ZENODO, read_text
 
 _FOLDER = Path(__file__).parent
 TABLES = yaml.safe_load((_FOLDER / "tables.yaml").read_text(encoding="utf-8"))
-_ROR, _FUNDER_REGISTRY, _ZENODO_DOI = "https://ror.org/", "10.13039/", "10.5281/zenodo."
 
 
 class Licence(NamedTuple):
@@ -36,9 +35,8 @@ class Licence(NamedTuple):
 
     def page(self) -> str:
         """Write LICENSE.txt of a deposit whose data have this licence."""
-        name = self.identifier if self.name == self.identifier else f"{self.name} ({self.identifier})"
         statement = (
-            f"Data, figures and texts of this deposit: {name}\n{self.address}\n\n"
+            f"Data, figures and texts of this deposit: {self.name} ({self.identifier})\n{self.address}\n\n"
             f"The program in {SOURCE}/ has a licence of its own: {SOURCE}/LICENSE\n"
         )
         return f"{statement}\n{'-' * 72}\n\n{self.text}" if self.text else statement
@@ -80,16 +78,18 @@ def licence_problem(campaign: Campaign) -> tuple[str, str] | None:
 
 
 def acknowledgement(funding: Funding) -> str:
-    """Write an acknowledgement of the funder and the grant."""
+    """Write an acknowledgement of the funder and the grant, with the address of the grant if it is known."""
     number = f"award {funding.award_number}" if funding.award_number else ""
     award = ": ".join(filter(None, (number, funding.award_title)))
+    award = ", ".join(filter(None, (award, funding.award_url and web_address(funding.award_url))))
     return f"Funded by {funding.funder}{f' ({award})' if award else ''}"
 
 
 def discovery_attributes(publication: Publication) -> dict[str, str]:
     """Return the attributes of the Attribute Convention for Data Discovery (ACDD 1.3) for a dataset.
 
-    Several creators are separated by semicolons, because names contain commas, in the same order in every attribute.
+    Semicolons separate several creators, because names contain commas. Every attribute lists the creators in the same
+    order.
     """
     authors = publication.authors
     values = {
@@ -118,7 +118,7 @@ def citation_cff(publication: Publication, revision: str) -> str:
     Parameters
     ----------
     publication : complete metadata (`icha.configuration.publication.missing_metadata`).
-    revision : that of the program that made the data.
+    revision : revision of the program that made the data.
     """
     licence = find_licence(publication.license)
     paper = {
@@ -202,7 +202,7 @@ def zenodo_metadata(publication: Publication) -> dict[str, Any]:
 
 
 def read_zenodo_metadata(folder: Path) -> dict[str, Any]:
-    """Read the metadata of a deposit from an unknown maker; raise ValueError if they are not a mapping."""
+    """Read the metadata for Zenodo of a deposit from an unknown maker; raise ValueError if they are not a mapping."""
     try:
         metadata = json.loads(read_text(folder, ZENODO))
     except (ValueError, RecursionError) as error:
@@ -213,7 +213,7 @@ def read_zenodo_metadata(folder: Path) -> dict[str, Any]:
 
 
 def summary_of(metadata: dict[str, Any]) -> dict[str, str]:
-    """Return title, version, authors, licence and communities of Zenodo metadata, of any types, as text."""
+    """Return title, version, authors, licence and communities of Zenodo metadata, whose values may have any type."""
 
     def join(entries: Any, key: str) -> str:
         entries = entries if isinstance(entries, list) else ()
@@ -222,81 +222,6 @@ def summary_of(metadata: dict[str, Any]) -> dict[str, str]:
     texts = {name: str(metadata.get(name, "")) for name in ("title", "version", "license")}
     communities = join(metadata.get("communities"), "identifier")
     return texts | {"authors": join(metadata.get("creators"), "name"), "community": communities}
-
-
-def datacite_metadata(publication: Publication) -> dict[str, Any]:
-    """Return the metadata after DataCite's schema 4.5 (https://doi.org/10.14454/g8e5-6293), for JSON.
-
-    Without a DOI the publisher is unknown, and has the value `:tba`: DataCite's word for "to be announced".
-    """
-    licence = find_licence(publication.license)
-    paper = RelatedIdentifier(identifier=f"arXiv:{MODEL_PAPER.arxiv}", relation="Cites", resource="Preprint")
-    rights = {
-        "rights": licence.name,
-        "rightsUri": licence.address,
-        "rightsIdentifier": licence.identifier,
-        "rightsIdentifierScheme": "SPDX",
-        "schemeUri": "https://spdx.org/licenses/",
-    }
-    related = [
-        {
-            "relatedIdentifier": each.identifier,
-            "relatedIdentifierType": _datacite_type(each.identifier),
-            "relationType": each.relation,
-            "resourceTypeGeneral": each.resource,
-        }
-        for each in (*publication.related_identifiers, paper)
-    ]
-    content = {
-        "schemaVersion": "http://datacite.org/schema/kernel-4",
-        "doi": publication.doi,
-        "types": {"resourceTypeGeneral": "Dataset", "resourceType": "Simulation results"},
-        "creators": [_datacite_creator(author) for author in publication.authors],
-        "titles": [{"title": publication.title}],
-        "publisher": {"name": "Zenodo" if (publication.doi or "").startswith(_ZENODO_DOI) else ":tba"},
-        "publicationYear": publication.date[:4],
-        "dates": [{"date": publication.date, "dateType": "Issued"}],
-        "version": publication.version,
-        "language": "en",
-        "descriptions": [{"description": publication.summary, "descriptionType": "Abstract"}],
-        "subjects": [{"subject": keyword} for keyword in publication.keywords],
-        "rightsList": [rights],
-        "relatedIdentifiers": related,
-        "fundingReferences": [_datacite_funding(funding) for funding in publication.funding],
-    }
-    return _without_empty(content)
-
-
-def _datacite_creator(author: Author) -> dict[str, Any]:
-    orcid, ror = (author.orcid_address, "ORCID", "https://orcid.org"), (author.ror, "ROR", _ROR)
-    name, place = ("nameIdentifier", "nameIdentifierScheme"), ("affiliationIdentifier", "affiliationIdentifierScheme")
-    identifier = dict(zip((*name, "schemeUri"), orcid if author.is_person else ror, strict=True))
-    affiliation = dict(zip((*place, "schemeUri"), ror, strict=True)) if author.ror else {}
-    return {
-        "name": author.sorted_name,
-        "nameType": "Personal" if author.is_person else "Organizational",
-        "givenName": author.given_names,
-        "familyName": author.family_names,
-        "nameIdentifiers": [identifier] if identifier["nameIdentifier"] else [],
-        "affiliation": [{"name": author.affiliation} | affiliation] if author.affiliation else [],
-    }
-
-
-def _datacite_type(identifier: str) -> str:
-    return "DOI" if identifier.startswith("10.") else "arXiv" if identifier.startswith("arXiv:") else "URL"
-
-
-def _datacite_funding(funding: Funding) -> dict[str, Any]:
-    registries = {_ROR: "ROR", _FUNDER_REGISTRY: "Crossref Funder ID"}
-    known = [name for start, name in registries.items() if start in (funding.funder_id or "")]
-    return {
-        "funderName": funding.funder,
-        "funderIdentifier": funding.funder_id and web_address(funding.funder_id),
-        "funderIdentifierType": funding.funder_id and (*known, "Other")[0],
-        "awardNumber": funding.award_number,
-        "awardTitle": funding.award_title,
-        "awardUri": funding.award_url and web_address(funding.award_url),
-    }
 
 
 def paragraphs(text: str) -> list[str]:

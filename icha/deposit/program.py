@@ -26,9 +26,9 @@ from icha.support.program import INSTALLED, is_installed, own_workflow, package_
 
 # Files and folders that compute the results: everything in them must be committed.
 PROGRAM = ("Snakefile", "icha/", "workflow/", "profiles/default/")
-# Configurations of campaigns may be changed or new; a deposit has the one that was used.
+# Configurations need not be committed, because a deposit contains the configuration that was used.
 _CONFIGURATIONS = "config/"
-# In a campaign's folder of results: the versions of packages with which some of them may have been made.
+# File in a campaign's folder of results: versions of packages with which results may have been made.
 MADE_WITH = "made_with.txt"
 # No setting of user or system changes what git reads.
 _GIT_ENVIRONMENT = {"GIT_CONFIG_GLOBAL": os.devnull, "GIT_CONFIG_NOSYSTEM": "1", "GIT_NO_REPLACE_OBJECTS": "1"}
@@ -81,7 +81,7 @@ def program_files(workflow: Path) -> dict[str, Path]:
 
 
 def _committed_source(project: Path) -> Source:
-    """Return the source at the commit that is checked out; the project may be a folder of a larger repository."""
+    """Return the source at the current commit of git; the project may be a folder of a larger repository."""
     commit = _git(project, "rev-parse", "--verify", "--quiet", "HEAD^{commit}").decode("ascii").strip()
     packed = _git(project, "archive", "--format=tar", "HEAD")
     if not commit or not packed:
@@ -122,7 +122,7 @@ def _git(project: Path, *arguments: str) -> bytes:
 
 
 def _changes(recorded: Mapping[str, str], present: Mapping[str, Path], added: str) -> list[str]:
-    """Compare the files that are present with the checksums recorded for them; `added` describes an extra file."""
+    """List files that differ from their recorded checksums, and files without one, which the text `added` describes."""
     changed = [
         f"changed: {name}"
         for name, digest in recorded.items()
@@ -170,7 +170,7 @@ def _listed(names: list[str]) -> str:
 
 
 def note_versions(results: Path) -> None:
-    """Add the installed versions of the packages that ICHA requires to those noted before."""
+    """Add the installed versions of the packages that ICHA requires to the list in a campaign's folder of results."""
     noted, installed = _noted(results), installed_versions()
     required = {canonicalize_name(Requirement(line).name) for line in importlib.metadata.requires("icha") or ()}
     now = {f"{name}=={installed[name]}" for name in required - {"icha"} if name in installed}
@@ -187,7 +187,7 @@ def _noted(results: Path) -> set[str]:
 
 
 def refuse_other_environment(project: Path, results: Path) -> None:
-    """Refuse to publish in another environment than the one that the deposit promises.
+    """Refuse to publish if the environment differs from the lock file, which the deposit promises.
 
     Parameters
     ----------

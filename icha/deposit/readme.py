@@ -1,17 +1,12 @@
-"""Pages of a deposit for readers: README.md, and data_dictionary.csv with every variable of every netCDF file."""
+"""README.md of a deposit, the page for its readers."""
 
-import csv
-import io
 import re
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import NamedTuple
 from urllib.parse import quote
 
 import jinja2
-import netCDF4
 import numpy as np
 import xarray as xr
 
@@ -23,7 +18,6 @@ from icha.configuration.surfaces import SelfAffineSurface
 from icha.contact.models import MODEL_PAPER
 from icha.datasets.campaign import run_place, runs_of_status
 from icha.datasets.labels import LABELS, slopes_of
-from icha.datasets.results import LOOP, RUN, SOLUTION, SURFACE, THEORIES
 from icha.datasets.variables.campaign import (
     BEYOND_MODEL,
     FAILED_CHECKS,
@@ -39,98 +33,13 @@ from icha.planning.requirements import further_software
 from icha.support import formatting
 
 _TEMPLATE = "README.md.jinja"
-# Placeholders for what differs between files of one kind.
-_PLACEHOLDERS = {name: f"<{name}>" for name in ("study", "entry", "surface", "material")}
-_PLACEHOLDERS |= {"seed": "<k>", "slope": "<g>", "pressure": "<load>"}
-_KINDS = [
-    pattern.format(**_PLACEHOLDERS, model_folder=folder)
-    for pattern in (SURFACE, RUN, SOLUTION, LOOP, THEORIES)
-    for folder in ("", "<model>/")
-]
 # Number of entries after which a list is cut.
 _MOST_NAMES = 12
-_METADATA = "citation, licence and provenance for people and machines"
 # A web address within a text, without punctuation after it.
 _ADDRESS = re.compile(r"(https?://[^\s<>|`\\]*[^\s<>|`\\.,;:!?()\[\]*_~'\"])")
-# Characters with a meaning in Markdown: anywhere, or at the beginning of an entity; and at the beginning of a line.
+# Characters with a meaning in Markdown: anywhere in a line, and at its beginning.
 _SPECIAL = re.compile(r"[\\`*\[\]<>|~$#]|(?<![^\W_])_|_(?![^\W_])|&(?=[#\w])")
 _SPECIAL_FIRST = re.compile(r"^(\d*)((?<!\d)[-+]|(?<=\d)[.)])(?!\w)")
-
-
-class Entry(NamedTuple):
-    """A variable of all files of one kind.
-
-    Attributes
-    ----------
-    file : path of the files, with placeholders for what differs.
-    group, variable, dimensions, type, units, long_name, flags, missing, comment : as in the files.
-    files : number of files with the variable.
-    """
-
-    file: str
-    group: str
-    variable: str
-    dimensions: str
-    type: str
-    units: str
-    long_name: str
-    flags: str
-    missing: str
-    comment: str
-    files: int
-
-
-def data_dictionary(folder: Path, files: Iterable[str]) -> list[Entry]:
-    """Describe the variables of netCDF files; variables that agree in all files of one kind have one entry.
-
-    Parameters
-    ----------
-    folder : the folder of the files.
-    files : their paths from there; files that are not netCDF are skipped.
-    """
-    found: Counter[tuple[str, ...]] = Counter()
-    for name in sorted(files):
-        if name.endswith(".nc"):
-            with netCDF4.Dataset(folder / name) as file:
-                for group in (file, *file.groups.values()):
-                    for variable in group.variables.values():
-                        found[file_pattern(name), group.path, *_described(variable)] += 1
-    return [Entry(*key, count) for key, count in found.items()]
-
-
-def dictionary_csv(entries: Iterable[Entry]) -> str:
-    """Write the dictionary as a table with headings, commas and quotes (RFC 4180 except for its line ends)."""
-    text = io.StringIO()
-    csv.writer(text, lineterminator="\n").writerows([Entry._fields, *entries])
-    return text.getvalue()
-
-
-def file_pattern(path: str) -> str:
-    """Return the path pattern of a kind of file, such as `surfaces/<surface>/<seed>.nc`."""
-    return next((kind for kind in _KINDS if re.fullmatch(re.sub("<.*?>", "[^/]+", kind), path)), path)
-
-
-def _described(variable) -> tuple[str, ...]:
-    """Name, dimensions, type, units, long name, flags, meaning of missing values, and comment of a variable."""
-    attributes = {name: variable.getncattr(name) for name in variable.ncattrs()}
-    dimensions, dtype = variable.dimensions, np.dtype(variable.dtype)
-    if dtype == np.dtype("S1"):  # text is stored as characters along a last dimension
-        dimensions = dimensions[:-1]
-    flags = zip(
-        np.atleast_1d(attributes.get("flag_values", [])), str(attributes.get("flag_meanings", "")).split(), strict=False
-    )
-    missing = str(attributes.get("missing", ""))
-    if "_FillValue" in attributes:
-        missing = f"{attributes['_FillValue']!s}: {missing or 'no value, see status and step_count'}"
-    return (
-        variable.name,
-        " ".join(dimensions),
-        dtype.name if dtype.kind in "fiu" else "text",
-        *(str(attributes.get(name, "")) for name in ("units", "long_name")),
-        ", ".join(f"{value}: {meaning}" for value, meaning in flags),
-        missing,
-        str(attributes.get("comment", "")),
-    )
 
 
 def readme(
@@ -143,12 +52,12 @@ def readme(
     sizes: Mapping[str, int],
     cost: Cost,
 ) -> str:
-    """Write the page, in Markdown.
+    """Write README.md of a deposit.
 
     Parameters
     ----------
     campaign : the configuration, with complete metadata.
-    revision : that of the source.
+    revision : revision of the source.
     dataset, checks, model_error : the results of the campaign.
     sizes : bytes of every file, by its path in the deposit.
     cost : expected cost of computing the whole campaign.
@@ -216,7 +125,7 @@ def _settings(campaign: Campaign) -> dict:
 
 
 def _outcome(publication: Publication, dataset: xr.DataTree, checks: Sequence[Check]) -> dict:
-    """Return complete and incomplete runs, and their checks."""
+    """Return the facts of the results: complete and incomplete runs, and their checks."""
     known = {failure.run: failure.reason for failure in publication.known_failures}
     designs, incomplete, complete = [], [], []
     for name, node in dataset.children.items():
@@ -232,16 +141,14 @@ def _outcome(publication: Publication, dataset: xr.DataTree, checks: Sequence[Ch
             incomplete.append({"labels": labels, "reason": known.get(str(labels), ""), **facts})
     example = complete[0] if complete else incomplete[0]["labels"]
     study = dataset[example.study].to_dataset()
-    meaning = "0 if the run reached the end of its path, else 1"
     return {
         "designs": designs,
         "partial": [study["name"] for study in designs if study["status"][STATUS_MEANINGS[NOT_IN_DESIGN]]],
         "incomplete": incomplete,
         "beyond_model": sum(study["status"][STATUS_MEANINGS[BEYOND_MODEL]] for study in designs),
         "example": example,
-        # Slopes that differ between surfaces have no index by which to select.
-        "slope_place": run_place(study, example)["rms_slope"] if study["rms_slope"].ndim == 2 else None,
-        "checks": [replace(each, description=meaning) if each.name == COMPLETED else each for each in worst(checks)],
+        "slope_place": run_place(study, example)["rms_slope"],
+        "checks": worst(checks),
         "failed": [check for check in checks if not check.passed and check.name != COMPLETED],
         "known": known,
         "count": Counter(check.name for check in checks),
@@ -254,20 +161,12 @@ def _model_errors(tree: xr.DataTree) -> list[dict]:
     """Return the range of the model's errors over loads, surfaces and slopes, for every entry and material."""
     found = []
     for entry, node in tree.children.items():
-        data = node.to_dataset()
-        for material in data["material"].values.tolist():
-            errors = data.sel(material=material)
-            known = np.isfinite(errors["area_error_mean"])
-            if not known.any():
-                continue
-            values = {
-                "loads": errors["reduced_pressure"].broadcast_like(known).where(known),
-                "area": errors["area_error_mean"],
-                "separation": errors["separation_error_mean"],
-                "overlap": errors["jaccard_mean"],
-            }
-            ranges = {name: (float(each.min()), float(each.max())) for name, each in values.items()}
-            found.append({"entry": entry, "study": data.attrs["study"], "material": material, **ranges})
+        for material, errors in node.to_dataset().groupby("material"):
+            means = [errors[f"{quantity}_error_mean"] for quantity in ("area", "separation")]
+            area, separation = ((float(each.min()), float(each.max())) for each in means)
+            if np.isfinite(area).all():
+                names = {"entry": entry, "study": node.attrs["study"], "material": material}
+                found.append(names | {"area": area, "separation": separation})
     return found
 
 
@@ -281,19 +180,19 @@ def _parts(sizes: Mapping[str, int]) -> list[dict]:
     rows = [(part if part in sizes else f"{part}/", part, content) for part, content in TABLES["contents"].items()]
     return [
         {"path": path, "content": content, "files": len(grouped[part]), "size": sum(grouped[part])}
-        for path, part, content in [*rows, (others, "", _METADATA)]
+        for path, part, content in [*rows, (others, "", "citation, licence and metadata for Zenodo")]
         if part in grouped
     ]
 
 
 def _few(values: Sequence) -> str:
-    """Write a list, or its beginning and its length."""
+    """Write a list, or the beginning of a long list and its length."""
     shown = [markdown(value) for value in values]
     return ", ".join(shown) if len(shown) <= _MOST_NAMES else f"{', '.join(shown[:_MOST_NAMES])}, … ({len(shown)})"
 
 
 def markdown(text) -> str:
-    """Escape plain text for a line of Markdown, also in a table; addresses become links."""
+    """Write plain text as one line of Markdown, also for a table; web addresses become links."""
     line = " ".join(str(text).split())
     # Every second part is an address.
     parts = [
@@ -309,7 +208,6 @@ def _link(address: str) -> str:
     return f"<{plain}>"
 
 
-def _span(values, form="{:z.3g}") -> str:
-    """Write the smallest and largest value, or the only one."""
-    least, most = form.format(min(values)), form.format(max(values))
-    return least if least == most else f"{least} to {most}"
+def _span(ends: tuple[float, float]) -> str:
+    """Write the smallest and the largest value of an error in per cent."""
+    return "{:+z.1%} to {:+z.1%}".format(*ends)

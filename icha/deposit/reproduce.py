@@ -17,18 +17,17 @@ from icha.configuration.load import INPUTS, load_configuration
 from icha.configuration.yaml_files import read_yaml
 from icha.datasets.attributes import why_no_result
 from icha.datasets.results import CONFIGURATION
-from icha.deposit.program import PROGRAM, program_files, version_differences
-from icha.deposit.verify import CHECKSUMS, COMPUTED, SOURCE, files_of, read_text
+from icha.deposit.program import version_differences
+from icha.deposit.verify import CHECKSUMS, SOURCE, files_of, read_text
 from icha.support.checksums import sha256_of
 from icha.support.formatting import format_count
 from icha.support.input_files import refuse_traps
-from icha.support.program import own_workflow
 from icha.support.values import NAME_PATTERN
 
 SMALLEST = "smallest"
 # In the source of a deposit: the version of the program, and the versions of all packages.
 _PYPROJECT, _LOCK = f"{SOURCE}/pyproject.toml", f"{SOURCE}/uv.lock"
-# In the folder of a rerun: the checksum of the deposit's list of checksums; configuration, inputs and results.
+# In the folder of a rerun: file with the checksum of the deposit's SHA256SUMS; folder of configuration and results.
 _BEGUN, _PROJECT = "rerun-of.sha256", "data"
 _RUN = re.compile(r"runs(/[^/]+){4}/[^/]+\.nc")
 
@@ -38,12 +37,10 @@ class RerunError(ValueError):
 
 
 def campaign_name(deposit: Path) -> str:
-    """Return the name of the campaign in a deposit; `RerunError` if it lacks what a rerun needs."""
+    """Return the name of the campaign in a deposit; raise `RerunError` if the deposit lacks what a rerun needs."""
     for file in (CONFIGURATION, _PYPROJECT, _LOCK):
         if not (deposit / file).is_file():
             raise RerunError(f"the deposit has no {file}, so it cannot be computed again")
-    if not any((deposit / name).exists() for name in COMPUTED):
-        raise RerunError("the deposit has no results to compare with")
     try:
         read_text(deposit, CONFIGURATION)  # refuses a file that is too large
         name = read_yaml(deposit / CONFIGURATION).get("name")
@@ -58,25 +55,15 @@ def other_versions(deposit: Path) -> list[str]:
     """List the versions of ICHA and of packages that differ between the deposit and what is installed."""
     try:
         made_by = tomllib.loads(read_text(deposit, _PYPROJECT))["project"]["version"]
-    except (ValueError, KeyError, TypeError, RecursionError):
-        raise RerunError(f"{_PYPROJECT}: has no version of the program") from None
-    try:
         wrong = version_differences(read_text(deposit, _LOCK))
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
-        raise RerunError(f"{_LOCK}: is not a lock file of uv") from None
+        raise RerunError(
+            f"{_PYPROJECT} or {_LOCK} cannot be read; expected the version of the program, and a lock file of uv"
+        ) from None
     installed = version("icha")
     if made_by != installed:
         wrong.insert(0, f"  icha: {installed} is installed, {made_by} made the deposit")
     return wrong
-
-
-def count_changed_files(deposit: Path) -> int:
-    """Count the files of package and workflow that differ between the deposit's source and what is installed."""
-    lines = read_text(deposit, CHECKSUMS).splitlines()
-    listed = {name.removeprefix(f"{SOURCE}/"): digest for digest, name in (line.split("  ", 1) for line in lines)}
-    theirs = {name: digest for name, digest in listed.items() if name == PROGRAM[0] or name.startswith(PROGRAM[1:])}
-    ours = {name: sha256_of(file) for name, file in program_files(own_workflow()).items()}
-    return sum(theirs.get(name) != ours.get(name) for name in {*theirs, *ours})
 
 
 def find_runs(only: Iterable[str], deposit: Path) -> list[str]:
@@ -110,7 +97,7 @@ def find_runs(only: Iterable[str], deposit: Path) -> list[str]:
 
 
 def _smallest(deposit: Path, runs: list[str]) -> str:
-    """Return the complete run that, together with its surface, has the fewest bytes."""
+    """Return the complete run whose file and surface together have the fewest bytes."""
     sizes = {run: sum((deposit / path).stat().st_size for path in add_surfaces([run], deposit)) for run in runs}
     for run in sorted(runs, key=lambda run: sizes[run]):
         if _is_complete(deposit, run):
@@ -134,7 +121,7 @@ def add_surfaces(runs: Iterable[str], deposit: Path) -> list[str]:
 
 
 def prepare_rerun(folder: Path, deposit: Path) -> Path:
-    """Copy configuration and inputs of a deposit to the folder of a rerun, unless it has them; return the copy.
+    """Copy configuration and inputs of a deposit to the folder of a rerun, unless they are there.
 
     Raises
     ------

@@ -16,7 +16,7 @@ from pathlib import Path
 
 from icha.support import formatting
 from icha.support.checksums import sha256_of
-from icha.support.formatting import is_printable, printable
+from icha.support.formatting import printable
 
 CHECKSUMS = "SHA256SUMS"
 # Files by which a deposit describes itself: to readers, as an RO-Crate, to Zenodo.
@@ -32,9 +32,9 @@ COMPUTED = (
 LARGEST_TEXT = 64_000_000
 # Longest name and longest path that common file systems accept, in bytes.
 _LONGEST_NAME, _LONGEST_PATH = 255, 1000
-# Limits that do not apply with the option `LARGE`: the number of files; the factor by which a zip may grow when it is
-# extracted; the size, in bytes, that is accepted in any case. ICHA does not compress deposits. Compression by others
-# makes them about three times smaller.
+# Limits that do not apply with the option `LARGE`: number of files; factor by which a zip may grow when extracted; size
+# that an extracted zip may always have, in bytes. ICHA does not compress deposits; zips of others have about a third of
+# the size.
 MOST_FILES, MOST_GROWTH, ALLOWANCE = 200_000, 50, 100_000_000
 LARGE = "--large"
 _LINE = re.compile(r"([0-9a-f]{64})  (.+)")
@@ -49,7 +49,7 @@ class DamagedDeposit(ValueError):
 def whole_deposit(path: str | os.PathLike, *, large: bool = False) -> Iterator[Path]:
     """Verify a deposit and provide its folder; a zip is extracted into a temporary folder.
 
-    Folders without files do not count, as in git and in the list of checksums.
+    Empty folders do not count, as in git.
 
     Parameters
     ----------
@@ -102,7 +102,7 @@ def problem_with_name(name: str) -> str:
         return "leads out of its folder, or to no file"
     if "\\" in name:
         return "has a backslash, which separates folders on other systems"
-    if not is_printable(name):
+    if printable(name) != name:
         return "has invisible characters"
     if len(name.encode()) > _LONGEST_PATH or max(len(each.encode()) for each in names) > _LONGEST_NAME:
         return "is too long"

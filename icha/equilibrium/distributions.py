@@ -1,4 +1,4 @@
-"""Distributions of gap and pressure over the nominal area, and the contact area of every grid cell."""
+"""Distributions of gap and pressure over the nominal area, and the part of every grid cell that spots cover."""
 
 import numpy as np
 
@@ -11,46 +11,36 @@ from icha.surfaces.square import cell_of
 from icha.surfaces.surface import Surface
 
 
-def contact_cover(surface: Surface, spots: Spots) -> np.ndarray:
-    """Return the fraction of every node's cell that is in contact, (n, n) float, exact for discs.
+def cover_grid(period: float, grid: int, centres, radii, free_square: bool = False) -> tuple[np.ndarray, np.ndarray]:
+    """Return the fraction of the cell around each node that discs cover, and whether the node is in a disc, (n, n).
 
-    The fractions of overlapping spots add up, so the value of a cell may exceed 1. The mean over the grid is A/A0 up to
-    rounding. On a free square the mean does not include the area beyond the edges.
+    Where discs overlap, their fractions add up and may exceed 1.
+
+    Parameters
+    ----------
+    period : side of the square, m.
+    grid : nodes along a side, n.
+    centres, radii : (m, 2) and (m,) float, m.
+    free_square : whether each disc exists once; otherwise it repeats with the period.
     """
-    cover, _ = _cover_grid(surface.period, surface.grid, spots.position, spots.contact_radius, surface.free)
-    return cover
-
-
-def nodes_in_discs(
-    period: float, grid: int, centres: np.ndarray, radii: np.ndarray, free_square: bool = False
-) -> np.ndarray:
-    """Return whether each node of a grid lies inside a disc, (n, n) bool.
-
-    centres : (m, 2), radii : (m,), m; free_square : True: each disc exists once; False: it repeats with the period.
-    """
-    _, inside = _cover_grid(period, grid, centres, radii, free_square)
-    return inside
-
-
-def _cover_grid(period, grid, centres, radii, free_square):
-    """Return the results of `_cover` for all rows of a grid."""
-    blocks = on_cores(lambda rows: _cover(period, grid, centres, radii, rows, free_square), row_blocks(grid))
-    return tuple(np.concatenate(parts) for parts in zip(*blocks, strict=True))
+    blocks = on_cores(lambda rows: _cover_rows(period, grid, centres, radii, rows, free_square), row_blocks(grid))
+    cover, inside = zip(*blocks, strict=True)
+    return np.concatenate(cover), np.concatenate(inside)
 
 
 def gap_distribution(law: JKR, surface: Surface, state: ContactState) -> dict:
     """Return the distribution P(u) of the gap over the nominal area, as a dictionary with the keys below.
 
-    A cell on the edge of a spot counts with its fraction outside the spot; if its node lies inside the spot, this
-    fraction has gap zero. The last bin includes larger gaps. The gaps are evaluated in blocks of rows, never as a whole
-    field.
+    A cell on the edge of a spot counts with its fraction outside the spot. If its node lies inside the spot, this
+    fraction has gap zero. The last bin includes larger gaps. The gaps are evaluated by blocks of rows to save memory.
 
     Returns
     -------
     gap_density : (bins,) float, P(u) in the bins of `icha.contact.model.gap_bins`, 1/m.
-    overlap_fraction : area fraction of negative gaps, where the model lets the surfaces overlap.
-    area_beyond_edges : A/A0 less the area fraction that spots cover. Spots may reach over the edges of a free square,
-        and two spots that have split may overlap. The integral of P(u) + A/A0 + overlap_fraction is 1 more than this.
+    overlap_fraction : area fraction of negative gaps, where the surfaces overlap in the model.
+    area_beyond_edges : A/A0 minus the area fraction that spots cover. Spots may reach over the edges of a free square,
+        and two spots that have split may overlap. The sum of the integral of P(u), A/A0 and overlap_fraction is
+        1 + area_beyond_edges.
     """
     edges = gap_bins(surface)
     spots, a = state.spots, state.spots.contact_radius
@@ -58,8 +48,9 @@ def gap_distribution(law: JKR, surface: Surface, state: ContactState) -> dict:
     field = DisplacementField(law, period, grid, spots.position, a, spots.radius_of_curvature, free_square)
 
     def count_cells(rows, w):
+        """Count the cells of a range of rows by their gaps; sum the covered and the doubly covered fractions."""
         u = w + (state.separation - surface.heights[rows])
-        cover, inside = _cover(period, grid, spots.position, a, rows, free_square)
+        cover, inside = _cover_rows(period, grid, spots.position, a, rows, free_square)
         u[inside] = 0.0
         # Bin 0 is the overlap.
         index = np.where(u < 0, 0, _gap_bin(u, edges) + 1).ravel()
@@ -78,7 +69,7 @@ def gap_distribution(law: JKR, surface: Surface, state: ContactState) -> dict:
 
 
 def _gap_bin(u, edges):
-    """Return the bin edges[i] <= u < edges[i + 1] of every gap; the last bin includes larger gaps."""
+    """Return the index i of the bin edges[i] <= u < edges[i + 1] of every gap u; the last bin has larger gaps too."""
     last = len(edges) - 2
     decade = np.log10(np.maximum(u / edges[1], 1.0))
     index = np.minimum(decade * GAPS_PER_DECADE + 1, last).astype(np.intp)
@@ -91,7 +82,7 @@ def _gap_bin(u, edges):
 def pressure_distribution(law: JKR, surface: Surface, spots: Spots) -> dict:
     """Return the distribution P(p) of the pressure over the nominal area, as a dictionary with the keys below.
 
-    It follows from the closed form for every spot, without a grid. The integral of P(p) is A/A0; the sum of density
+    P(p) follows from a closed form for every spot, without a grid. The integral of P(p) is A/A0. The sum of density
     times width times mean over the bins is F/A0. The last bin, which ends at 500 E* h'_rms, includes larger pressures.
 
     Returns
@@ -103,7 +94,7 @@ def pressure_distribution(law: JKR, surface: Surface, spots: Spots) -> dict:
     a, R = spots.contact_radius, spots.radius_of_curvature
     area, force = np.zeros(len(edges)), np.zeros(len(edges))
     if len(a):
-        largest = np.max(law.largest_pressure(a, R))
+        largest = np.max(law.pressure(0.0, a, R))
         for k, p in enumerate([*edges[:-1], max(edges[-1], largest)]):
             # Area and force at pressures below p, of every spot.
             areas, forces = law.pressure_distribution(p, a, R)
@@ -115,11 +106,11 @@ def pressure_distribution(law: JKR, surface: Surface, spots: Spots) -> dict:
     return {"pressure_density": content / (surface.period**2 * np.diff(edges)), "pressure_bin_mean": mean}
 
 
-def _cover(period, grid, centres, radii, rows, free_square=False):
-    """Return for a range of rows the fraction of every cell in contact, and whether its node lies inside a spot."""
+def _cover_rows(period, grid, centres, radii, rows, free_square=False):
+    """Return the results of `cover_grid` for a range of rows, given as a slice."""
     if free_square:
-        # In a cell of twice the side no spot returns at the opposite edge.
-        parts = _cover(cell_of(period, free_square), cell_of(grid, free_square), centres, radii, rows)
+        # In a cell of twice the side no disc returns at the opposite edge.
+        parts = _cover_rows(cell_of(period, free_square), cell_of(grid, free_square), centres, radii, rows)
         return tuple(part[:, :grid] for part in parts)
     spacing = period / grid
     cover = np.zeros((rows.stop - rows.start) * grid)
@@ -131,17 +122,16 @@ def _cover(period, grid, centres, radii, rows, free_square=False):
         for spot, dy, dx, node in windows(centres[same], (cells - 1) * spacing, grid, period, rows):
             a = radii[same][spot][:, None]
             left = np.concatenate([dx - 0.5 * spacing, dx[:, -1:] + 0.5 * spacing], axis=1)
-            below = [_disc_below(left, (dy + side * spacing)[:, None], a) for side in (-0.5, 0.5)]
+            below = [_disc_area_left_below(left, (dy + side * spacing)[:, None], a) for side in (-0.5, 0.5)]
             np.add.at(cover, node.ravel(), np.diff(below[1] - below[0], axis=1).ravel() / spacing**2)
             inside[node[np.hypot(dx, dy[:, None]) <= a]] = True
     return cover.reshape(-1, grid), inside.reshape(-1, grid)
 
 
-def _disc_below(x, y, a):
+def _disc_area_left_below(x, y, a):
     """Return the area of the disc of radius a around the origin that lies left of x and below y."""
     x, y = np.clip(x, -a, a), np.clip(y, -a, a)
-    left = _disc_left(x, a)
-    below = _disc_left(y, a)
+    left, below = _disc_area_left(x, a), _disc_area_left(y, a)
     # The lines at x and y cut the disc into four parts; this one is left and below.
     corner = x**2 + y**2 < a**2
     quarter = 0.5 * (left + below) + x * y - 0.25 * np.pi * a**2
@@ -154,6 +144,6 @@ def _disc_below(x, y, a):
     return np.where(corner, quarter, outside)
 
 
-def _disc_left(x, a):
-    """Return the area of the disc left of x, -a <= x <= a."""
+def _disc_area_left(x, a):
+    """Return the area of the disc of radius a around the origin that lies left of x, -a <= x <= a."""
     return a**2 * (0.5 * np.pi + np.arcsin(x / a)) + x * np.sqrt(np.maximum(a**2 - x**2, 0.0))

@@ -1,14 +1,14 @@
-"""Equations of equilibrium, eq. (4), their error at given approaches, and the load or area under control.
+"""Equations of equilibrium, eq. (4), their error at given approaches, and the prescribed load or area.
 
 The unknowns are the local approaches delta_i of the spots in contact:
 
     delta_i + w_i(a(delta)) = h_i - u,        a_i = a_law(delta_i),
 
-with h_i the height of the asperity, u the mean separation and w_i the displacement of the half-space at spot i by all
-other spots and all images. On a free half-space there are no images, and u is the distance between the mean plane of
-the surface and the half-space far away. This distance may be negative because the loaded part sinks in; the mean gap is
-u plus the mean of w over the square. While the equations are solved, a spot below its jump-off approach keeps its
-jump-off radius (zero for Hertz's law). So the equations are defined everywhere and, without adhesion, smooth.
+Here h_i is the height of the asperity, u the mean separation, and w_i the displacement of the half-space at spot i by
+all other spots and all images. On a free half-space there are no images, and u is the distance between the mean plane
+of the surface and the half-space far away. This distance may be negative because the loaded part sinks in; the mean gap
+is u plus the mean of w over the square. While the equations are solved, a spot below its jump-off approach keeps its
+jump-off radius (zero for Hertz's law). So the equations have a value for all approaches.
 """
 
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ from icha.contact.models import RESIDUAL_TOLERANCE, SMALLEST_LOAD
 from icha.equilibrium.sites import AsperityContact, Sites
 from icha.half_space.interaction import Interaction
 
-# Largest relative error of a load or an area under control.
+# Largest relative error of a prescribed load or area.
 TARGET_TOLERANCE = 1e-11
 # Weight of the error of a load or area relative to the error of the equilibrium, so that one tolerance is enough.
 _TARGET_WEIGHT = RESIDUAL_TOLERANCE / TARGET_TOLERANCE
@@ -32,21 +32,24 @@ _RADIUS_AHEAD = 1.2
 
 
 def nominal_value(contact: AsperityContact, quantity: str, a, R) -> float:
-    """Return the nominal pressure (Pa) or the area fraction of spots of contact radii a and radii of curvature R, m."""
+    """Return the nominal pressure (Pa) or the contact area fraction of spots, as `quantity` names it.
+
+    a, R : (n,) float, contact radii and radii of curvature, m.
+    """
     if quantity == PRESSURE:
         return float(np.sum(contact.law.force(a, R))) / contact.area
     return float(np.sum(np.pi * a**2)) / contact.area
 
 
 def nominal_derivative(contact: AsperityContact, quantity: str, a, R):
-    """Return the derivative of `nominal_value` with respect to each contact radius."""
+    """Return the derivatives of `nominal_value` with respect to the n contact radii, (n,)."""
     if quantity == PRESSURE:
         return contact.law.force_derivative(a, R) / contact.area
     return 2 * np.pi * a / contact.area
 
 
 def radius_slope(law: JKR, a, R, approach, jump_off_approach):
-    """Return da/d(delta): zero past jump-off, and a finite bound close to jump-off, where it is infinite."""
+    """Return da/d(delta) of n spots, (n,): zero past jump-off, and limited near jump-off, where it is infinite."""
     slope = np.zeros(len(a))
     touching = (a > 0) & (approach >= jump_off_approach)
     slope[touching] = law.radius_derivative(a[touching], R[touching])
@@ -55,18 +58,18 @@ def radius_slope(law: JKR, a, R, approach, jump_off_approach):
 
 @dataclass(frozen=True, eq=False)
 class Evaluation:
-    """One evaluation of the equations at n sites.
+    """Values of the equations at given approaches of n sites.
 
     Attributes
     ----------
     approach : (n,) float, m.
     separation : mean separation, m.
     a : (n,) float, contact radii, m.
-    equilibrium_height : (n,) float, heights with which the sites would be in equilibrium, m.
+    equilibrium_height : (n,) float, asperity heights at which these approaches would be an equilibrium, m.
     error : (n,) float, left side minus right side of the equations, m.
-    control_error : load or area minus its target, in Pa or as a fraction; 0 without a control.
-    repulsion : nominal pressure by the repulsive parts of the forces alone, Pa.
-    interaction : interaction of the spots.
+    control_error : nominal pressure (Pa) or area fraction minus the prescribed value; 0 if none is prescribed.
+    repulsion : nominal pressure by the repulsive parts of the forces alone, Pa; 0 if no load is prescribed.
+    interaction : elastic interaction of the spots.
     """
 
     approach: np.ndarray
@@ -87,7 +90,7 @@ class Equations:
     ----------
     contact : contact of the asperities.
     sites : table of n sites.
-    control : load or area that is prescribed; the separation is then one more unknown.
+    control : prescribed load or area; the separation is then one more unknown.
     """
 
     contact: AsperityContact
@@ -95,9 +98,9 @@ class Equations:
     control: Control | None = None
 
     def evaluate(self, approach, separation: float, interaction: Interaction | None = None) -> Evaluation:
-        """Evaluate the equations at approaches (n,) and a separation, m.
+        """Evaluate contact radii, displacements and errors at approaches (n,) and a mean separation, m.
 
-        interaction : interaction of the last evaluation, which is used again if it is set up for these contact radii.
+        interaction : interaction of the last evaluation. It is used again if its exact pairs suffice for the new radii.
         """
         contact, sites, law = self.contact, self.sites, self.contact.law
         present, R = sites.present, sites.radius_of_curvature
@@ -121,7 +124,7 @@ class Equations:
         return Evaluation(approach, separation, a, equilibrium_height, error, control_error, repulsion, interaction)
 
     def error_size(self, evaluation: Evaluation, target_weight: float = _TARGET_WEIGHT) -> float:
-        """Return the largest error, in h_rms; the relative error of the load or area counts with a weight."""
+        """Return the larger error: of the sites in h_rms, or the relative one of the load or area times a weight."""
         size = float(np.max(np.abs(evaluation.error), initial=0.0)) / self.contact.rms_height
         if self.control is None:
             return size

@@ -27,12 +27,12 @@ _UNSTABLE_RESPONSE = 10.0
 class InteractingAsperities(AsperityContact):
     """Asperities that interact through the half-space and unite where they overlap: a `ContactModel`."""
 
-    # Largest contact area fraction of a state. Targets are allowed up to 0.25; the search for them goes beyond 0.25.
+    # Largest contact area fraction of a state. Targets may be up to 0.25; the search for them goes beyond 0.25.
     largest_area_fraction = 1.5 * 0.25
     path_accuracy = MODELS[DEFAULT_MODEL].accuracy
 
     def untouched(self) -> ContactState:
-        """Return the state at first contact: the first asperity is about to jump in, and none touches yet."""
+        """Return the state without contact at the separation at which the first asperity is about to jump in."""
         asperities = self.asperities
         separation = float(np.max(asperities.height - self.jump_in_approach))
         return ContactState(
@@ -65,7 +65,7 @@ class InteractingAsperities(AsperityContact):
     def mean_gap(self, state: ContactState) -> float:
         """Return the mean gap, m; on a periodic surface the mean separation.
 
-        On a free square the mean displacement is added. It is computed with the spots as forces at their centres.
+        On a free square it is the mean separation plus the mean displacement by the forces at the spots' centres.
         """
         if not self.asperities.free:
             return state.separation
@@ -78,7 +78,7 @@ class InteractingAsperities(AsperityContact):
         return len(state.spots)
 
     def stiffness(self, state: ContactState) -> float:
-        """Return -dp/du of the present spots, Pa/m."""
+        """Return the contact stiffness -dp/du of the present spots, Pa/m."""
         return 0.0 - self.slope(PRESSURE, state)
 
     def slope(self, quantity: str, state: ContactState) -> float:
@@ -92,21 +92,21 @@ class InteractingAsperities(AsperityContact):
         """Return the elastic energy minus the energy of adhesion, over the nominal area, J/m^2; zero without contact.
 
         The energy of a spot is that of a single JKR contact, plus half its force times the displacement by the other
-        spots. As in eq. (4), each spot is a force at its centre, and the displacement is taken at the centre. Therefore
-        the interaction of two spots of different size is not exactly reciprocal: along a path without events, the
-        change of the energy differs from the work done by a fraction of order (a/r)^2 of the energy of interaction.
+        spots. Each displacement is taken at the centre of a spot, as in eq. (4), although the spot has an area.
+        Therefore the interaction of two spots of different size is not exactly reciprocal. Along a path without events,
+        the change of the energy differs from the work done by a fraction of order (a/r)^2 of the interaction energy.
         """
         spots, law = state.spots, self.law
         a, R = spots.contact_radius, spots.radius_of_curvature
-        displaced = spots.height - state.separation - spots.approach
-        return float(np.sum(law.energy(a, R) + 0.5 * law.force(a, R) * displaced)) / self.area
+        displacement = spots.height - state.separation - spots.approach
+        return float(np.sum(law.energy(a, R) + 0.5 * law.force(a, R) * displacement)) / self.area
 
     def is_unstable(self, state: ContactState) -> bool:
-        """Return whether d(delta)/du of a spot exceeds 10, which does not happen on a stable branch."""
+        """Return whether d(delta)/du of any spot exceeds 10, which happens only on an unstable branch."""
         return bool(np.max(state.sites.response[state.contact_index], initial=0.0) > _UNSTABLE_RESPONSE)
 
     def observables(self, surface: Surface) -> AsperityObservables:
-        """Return the observables of the states on a surface."""
+        """Return the object that computes what a run records of a state."""
         return AsperityObservables(self, surface)
 
 
@@ -118,11 +118,11 @@ class AsperityObservables:
     surface: Surface
 
     def of_contact(self) -> dict:
-        """Return nothing: all values that are the same in all states follow from the surface and the material."""
+        """Return an empty dictionary: there are no values of this model that are the same in all states."""
         return {}
 
     def of_step(self, state: ContactState) -> dict:
-        """Return the residual, and the fraction of single spots outside the range of Wu's formula."""
+        """Return the residual, the number of barred asperities, and the fraction of spots outside Wu's range."""
         law, spots = self.contact.law, state.spots
         verified = law.is_jump_in_verified(spots.radius_of_curvature[spots.members == 1])
         outside = np.count_nonzero(~verified) / max(len(verified), 1)
@@ -133,7 +133,7 @@ class AsperityObservables:
         }
 
     def of_snapshot(self, state: ContactState) -> dict:
-        """Return the distributions of gap and pressure, and the spots."""
+        """Return the distributions of gap and pressure, and the properties of the spots."""
         law, spots = self.contact.law, state.spots
         return {
             **gap_distribution(law, self.surface, state),
@@ -149,7 +149,7 @@ class AsperityObservables:
         }
 
     def reasons_against(self, separations: Iterable[float], pressed: ContactState | None) -> list[str]:
-        """Return the reasons why the asperities do not represent the surface in the first loading."""
+        """Return reasons why summits do not represent the surface in the first loading; see `Observables`."""
         reasons = SummitCoverage.of(self.surface, self.contact.asperities).reasons_against(separations)
         if pressed is None:
             return reasons

@@ -1,4 +1,4 @@
-"""State of the search for an equilibrium: the sites, the known values of the asperities, and the events so far."""
+"""State of the search for an equilibrium: the sites, what is known of the asperities, and the events so far."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from icha.equilibrium.sites import CONTACT, AsperityContact, ContactState, Sites
 
 @dataclass(frozen=True, eq=False)
 class IterationState:
-    """State of the search between two equilibria. It is immutable: events and Newton steps create a new one.
+    """State of the search for an equilibrium. It is immutable: every event creates a new state.
 
     Attributes
     ----------
     contact : contact of the asperities.
     start : equilibrium from which the search starts.
-    unloading : whether the separation, given or guessed, is larger than that of the start.
+    unloading : whether the prescribed or guessed separation is larger than that of `start`.
     sites : table of sites.
     site_of_asperity, last_approach, last_separation, barred_count : as in `ContactState`.
-    released_from : (asperities,) int, union that has just released an asperity; -1 for others.
+    released_from : (asperities,) int, site of the union that released an asperity in the last jump-off; -1 for others.
     was_released : (asperities,) bool, whether a union has released an asperity during this search.
-    barred : (asperities,) bool, whether an asperity has broken contact during this search and may not make it again.
-    new_unions : indices of the unions whose heights are set at the next evaluation of the equations.
+    barred : (asperities,) bool, whether an asperity has broken contact during this search; it may not make it again.
+    new_unions : sites of the unions whose heights are not known yet.
     log : events so far, as rows of kind, position, members, energy and asperity.
     """
 
@@ -44,7 +44,7 @@ class IterationState:
 
     @classmethod
     def towards(cls, contact: AsperityContact, state: ContactState, separation: float) -> IterationState:
-        """Start from an equilibrium towards another separation, m; approaches are extrapolated by their responses."""
+        """Return the start of a search from an equilibrium: approaches are extrapolated linearly to a separation, m."""
         count, before = len(contact.asperities), state.sites
         sites = replace(
             before,
@@ -69,7 +69,7 @@ class IterationState:
 
     @property
     def without_site(self) -> np.ndarray:
-        """True where an asperity is not a site, and no site contains or covers it, (asperities,) bool."""
+        """True where an asperity belongs to no site, neither alone nor in a union nor under a spot, (asperities,)."""
         without_site = self.site_of_asperity < 0
         single = (self.sites.asperity >= 0) & self.sites.present
         without_site[self.sites.asperity[single]] = False
@@ -81,11 +81,11 @@ class IterationState:
         return [row[4] for row in self.log if row[0] == JUMP_IN]
 
     def with_approach(self, approach) -> IterationState:
-        """Return the state with the sites at these approaches (n,), m."""
+        """Return the state with other approaches (n,) of the sites, m."""
         return replace(self, sites=replace(self.sites, approach=approach))
 
     def with_events(self, kind, position, members, energy=0.0, asperity=-1) -> IterationState:
-        """Return the state with k more events of one kind in its log.
+        """Return the state after adding k events of one kind to its log.
 
         position : (k, 2) float, m. All other arguments are (k,), or one value for all events.
         """
@@ -94,12 +94,12 @@ class IterationState:
         return replace(self, log=(*self.log, *rows))
 
     def without_jumps_in(self, asperity) -> IterationState:
-        """Return the state without the jump-ins of these asperities in its log."""
+        """Return the state after removing the jump-ins of these asperities from its log."""
         dropped = set(asperity.tolist())
         return replace(self, log=tuple(row for row in self.log if row[0] != JUMP_IN or row[4] not in dropped))
 
     def events(self) -> Events:
-        """Return the events so far."""
+        """Return the log as `Events`."""
         if not self.log:
             return Events.concatenate(())
         kind, position, members, energy, _ = zip(*self.log, strict=True)

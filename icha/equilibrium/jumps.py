@@ -1,10 +1,10 @@
 """Jumps of asperities into contact and out of it.
 
-Jump-in: asperities out of contact whose approach reaches the jump-in approach, eq. (3), become sites. Without adhesion
-contact forms at an approach of zero and without a jump. In that case all asperities that may come into contact are
-candidates, and the Newton iteration decides which of them come into contact. Jump-off: spots past the end of their
-stable branch break contact, and unions release their asperities. Released asperities stay in contact if they have a
-stable state.
+Jump-in: an asperity out of contact whose approach reaches the jump-in approach, eq. (3), becomes a site. Without
+adhesion contact forms at an approach of zero and without a jump. In that case all asperities that may come into contact
+are candidates: they are unknowns of the equations, and the solution shows which of them are in contact. Jump-off: a
+spot past the end of its stable branch breaks contact. If this spot is a union, it releases its asperities. A released
+asperity stays in contact if it has a stable state.
 """
 
 from dataclasses import replace
@@ -18,36 +18,33 @@ from icha.equilibrium.iteration_state import IterationState
 from icha.equilibrium.sites import CANDIDATE, CONTACT
 from icha.half_space.interaction import displacement_at
 
-# Largest growth of the approach of an asperity out of contact, and its usual growth, over the fall of the separation.
+# Growth of the approach of an asperity out of contact, over the decrease of the separation: largest and usual value.
 _FASTEST_APPROACH = 3.0
 _PROBABLE_APPROACH = 1.2
-# Jumps of other spots may increase an approach by up to x h_rms + y |delta_off|, where delta_off is the largest
-# jump-off approach. The pairs are x and y: the guess is used during the search, the bound at the equilibrium.
+# Jumps of other spots may increase an approach by up to x h_rms + y |delta_off|, where delta_off is the jump-off
+# approach of the bluntest asperity. The pairs are x and y: the guess holds during the search, the bound at its end.
 _SUDDEN_GUESS = 0.02, 2.0
 _SUDDEN_BOUND = 1.0, 10.0
-# Spots break contact together if their distances from jump-off differ by less than this fraction.
+# Largest relative difference of the distances from jump-off of spots that break contact together.
 _SAME_STRENGTH = 1e-3
 
 
 def add_candidates(state: IterationState, separation: float) -> IterationState:
-    """Add the asperities that will probably come into contact at a separation, m, as candidates; without adhesion."""
+    """Add as candidates the asperities that will probably be in contact at a separation, m; without adhesion only."""
     fall = state.last_separation - separation
     growth = _PROBABLE_APPROACH * fall + _sudden_growth(state.contact, _SUDDEN_GUESS)
     candidates = np.flatnonzero((state.last_approach + growth > 0) & state.without_site)
-    # The approach of an asperity that has broken contact is not known, but it is small.
+    # The approach of an asperity that was just in contact is not known, but it is small.
     expected = np.where(np.isfinite(fall), state.last_approach + fall, 0.0)
     return _add_sites(state, candidates, CANDIDATE, expected[candidates])
 
 
 def apply_jump_in(state: IterationState, evaluation: Evaluation, margin: float) -> tuple[IterationState, bool]:
-    """Bring asperities into contact that are beyond their jump-in approach by more than a margin, m.
+    """Bring asperities into contact whose approaches exceed their jump-in approaches by more than a margin, m.
 
-    A spot absorbs the asperities under it. An asperity that a union has just released was in contact, and stays in
-    contact if it has a stable state. If some of the released asperities stay in contact, this counts as a split.
-
-    Returns
-    -------
-    The new state, and whether sites were added.
+    An asperity under a spot becomes part of this spot. An asperity that a union has just released stays in contact if
+    its approach exceeds the jump-off approach. If any asperity of a union stays in contact, the union has split.
+    Return the new state and whether sites were added.
     """
     contact, law, asperities = state.contact, state.contact.law, state.contact.asperities
     spots = np.flatnonzero((evaluation.a > 0) & state.sites.present)
@@ -83,14 +80,14 @@ def apply_jump_in(state: IterationState, evaluation: Evaluation, margin: float) 
 
 
 def _sudden_growth(contact, reach):
-    """Return by how much the approach of an asperity may grow by jumps of other spots, m."""
+    """Return by how much jumps of other spots may increase an approach, m; `reach` is a pair like _SUDDEN_GUESS."""
     heights, jumps = reach
     largest_jump = -contact.law.jump_off_approach(np.max(contact.asperities.radius_of_curvature))
     return heights * contact.rms_height + jumps * largest_jump
 
 
 def _evaluate_approaches(state, evaluation, spots, margin):
-    """Evaluate the approaches of asperities that may have made contact; return the state and their indices."""
+    """Evaluate the approaches of all asperities that may have reached jump-in; return the state and their indices."""
     contact, asperities, sites = state.contact, state.contact.asperities, state.sites
     reach = state.last_approach + _FASTEST_APPROACH * np.abs(state.last_separation - evaluation.separation)
     reach += _sudden_growth(contact, _SUDDEN_GUESS if margin > 0 else _SUDDEN_BOUND)
@@ -111,7 +108,7 @@ def _evaluate_approaches(state, evaluation, spots, margin):
 
 
 def _largest_of_each_group(state, jumping):
-    """Select the jumping asperities that would not lie inside the contact of a larger one of them."""
+    """Return the indices of jumping asperities without those that would lie under the larger spot of another one."""
     asperities = state.contact.asperities
     if len(jumping) < 2:
         return jumping
@@ -122,7 +119,7 @@ def _largest_of_each_group(state, jumping):
 
 
 def _add_sites(state, asperity, status, approach):
-    """Make asperities (k,) sites with approaches (k,), m."""
+    """Append asperities, given by their indices (k,), to the sites, with one status and approaches (k,), m."""
     if not len(asperity):
         return state
     asperities, site_of_asperity = state.contact.asperities, state.site_of_asperity
@@ -145,11 +142,11 @@ def _add_sites(state, asperity, status, approach):
 
 
 def apply_jump_off(state: IterationState, evaluation: Evaluation, margin: float) -> IterationState:
-    """Break the contact of all spots past jump-off by more than a margin, m.
+    """Break the contact of all spots whose approaches are below their jump-off approaches by more than a margin, m.
 
     Without adhesion only unions break contact here, because a single asperity with a negative approach exerts no force.
-    Spots that have come into contact during this search break contact first. After that, the others may be stable
-    again.
+    If a spot that has formed during this search is past jump-off, only such new spots break contact, because the others
+    may then be stable again.
     """
     sites = state.sites
     breaking = sites.status == CONTACT
@@ -164,9 +161,11 @@ def apply_jump_off(state: IterationState, evaluation: Evaluation, margin: float)
 
 
 def break_closest_to_jump_off(state: IterationState, separation: float, let_go: int) -> IterationState:
-    """Break the contact of the `let_go` spots that would reach jump-off first, and of those equally close to it.
+    """Break the contact of the `let_go` spots that would reach jump-off first, and of spots equally close to it.
 
-    The approaches of all sites are set to those at the start of the search.
+    The approaches of all sites are reset to those at the start of the search.
+
+    separation : mean separation to which the search has extrapolated the approaches, m.
     """
     sites = state.sites
     approach = sites.approach - sites.response * (separation - state.start.separation)
@@ -177,10 +176,11 @@ def break_closest_to_jump_off(state: IterationState, separation: float, let_go: 
 
 
 def _break_contact(state, breaking):
-    """Break the contact of spots, given by a mask (n,).
+    """Break the contact of the spots where the mask `breaking` (n,) is True, and log their jump-offs.
 
-    Unions release their asperities, each at most once during a search. All other asperities may not make contact again
-    at this separation. If an asperity jumped in during this search, its jump is removed from the log instead.
+    A union releases its asperities, each at most once during a search. All other asperities are barred: they may not
+    make contact again at this separation. If an asperity jumped in during this search, its jump-in is removed from the
+    log, and no jump-off is logged.
     """
     sites, law = state.sites, state.contact.law
     new = np.isin(sites.asperity, state.jumped_in) & breaking

@@ -1,7 +1,7 @@
-"""Newton's method for the equations of equilibrium between events, with an inexact Krylov solver.
+"""Newton's method for the equations of equilibrium between events; GMRES solves its linear equations approximately.
 
 The unknowns are the approaches of the sites: the spots and, without adhesion, the candidates for contact. A candidate
-with a negative approach exerts no force, so the solution shows which candidates come into contact.
+with a negative approach exerts no force, so the solution shows which candidates are in contact.
 """
 
 from dataclasses import replace
@@ -18,7 +18,7 @@ from icha.equilibrium.sites import CONTACT
 _MAX_HALVINGS = 8
 # Largest error of the response of the approaches to the separation.
 _RESPONSE_ERROR = MODELS[DEFAULT_MODEL].stiffness_error
-# Relative errors of linear solves with the approximate matrix, and with the exact matrix.
+# Relative errors of linear solves: with the approximate matrix, and with the exact matrix.
 _LINEAR_TOLERANCE = 3e-3
 _EXACT_TOLERANCE = 1e-6
 # Number of solves for the response: first with the approximate matrix, then with the exact one.
@@ -34,12 +34,10 @@ _PAST_JUMP_OFF = 0.2
 
 
 def newton_step(equations: Equations, evaluation: Evaluation, size: float) -> tuple[Evaluation, bool, bool]:
-    """Take a Newton step, shortened until the error falls below its present `size`.
+    """Take one Newton step, and halve it until the error is smaller than its present `size`, in h_rms.
 
-    Returns
-    -------
-    The new evaluation, or the old one if no step reduces the error; whether the error falls; and whether the exact
-    matrix was needed.
+    Return the evaluation after the step, or the old one if no step reduces the error; whether the error is smaller; and
+    whether the exact matrix was needed.
     """
     for exact in (False, True):
         step, separation_step = _solve_step(equations, evaluation, exact)
@@ -56,7 +54,7 @@ def newton_step(equations: Equations, evaluation: Evaluation, size: float) -> tu
 
 
 def solve_response(equations: Equations, evaluation: Evaluation) -> np.ndarray:
-    """Solve (1 + W' da/d(delta)) x = -1 for x = d(delta)/du of every site, (n,), with W' = dw/da."""
+    """Return the response x = d(delta)/du of every site, (n,): solve (1 + W' da/d(delta)) x = -1 with W' = dw/da."""
     sites = equations.sites
     response = np.full(len(sites), -1.0)
     present, _, exact, approximate = _linearise(equations, evaluation)
@@ -76,12 +74,10 @@ def solve_response(equations: Equations, evaluation: Evaluation) -> np.ndarray:
 
 
 def _linearise(equations, evaluation):
-    """Linearise the displacements.
+    """Linearise the displacements at the m present sites as functions of their approaches.
 
-    Returns
-    -------
-    Indices of the present sites; da/d(delta) of these sites; and two functions that multiply by W' da/d(delta), an
-    exact and an approximate one.
+    Return the indices of these sites and their da/d(delta), both (m,), and two functions, an exact and an approximate
+    one, that turn changes of the approaches (m,) into changes of the displacements (m,).
     """
     sites = equations.sites
     present = np.flatnonzero(sites.present)
@@ -95,6 +91,7 @@ def _linearise(equations, evaluation):
     tangent, approximate_tangent = evaluation.interaction.tangent(evaluation.a)
 
     def radius_change(x):
+        """Return the changes of all contact radii (n,) for changes x of the approaches (m,)."""
         change = np.zeros(len(sites))
         change[present] = slope * x
         return change
@@ -109,7 +106,7 @@ def _linearise(equations, evaluation):
 
 
 def _solve_step(equations, evaluation, exact):
-    """Solve the linear equations for the changes of the approaches (n,) and of the separation, m."""
+    """Return the full Newton step by the exact or approximate matrix: changes of approaches (n,) and separation, m."""
     contact, sites, control = equations.contact, equations.sites, equations.control
     present, slope, exact_product, approximate_product = _linearise(equations, evaluation)
     product, tolerance = (exact_product, _EXACT_TOLERANCE) if exact else (approximate_product, _LINEAR_TOLERANCE)
@@ -118,8 +115,8 @@ def _solve_step(equations, evaluation, exact):
     if control is None:
         step[present] = _solve_linear(lambda x: x + product(x), -evaluation.error[present], tolerance)
         return step, 0.0
-    # The separation is one more unknown. The change of variables by the last response makes the bordered matrix nearly
-    # the identity matrix.
+    # The separation is one more unknown. Changes of the approaches are measured from those that the last response gives
+    # for the change of the separation. So the bordered matrix is close to the identity matrix.
     last = sites.response[present]
     R = sites.radius_of_curvature[present]
     gradient = slope * nominal_derivative(contact, control.quantity, evaluation.a[present], R)
@@ -128,6 +125,7 @@ def _solve_step(equations, evaluation, exact):
         raise NotConverged("no contact radius changes with the separation, so the load or area cannot be reached")
 
     def bordered(x):
+        """Multiply by the matrix of the approaches and the separation, which is the last entry of x (m + 1,)."""
         y = x[:size] + x[size] * last
         return np.append(y + product(y) + x[size], np.sum(gradient * y) / rate)
 
@@ -139,12 +137,12 @@ def _solve_step(equations, evaluation, exact):
 
 
 def _take_step(equations, evaluation, step):
-    """Return the approaches (n,) after a step.
+    """Return the approaches (n,) after a step (n,), m, with care near jump-off.
 
-    Close to jump-off the radius changes with the square root of the distance from jump-off, and the equations are
-    smooth functions of the radius. Therefore a step towards jump-off is taken as a step of the radius. A spot that
-    returns from far past jump-off stops at jump-off. For a spot a little past jump-off, a quadratic equation gives the
-    square root of its new distance from jump-off.
+    Near jump-off the radius changes as the square root of the distance from jump-off, and the equations are smooth
+    functions of the radius. Therefore a step towards jump-off is taken as a step of the radius. A spot far past
+    jump-off returns to jump-off at most. For a spot a little past jump-off, a quadratic equation gives the square root
+    of its new distance from jump-off.
     """
     approach = evaluation.approach + step
     if not equations.contact.adhesive:
@@ -175,13 +173,13 @@ def _take_step(equations, evaluation, step):
 
 
 def _returns_to_contact(sites, evaluation):
-    """Return whether a spot is a little past jump-off and its error moves it back into contact, (n,) bool."""
+    """Return where a spot is a little past jump-off and its error moves it back into contact, (n,) bool."""
     gap = sites.jump_off_approach - evaluation.approach
     return (sites.status == CONTACT) & (gap >= 0) & (gap < -_PAST_JUMP_OFF * evaluation.error)
 
 
 def _solve_linear(apply, b, tolerance):
-    """Solve apply(x) = b approximately with GMRES; the caller checks the error of the equations."""
+    """Solve the linear equations apply(x) = b, (m,), approximately with GMRES, and return x, (m,)."""
     size = len(b)
     operator = LinearOperator((size, size), matvec=apply, dtype=float)
     x, _ = gmres(operator, b, rtol=tolerance, atol=0.0, restart=min(size, _KRYLOV), maxiter=2)

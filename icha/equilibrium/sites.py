@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -23,18 +23,17 @@ class AsperityContact(MaterialUnits):
     asperities : summits of the surface, n of them.
     rms_height : rms height of the surface, the unit of the errors of an equilibrium, m.
     rms_slope : rms slope of the surface.
-    jump_in_approach : (n,) float, approaches at which the asperities jump into contact, m.
     """
 
     law: JKR
     asperities: Asperities
     rms_height: float
     rms_slope: float = 1.0
-    jump_in_approach: np.ndarray = field(init=False)
 
-    def __post_init__(self):
-        """Evaluate the jump-in approaches once."""
-        object.__setattr__(self, "jump_in_approach", self.law.jump_in_approach(self.asperities.radius_of_curvature))
+    @cached_property
+    def jump_in_approach(self) -> np.ndarray:
+        """Approaches at which the n asperities jump into contact, (n,), m."""
+        return self.law.jump_in_approach(self.asperities.radius_of_curvature)
 
     @property
     def area(self) -> float:
@@ -42,16 +41,16 @@ class AsperityContact(MaterialUnits):
         return self.asperities.period**2
 
 
-# Status of a site: in contact; without adhesion, a candidate for contact; or removed.
+# Status of a site: in contact; a candidate for contact, only without adhesion; or removed.
 CONTACT, CANDIDATE, REMOVED = 1, 2, 3
-# The half-space is set up anew when the number of sites has grown by this factor, or this fraction of them is removed.
+# The half-space is set up again when the number of sites has grown by this factor, or this fraction of them is removed.
 _GROWTH = 1.5
 _REMOVED_FRACTION = 0.25
 
 
 @dataclass(frozen=True, eq=False)
 class MergeRecord:
-    """The two spots of a union, as they were just before they united.
+    """The two spots of a union, with their properties just before they united.
 
     Attributes
     ----------
@@ -67,7 +66,7 @@ class MergeRecord:
     columns: dict[str, np.ndarray]
 
     def asperities(self) -> list[list[int]]:
-        """Return the asperities of the first spot and those of the second spot as two lists."""
+        """Return the indices of all asperities in the first spot and in the second spot, as two lists."""
         return [
             [index] if union is None else [each for spot in union.asperities() for each in spot]
             for index, union in zip(self.columns["asperity"].tolist(), self.columns["union"], strict=True)
@@ -76,7 +75,7 @@ class MergeRecord:
 
 @dataclass(frozen=True, eq=False)
 class Sites:
-    """Table of n sites, and the half-space with a point at every site.
+    """Table of n sites: spots in contact, candidates for contact, and removed ones; with a half-space for all of them.
 
     Attributes
     ----------
@@ -91,7 +90,7 @@ class Sites:
     approach : (n,) float, last known approach, m.
     response : (n,) float, derivative of the approach with respect to the mean separation.
     was_in_contact : (n,) bool, whether the site was in contact before the present search for equilibrium.
-    half_space : elastic half-space.
+    half_space : elastic half-space with a point at every site.
     arranged : number of sites when the half-space was set up.
     """
 
@@ -119,7 +118,7 @@ class Sites:
 
     @classmethod
     def empty(cls, law: JKR, asperities: Asperities) -> Sites:
-        """Return a table without sites."""
+        """Return a table without sites for a surface of these asperities."""
         types = {"asperity": int, "members": int, "union": object, "split_number": int, "status": np.int8}
         types |= {"was_in_contact": bool}
         arrays: dict = {name: np.empty(0, types.get(name, float)) for name in _ARRAYS} | {"position": np.empty((0, 2))}
@@ -135,7 +134,8 @@ class Sites:
     def append(self, law: JKR, *, status, was_in_contact, split_number=-1, **more) -> Sites:
         """Return the table with k more sites.
 
-        status, was_in_contact, split_number : one value for all new sites; all others are arrays of k rows.
+        status, was_in_contact, split_number : one value for all new sites.
+        more : the other columns of `Sites`, arrays of k rows.
         """
         count = len(more["height"])
         more |= {
@@ -151,18 +151,16 @@ class Sites:
         return Sites(**arrays, half_space=self.half_space.extended(more["position"]), arranged=self.arranged)
 
     def remove(self, which) -> Sites:
-        """Return the table with the status of some sites, given by a mask or indices, set to REMOVED."""
+        """Return the table with the status REMOVED for some sites, given by a mask (n,) or by indices."""
         status = self.status.copy()
         status[which] = REMOVED
         return replace(self, status=status)
 
     def compact(self) -> tuple[Sites, np.ndarray | None]:
-        """Drop the removed sites if they are many, or if the table has grown by half since the half-space was set up.
+        """Delete removed sites if they are many, or if the table has grown by half since the half-space was set up.
 
-        Returns
-        -------
-        The table, and the new index of every site, (n + 1,) int: -1 for removed sites and in the last place. The index
-        is None if the table is unchanged.
+        Return the table, and the new index of every site, (n + 1,) int: -1 for removed sites and in the last place. The
+        index is None if the table is unchanged.
         """
         removed = self.status == REMOVED
         if len(self) <= _GROWTH * self.arranged and np.count_nonzero(removed) <= _REMOVED_FRACTION * len(self):
@@ -173,7 +171,7 @@ class Sites:
         return self._arrange({name: getattr(self, name)[present] for name in _ARRAYS}), index
 
     def _arrange(self, arrays):
-        """Return a table of these arrays with a new half-space, whose near field suits the number of sites."""
+        """Return a table of these columns with a new half-space, whose near field suits the number of sites."""
         ewald = self.half_space.ewald
         half_space = PointHalfSpace.at(arrays["position"], ewald.side, ewald.contact_modulus, ewald.free)
         return Sites(**arrays, half_space=half_space, arranged=len(arrays["height"]))
@@ -214,10 +212,10 @@ class ContactState:
     separation : mean separation u, m.
     sites : table of sites, n of them.
     contact_radius : (n,) float, zero out of contact, m.
-    site_of_asperity : (asperities,) int, site to which an asperity belongs: the asperity itself, a union that contains
-        it, or a spot that covers it; -1 for an asperity out of contact.
+    site_of_asperity : (asperities,) int, site to which an asperity belongs: its own spot, a union that contains it, or
+        a spot that covers it; -1 for an asperity out of contact.
     last_approach : (asperities,) float, approach of an asperity when it was evaluated last, m.
-    last_separation : (asperities,) float, mean separation at that evaluation, m; inf if the approach is not known.
+    last_separation : (asperities,) float, mean separation at that evaluation, m; inf if there was none since contact.
     residual : largest error of the equilibrium, in h_rms.
     barred_count : number of asperities out of contact beyond their jump-in approach. They have broken contact at this
         separation, and may not make contact again.
@@ -245,10 +243,3 @@ class ContactState:
         names = ("position", "height", "radius_of_curvature", "approach", "members")
         columns = {name: getattr(self.sites, name)[self.contact_index] for name in names}
         return Spots(contact_radius=self.contact_radius[self.contact_index], **columns)
-
-    @cached_property
-    def spot_of_asperity(self) -> np.ndarray:
-        """Index of the spot to which each asperity belongs; -1 for an asperity out of contact."""
-        spot = np.full(len(self.sites) + 1, -1)
-        spot[self.contact_index] = np.arange(len(self.contact_index))
-        return spot[self.site_of_asperity]  # -1 takes the last entry

@@ -19,8 +19,8 @@ from icha.equilibrium.newton import newton_step, solve_response
 from icha.equilibrium.sites import CANDIDATE, CONTACT, AsperityContact, ContactState
 from icha.equilibrium.unions import absorb_covered, merge_overlapping, set_union_heights, split_unions
 
-# Error in h_rms below which the search applies events. Events that are due by less than ten times the error wait for
-# the equilibrium.
+# Error in h_rms below which the search applies events. Events that are due by less than ten times the error are applied
+# only when the equations are solved.
 _EVENT_TOLERANCE = 3e-4
 _EVENT_MARGIN = 10.0
 # Largest number of Newton steps between two events, and of all steps with the exact matrix. If more are needed, the
@@ -28,7 +28,7 @@ _EVENT_MARGIN = 10.0
 _MAX_NEWTON_STEPS = 60
 _MAX_EXACT_STEPS = 4
 # Largest number of rounds of events: a surface with many equal summits may need many. Largest number of rounds that
-# lead to the same spots: if unions form and split again and again, there is no equilibrium.
+# lead to the same spots: unions that form and split again and again have no equilibrium.
 _MAX_ROUNDS, _MAX_RETURNS = 1000, 10
 # Distance, in periods, up to which two spots count as the same.
 _SAME_PLACE = 1e-6
@@ -42,13 +42,12 @@ def find_equilibrium(
     """Find the equilibrium at another mean separation, load or contact area, starting from an equilibrium.
 
     Parameters and errors are those of `icha.contact.model.ContactModel.equilibrium`. Newton steps solve the equations
-    for the present spots. When the equations are nearly solved, all events that are due happen at once: spots past
-    jump-off break contact, asperities beyond jump-in make contact, a spot absorbs the asperities under it, overlapping
-    spots coalesce, and on unloading unions split. The search ends when the equations are solved and no event is due.
+    for the present spots. When the equations are nearly solved, all events that are due are applied: spots past
+    jump-off break contact, asperities beyond jump-in make contact, overlapping spots coalesce, and on unloading unions
+    split. The search ends when the equations are solved and no event is due.
 
     An asperity that has broken contact may not make contact again at this separation; `barred_count` counts the
-    asperities that this rule keeps out of contact. Without adhesion a single spot of radius zero becomes a candidate at
-    the end.
+    asperities that this rule keeps out of contact.
     """
     state = IterationState.towards(contact, start, separation)
     if not contact.adhesive:
@@ -62,14 +61,14 @@ def find_equilibrium(
         state, evaluation = _absorb_and_evaluate(state, evaluation, control)
         equations = Equations(contact, state.sites, control)
         size = equations.error_size(evaluation)
-        # With the weight 1, a relative error of the load counts as much as an error of the separation in h_rms.
+        # With the weight 1, a relative error of the load counts as much as the same error of the approaches in h_rms.
         closeness = equations.error_size(evaluation, 1.0)
         margin = _EVENT_MARGIN * closeness * contact.rms_height
         changed = False
         if size <= RESIDUAL_TOLERANCE:
             state, changed = apply_events(state, evaluation, 0.0)
             if not changed:
-                return _contact_state(state, evaluation, control)
+                return _build_contact_state(state, evaluation, control)
         elif closeness <= _EVENT_TOLERANCE and not wait:
             state, changed = apply_events(state, evaluation, margin)
             wait = not changed
@@ -95,9 +94,7 @@ def find_equilibrium(
 def apply_events(state: IterationState, evaluation: Evaluation, margin: float) -> tuple[IterationState, bool]:
     """Apply all jumps and unions that are due by more than a margin, m, and on unloading all splits.
 
-    Returns
-    -------
-    The new state, and whether there was any event.
+    Return the new state and whether there was any event. Raise `FullContact` if half the nominal area is in contact.
     """
     contact = state.contact
     area = nominal_value(contact, AREA_FRACTION, evaluation.a, state.sites.radius_of_curvature)
@@ -106,7 +103,7 @@ def apply_events(state: IterationState, evaluation: Evaluation, margin: float) -
     before = state = state.with_approach(evaluation.approach)
     state = apply_jump_off(state, evaluation, margin)
     changed = state is not before
-    # Without adhesion the expected contacts are candidates already; all others wait for the equilibrium.
+    # Without adhesion the expected contacts are candidates already; others are found when the equations are solved.
     if contact.adhesive or margin == 0:
         state, jumped = apply_jump_in(state, evaluation, margin)
         changed |= jumped
@@ -118,7 +115,7 @@ def apply_events(state: IterationState, evaluation: Evaluation, margin: float) -
 
 
 def _count_round(state, visited):
-    """Count a round of events by the positions of its spots; raise `NotConverged` if the rounds do not end."""
+    """Count in `visited` how often events have led to the same spots; raise `NotConverged` if they do not end."""
     sites = state.sites
     places = np.rint(sites.position[sites.status == CONTACT] / (_SAME_PLACE * state.contact.asperities.period))
     checksum = hashlib.sha256(np.sort(places @ (1.0, 2 / _SAME_PLACE)).tobytes()).digest()
@@ -129,7 +126,7 @@ def _count_round(state, visited):
 
 
 def _absorb_and_evaluate(state, evaluation, control):
-    """Let spots absorb new contacts inside them; if there are any, evaluate the equations again."""
+    """Remove new contacts under other spots, and return state and evaluation without them."""
     after = absorb_covered(state, evaluation)
     if after is not state:
         equations = Equations(state.contact, after.sites, control)
@@ -138,9 +135,10 @@ def _absorb_and_evaluate(state, evaluation, control):
 
 
 def _merge_after_failed_step(state, evaluation, margin, size):
-    """Merge overlapping spots after a failed Newton step; raise `NotConverged` if there are none.
+    """Return the state after merging overlapping spots, because no Newton step succeeds; raise `NotConverged` if none.
 
-    If no spots overlap by more than the margin, those spots merge of which one covers the centre of the other.
+    If no spots overlap by more than the margin, m, pairs merge in which one spot covers the centre of the other.
+    size : error of the equilibrium, in h_rms.
     """
     before = state.with_approach(evaluation.approach)
     state = merge_overlapping(before, evaluation, margin)
@@ -152,8 +150,8 @@ def _merge_after_failed_step(state, evaluation, margin, size):
     return state
 
 
-def _contact_state(state, evaluation, control):
-    """Build the equilibrium state from the final state of the search."""
+def _build_contact_state(state, evaluation, control):
+    """Build the `ContactState` at the end of a search, with the responses of the sites."""
     contact, history = state.contact, state.start.history
     response = solve_response(Equations(contact, state.sites, control), evaluation)
     if not contact.adhesive:
@@ -174,7 +172,7 @@ def _contact_state(state, evaluation, control):
 
 
 def _update_candidates(state, evaluation):
-    """Set which single asperities are in contact and which are candidates; used without adhesion."""
+    """Turn candidates with a positive approach into contacts, and contacts without one into candidates; no adhesion."""
     sites, status, site_of_asperity = state.sites, state.sites.status.copy(), state.site_of_asperity.copy()
     made = np.flatnonzero((status == CANDIDATE) & (evaluation.approach > 0))
     status[made] = CONTACT

@@ -1,8 +1,8 @@
 """Coalescence of spots, the splitting of unions on unloading, and new contacts that lie inside other spots.
 
-Overlapping spots become one spot (`icha.asperity.jkr.JKR.union`). The height of the union is chosen so that it is in
-equilibrium at the moment of coalescence. The equations are singular where the edge of one spot passes through the
-centre of another.
+Overlapping spots become one spot, a union (`icha.asperity.jkr.JKR.union`). The height of the union is chosen so that it
+is in equilibrium at the moment of coalescence. New contacts inside other spots are removed, because the equations are
+singular where the edge of one spot passes through the centre of another.
 """
 
 from dataclasses import replace
@@ -20,18 +20,16 @@ from icha.surfaces.square import periodic_difference
 def merge_overlapping(
     state: IterationState, evaluation: Evaluation, margin: float = 0.0, *, deep: bool = False
 ) -> IterationState:
-    """Replace overlapping spots by their unions.
-
-    Each spot merges with at most one other spot; the next round merges the rest.
+    """Replace pairs of overlapping spots by unions; each spot merges with at most one other spot.
 
     Parameters
     ----------
     margin : error of the approaches, m; spots merge only if this error cannot explain their overlap.
-    deep : True: two spots merge only if one covers the centre of the other, even if they have just split from one
-        union.
+    deep : whether only those pairs merge in which one spot covers the centre of the other. On unloading, a pair that
+        has split from one union during this path merges again only if `deep` is True.
     """
     sites, law, period, a = state.sites, state.contact.law, state.contact.asperities.cell, evaluation.a
-    pairs = _overlapping_pairs(state, evaluation, margin, deep)
+    pairs = _select_merging_pairs(state, evaluation, margin, deep)
     if not len(pairs):
         return state
     i, j = pairs.T
@@ -40,7 +38,7 @@ def merge_overlapping(
         law, sites.position[i], a[i], R[i], sites.position[j], a[j], R[j], period
     )
     unions = _record_unions(state, pairs, a, radius)
-    state = _admit_candidates(state, pairs[sites.status[pairs] == CANDIDATE])
+    state = _log_contacts_of_candidates(state, pairs[sites.status[pairs] == CANDIDATE])
     members = sites.members[i] + sites.members[j]
     new = len(sites) + np.arange(len(pairs))
     index = np.append(np.arange(len(sites)), -1)
@@ -65,7 +63,7 @@ def merge_overlapping(
 
 
 def set_union_heights(state: IterationState, evaluation: Evaluation) -> tuple[IterationState, Evaluation]:
-    """Set the heights of new unions so that they are in equilibrium."""
+    """Give new unions the heights at which they are in equilibrium; return state and evaluation with these heights."""
     if not len(state.new_unions):
         return state, evaluation
     height = state.sites.height.copy()
@@ -75,8 +73,8 @@ def set_union_heights(state: IterationState, evaluation: Evaluation) -> tuple[It
     return replace(state, sites=sites, new_unions=np.empty(0, dtype=int)), replace(evaluation, error=error)
 
 
-def _overlapping_pairs(state, evaluation, margin, deep):
-    """Return the pairs (k, 2) of spots that merge; every spot is in one pair at most."""
+def _select_merging_pairs(state, evaluation, margin, deep):
+    """Return the pairs (k, 2) of spots that `merge_overlapping` merges; every spot is in one pair at most."""
     sites, a, interaction = state.sites, evaluation.a, evaluation.interaction
     first, second, r = interaction.source, interaction.target, interaction.r
     depth = a[first] + a[second] - r
@@ -98,7 +96,7 @@ def _overlapping_pairs(state, evaluation, margin, deep):
 
 
 def _record_unions(state, pairs, a, radius):
-    """Return a `MergeRecord` for every pair of spots, (k,) object, from the contact radii of spots and unions, m."""
+    """Return the `MergeRecord` of every pair (k, 2), from contact radii of the spots (n,) and of the unions (k,), m."""
     unions = np.full(len(pairs), None)
     sites, (i, j) = state.sites, pairs.T
     offset = periodic_difference(sites.position[j], sites.position[i], state.contact.asperities.cell)
@@ -110,8 +108,8 @@ def _record_unions(state, pairs, a, radius):
     return unions
 
 
-def _admit_candidates(state, candidates):
-    """Record that candidates have come into contact; candidates exist only without adhesion."""
+def _log_contacts_of_candidates(state, candidates):
+    """Log that candidates, given by their sites, have come into contact, because they become parts of unions."""
     sites, site_of_asperity = state.sites, state.site_of_asperity.copy()
     asperity = sites.asperity[candidates]
     site_of_asperity[asperity] = candidates
@@ -120,17 +118,17 @@ def _admit_candidates(state, candidates):
 
 
 def split_unions(state: IterationState, evaluation: Evaluation) -> IterationState:
-    """Split the unions that have become so small that their two spots would no longer overlap."""
+    """Split the unions whose contact radii are below the radii at which their two spots just touch."""
     a, sites = evaluation.a, state.sites
     touching = np.array([0.0 if union is None else union.touching_radius for union in sites.union[: len(a)]])
     split = np.flatnonzero((sites.status[: len(a)] == CONTACT) & (a < touching))
     for site in split.tolist():
-        state = _split(state, site, a[site])
+        state = _split_union(state, site, a[site])
     return state
 
 
-def _split(state, site, a):
-    """Replace a union of contact radius a, m, by its two spots, which have shrunk by the same factor."""
+def _split_union(state, site, a):
+    """Replace a union by its two spots; their radii shrink by the same factor as that of the union, now a, m."""
     sites, law, union = state.sites, state.contact.law, state.sites.union[site]
     contact_radius = union.contact_radius * (a / union.union_radius)
     merged = state.site_of_asperity == site
@@ -152,7 +150,7 @@ def _split(state, site, a):
 
 
 def absorb_covered(state: IterationState, evaluation: Evaluation) -> IterationState:
-    """Remove new contacts whose centres another spot covers; their asperities then belong to that spot."""
+    """Remove the spots that have formed in this search under another spot; that spot then contains their asperities."""
     sites, a, interaction, old = state.sites, evaluation.a, evaluation.interaction, state.sites.was_in_contact
     i, j, r = interaction.target, interaction.source, interaction.r
     inside = np.flatnonzero((r < a[j]) & (a[i] > 0) & ~old[i])
@@ -164,7 +162,7 @@ def absorb_covered(state: IterationState, evaluation: Evaluation) -> IterationSt
     site_of_asperity = state.site_of_asperity.copy()
     site_of_asperity[sites.asperity[i]] = i
     index = np.append(np.arange(len(sites)), -1)
-    index[i] = j  # the spot that covers a site deepest comes last and replaces the others
+    index[i] = j  # the spot that covers a site deepest is the last one and replaces the others
     while np.any(index[index] != index):  # a covering spot may itself be covered by a larger spot
         index = index[index]
     state = state.without_jumps_in(sites.asperity[np.unique(i)])

@@ -1,4 +1,4 @@
-"""Curves of a study against load: means over the seeds, boundary elements beside them, unloading, legends."""
+"""Curves of a study against load: means over the seeds, boundary elements, unloading, and legends."""
 
 from __future__ import annotations
 
@@ -41,20 +41,23 @@ _UNLOADING = {"ls": BRANCH_DASHES["unloading"], "lw": 0.7, "zorder": 2.2}
 
 
 def gap_label(data: xr.Dataset) -> str:
-    """Return the label of the mean gap, which is the mean separation on periodic surfaces but not on free squares."""
+    """Return the label of the mean gap; on periodic surfaces the mean gap is the mean separation."""
     return GAP_LABEL if (data["boundary"] == "free").any() else SEPARATION_LABEL
 
 
 class Curve(NamedTuple):
-    """The runs of one contact, and the look of their markers, arguments of `Axes.plot`."""
+    """The runs of one contact against load.
+
+    Attributes
+    ----------
+    runs : the runs.
+    stops : steps of the runs at the targets of their study, by seed.
+    look : look of the markers, arguments of `Axes.plot`.
+    """
 
     runs: select.ContactRuns
+    stops: dict[int, xr.Dataset]
     look: dict
-
-    @property
-    def stops(self) -> dict[int, xr.Dataset]:
-        """Steps of the runs at the targets of their study, by seed."""
-        return {seed: select.path_steps(run) for seed, run in self.runs.by_seed.items()}
 
 
 class Curves(NamedTuple):
@@ -63,9 +66,9 @@ class Curves(NamedTuple):
     Attributes
     ----------
     lines : the curves of the study's `shown_model`.
-    crosses : if that is the asperity model, the curves of the same contacts with boundary elements.
+    crosses : curves with boundary elements, if the lines are of the asperity model.
     looks : colours and markers of the lines.
-    handles : what the legend names of them: materials, surfaces and slopes as far as there are several, and models.
+    handles : legend entries by name: materials, surfaces, slopes and models.
     """
 
     lines: list[Curve]
@@ -75,7 +78,7 @@ class Curves(NamedTuple):
 
 
 def study_curves(campaign: xr.DataTree, study: str, boundary_elements: str | None = None, **changed: object) -> Curves:
-    """Return the curves of a study, with crosses of boundary elements of this study or another.
+    """Return the curves of a study, with boundary elements of the same study or of the study `boundary_elements`.
 
     `changed` overrides the look of all markers.
     """
@@ -89,32 +92,36 @@ def study_curves(campaign: xr.DataTree, study: str, boundary_elements: str | Non
         look = looks.look(group.contact, applicable=group.applicable) | {"ls": "-" if looks.many else "none"} | changed
         if name != ASPERITIES_NAME:
             look |= {"marker": MODEL_MARKERS[name], "ms": look["ms"] + 2}
-        lines.append(Curve(group, look))
+        lines.append(_curve(group, look))
     other = boundary_elements or (study if name == ASPERITIES_NAME else None)
     truths = select.select_runs(campaign, other, ragged=False, model=REFERENCE_MODEL) if other else []
-    crosses = [Curve(truth, cross_look(looks, truth.contact)) for truth in select.group_by_contact(campaign, truths)]
+    crosses = [_curve(truth, cross_look(looks, truth.contact)) for truth in select.group_by_contact(campaign, truths)]
     changed |= {"ls": "-" if looks.many or any(len(group.by_seed) > 1 for group in groups) else "none"}
     changed |= {} if looks.by_place else {"marker": MODEL_MARKERS[name]}
     handles = looks.handles(**changed) | {name: model_handle(name, mfc="white")}
     return Curves(lines, crosses, looks, handles | ({SHORT_RANGE: model_handle(SHORT_RANGE)} if crosses else {}))
 
 
+def _curve(runs, look):
+    return Curve(runs, {seed: select.path_steps(run) for seed, run in runs.by_seed.items()}, look)
+
+
 def cross_look(looks: Looks, contact: Contact, model: str = SHORT_RANGE) -> dict:
-    """Return the look of boundary elements: crosses in the colour of the contact, or else of its material."""
+    """Return the look of boundary elements: crosses in the colour of the contact."""
     colour, adhesive = looks.colour(contact), looks.adhesive(contact[0])
-    # If the results agree, the larger ones show behind the others, as the markers of asperities do.
+    # Without adhesion, crosses are larger, so that both are visible if they coincide.
     size = (8 if adhesive else 11) * (1 if len(looks.contacts) <= FEW_LINES else 0.7)
     look = {"color": colour, "mec": colour, "ms": size, "zorder": 6 + adhesive}
     return look | {"ls": "none", "marker": MODEL_MARKERS[model], "mew": 1.0}
 
 
 def model_name(dataset: xr.Dataset) -> str:
-    """Return the name of the model that the figures of a study show (`shown_model`), as written in legends."""
+    """Return the legend name of the model that figures of a study show (`shown_model`)."""
     return MODELS[select.shown_model(dataset)].words
 
 
 def snapshot_looks(campaign: xr.DataTree, study: str, lines: Sequence[select.Snapshots]) -> tuple[list[dict], Looks]:
-    """Return the looks of lines of snapshots, one for every material."""
+    """Return the looks of the snapshots of a study, one for each of the lines, and all looks of the figure."""
     dataset = campaign[study].to_dataset()
     groups = [line.runs for line in lines]
     looks = Looks(campaign, dataset, [group.contact for group in groups])
@@ -125,7 +132,7 @@ def snapshot_looks(campaign: xr.DataTree, study: str, lines: Sequence[select.Sna
 def add_snapshot_legend(
     figure: Figure, panels: Sequence[Axes], dataset: xr.Dataset, lines: Sequence[select.Snapshots], looks: Looks
 ) -> None:
-    """Add titles and legend of a figure of one snapshot of a study."""
+    """Add the titles and the legend to a figure of one snapshot of a study."""
     shown, model = lines[0].runs.labels, model_name(dataset)
     several = {shown.surface: dataset.sizes["surface"] > 1, slope_label(shown.rms_slope): len(slopes_of(dataset)) > 1}
     panels[0].set_title(select.snapshot_label(*lines[-1].members[0]), loc="right")
@@ -138,7 +145,7 @@ def add_snapshot_legend(
     legend_below(figure, handles)
 
 
-# Return load and value of the steps of a run.
+# Function that returns load and value of each step of a run.
 Points = Callable[["xr.Dataset"], tuple[np.ndarray, np.ndarray]]
 
 
@@ -155,22 +162,22 @@ def gap_points(run: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
 def draw_curves(
     curves: Curves, panels: Mapping[Axes, Points], *, unloading: bool = False
 ) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Draw the lines of a study, and boundary elements beside them, on double logarithmic axes.
+    """Draw the curves of a study on double logarithmic axes.
 
     Parameters
     ----------
-    curves : the lines.
-    panels : the points that a panel shows.
+    curves : the curves.
+    panels : for each panel, the function that returns the points of a run.
     unloading : whether unloading is drawn as well.
 
     Returns
     -------
-    Loads and values that were drawn in each of the panels.
+    For each panel, loads and values of all points of loading.
     """
     drawn = {axes: [] for axes in panels}
     for line in curves.lines:
         for axes, points in panels.items():
-            drawn[axes].append(_draw_line(axes, line, points, lines=len(curves.lines)))
+            drawn[axes].append(_draw_line(axes, line, points))
         if unloading:
             _draw_unloading(panels, line)
     for line in curves.crosses:
@@ -181,17 +188,17 @@ def draw_curves(
     return [tuple(map(np.concatenate, zip(*points, strict=True))) for points in drawn.values()]
 
 
-def _draw_line(axes, line, points, *, lines):
-    """Draw a run by markers, or the mean of several seeds at common loads by a line, with their scatter."""
+def _draw_line(axes, line, points):
+    """Draw a single run with markers, or the mean of several seeds at common loads as a line, with their scatter."""
     from icha.analysis.common_loads import at_common_loads
 
     members, asked = [points(run) for run in line.stops.values()], line.runs.asked
     if len(members) > 1:
         load, values = at_common_loads(members, logarithmic=True)
         if len(load):
-            draw_members(axes, load, values, line.look, positive=True, lines=lines, asked=asked)
+            draw_members(axes, load, values, line.look, positive=True, asked=asked)
             return np.tile(load, len(values)), values.ravel()
-    # Runs without a common load have no mean.
+    # A single run, or runs that share no load and have no mean.
     for load, values in members:
         axes.plot(load, values, **line.look)
         if len(members) < asked:
@@ -200,7 +207,7 @@ def _draw_line(axes, line, points, *, lines):
 
 
 def _draw_crosses(axes, line, points):
-    """Draw a curve with boundary elements by crosses, of several seeds at their means at common loads."""
+    """Draw a curve of boundary elements as crosses; several seeds have their mean at common loads."""
     from icha.analysis.common_loads import at_common_loads
 
     load, values = at_common_loads([points(run) for run in line.stops.values()], logarithmic=True)
@@ -211,31 +218,27 @@ def _draw_crosses(axes, line, points):
 
 
 def _draw_unloading(panels, line):
-    """Draw the unloading of a line's runs, or of several seeds its mean, while the load is compressive.
-
-    The axes keep their range.
-    """
-    runs = line.runs.by_seed.values()
-    for leg in select.average_legs([[("unloading", leg) for leg in select.unloading_legs(run)] for run in runs]):
+    """Draw the unloading of every run of a line where the load is compressive; the ranges of the axes do not change."""
+    for leg in [leg for run in line.runs.by_seed.values() for leg in select.unloading_legs(run)]:
         for axes, points in panels.items():
-            load, values = points(leg.values)
-            # Just before separation loads are arbitrarily small.
+            load, values = points(leg)
+            # Loads just before separation are arbitrarily small, so that the line has no effect on the axes.
             pressed = np.where(load > 0, load, np.nan)
             axes.add_artist(legend_handle(pressed, values, color=line.look["mec"], **_UNLOADING))
             axes.plot([], [], color=GREY, label="unloading", **_UNLOADING)
 
 
 def add_legend(figure: Figure, panels: Sequence[Axes], curves: Curves) -> None:
-    """Add a legend of the curves and of everything named in the panels."""
+    """Add a legend of the curves, and of everything that has a label in the panels."""
     seeds = lines_handles(len(line.runs.by_seed) for line in curves.lines)
     handles = curves.handles | seeds | named_handles(panels)
     legend_below(figure, handles)
 
 
 def drop_rounding_errors(values: np.ndarray) -> np.ndarray:
-    """Return those values that a logarithmic axis can show: larger than rounding errors of the largest."""
+    """Return the values that exceed rounding errors, which a logarithmic axis can show."""
     return values[values > _ROUNDING * values.max(initial=0.0)]
 
 
-# Rounding errors over the largest value.
+# Bound of rounding errors over the largest value.
 _ROUNDING = 1e-7

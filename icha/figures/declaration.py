@@ -6,13 +6,12 @@ modules of all figures. Therefore these modules import libraries for drawing, an
 the functions that draw.
 
 The function `figure` takes the data of the `inputs`, and the `arguments` of the options as keywords. It raises
-ValueError if the campaign has no such study or snapshot; the message names the existing ones. It raises
 `icha.figures.select.NothingToDraw` if no run in the figure is complete.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -26,6 +25,7 @@ from icha.support.values import Label, Name, Positive, Problem, Section, Seed, l
 
 # A configuration (`icha.configuration.campaign.Campaign`), which stands above this folder.
 Campaign = Any
+_NOT_UNLOADED = "is not unloaded; expected a study with `unload: true`"
 # Files by the names of the arguments that are read from them: one, or a list of them.
 Inputs = dict[str, str | list[str]]
 
@@ -160,16 +160,27 @@ class SnapshotFigure(StudyFigure):
         return arguments
 
 
-# Options that choose a run, which are also names of labels.
-_RUN_OPTIONS = {"study", "surface", "seed", "rms_slope", "material"}
+class TopographyFigure(StudyFigure):
+    """A figure of one topography of a study."""
+
+    surface: Label | None = Field(default=None, description="Surface to show. Default: the first of the study.")
+    seed: Seed | None = Field(default=None, description="Seed to show. Default: the first of the study.")
 
 
-class RunFigure(StudyFigure):
+class UnloadedFigure(StudyFigure):
+    """A figure of the runs of a study in loading and unloading."""
+
+    def study_problems(self, campaign: Campaign, study: Any) -> Iterator[Problem]:
+        """Also yield a problem if the study does not unload."""
+        yield from super().study_problems(campaign, study)
+        if not (study.unload or study.turning_points):
+            yield ("study",), self.study, _NOT_UNLOADED
+
+
+class RunFigure(TopographyFigure):
     """A figure of one run; options that are left out take the study's first value."""
 
-    surface: Label | None = Field(default=None, description="Surface to show.")
-    seed: Seed | None = Field(default=None, description="Seed to show.")
-    rms_slope: Positive | None = Field(default=None, description="Rms slope to show.")
+    rms_slope: Positive | None = Field(default=None, description="Rms slope to show. Default: the first of the study.")
     material: Label | None = Field(
         default=None, description="Material to show. Default: the first one with adhesion, if there is any."
     )
@@ -177,30 +188,28 @@ class RunFigure(StudyFigure):
     def arguments(self, campaign: Campaign) -> dict[str, Any]:
         """Return the arguments, with the labels of the run instead of the options that choose the run."""
         arguments = super().arguments(campaign)
-        return {name: arguments[name] for name in arguments.keys() - _RUN_OPTIONS} | {"run": tuple(self.run(campaign))}
+        others = arguments.keys() - set(RunLabels._fields)
+        return {name: arguments[name] for name in others} | {"run": tuple(self.run(campaign))}
 
     def run(self, campaign: Campaign) -> RunLabels:
         """Return the first requested run with adhesion; without any, return the first requested run."""
         model = first_model(campaign.studies[self.study].models)
-        wanted = self.model_dump(include=_RUN_OPTIONS, exclude_none=True)
+        wanted = self.model_dump(include=set(RunLabels._fields), exclude_none=True)
         runs = [RunLabels(self.study, model, *contact) for contact in campaign.contacts(self.study)]
         runs = [run for run in runs if wanted.items() <= run._asdict().items()]
         return next((run for run in runs if campaign.materials[run.material].surface_energy > 0), runs[0])
 
 
 class ComparedFigure(StudyFigure):
-    """A figure that compares a study's runs with boundary elements."""
+    """A comparison of a study with boundary elements. The study needs both `models`, or an entry of `finite_range`."""
 
     def study_problems(self, campaign: Campaign, study: Any) -> Iterator[Problem]:
         """Also yield a problem if the study has no boundary elements at the same loads."""
         yield from super().study_problems(campaign, study)
         if campaign.compares_models(self.study) or is_solved_at_finite_range(campaign, self.study):
             return
-        reason = (
-            "has no boundary elements at the same loads; expected a study with both `models` and reduced_pressures as "
-            "targets, or a study that an entry of finite_range names"
-        )
-        yield ("study",), self.study, reason
+        expected = "both `models` and reduced_pressures as targets, or a study that an entry of finite_range names"
+        yield ("study",), self.study, f"has no boundary elements at the same loads; expected a study with {expected}"
 
 
 def is_solved_at_finite_range(campaign: Campaign, study: str) -> bool:
@@ -208,15 +217,9 @@ def is_solved_at_finite_range(campaign: Campaign, study: str) -> bool:
     return any(entry.study == study for entry in campaign.finite_range.values())
 
 
-def unloading_problems(campaign: Campaign, location: tuple, name: str, *, partly: bool) -> Iterator[Problem]:
-    """Yield a problem if a study does not unload completely; with `partly`, only if it does not unload at all."""
-    study = campaign.studies.get(name)
-    if study is not None and not (study.unload or (partly and study.turning_points)):
-        yield location, name, "is not unloaded; expected a study with `unload: true`"
-
-
-def studies_problems(campaign: Campaign, key: str, names: Iterable[str]) -> Iterator[Problem]:
-    """Yield a problem for each study of a list that does not exist or does not unload completely."""
-    for index, name in enumerate(names):
-        yield from unknown((key, index), name, campaign.studies)
-        yield from unloading_problems(campaign, (key, index), name, partly=False)
+def problems_of_unloading(campaign: Campaign, studies: Mapping[tuple, str]) -> Iterator[Problem]:
+    """Yield a problem for each study, by its location, that does not exist or does not unload completely."""
+    for location, name in studies.items():
+        yield from unknown(location, name, campaign.studies)
+        if name in campaign.studies and not campaign.studies[name].unload:
+            yield location, name, _NOT_UNLOADED

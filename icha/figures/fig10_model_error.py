@@ -5,20 +5,14 @@ from __future__ import annotations
 from functools import partial
 
 from icha.figures.declaration import ComparedFigure, Declaration, dataset_and_model_error
-from icha.figures.errors import ErrorPanel, draw_errors
+from icha.figures.errors import draw_errors
 
 DECLARATION = Declaration(
-    description=(
-        "Relative error of contact area and mean separation against boundary elements. The study needs both `models`, "
-        "or an entry of `finite_range`."
-    ),
+    description="Error of contact area and mean separation of the asperity model, relative to boundary elements.",
     options=ComparedFigure,
     inputs=dataset_and_model_error,
 )
 
-QUANTITIES = (
-    ErrorPanel("area_error", r"error of $A/A_0$ (%)", 100),
-    ErrorPanel("separation_error", r"error of $\bar{u}$ (%)", 100),
-)
+LABELS = {"area_error": r"error of $A/A_0$ (%)", "separation_error": r"error of $\bar{u}$ (%)"}
 
-figure = partial(draw_errors, quantities=QUANTITIES)
+figure = partial(draw_errors, labels=LABELS, percent=True)

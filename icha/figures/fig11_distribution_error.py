@@ -5,21 +5,18 @@ from __future__ import annotations
 from functools import partial
 
 from icha.figures.declaration import ComparedFigure, Declaration, dataset_and_model_error
-from icha.figures.errors import ErrorPanel, draw_errors
+from icha.figures.errors import draw_errors
 
 DECLARATION = Declaration(
-    description=(
-        "Distance of the distributions of pressure and gap, and of the contact map, from those of boundary elements. "
-        "The study needs both `models`, or an entry of `finite_range`."
-    ),
+    description="Differences of distributions and contact maps between the asperity model and boundary elements.",
     options=ComparedFigure,
     inputs=dataset_and_model_error,
 )
 
-QUANTITIES = (
-    ErrorPanel("pressure_distribution_distance", r"distance of $P(p)$,  $W_1/p$", positive=True),
-    ErrorPanel("gap_distribution_distance", r"distance of $P(u)$,  $W_1/h_{\mathrm{rms}}$", positive=True),
-    ErrorPanel("jaccard", "overlap of the contact maps", positive=True),
-)
+LABELS = {
+    "pressure_distribution_distance": r"distance of $P(p)$,  $W_1/p$",
+    "gap_distribution_distance": r"distance of $P(u)$,  $W_1/h_{\mathrm{rms}}$",
+    "jaccard": "overlap of the contact maps",
+}
 
-figure = partial(draw_errors, quantities=QUANTITIES)
+figure = partial(draw_errors, labels=LABELS, percent=False)

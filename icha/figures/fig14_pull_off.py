@@ -10,11 +10,11 @@ import numpy as np
 from pydantic import Field
 
 from icha.figures.curves import drop_rounding_errors
-from icha.figures.declaration import Campaign, Declaration, StudyFigure, studies_problems, unloading_problems
+from icha.figures.declaration import Campaign, Declaration, StudyFigure, problems_of_unloading
 from icha.figures.ensembles import Points, points_handles
 from icha.figures.looks import legend_below, looks_of_studies
 from icha.figures.select import name_model, select_detached_lines
-from icha.figures.style import GREY, ONE_COLUMN, TWO_COLUMNS, in_style, logarithmic_axes, new_panels, slope_label
+from icha.figures.style import GREY, ONE_COLUMN, TWO_COLUMNS, in_style, logarithmic_axes, new_panels
 from icha.support.formatting import choose_unit
 from icha.support.values import Problem, list_of_names
 
@@ -35,20 +35,19 @@ class PullOffFigure(StudyFigure):
         return tuple(dict.fromkeys([self.study, *(self.load_studies or ())]))
 
     def problems(self, campaign: Campaign) -> Iterator[Problem]:
-        """Also yield a problem for each study that does not exist or does not unload completely."""
-        yield from studies_problems(campaign, "load_studies", self.load_studies or ())
-        yield from super().problems(campaign)
-        yield from unloading_problems(campaign, ("study",), self.study, partly=False)
+        """Yield a problem for each study that does not exist or does not unload completely."""
+        loads = {("load_studies", k): name for k, name in enumerate(self.load_studies or ())}
+        yield from problems_of_unloading(campaign, loads | {("study",): self.study})
 
 
 DECLARATION = Declaration(
     description="Pull-off against rms slope, and against the largest load.", options=PullOffFigure
 )
 
-# Ratio of values above which their axis is logarithmic.
+# If the ratio of the largest to the smallest value is larger, the axis is logarithmic.
 _SPAN = 30.0
 _LINE = {"lw": 0.9}
-# Quantity along y.
+# Variable along y.
 _Y = "pull_off_pressure"
 
 
@@ -58,10 +57,6 @@ def figure(campaign: xr.DataTree, *, study: str, load_studies: Sequence[str] = (
     load_studies = list(dict.fromkeys(load_studies))
     by_slope = select_detached_lines(campaign, [study], along_slopes=True)
     by_load = select_detached_lines(campaign, load_studies)
-    loaded_slopes = {slope for (*_, slope), _ in by_load}
-    if len(loaded_slopes) == 1:
-        # The title of the panel names the slope, and lines have the looks of those in (a).
-        by_load = select_detached_lines(campaign, load_studies, along_slopes=True)
     looks = looks_of_studies(campaign, [study, *load_studies], [contact for contact, _ in (*by_slope, *by_load)])
     points = itertools.chain(*by_slope.values(), *by_load.values())
     factor, unit = choose_unit(max(float(run[_Y]) for point in points for run in point.by_seed.values()), "Pa")
@@ -76,29 +71,23 @@ def figure(campaign: xr.DataTree, *, study: str, load_studies: Sequence[str] = (
         loads, values = np.concatenate([line.means for line in lines.values()], axis=1)
         _scale(ax, values)
         ax.set_ylabel(f"pull-off pressure ({unit})")
-    _label_slopes(panels[0], sorted({point.labels.rms_slope for line in by_slope.values() for point in line}))
+    slopes = sorted({point.labels.rms_slope for line in by_slope.values() for point in line})
+    scale = "log" if slopes[-1] > 3 * slopes[0] else "linear"
+    panels[0].set(xlabel=r"rms slope  $h_{\mathrm{rms}}^{\prime}$", xscale=scale)
+    panels[0].set_xticks(slopes, [f"{slope:g}" for slope in slopes])
+    panels[0].minorticks_off()
     if by_load:
         panels[1].set_xlabel(r"largest reduced pressure  $F/(E^{\ast}h_{\mathrm{rms}}^{\prime}A_0)$")
         if loads.min() > 0:
             logarithmic_axes(panels[1], "x")
             panels[1].set_xlim(loads.min() / 1.6, loads.max() * 1.6)
-        if len(loaded_slopes) == 1:
-            panels[1].set_title(slope_label(*loaded_slopes), loc="right")
     name_model(panels[0], campaign, [study, *load_studies])
     legend_below(fig, looks.handles(**_LINE) | points_handles(counts))
     return fig
 
 
-def _label_slopes(ax, slopes):
-    """Label the axis of slopes by the slopes that are drawn."""
-    ax.set_xlabel(r"rms slope  $h_{\mathrm{rms}}^{\prime}$")
-    ax.set_xscale("log" if slopes[-1] > 3 * slopes[0] else "linear")
-    ax.set_xticks(slopes, [f"{slope:g}" for slope in slopes])
-    ax.minorticks_off()
-
-
 def _scale(ax, values):
-    """Scale an axis so that it shows all values: logarithmic if they span decades, linear around zero."""
+    """Scale the y axis so that it shows all values: logarithmic if they span decades, but linear near zero."""
     positive = drop_rounding_errors(values)
     if len(positive) and positive.max() > _SPAN * positive.min():
         least = 10.0 ** np.floor(np.log10(positive.min()))

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from icha.figures.declaration import Campaign, Declaration, FigureOptions, studies_problems
+from icha.figures.declaration import Campaign, Declaration, FigureOptions, problems_of_unloading
 from icha.figures.ensembles import Points, points_handles
 from icha.figures.looks import legend_below, looks_of_studies
 from icha.figures.select import ContactRuns, NothingToDraw, name_model, select_detached_lines
@@ -31,12 +31,12 @@ class LossFigure(FigureOptions):
 
     def problems(self, campaign: Campaign) -> Iterator[Problem]:
         """Yield the problems of studies that are unknown or do not unload completely."""
-        yield from studies_problems(campaign, "studies", self.studies)
+        yield from problems_of_unloading(campaign, {("studies", k): name for k, name in enumerate(self.studies)})
 
 
 DECLARATION = Declaration(description="Energy lost in a loop against contact area, and its parts.", options=LossFigure)
 
-# Parts of the loss with names and looks of their bars, none of which has the colour of a material.
+# Parts of the loss, with names and looks of their bars. No bar has the colour of a material.
 PARTS = {
     "loss_by_jump_in": ("jump into contact", {"fc": "0.25"}),
     "loss_by_jump_off": ("jump off", {"fc": "0.65"}),
@@ -44,15 +44,14 @@ PARTS = {
     "loss_by_load_jump": ("jumps at controlled load", {"fc": "0.85", "hatch": "xxxx"}),
     "loss_unattributed": ("unattributed", {"fc": "white", "hatch": "...."}),
 }
-# A straight line passes through any two points.
+# Least number of points of a fit, because a straight line passes through any two points.
 _LEAST_POINTS = 3
 _FIT_POINTS = 100
-_QUANTITIES = ("largest_contact_area_fraction", "hysteresis_loss_over_surface_energy")
-# Ratio of areas, and of losses, above which both axes are logarithmic.
+# If the ratios of the largest to the smallest area and loss are both larger, the axes are logarithmic.
 _SPAN = 30.0
-# Largest share of a part that is left out of the legend.
+# Smaller parts have no entry in the legend.
 _LEAST_SHARE = 1e-6
-# Opacity of the bars of runs to which the asperity model is not applicable.
+# Opacity of the bars of runs for which the asperity model is not applicable.
 _PALE = 0.35
 
 
@@ -78,8 +77,9 @@ def figure(campaign: xr.DataTree, *, studies: Sequence[str]) -> Figure:
 
 
 def _draw_losses(ax, runs, looks):
-    """Draw the losses of all lines with their fits; return what the legend shows, and numbers of seeds."""
-    drawn = {key: Points(line, *_QUANTITIES) for key, line in runs.items()}
+    """Draw the losses of all lines with their fits; return the legend entries and the numbers of seeds."""
+    quantities = "largest_contact_area_fraction", "hysteresis_loss_over_surface_energy"
+    drawn = {key: Points(line, *quantities) for key, line in runs.items()}
     handles = looks.handles(ls="none") if looks.many else {}
     for (contact, applicable), line in drawn.items():
         handle = line.draw(ax, looks.look(contact, applicable=applicable) | {"ls": "none"})
@@ -117,19 +117,14 @@ def fit_line(x: np.ndarray, y: np.ndarray, along: np.ndarray) -> tuple[np.ndarra
 
 
 def shares(line: Sequence[ContactRuns]) -> dict[str, float]:
-    """Return the parts of the loss at the largest load of a line, means over the seeds, over their total magnitude."""
-
-    def mean(point, name):
-        return np.mean([float(run[name]) for run in point.by_seed.values()])
-
-    top = max(line, key=lambda point: mean(point, "largest_reduced_pressure"))
-    found = {name: mean(top, name) for name in PARTS}
-    total = sum(map(abs, found.values()))
-    return {name: value / total if total > 0 else 0.0 for name, value in found.items()}
+    """Return the parts of the loss at the largest load of a line, divided by the sum of their magnitudes."""
+    parts = Points(line, "largest_reduced_pressure", *PARTS).means[1:, -1]
+    total = np.abs(parts).sum()
+    return dict(zip(PARTS, parts / total if total > 0 else parts, strict=True))
 
 
 def _draw_parts(ax, runs, looks):
-    """Draw a bar for every line; return the names of the parts that occur in the bars."""
+    """Draw the parts of the loss of every line as a bar; return the names of the parts that are not zero."""
     bars = {key: shares(line) for key, line in runs.items()}
     shown = [name for name in PARTS if any(abs(bar[name]) >= _LEAST_SHARE for bar in bars.values())]
     for position, ((contact, applicable), bar) in enumerate(bars.items()):

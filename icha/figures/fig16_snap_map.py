@@ -2,37 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from icha.contact.model import EVENT_KINDS
 from icha.datasets import results
 from icha.datasets.labels import RunLabels
 from icha.figures.curves import SEPARATION_LABEL
-from icha.figures.declaration import Campaign, Declaration, Inputs, RunFigure, unloading_problems
+from icha.figures.declaration import Campaign, Declaration, Inputs, RunFigure, UnloadedFigure
 from icha.figures.looks import BRANCH_DASHES, NOT_APPLICABLE_ALONE, legend_below
 from icha.figures.maps import topography_of
 from icha.figures.select import is_applicable, select_complete_run, unloading_legs
 from icha.figures.style import BLACK, GREY, in_style, legend_handle, material_label, new_panels, slope_label
-from icha.support.values import Problem
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
 
-class SnapMapFigure(RunFigure):
+class SnapMapFigure(RunFigure, UnloadedFigure):
     """A figure of the events of one run; options that are left out take the study's first value."""
-
-    def problems(self, campaign: Campaign) -> Iterator[Problem]:
-        """Also yield a problem if the study does not unload."""
-        yield from super().problems(campaign)
-        yield from unloading_problems(campaign, ("study",), self.study, partly=True)
 
 
 def inputs(campaign: Campaign, options: SnapMapFigure, files: results.ResultFiles) -> Inputs:
-    """Return the runs, and the topography of the run that is drawn."""
+    """Return the campaign dataset, and the surface file of the run."""
     return {"campaign": files.path(results.DATASET), "surface": files.path(results.SURFACE, options.run(campaign))}
 
 
@@ -45,15 +40,16 @@ DECLARATION = Declaration(
 
 
 _RED = (0.9, 0.0, 0.05)
-# By kind of event: name in the legend, branch whose events the map shows, and look of the marks. Events that form a
-# spot or a union are black, those that break one red; other colours are those of materials.
+# For each kind of event: name in the legend, branch whose events the map shows, and look of the marks. Events that form
+# a spot or a union are black, events that break them are red. Other colours stand for materials.
 _KINDS = {
     "jump_in": ("spot formed", "loading", {"marker": "o", "mfc": BLACK, "mec": BLACK}),
     "jump_off": ("spot broken", "unloading", {"marker": "o", "mfc": "none", "mec": _RED}),
     "coalescence": ("union", "loading", {"marker": "D", "mfc": "none", "mec": BLACK}),
     "split": ("union undone", "unloading", {"marker": "+", "mec": _RED}),
 }
-# Size of the marks of up to so many events, in points; the marks of more cover about the same area together.
+# Up to _FEW events have marks of _SIZE points. The marks of more events are smaller, so that the area of all marks is
+# about the same, but not smaller than _LEAST_SIZE.
 _FEW = 60
 _SIZE = 5.0
 _LEAST_SIZE = 1.6
@@ -83,8 +79,8 @@ def figure(campaign: xr.DataTree, surface: xr.Dataset, *, run: Sequence) -> Figu
 
 
 def _draw_places(ax, topography, events):
-    """Draw events over the topography; return what the legend shows, by name."""
-    # Light, so that the marks show.
+    """Draw events over the topography; return the legend entries by name."""
+    # The map is light, so that the marks are visible.
     image = topography.draw(ax, cmap="gray", vmin=-2.2 * topography.highest, vmax=topography.highest)
     topography.label(ax)
     marks = {name: (events["kind"] == name) & (events["branch"] == branch) for name, (_, branch, _) in _KINDS.items()}
@@ -93,7 +89,7 @@ def _draw_places(ax, topography, events):
     handles = {}
     for name, (words, _, look) in _KINDS.items():
         shown = marks[name]
-        # Marks of a spot that formed and broke at the same place: a ring around a dot, a square around a cross.
+        # If a spot forms and breaks at one place, its marks are a ring around a dot, or a square around a cross.
         ring = 1.6 if name in ("jump_off", "coalescence") else 1.0
         x, y = (events[axis][shown] * topography.length for axis in "xy")
         (points,) = ax.plot(x, y, **{"ls": "none", "ms": ring * size, "mew": 0.9} | look)
@@ -106,7 +102,7 @@ def _draw_places(ax, topography, events):
 
 
 def _draw_counts(ax, events):
-    """Draw the number of events of every kind so far against the separation on every branch."""
+    """Draw the number of events so far against the separation, for each kind of event in loading and unloading."""
     from matplotlib.ticker import MaxNLocator
 
     for name, (_, _, look) in _KINDS.items():
@@ -123,13 +119,11 @@ def _draw_counts(ax, events):
 
 def _events(run):
     """Return the events of the first loading and the last unloading: kind, branch, x and y in m, u/h_rms."""
-    kind, steps = run["event_kind"], run["event_step"].values.astype(int)
-    meanings = zip(np.atleast_1d(kind.attrs["flag_values"]), kind.attrs["flag_meanings"].split(), strict=True)
-    names = {int(value): name for value, name in meanings}
+    steps = run["event_step"].values.astype(int)
     leg = run["leg"].sel(step=steps).values
     shown = (leg == 0) | (leg == unloading_legs(run)[-1]["leg"].values[-1])
     return {
-        "kind": np.array([names[int(value)] for value in kind.values], dtype=object)[shown],
+        "kind": np.array(EVENT_KINDS)[run["event_kind"].values[shown].astype(int)],
         "branch": run["branch"].sel(step=steps).values.astype(object)[shown],
         "x": run["event_x"].values[shown],
         "y": run["event_y"].values[shown],

@@ -33,10 +33,9 @@ def figure(*, tabor_parameter: float = 3.0) -> Figure:
     from icha.asperity.material import Material
 
     law = JKR(Material(contact_modulus=1.0, surface_energy=1.0, interaction_range=1 / tabor_parameter))
-    R = 1.0
+    R, left, right = 1.0, -3.0, 3.2
     jump_in, jump_off = float(law.jump_in_approach(R)), float(law.jump_off_approach(R))
     a_off, a_in = float(law.jump_off_radius(R)), float(law.contact_radius(jump_in, R))
-    left, right = -3.0, 3.2
     a_end = float(law.contact_radius(right, R))
     stable = np.linspace(a_off, a_end, 400)
     after_jump = np.linspace(a_in, a_end, 400)
@@ -48,14 +47,12 @@ def figure(*, tabor_parameter: float = 3.0) -> Figure:
         ax.axhline(0, color="0.75", lw=0.6, zorder=0)
         ax.axvline(0, color="0.75", lw=0.6, zorder=0)
         ax.plot(law.approach(unstable, R), value(unstable), ":", color=GREY, label="unstable")
-        loading_x = np.concatenate([[left, jump_in], law.approach(after_jump, R)])
-        loading_y = np.concatenate([[0, 0], value(after_jump)])
-        unloading_x = np.concatenate([law.approach(stable[::-1], R), [jump_off, left]])
-        unloading_y = np.concatenate([value(stable[::-1]), [0, 0]])
-        ax.plot(loading_x, loading_y, "-", color=BLUE, lw=2.4, alpha=0.45, solid_joinstyle="round", label="loading")
-        ax.plot(unloading_x, unloading_y, "--", color=VERMILLION, dashes=(4, 2), label="unloading")
-        _arrow(ax, jump_in, 0.0, jump_in, value(a_in), BLUE)
-        _arrow(ax, jump_off, value(a_off), jump_off, 0.0, VERMILLION)
+        loading = np.append([left, jump_in], law.approach(after_jump, R)), np.append([0, 0], value(after_jump))
+        ax.plot(*loading, "-", color=BLUE, lw=2.4, alpha=0.45, solid_joinstyle="round", label="loading")
+        unloading = np.append(law.approach(stable[::-1], R), [jump_off, left]), np.append(value(stable[::-1]), [0, 0])
+        ax.plot(*unloading, "--", color=VERMILLION, dashes=(4, 2), label="unloading")
+        _arrow(ax, jump_in, 0.0, value(a_in), BLUE)
+        _arrow(ax, jump_off, value(a_off), 0.0, VERMILLION)
         for point, x, y, shift in (
             ("A", jump_in, 0.0, (5, 5)),
             ("B", float(law.approach(a_pull, R)), value(a_pull), (3, -11) if ax is axes[0] else (5, -9)),
@@ -75,8 +72,7 @@ def figure(*, tabor_parameter: float = 3.0) -> Figure:
     return fig
 
 
-def _arrow(ax, x0, y0, x1, y1, colour):
-    """Draw an arrow head in the middle of a jump."""
-    middle = (x0 + 0.55 * (x1 - x0), y0 + 0.55 * (y1 - y0))
-    start = (x0 + 0.45 * (x1 - x0), y0 + 0.45 * (y1 - y0))
-    ax.annotate("", middle, start, arrowprops={"arrowstyle": "-|>", "color": colour, "shrinkA": 0, "shrinkB": 0})
+def _arrow(ax, x, start, end, colour):
+    """Draw an arrow head in the middle of a jump at x."""
+    tail, tip = ((x, start + share * (end - start)) for share in (0.45, 0.55))
+    ax.annotate("", tip, tail, arrowprops={"arrowstyle": "-|>", "color": colour, "shrinkA": 0, "shrinkB": 0})

@@ -6,7 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from icha.contact.models import REFERENCE_MODEL
 from icha.datasets import results
+from icha.datasets.labels import RunLabels
 from icha.datasets.variables.model_error import FINITE_RANGE
 from icha.figures import curves
 from icha.figures.declaration import (
@@ -17,10 +19,10 @@ from icha.figures.declaration import (
     dataset_and_theories,
     is_solved_at_finite_range,
 )
-from icha.figures.ensembles import draw_members, mark_fewer
-from icha.figures.select import asked_of_entry, select_errors
-from icha.figures.style import BLACK, GREY, TWO_COLUMNS, in_style, logarithmic_axes, new_figure, panel_label
-from icha.support.statistics import ensemble
+from icha.figures.ensembles import draw_members
+from icha.figures.looks import model_handle
+from icha.figures.select import ContactRuns, asked_of_entry, select_errors
+from icha.figures.style import BLACK, GREY, in_style, logarithmic_axes, new_panels
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -28,7 +30,7 @@ if TYPE_CHECKING:
 
 
 def inputs(campaign: Campaign, options: StudyFigure, files: results.ResultFiles) -> Inputs:
-    """Return the runs, theories for their first surface, and boundary elements at a finite range, if any."""
+    """Return the campaign dataset, theories for its first surface, and the model error if it has finite ranges."""
     found = dataset_and_theories(campaign, options, files)
     if is_solved_at_finite_range(campaign, options.study):
         found["model_error"] = files.path(results.MODEL_ERROR)
@@ -36,19 +38,19 @@ def inputs(campaign: Campaign, options: StudyFigure, files: results.ResultFiles)
 
 
 DECLARATION = Declaration(
-    description="Contact area and mean separation against load, with theories, and what the logarithmic axes hide.",
+    description="Contact area and mean separation against load, with theories, and differences between the models.",
     options=StudyFigure,
     inputs=inputs,
 )
 
 # Height of the panels of differences over that of the panels above them.
 _LOWER = 0.42
-# Largest relative difference of loads that are the same, since each model has its tolerance.
+# Loads with a smaller relative difference are the same; they differ because each model has its own tolerance.
 _SAME_LOAD = 1e-6
-# Labels of the axis of separations if it is short.
+# Ticks of the axis of separations if it spans less than two decades.
 _SEPARATIONS = (0.05, 0.1, 0.2, 0.3, 0.5, 0.7, 1, 1.5, 2, 3, 5)
-# Points of a run, their error in a model error, and their symbol.
-_QUANTITIES = ((curves.area_points, "area_error", "A"), (curves.gap_points, "separation_error", r"\bar{u}"))
+# Function that returns the points of a run, and symbol of the quantity.
+_QUANTITIES = ((curves.area_points, "A"), (curves.gap_points, r"\bar{u}"))
 
 
 @in_style
@@ -64,22 +66,17 @@ def figure(
     model_error : boundary elements at a finite range (`icha.analysis.model_error.model_error`), if any.
     """
     shown, dataset = curves.study_curves(campaign, study), campaign[study].to_dataset()
-    solutions = [
-        (contact, errors)
-        for _, contact, errors in select_errors(model_error, study)
-        if errors.attrs["truth"] == FINITE_RANGE
-        and np.isfinite(errors["contact_area_fraction_boundary_elements"].values).any()
-    ]
-    differences = _differences(shown, solutions, references)
-    fig = new_figure(TWO_COLUMNS, 4.5)
-    mosaic = "ab;cd" if len(differences) == 2 else "ab;cb"
-    axes = fig.subplot_mosaic(mosaic, height_ratios=(1, _LOWER))
-    left, right = axes["a"], axes["b"]
+    if solved := _finite_range_curves(model_error, study, shown.looks):
+        shown.crosses.extend(solved)
+        shown.handles[FINITE_RANGE] = model_handle(FINITE_RANGE, ms=8)
+    # The crosses begin with the limit of a short range, which is used if there is one. Finite ranges only bound it.
+    truths = {truth.runs.contact: truth for truth in reversed(shown.crosses)}
+    compared = [(line, truths[line.runs.contact]) for line in shown.lines if line.runs.contact in truths]
+    fig, axes = new_panels(4.5, 2, sharex=True, height_ratios=(1, _LOWER)) if compared else new_panels(3.3)
+    left, right = axes[0]
     panels = {left: curves.area_points, right: curves.gap_points}
-    (p, areas), (_, gaps) = curves.draw_curves(shown, panels, unloading=True)
-    states = [(p, areas, gaps), *_draw_solutions([left, right], shown.looks, solutions)]
-    pressures, areas, gaps = (
-        curves.drop_rounding_errors(np.concatenate(values)) for values in zip(*states, strict=True)
+    (pressures, areas), (_, gaps) = (
+        map(curves.drop_rounding_errors, drawn) for drawn in curves.draw_curves(shown, panels, unloading=True)
     )
     x = (pressures.min() / 1.6, pressures.max() * 1.6)
     if references is not None:
@@ -92,56 +89,41 @@ def figure(
     right.yaxis.set_minor_formatter("")
     if high < 60 * low:
         right.set_yticks([tick for tick in _SEPARATIONS if low < tick < high])
-    for letter, (label, drawn) in zip("cd", differences, strict=False):
-        _draw_differences(axes[letter], drawn, len(shown.lines))
-        axes[letter].set_ylabel(label)
-    for letter, ax in axes.items():
-        panel_label(ax, letter)
-        lowest = letter in mosaic.split(";")[1]
-        ax.set(xlim=x, xlabel=curves.PRESSURE_LABEL if lowest else "")
-        ax.tick_params(which="both", labelbottom=lowest)
+    for ax, (points, symbol) in zip(axes[1:].ravel(), _QUANTITIES, strict=False):
+        for line, truth in compared:
+            load, members = _difference(line, truth, points)
+            if members.size:
+                look, asked = line.look | {"lw": 0.6}, min(line.runs.asked, truth.runs.asked)
+                draw_members(ax, load, members, look, positive=False, asked=asked)
+        logarithmic_axes(ax, "x")
+        ax.axhline(0, color="0.6", lw=0.6, zorder=0)
+        ax.set_ylabel(rf"${symbol}/{symbol}_{{\mathrm{{BEM}}}}-1$  (%)")
+    for ax in axes[-1]:
+        ax.set(xlim=x, xlabel=curves.PRESSURE_LABEL)
     curves.add_legend(fig, [left, right], shown)
     return fig
 
 
-def _differences(shown, solutions, references):
-    """Return the differences of area and separation from boundary elements, or else from theories, in per cent.
-
-    Returns
-    -------
-    Of each quantity the label of the axis, and of each curve the loads, the differences (members, loads), and the
-    number of requested members. Without a theory of the separation, there is no second quantity.
-    """
-    from icha.references.persson import persson_area
-
-    theories = {curves.area_points: persson_area, curves.gap_points: None}
-    if references is not None and "persson_reduced_separation" in references:
-        known = (np.log(references["reduced_pressure"].values), references["persson_reduced_separation"].values)
-        theories[curves.gap_points] = lambda p: np.interp(np.log(p), *known)
-    # The limit of a short range comes first: with adhesion, finite ranges only bound it.
-    truths, solved = {truth.runs.contact: truth for truth in shown.crosses}, dict(reversed(solutions))
+def _finite_range_curves(model_error, study, looks):
+    """Return the curves of boundary elements at a finite range, from a model error."""
     found = []
-    for points, error, symbol in _QUANTITIES:
-        drawn, name = [], "BEM"
-        for line in shown.lines:
-            if truth := truths.get(line.runs.contact):
-                drawn.append((line, *_from_runs(line, truth, points), min(line.runs.asked, truth.runs.asked)))
-            elif (errors := solved.get(line.runs.contact)) is not None:
-                own = errors.isel(seed=np.isin(errors["seed"], list(line.runs.by_seed)))
-                own = own[error].dropna("reduced_pressure", how="all").dropna("seed", how="all")
-                drawn.append((line, own["reduced_pressure"].values, 100 * own.values, asked_of_entry(errors)))
-        if not drawn and theories[points]:
-            name = "Persson"
-            drawn = [(line, *_from_theory(line, points, theories[points]), line.runs.asked) for line in shown.lines]
-        if drawn:
-            found.append((rf"${symbol}/{symbol}_{{\mathrm{{{name}}}}}-1$  (%)", drawn))
+    for contact, errors in select_errors(model_error, study):
+        material, surface, slope = contact
+        states = errors[[f"{name}_boundary_elements" for name in ("contact_area_fraction", "reduced_separation")]]
+        states = states.rename({name: name.removesuffix("_boundary_elements") for name in states})
+        by_seed = {seed: states.sel(seed=seed).dropna("reduced_pressure") for seed in errors["seed"].values.tolist()}
+        by_seed = {seed: states for seed, states in by_seed.items() if states["reduced_pressure"].size}
+        if by_seed and errors.attrs["truth"] == FINITE_RANGE:
+            labels = RunLabels(study, REFERENCE_MODEL, surface, next(iter(by_seed)), slope, material)
+            runs = ContactRuns(labels, by_seed, asked_of_entry(errors), True)
+            found.append(curves.Curve(runs, by_seed, curves.cross_look(looks, contact, FINITE_RANGE)))
     return found
 
 
-def _from_runs(line, truth, points):
-    """Return loads, and differences (seeds, loads) of runs from boundary elements with the same seed, in per cent.
+def _difference(line, truth, points):
+    """Return loads, and differences (seeds, loads) of a curve from boundary elements of the same seeds, in per cent.
 
-    The loads are those of the runs, as far as boundary elements reach. Their values are interpolated.
+    The loads are those of the curve within the loads of boundary elements, whose values are interpolated.
     """
     from icha.analysis.common_loads import at_common_loads, interpolate
 
@@ -159,47 +141,8 @@ def _from_runs(line, truth, points):
     return at_common_loads(members, logarithmic=False) if members else (np.empty(0), np.empty((0, 0)))
 
 
-def _from_theory(line, points, theory):
-    """Return loads, and differences (seeds, loads) of runs from a function of the reduced pressure, in per cent."""
-    from icha.analysis.common_loads import at_common_loads
-
-    members = []
-    for load, values in map(points, line.stops.values()):
-        pressed = load > 0
-        members.append((load[pressed], 100 * (values[pressed] / theory(load[pressed]) - 1)))
-    return at_common_loads(members, logarithmic=False)
-
-
-def _draw_differences(ax, drawn, lines):
-    """Draw the differences of all curves in a lower panel."""
-    for line, load, members, asked in drawn:
-        if members.size:
-            look = line.look | {"ls": "-", "lw": 0.6}
-            draw_members(ax, load, members, look, positive=False, lines=lines, asked=asked)
-    logarithmic_axes(ax, "x")
-    ax.axhline(0, color="0.6", lw=0.6, zorder=0)
-
-
-def _draw_solutions(panels, looks, solutions):
-    """Mark the states of boundary elements at a finite range, means over their seeds; return loads and values."""
-    states = []
-    for contact, errors in solutions:
-        names = ("contact_area_fraction_boundary_elements", "reduced_separation_boundary_elements")
-        solved = errors.dropna("reduced_pressure", how="all", subset=names[:1])
-        members, p = [solved[name].values for name in names], solved["reduced_pressure"].values
-        states.append((p, *(ensemble(values).mean for values in members)))
-        look = curves.cross_look(looks, contact, FINITE_RANGE)
-        for ax, values in zip(panels, states[-1][1:], strict=True):
-            ax.plot(p, values, **look)
-            mark_fewer(ax, p, values, np.isfinite(members[0]), look, asked_of_entry(errors))
-    if states:
-        for ax in panels:
-            ax.plot([], [], **look | {"color": GREY, "mec": GREY, "ms": 8}, label=FINITE_RANGE)
-    return states
-
-
 def _draw_references(left, right, references, limits):
-    """Draw theories of rough contact and published points within the limits of the loads."""
+    """Draw theories of rough contact, within the limits of the loads, and published points."""
     p, black = references["reduced_pressure"].values, {"color": BLACK, "lw": 1, "zorder": 2}
     shown = (p >= limits[0] / 1.5) & (p <= limits[1] * 1.5)
     left.plot(p[shown], references["persson_area_fraction"].values[shown], label="Persson", **black)
@@ -218,7 +161,7 @@ def _draw_references(left, right, references, limits):
 
 
 def _draw_separate_summits(left, right, references, dataset, looks):
-    """Draw theories of separate summits as thin lines, if the references have them; Fuller & Tabor by material."""
+    """Draw the theories of separate summits as thin lines, if any; that of Fuller & Tabor for each material."""
     theories = []
     if "greenwood_williamson_reduced_pressure" in references:
         theories.append(("Greenwood & Williamson", (0, (5, 2, 1, 2)), GREY, "greenwood_williamson", references))

@@ -10,7 +10,7 @@ import numpy as np
 from icha.datasets.variables.model_error import SHORT_RANGE
 from icha.figures.curves import add_snapshot_legend, drop_rounding_errors, snapshot_looks
 from icha.figures.declaration import Declaration, SnapshotFigure
-from icha.figures.ensembles import draw_members
+from icha.figures.ensembles import draw_members, join_bins
 from icha.figures.looks import MODEL_MARKERS, TRUTH_LINE
 from icha.figures.select import select_snapshots
 from icha.figures.style import BLACK, in_style, logarithmic_axes, new_panels
@@ -25,9 +25,9 @@ DECLARATION = Declaration(
     options=SnapshotFigure,
 )
 
-# Least number of sampled gaps in a plotted point; bins with fewer are joined with their neighbours.
+# Least number of grid cells in a point of P(u). Bins with fewer cells are joined with their neighbours.
 _LEAST_CELLS = 100
-# The same for nodes in contact, which are few.
+# The same for P(p) of boundary elements, which have few nodes in contact.
 _LEAST_NODES = 25
 # Largest number of markers of boundary elements.
 _BESIDE_MARKERS = 14
@@ -41,26 +41,28 @@ def figure(campaign: xr.DataTree, *, study: str, kind: str | None = None, target
     lines = select_snapshots(campaign, study, kind, target)
     each_look, looks = snapshot_looks(campaign, study, lines)
     fig, [(left, right)] = new_panels(3.1)
-    lowest, highest, top, floor = -0.3, 0.3, 0.0, []
+    lowest, highest, top, floor = -0.3, 0.3, 0.0, 1.0
     for line, look in zip(lines, each_look, strict=True):
         u, densities = gap_densities(line.members)
-        drawn = {"positive": True, "lines": len(lines), "asked": line.runs.asked}
+        drawn = {"positive": True, "asked": line.runs.asked}
         draw_members(left, u, densities, look, **drawn)
-        floor.append(drop_rounding_errors(densities.mean(axis=0)).min())
+        floor = drop_rounding_errors(densities.mean(axis=0)).min(initial=floor)
         p, densities = pressure_densities(line.members)
         draw_members(right, p, densities, look, **drawn)
         density = densities.mean(axis=0)
         shown = p[density > 1e-3 * density.max(initial=0)]
         lowest, highest = shown.min(initial=lowest), shown.max(initial=highest)
         top = density.max(initial=top)
-        for ax, densities_of in ((left, gap_densities), (right, joined_pressure_densities)) if line.truths else ():
-            at, densities = densities_of(line.truths)
+        if not line.truths:
+            continue
+        beside = ((left, *gap_densities(line.truths)), (right, *pressure_densities(line.truths, joined=True)))
+        for ax, at, densities in beside:
             dashed = TRUTH_LINE | {"color": look["color"], "marker": MODEL_MARKERS[SHORT_RANGE]}
             ax.plot(at, densities.mean(axis=0), markevery=1 + len(at) // _BESIDE_MARKERS, **dashed)
             top = densities.mean(axis=0).max(initial=top) if ax is right else top
     logarithmic_axes(left)
     logarithmic_axes(right, "y")
-    left.set_ylim(min(floor) / 2)
+    left.set_ylim(floor / 2)
     load = np.mean([float(state_of(run, at)["reduced_pressure"]) for run, at in lines[-1].members])
     _finish(left, right, (lowest, highest), top, load)
     add_snapshot_legend(fig, [left, right], campaign[study].to_dataset(), lines, looks)
@@ -68,7 +70,7 @@ def figure(campaign: xr.DataTree, *, study: str, kind: str | None = None, target
 
 
 def _finish(left, right, pressures, highest, load):
-    """Label both panels; draw Persson's theory at a reduced pressure and set the limits of the panel of pressures."""
+    """Label both panels, draw Persson's theory for a reduced pressure, and set the limits of the panel of pressures."""
     from icha.references.persson import persson_pressure_density
 
     if load > 0:
@@ -84,60 +86,28 @@ def _finish(left, right, pressures, highest, load):
 
 
 def gap_densities(members: Sequence[tuple[xr.Dataset, int]]) -> tuple[np.ndarray, np.ndarray]:
-    """Return u/h_rms (k,) and P(u) h_rms (members, k) of snapshots; bins with few cells are joined.
+    """Return u/h_rms (k,) and P(u) h_rms (members, k) of snapshots; bins with few cells are joined."""
+    (first, _), *_ = members
+    edges = first["gap_bin_edges"].values / float(first["rms_height"])
+    contents = np.array([run["gap_density"].values[at] * float(run["rms_height"]) for run, at in members])
+    contents *= np.diff(edges)
+    # The first bin begins at zero, which a logarithmic axis does not show.
+    edges, densities = join_bins(edges[1:], contents[:, 1:], _LEAST_CELLS / int(first["grid"]) ** 2)
+    return np.sqrt(edges[:-1] * edges[1:]), densities
 
-    Raises
-    ------
-    ValueError
-        If the distributions are empty.
+
+def pressure_densities(
+    members: Sequence[tuple[xr.Dataset, int]], *, joined: bool = False
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return p/(E* h'_rms) (k,) and P(p) E* h'_rms (members, k) of the bins of snapshots that are not empty.
+
+    `joined` joins bins with few nodes, for boundary elements, which have few nodes in contact.
     """
     (first, _), *_ = members
-    heights = [float(run["rms_height"]) for run, _ in members]
-    densities = np.array([run["gap_density"].values[at] * h for (run, at), h in zip(members, heights, strict=True)])
-    # The first bin begins at zero, which a logarithmic axis does not show.
-    edges = (first["gap_bin_edges"].values / heights[0])[1:]
-    low, high, densities = _join_bins(edges, densities[:, 1:] * np.diff(edges), _LEAST_CELLS / int(first["grid"]) ** 2)
-    if not len(low):
-        raise ValueError("the gap distribution is empty")
-    return np.sqrt(low * high), densities
-
-
-def pressure_densities(members: Sequence[tuple[xr.Dataset, int]]) -> tuple[np.ndarray, np.ndarray]:
-    """Return p/(E* h'_rms) (k,) and P(p) E* h'_rms (members, k) of the bins of snapshots that are not empty."""
-    edges, densities = _reduced_pressure_densities(members)
-    filled = densities.max(axis=0) > 0
-    return (0.5 * (edges[1:] + edges[:-1]))[filled], densities[:, filled]
-
-
-def joined_pressure_densities(members: Sequence[tuple[xr.Dataset, int]]) -> tuple[np.ndarray, np.ndarray]:
-    """Return the same as `pressure_densities` with bins joined, for boundary elements with few nodes in contact."""
-    edges, densities = _reduced_pressure_densities(members)
-    content = densities * np.diff(edges)
-    filled = np.flatnonzero(content.any(axis=0))
-    if not len(filled):  # before first contact
-        return np.empty(0), np.empty((len(densities), 0))
-    inside, least = slice(filled[0], filled[-1] + 1), _LEAST_NODES / int(members[0][0]["grid"]) ** 2
-    low, high, joined = _join_bins(edges[filled[0] : filled[-1] + 2], content[:, inside], least)
-    return 0.5 * (low + high), joined
-
-
-def _reduced_pressure_densities(members):
-    """Return edges of the bins of p/(E* h'_rms), and P(p) E* h'_rms (members, bins)."""
-    (first, _), *_ = members
     unit = float(first["contact_modulus"]) * float(first["rms_slope"])
-    return first["pressure_bin_edges"].values / unit, np.array(
-        [run["pressure_density"].values[at] * unit for run, at in members]
-    )
-
-
-def _join_bins(edges, contents, least):
-    """Join bins until the members together have a content of `least` in each; return edges and densities."""
-    bounds, gathered = [0], 0.0
-    for k, content in enumerate(contents.sum(axis=0)):
-        gathered += content
-        if gathered >= least:
-            bounds.append(k + 1)
-            gathered = 0.0
-    low, high = edges[bounds[:-1]], edges[bounds[1:]]
-    cumulative = np.concatenate([np.zeros((len(contents), 1)), np.cumsum(contents, axis=1)], axis=1)
-    return low, high, np.diff(cumulative[:, bounds], axis=1) / (high - low)
+    edges = first["pressure_bin_edges"].values / unit
+    densities = np.array([run["pressure_density"].values[at] * unit for run, at in members])
+    if joined:
+        edges, densities = join_bins(edges, densities * np.diff(edges), _LEAST_NODES / int(first["grid"]) ** 2)
+    filled = densities.any(axis=0)
+    return (0.5 * (edges[1:] + edges[:-1]))[filled], densities[:, filled]

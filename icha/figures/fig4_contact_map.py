@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -27,7 +27,7 @@ class MapFigure(SnapshotFigure, RunFigure):
 
 
 def inputs(campaign: Campaign, options: MapFigure, files: results.ResultFiles) -> Inputs:
-    """Return the runs, the topography, and the file of the same run with boundary elements, if there is one."""
+    """Return the campaign dataset, the surface file, and the same run with boundary elements, if there is one."""
     run = options.run(campaign)
     found = {"campaign": files.path(results.DATASET), "surface": files.path(results.SURFACE, run)}
     if run.model == DEFAULT_MODEL and REFERENCE_MODEL in campaign.studies[options.study].models:
@@ -39,15 +39,15 @@ DECLARATION = Declaration(
     description="Contact spots over the topography.", options=MapFigure, inputs=inputs, holds_topography=True
 )
 
-# The enlarged view shows a quarter of the period. It is halved while it is wider than this number of mean radii of the
-# spots and has more than twice this number of cells.
+# The window that is enlarged has a quarter of the side of the surface. It is halved as long as it is wider than
+# _WIDEST_IN_RADII mean radii of the spots, and has at least _LEAST_CELLS cells a side after the division.
 _ZOOM = 4
 _WIDEST_IN_RADII = 40
 _LEAST_CELLS = 64
-# More spots than this are drawn as an image in PDF files as well.
+# More spots are drawn as an image, also in PDF files, which would otherwise be large.
 _MANY_SPOTS = 2000
 _RED = (0.9, 0.0, 0.05)
-# Names and colours of nodes in contact with no model, asperities, boundary elements, and both.
+# Names and colours of nodes: without contact, in contact by one of the models, and by both.
 _STATES = (("", "white"), ("asperities only", _RED), ("boundary elements only", "black"), ("both", "0.72"))
 
 
@@ -73,30 +73,34 @@ def figure(
     """
     from matplotlib.patches import Rectangle
 
-    from icha.analysis.model_error import contact_of_spots, state_of
+    from icha.analysis.model_error import contact_of_spots, snapshot_if_any, state_of
     from icha.datasets.campaign import find_snapshot
 
     labels = RunLabels(*run)
     data = select_complete_run(campaign, labels)
     at = find_snapshot(data, kind, target)
-    state, beside = state_of(data, at), _state_beside(truth, data, at)
+    state, beside = state_of(data, at), None
+    kind, target = str(data["snapshot_kind"].values[at]), float(data["snapshot_target"].values[at])
+    # The path of boundary elements may have ended before this snapshot.
+    if truth is not None and (same := snapshot_if_any(truth, kind, target)) is not None:
+        beside = state_of(truth, same)
     topography = topography_of(data, surface)
-    view = _view(data, at, topography)
+    circles, corner, width = _view(data, at, topography)
 
     fig, panels = new_panels(*(3.35, 1) if beside is None else (6.9, 2))
     whole, enlarged = panels[0, 0], panels[0, 1] if beside is None else panels[1, 0]
     heights = {"cmap": "cividis", "vmin": -topography.highest, "vmax": topography.highest}
     image = topography.draw(whole, **heights)
-    draw_spots(whole, view.circles, facecolor=(*_RED, 0.85), lw=0, rasterized=len(view.circles) > _MANY_SPOTS)
-    nodes, borders = _window(topography.heights, topography.side, view)
+    draw_spots(whole, circles, facecolor=(*_RED, 0.85), lw=0, rasterized=len(circles) > _MANY_SPOTS)
+    nodes, borders = _window(topography.heights, topography.side, corner, width)
     enlarged.imshow(nodes * topography.scale, extent=borders, origin="lower", interpolation="nearest", **heights)
-    draw_spots(enlarged, view.circles, facecolor=(*_RED, 0.4), edgecolor=(0.75, 0, 0), lw=1.0)
+    draw_spots(enlarged, circles, facecolor=(*_RED, 0.4), edgecolor=(0.75, 0, 0), lw=1.0)
     area = rf"$A/A_0$ = {float(state['contact_area_fraction']):.3f}"
     whole.set_title(area if beside is None else f"asperities, {area}", loc="right")
-    enlarged.set_title(f"enlarged ×{view.zoom}", loc="right")
+    enlarged.set_title(f"enlarged ×{topography.side / width:.0f}", loc="right")
     if beside is not None:
         covered = contact_of_spots(data, at, len(beside["contact_map"]))
-        _draw_boundary_elements(panels, topography, view, heights, beside, covered)
+        _draw_boundary_elements(panels, topography, (corner, width), heights, beside, covered)
     load = rf"$F/(E^{{\ast}}h_{{\mathrm{{rms}}}}^{{\prime}}A_0)$ = {format_number(float(state['reduced_pressure']))}"
     title = f"{labels.surface}, {material_label(campaign[labels.study].to_dataset(), labels.material)}, {load}"
     fig.suptitle(title if is_applicable(data) else f"{title}\n{NOT_APPLICABLE_ALONE}", fontsize="medium")
@@ -104,45 +108,18 @@ def figure(
         topography.label(ax)
         if ax is not enlarged:
             frame = "white" if ax.get_images()[0].get_array().ndim == 2 else "black"
-            ax.add_patch(Rectangle(view.corner, view.window, view.window, fill=False, ec=frame, lw=1.2))
-    (x, y), width = view.corner, view.window
-    enlarged.set(xlim=(x, x + width), ylim=(y, y + width))
+            ax.add_patch(Rectangle(corner, width, width, fill=False, ec=frame, lw=1.2))
+    enlarged.set(xlim=corner[0] + np.array([0, width]), ylim=corner[1] + np.array([0, width]))
     bar = fig.colorbar(image, ax=panels, shrink=0.92 if beside is None else 0.46, pad=0.015, aspect=28)
     bar.set_label(f"height ({topography.height_unit})")
     return fig
 
 
-def _state_beside(truth, run, at):
-    """Return the state of boundary elements at the snapshot `at` of a run; None if there is none."""
-    from icha.analysis.model_error import state_of
-    from icha.datasets.campaign import find_snapshot
-
-    kind, target = (run[name].values[at] for name in ("snapshot_kind", "snapshot_target"))
-    try:
-        return None if truth is None else state_of(truth, find_snapshot(truth, str(kind), float(target)))
-    except ValueError:  # its path ended before
-        return None
-
-
-class _View(NamedTuple):
-    """Spots in the unit of the axes, and the window that is enlarged.
-
-    Attributes
-    ----------
-    circles : (m, 3) float, x, y and radius of the spots.
-    zoom : side of the surface over that of the window.
-    corner : (2,) float, lower left corner of the window.
-    window : side of the window.
-    """
-
-    circles: np.ndarray
-    zoom: int
-    corner: np.ndarray
-    window: float
-
-
 def _view(run, at, topography):
-    """Return the spots of a snapshot, and a window around the largest spot."""
+    """Return the spots as circles (`wrap_circles`), and the lower left corner and the side of a window to enlarge.
+
+    The window is around the largest spot. All lengths are in the unit of the axes.
+    """
     from icha.datasets.campaign import spots_of
 
     spots, side = spots_of(run, at), topography.side
@@ -154,11 +131,11 @@ def _view(run, at, topography):
     largest = np.argmax(radius) if len(radius) else None
     middle = np.array([side, side]) / 2 if largest is None else np.array([x[largest], y[largest]])
     corner = np.clip(middle - side / zoom / 2, 0, side - side / zoom)
-    return _View(wrap_circles(x, y, radius, side, str(run["boundary"].values)), zoom, corner, side / zoom)
+    return wrap_circles(x, y, radius, side, str(run["boundary"].values)), corner, side / zoom
 
 
-def _draw_boundary_elements(panels, topography, view, heights, beside, covered):
-    """Draw the contact of boundary elements: over the topography, around the enlarged spots, and with asperities."""
+def _draw_boundary_elements(panels, topography, window, heights, beside, covered):
+    """Draw the contact of boundary elements over the topography, around the enlarged spots, and beside asperities."""
     from matplotlib.colors import LinearSegmentedColormap, to_rgb
     from matplotlib.patches import Patch
 
@@ -170,7 +147,7 @@ def _draw_boundary_elements(panels, topography, view, heights, beside, covered):
     topography.draw(solution, **heights)
     red = LinearSegmentedColormap.from_list("contact", [(*_RED, 0.0), (*_RED, 0.9)])
     draw_map(solution, fraction, topography.side, cmap=red, vmin=0, vmax=1)
-    nodes, borders = _window(fraction, topography.side, view)
+    nodes, borders = _window(fraction, topography.side, *window)
     enlarged.contour(nodes, [0.5], extent=borders, origin="lower", colors="black", linewidths=0.9)
     palette = np.array([to_rgb(colour) for _, colour in _STATES])
     draw_map(compared, palette[1 * covered + 2 * contact], topography.side)
@@ -180,12 +157,11 @@ def _draw_boundary_elements(panels, topography, view, heights, beside, covered):
     compared.set_title(f"overlap (both / at least one) {jaccard(covered, contact):.2f}", loc="right")
 
 
-def _window(nodes, side, view):
-    """Return the nodes of a periodic map in the window, and where their cells begin and end in x and in y."""
+def _window(nodes, side, corner, width):
+    """Return the nodes of a periodic map in a window, and the borders of their cells in x and in y."""
     cell = side / len(nodes)
     columns, rows = (
-        np.arange(start, start + int(np.ceil(view.window / cell)) + 2)
-        for start in np.floor(view.corner / cell).astype(int)
+        np.arange(start, start + int(np.ceil(width / cell)) + 2) for start in np.floor(corner / cell).astype(int)
     )
     borders = tuple(float(edge) * cell for at in (columns, rows) for edge in (at[0] - 0.5, at[-1] + 0.5))
     return nodes[np.ix_(rows % len(nodes), columns % len(nodes))], borders

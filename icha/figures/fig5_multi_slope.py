@@ -21,12 +21,14 @@ class SlopesAndMaterialsFigure(TruthFigure):
     """A figure of all runs of a study, with boundary elements and measurements."""
 
     def arguments(self, campaign: Campaign) -> dict[str, Any]:
-        """Return the arguments, and what the figure needs to know about each table of measurements."""
-        known = [
-            {name: getattr(measurement, name) for name in ("label", "columns", "material", "rms_slope")}
-            | {"load_unit": _load_unit(campaign, measurement)}
-            for measurement in self.measurements(campaign)
-        ]
+        """Return the arguments, with `measurements` as the function `figure` takes them."""
+        known = []
+        for each in self.measurements(campaign):
+            names = ("label", "columns", "material", "rms_slope")
+            unit = 1.0
+            if each.load_is_pressure:
+                unit = campaign.materials[each.material].contact_modulus * each.rms_slope
+            known.append({name: getattr(each, name) for name in names} | {"load_unit": unit})
         return super().arguments(campaign) | ({"measurements": known} if known else {})
 
     def measurements(self, campaign: Campaign) -> list:
@@ -34,15 +36,8 @@ class SlopesAndMaterialsFigure(TruthFigure):
         return [measurement for measurement in campaign.measurements.values() if measurement.study == self.study]
 
 
-def _load_unit(campaign, measurement) -> float:
-    """Return the divisor that turns a measured load into p/(E* h'rms)."""
-    if not measurement.load_is_pressure:
-        return 1.0
-    return campaign.materials[measurement.material].contact_modulus * measurement.rms_slope
-
-
 def inputs(campaign: Campaign, options: SlopesAndMaterialsFigure, files: results.ResultFiles) -> Inputs:
-    """Return the runs, and tables of measurements that belong to the study, if there are any."""
+    """Return the campaign dataset, and the tables of measurements that belong to the study, if there are any."""
     tables = [measurement.path for measurement in options.measurements(campaign)]
     return {"campaign": files.path(results.DATASET)} | ({"tables": tables} if tables else {})
 
@@ -86,7 +81,7 @@ def figure(
 
 
 def _draw_measured(left, right, table, known, colour, dashes):
-    """Draw a measured curve; over the load only if its slope is known."""
+    """Draw a measured curve; in panel (b) only if its slope is known."""
     load, area = read_columns(table, known["columns"])
     pressure, slope = load / known["load_unit"], known["rms_slope"]
     look = {"color": colour, "ls": dashes, "lw": 1.1, "zorder": 1}

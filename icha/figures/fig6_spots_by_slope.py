@@ -7,24 +7,22 @@ from typing import TYPE_CHECKING, Any
 
 from pydantic import Field
 
-from icha.figures.declaration import Campaign, Declaration, StudyFigure
+from icha.figures.declaration import Campaign, Declaration, TopographyFigure
 from icha.figures.looks import NOT_APPLICABLE_ALONE, graded_colours, legend_below
 from icha.figures.maps import draw_spots, wrap_circles
-from icha.figures.select import is_applicable, pick, select_runs, snapshot_label
+from icha.figures.select import is_applicable, select_by_labels, select_runs, snapshot_label
 from icha.figures.style import in_style, new_panels, slope_label
 from icha.support.formatting import choose_unit
-from icha.support.values import Label, Problem, Seed
+from icha.support.values import Label, Problem
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
 
-class SlopesFigure(StudyFigure):
+class SlopesFigure(TopographyFigure):
     """A figure of the spots of all slopes, at the same load and at the same area."""
 
-    surface: Label | None = Field(default=None, description="Surface to show. Default: the first of the study.")
-    seed: Seed | None = Field(default=None, description="Seed to show. Default: the first of the study.")
     material: Label | None = Field(default=None, description="Material to show. Default: the first of the study.")
 
     def study_problems(self, campaign: Campaign, study: Any) -> Iterator[Problem]:
@@ -59,12 +57,8 @@ def figure(
     """Draw the spots of all slopes for one surface, seed and material; those left out are the study's first."""
     from matplotlib.patches import Patch
 
-    runs = select_runs(campaign, study)
-    surface = pick("surface", surface, [labels.surface for labels, _ in runs])
-    seed = pick("seed", seed, [labels.seed for labels, _ in runs if labels.surface == surface])
-    runs = [(labels, run) for labels, run in runs if (labels.surface, labels.seed) == (surface, seed)]
-    material = pick("material", material, [labels.material for labels, _ in runs])
-    by_slope = {labels.rms_slope: run for labels, run in runs if labels.material == material}
+    runs = select_by_labels(select_runs(campaign, study), surface=surface, seed=seed, material=material)
+    by_slope = {labels.rms_slope: run for labels, run in runs}
     slopes = sorted(by_slope, reverse=True)
     # From dark to bright; the colours of the palette are those of materials.
     colours = dict(zip(slopes, graded_colours(len(slopes)), strict=True))
@@ -89,16 +83,13 @@ def _draw_slopes(ax, runs, kind, colours, length):
     from matplotlib.collections import PatchCollection
     from matplotlib.patches import Wedge
 
+    from icha.analysis.model_error import state_of
     from icha.datasets.campaign import find_snapshot, spots_of
 
     at = {slope: find_snapshot(run, kind) for slope, run in runs.items()}
-
-    def area(slope):
-        run = runs[slope]
-        return float(run["contact_area_fraction"].values[int(run["snapshot_step"].values[at[slope]])])
-
-    # Spots that cover less lie on top.
-    for order, slope in enumerate(sorted(colours, key=area, reverse=True)):
+    areas = {slope: float(state_of(run, at[slope])["contact_area_fraction"]) for slope, run in runs.items()}
+    # Spots that cover a smaller area are drawn on top.
+    for order, slope in enumerate(sorted(colours, key=areas.get, reverse=True)):
         run, look = runs[slope], {"facecolor": colours[slope], "edgecolor": "black", "lw": 0.25}
         side, spots = float(run["period"]) * length, spots_of(run, at[slope])
         places = (spots[f"spot_{name}"].values * length for name in ("x", "y", "radius"))
@@ -106,7 +97,7 @@ def _draw_slopes(ax, runs, kind, colours, length):
         if kind == "relative_load":
             draw_spots(ax, circles, zorder=2 + order, **look)
         else:
-            # The spots nearly coincide. Every slope fills a sector of the disc, so that all are visible.
+            # The spots of all slopes nearly coincide. Each slope fills a sector of the circle, so that all are visible.
             share = 360 / len(runs)
             start = 90 + share * list(colours).index(slope)
             ax.add_collection(PatchCollection([Wedge((x, y), r, start, start + share) for x, y, r in circles], **look))

@@ -10,7 +10,7 @@ import numpy as np
 from icha.datasets.variables.model_error import SHORT_RANGE
 from icha.figures.curves import add_snapshot_legend, snapshot_looks
 from icha.figures.declaration import Declaration, SnapshotFigure
-from icha.figures.ensembles import draw_members
+from icha.figures.ensembles import draw_members, join_bins
 from icha.figures.looks import MODEL_MARKERS, TRUTH_LINE
 from icha.figures.select import select_snapshots
 from icha.figures.style import in_style, logarithmic_axes, new_panels
@@ -50,7 +50,7 @@ def figure(campaign: xr.DataTree, *, study: str, kind: str | None = None, target
             (left, patch_density, look, MODEL_MARKERS[SHORT_RANGE]),
             (right, patches_above, smooth, "none"),
         ):
-            draw_members(ax, *points(areas, cell), line_look, positive=True, lines=len(lines), asked=line.runs.asked)
+            draw_members(ax, *points(areas, cell), line_look, positive=True, asked=line.runs.asked)
             if line.truths:
                 area, values = points(true_areas, cell)
                 ax.plot(area, values.mean(axis=0), color=look["color"], marker=marker, **TRUTH_LINE)
@@ -86,22 +86,11 @@ def patch_density(areas: Sequence[np.ndarray], nominal_area: float) -> tuple[np.
     pooled = np.sort(np.concatenate(areas))
     if not len(pooled):
         return np.empty(0), np.empty((len(areas), 0))
-    decades = np.log10([pooled[0], pooled[-1]])
-    count = max(int(np.ceil((decades[1] - decades[0]) * _BINS_PER_DECADE)), 1)
-    edges = np.logspace(*decades, count + 1) if count > 1 else np.array([pooled[0], pooled[-1] * (1 + 1e-9)])
-    edges[0], edges[-1] = pooled[0], max(pooled[-1], np.nextafter(pooled[0], np.inf))
-    number, _ = np.histogram(pooled, edges)
-    # A bin ends when it has enough patches; the remaining ones belong to the last bin.
-    ends, gathered = [], 0
-    for k, count_of_bin in enumerate(number):
-        gathered += count_of_bin
-        if gathered >= _LEAST_PATCHES:
-            ends.append(k + 1)
-            gathered = 0
-    ends = [*ends[:-1], count] if ends else [count]
-    limits = edges[[0, *ends]]
-    densities = [np.histogram(area, limits)[0] / (np.diff(limits) * nominal_area) for area in areas]
-    return np.sqrt(limits[1:] * limits[:-1]), np.array(densities)
+    highest = max(pooled[-1], np.nextafter(pooled[0], np.inf))
+    count = max(int(np.ceil(np.log10(highest / pooled[0]) * _BINS_PER_DECADE)), 1)
+    edges = np.geomspace(pooled[0], highest, count + 1)
+    limits, densities = join_bins(edges, np.array([np.histogram(area, edges)[0] for area in areas]), _LEAST_PATCHES)
+    return np.sqrt(limits[1:] * limits[:-1]), densities / nominal_area
 
 
 def patches_above(areas: Sequence[np.ndarray], nominal_area: float) -> tuple[np.ndarray, np.ndarray]:

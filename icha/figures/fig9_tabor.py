@@ -2,33 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from icha.figures.curves import AREA_LABEL, gap_label
-from icha.figures.declaration import Campaign, Declaration, SnapshotFigure
+from icha.figures.declaration import Declaration, SnapshotFigure
 from icha.figures.ensembles import Points, points_handles
 from icha.figures.looks import Looks, legend_below, named_handles
 from icha.figures.select import ContactRuns, NothingToDraw, group_by_contact, select_runs, snapshot_label
 from icha.figures.style import GREY, in_style, new_panels
-from icha.support.values import Problem
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
-
-
-class TaborFigure(SnapshotFigure):
-    """A figure of one snapshot of all runs of a study, whose materials differ in their range of attraction."""
-
-    def study_problems(self, campaign: Campaign, study: Any) -> Iterator[Problem]:
-        """Yield in addition the problem of a study without adhesion."""
-        if not any(campaign.materials[name].surface_energy > 0 for name in study.materials):
-            reason = "has no material with adhesion, so no Tabor parameter; expected a study with one"
-            yield ("study",), self.study, reason
-        yield from super().study_problems(campaign, study)
 
 
 DECLARATION = Declaration(
@@ -36,12 +23,10 @@ DECLARATION = Declaration(
         "Contact area and mean separation against the Tabor parameter. The study needs materials with adhesion that "
         "differ in their `interaction_range`."
     ),
-    options=TaborFigure,
+    options=SnapshotFigure,
 )
 
 _STATE = ("contact_area_fraction", "reduced_separation")
-# Least half height of a panel, over the value in its middle.
-_LEAST_REACH = 0.05
 
 
 @in_style
@@ -53,7 +38,7 @@ def figure(campaign: xr.DataTree, *, study: str, kind: str | None = None, target
     groups = group_by_contact(campaign, select_runs(campaign, study, ragged=False))
     run = next(iter(groups[-1].by_seed.values()))
     shown = snapshot_label(run, find_snapshot(run, kind, target))
-    # Materials that differ only in their range are one line, which has the name of the first of them.
+    # Materials that differ only in their range of attraction form one line, which has the name of the first material.
     materials: dict[tuple, str] = {}
     curves: dict[tuple, list[ContactRuns]] = {}
     bare: dict[tuple, list[ContactRuns]] = {}
@@ -95,16 +80,15 @@ def figure(campaign: xr.DataTree, *, study: str, kind: str | None = None, target
 
 
 def _finish(ax, smallest):
-    """Shade where the jump-in was not verified, and choose the limits of the axes."""
+    """Shade the Tabor parameters for which the jump into contact is not verified, and set the limits of the axes."""
     from icha.asperity.material import WU_HOLDS_FROM
 
     low, high = ax.get_xlim()
-    # The tolerance is for a range of attraction that was rounded.
+    # The tolerance allows for a range of attraction that was rounded.
     if smallest < WU_HOLDS_FROM / 1.01:
         ax.axvspan(low, WU_HOLDS_FROM, color="0.93", lw=0, zorder=0)
     ax.set_xlim(low, high)
     ax.set_xlabel(r"Tabor parameter  $\mu$")
+    # Room above and below, so that differences of a few per mille do not fill the panel.
     bottom, top = ax.get_ylim()
-    # Differences of a few per mille do not fill the panel.
-    reach = max(0.65 * (top - bottom), _LEAST_REACH * 0.5 * (top + bottom))
-    ax.set_ylim(0.5 * (bottom + top) - reach, 0.5 * (bottom + top) + reach)
+    ax.set_ylim(0.95 * bottom, 1.05 * top)

@@ -1,9 +1,9 @@
-"""Colours, markers and legends of lines, the same in all figures of a campaign.
+"""Colours, markers and legends of lines, which are the same in all figures of a campaign.
 
-A colour stands for a material, a marker for a model. Closed markers are asperities with adhesion, open markers
-asperities without adhesion, crosses boundary elements. If a figure has several surfaces and slopes, the shapes of the
-closed markers distinguish them. If there are many materials, or many surfaces and slopes, graded colours from dark to
-bright distinguish them instead, and the legend names some of them.
+A colour stands for a material, and a marker for a model: closed markers for asperities with adhesion, open markers for
+asperities without adhesion, crosses for boundary elements. The shape of open and closed markers distinguishes surfaces
+and slopes. Many materials, or many surfaces and slopes, have graded colours from dark to bright, and the legend names
+some of them.
 """
 
 from __future__ import annotations
@@ -27,34 +27,34 @@ if TYPE_CHECKING:
 # Material, surface and rms slope of a line; the slope is None if slopes are not distinguished.
 Contact = tuple[str, str, float | None]
 
-# Okabe and Ito's colours without black, which is for theories, and darker ones of the same hues.
+# The colours of Okabe and Ito without black, which is for theories, and darker colours of the same hues.
 MATERIAL_COLOURS = (*COLOURS[:-1], "#004166", "#803800", "#005A42", "#80436A", "#805800", "#2B6C94")
 MARKERS = ("o", "s", "^", "D", "v", "p", "*")
 
 ASPERITIES_NAME = MODELS["asperities"].words
-# By the names of models in legends.
+# Markers by the name of the model in legends.
 MODEL_MARKERS = {ASPERITIES_NAME: "o", SHORT_RANGE: "+", FINITE_RANGE: "1"}
 UNLOADING_MARKERS = {SHORT_RANGE: "x", FINITE_RANGE: "2"}
 BRANCH_DASHES = {"loading": "-", "unloading": (0, (4, 2))}
-# Lines of boundary elements, which are drawn beside those of asperities.
+# Look of lines of boundary elements that are drawn beside lines of asperities.
 TRUTH_LINE = {"ls": (0, (3, 2)), "lw": 0.8, "ms": 5, "mew": 0.8, "zorder": 5}
 
-# Largest number of materials, or of surfaces and slopes, with distinct colours; more have graded colours.
+# Largest number of materials, or of surfaces and slopes, that have distinct colours. More have graded colours.
 MOST_COLOURS = len(COLOURS)
-# Largest number of lines that are not drawn thin.
+# Largest number of lines of normal width in a figure; more lines are thin.
 FEW_LINES = 6
-# All of several curves that coincide stay visible: without adhesion they are widest, and of several materials each is
-# narrower than the one before. Sizes of markers in points, width of lines in sizes of markers.
+# Sizes of markers in points, and widths of lines in sizes of markers. Curves without adhesion are widest, and each
+# material is narrower than the one before, so that curves that coincide are all visible.
 _BARE_SIZE, _ADHESIVE_SIZE, _LEAST_SIZE, _NARROWER = 6.0, 4.6, 1.8, 0.75
 _LINE_WIDTH = 0.22
-# Largest fraction of the graded colours; brighter colours are invisible on white.
+# End of the graded colours that are used; brighter colours are invisible on white.
 _BRIGHTEST = 0.9
-# Largest number of names of graded colours in a legend.
+# Largest number of graded colours that a legend names.
 _MOST_NAMED = 9
-# Fraction of a colour that is left in its pale one.
+# Fraction of a colour in its pale form; the rest is white.
 _PALENESS = 0.4
 
-# Label of lines to which the asperity model is not applicable, and its form in figures of a single run.
+# Label of runs for which the asperity model is not applicable, in figures of several runs and of one run.
 NOT_APPLICABLE = "pale: asperity model not applicable"
 NOT_APPLICABLE_ALONE = "asperity model not applicable"
 
@@ -62,12 +62,14 @@ NOT_APPLICABLE_ALONE = "asperity model not applicable"
 class Looks:
     """Colour, marker and name of every line of a figure.
 
+    A place is a surface and an rms slope.
+
     Parameters
     ----------
-    campaign : the campaign dataset, from which materials have their colours.
-    interfaces : modulus, surface energy and range of the materials.
-    contacts : those of the lines.
-    by_place : whether surfaces and slopes have colours even if they are few, as lines without markers need.
+    campaign : the campaign dataset; the order of its materials gives their colours.
+    interfaces : modulus, surface energy and range of attraction of the materials.
+    contacts : material, surface and rms slope of every line.
+    by_place : whether colours distinguish places instead of materials. Many places always have colours.
     """
 
     def __init__(
@@ -95,16 +97,16 @@ class Looks:
             self._sizes |= {name: max(largest * _NARROWER**rank, _LEAST_SIZE) for rank, name in enumerate(alike)}
 
     def adhesive(self, material: str) -> bool:
-        """Return whether a material has surface energy."""
+        """Return whether the surface energy of a material is positive."""
         return float(self.interfaces["surface_energy"].sel(material=material)) > 0
 
     def colour(self, contact: Contact) -> str:
-        """Return the colour of a line; grey for a contact without a line."""
+        """Return the colour of a contact; grey if no line of the figure has its colour."""
         material, *place = contact
         return self._colours.get(tuple(place) if self.by_place else material, GREY)
 
     def material_colour(self, material: str | None) -> str:
-        """Return the colour of a material; black if the figure has no such material, or if places have the colours."""
+        """Return the colour of a material; black if no line shows it, or if colours distinguish places."""
         return self._colours.get(material, BLACK)
 
     def look(self, contact: Contact, *, applicable: bool = True) -> dict:
@@ -126,7 +128,10 @@ class Looks:
         return look if applicable else _pale(look)
 
     def handles(self, **changed: object) -> dict[str, Line2D]:
-        """Return the handles of the names, of many names of some; `changed` overrides the looks of the lines."""
+        """Return the legend entries of materials and places by name; `changed` overrides the looks of the lines.
+
+        If there are many names, only some have an entry.
+        """
         material, place = self.materials[0], self.places[0]
         if self.by_place:
             found = {self.place_name(each): self.look((material, *each)) | changed for each in some_of(self.places)}
@@ -146,24 +151,24 @@ class Looks:
         return material_label(self.interfaces, material)
 
     def place_name(self, place: tuple[str, float | None]) -> str:
-        """Return surface and rms slope of a line in words, as far as the figure has several."""
+        """Return surface and rms slope in words; each is left out if the figure has only one."""
         surface, slope = place
         surfaces, slopes = (set(each) for each in zip(*self.places, strict=True))
         words = [surface] if len(surfaces) > 1 else []
         return ", ".join([*words, slope_label(slope)] if slope is not None and len(slopes) > 1 else words)
 
     def name(self, contact: Contact) -> str:
-        """Return the name of a line, which distinguishes it from the other lines of the figure."""
+        """Return a name that distinguishes a line from the other lines of the figure."""
         material, *place = contact
         place = self.place_name(tuple(place))
-        # A single material is not named if surfaces and slopes have the colours.
+        # A single material has no name if colours distinguish places.
         if place and self.by_place and len(self.materials) == 1:
             return place
         return ", ".join(filter(None, [self.material_name(material), place]))
 
 
 def looks_of_studies(campaign: xr.DataTree, studies: Sequence[str], contacts: Iterable[Contact]) -> Looks:
-    """Return looks of lines of some studies; lines of a single material have the colours of surfaces and slopes."""
+    """Return the looks of lines of some studies; if all have one material, colours distinguish surfaces and slopes."""
     import xarray as xr
 
     contacts = list(contacts)
@@ -179,7 +184,7 @@ def material_colours(campaign: xr.DataTree) -> dict[str, str]:
 
 
 def _pale(look):
-    """Return the look of a line to which the asperity model is not applicable: open, and in a lighter colour."""
+    """Return the look of runs for which the asperity model is not applicable: open markers in a lighter colour."""
     from matplotlib.colors import to_hex, to_rgb
 
     colour = to_hex([1 - _PALENESS * (1 - part) for part in to_rgb(look["color"])])
@@ -195,7 +200,7 @@ def graded_colours(count: int) -> list[str]:
 
 
 def some_of(names: Sequence) -> list:
-    """Return all of a few names, or evenly spaced ones of many, including the first and the last."""
+    """Return all names if they are few; else return evenly spaced ones, including the first and the last."""
     at = np.unique(np.rint(np.linspace(0, len(names) - 1, min(len(names), _MOST_NAMED))).astype(int))
     return [names[k] for k in at]
 
@@ -206,17 +211,15 @@ FEWER_SEEDS = "crossed: mean over fewer seeds than requested"
 # Largest number of names in the larger font.
 _MANY_NAMES = 12
 _MOST_COLUMNS = 4
-# Labels of marks that a legend names if a panel has some.
-_MARKS = (FEWER_SEEDS, NOT_APPLICABLE)
 
 
 def legend_below(figure: Figure, handles: Mapping[str, object]) -> None:
-    """Add a legend of handles by name below the panels, in as many columns as have room.
+    """Add a legend below the panels, with an entry for each handle, in as many columns as fit.
 
-    The figure, in which all else is drawn, grows by the height of the legend.
+    The height of the figure grows by that of the legend. Therefore the legend is drawn last.
     """
-    marks = {name: handle for name, handle in named_handles(figure.axes).items() if name in _MARKS}
-    handles = dict(handles) | marks
+    marks = named_handles(figure.axes)
+    handles = dict(handles) | {name: marks[name] for name in (FEWER_SEEDS, NOT_APPLICABLE) if name in marks}
     look = {"loc": "outside lower center", "fontsize": 8 if len(handles) <= _MANY_NAMES else 7}
     for columns in range(_MOST_COLUMNS if handles else 0, 0, -1):
         legend = figure.legend(handles.values(), handles.keys(), ncols=columns, **look)
@@ -228,7 +231,7 @@ def legend_below(figure: Figure, handles: Mapping[str, object]) -> None:
 
 
 def named_handles(panels: Iterable[Axes]) -> dict[str, object]:
-    """Return the handles of all names in some panels."""
+    """Return the legend entries of everything that has a label in some panels."""
     found: dict[str, object] = {}
     for axes in panels:
         for handle, name in zip(*axes.get_legend_handles_labels(), strict=True):
@@ -237,5 +240,5 @@ def named_handles(panels: Iterable[Axes]) -> dict[str, object]:
 
 
 def model_handle(name: str, **look: object) -> Line2D:
-    """Return the handle of a model."""
+    """Return the legend entry of a model; `look` has keywords of `Axes.plot`."""
     return legend_handle(**{"ls": "none", "marker": MODEL_MARKERS[name], "color": GREY, "mec": GREY, "ms": 6} | look)

@@ -1,4 +1,4 @@
-"""Find the figures, which are the modules of this folder whose names begin with `fig` and a number, and draw them."""
+"""Find and draw the figures, which are the modules of this folder with names that begin with `fig` and a number."""
 
 from __future__ import annotations
 
@@ -26,18 +26,15 @@ def figure_number(name: str) -> int:
     return int(_NUMBERED.match(name)[1])
 
 
-def _names() -> list[str]:
-    names = [module.name for module in pkgutil.iter_modules(icha.figures.__path__) if _NUMBERED.match(module.name)]
-    return sorted(names, key=lambda name: (figure_number(name), name))
-
-
 def figure_module(name: str) -> ModuleType:
     """Return the module of a figure."""
     return importlib.import_module(f"icha.figures.{name}")
 
 
-# By name of the figure, in the order of the numbers.
-DECLARATIONS: dict[str, Declaration] = {name: figure_module(name).DECLARATION for name in _names()}
+_MODULES = (module.name for module in pkgutil.iter_modules(icha.figures.__path__))
+_NAMES = sorted(filter(_NUMBERED.match, _MODULES), key=figure_number)
+# Declarations by the name of the figure, in the order of the numbers.
+DECLARATIONS: dict[str, Declaration] = {name: figure_module(name).DECLARATION for name in _NAMES}
 
 
 def draw_figure(
@@ -48,10 +45,9 @@ def draw_figure(
     inputs: Mapping[str, str | Sequence[str]],
     arguments: Mapping[str, Any],
 ) -> None:
-    """Draw a figure and write it to `png` and `pdf`.
+    """Draw a figure and write it to `png` and `pdf`; if none of its runs is complete, the page only has a message.
 
-    `inputs` and `arguments` are those of its declaration. If no run that it shows is complete, the figure is an empty
-    page with a message.
+    `inputs` and `arguments` are those that the declaration of the figure returns.
     """
     from icha.figures.select import NothingToDraw
 

@@ -1,11 +1,7 @@
-"""Select what a figure shows from a campaign dataset.
-
-All functions raise ValueError if the campaign has no such study, run or snapshot; the message names those it has.
-"""
+"""Select what a figure shows from a campaign dataset."""
 
 from __future__ import annotations
 
-import contextlib
 import itertools
 from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING, NamedTuple
@@ -22,13 +18,13 @@ if TYPE_CHECKING:
 
 
 class NothingToDraw(ValueError):
-    """A study has no complete run of the kind that a figure shows; the message names what is missing."""
+    """No complete run of the kind that a figure shows; the message names what is missing."""
 
 
 class ContactRuns(NamedTuple):
-    """The complete runs of one contact with one model, one for each seed.
+    """The complete runs of one material, surface and rms slope with one model: one run for each seed.
 
-    Runs to which the asperity model is not applicable are apart from the others.
+    Runs for which the asperity model is not applicable are in a group of their own.
 
     Attributes
     ----------
@@ -50,7 +46,7 @@ class ContactRuns(NamedTuple):
 
 
 def group_by_contact(campaign: xr.DataTree, runs: Iterable[tuple[RunLabels, xr.Dataset]]) -> list[ContactRuns]:
-    """Group runs of the campaign that differ only in their seed."""
+    """Group runs that differ only in their seed."""
     found: dict[tuple, ContactRuns] = {}
     for labels, run in runs:
         key = labels._replace(seed=None), is_applicable(run)
@@ -68,8 +64,8 @@ def select_runs(
 
     Parameters
     ----------
-    ragged : whether the runs have their spots and events, which take long to select.
-    model : name of the model; left out, the `shown_model` of the study.
+    ragged : whether the runs include their spots and events, which take long to select.
+    model : name of the model. Default: the `shown_model` of the study.
 
     Raises
     ------
@@ -81,8 +77,6 @@ def select_runs(
     from icha.datasets.campaign import reduced_gap, runs_of_status, select_run
     from icha.datasets.variables.campaign import LOADED_RUNS, RAGGED
 
-    if study not in campaign.children:
-        raise ValueError(f"no study {study!r} in this campaign; expected one of: {', '.join(campaign.children)}")
     dataset = campaign[study].to_dataset()
     wanted = model or shown_model(dataset)
     found = [labels for labels in runs_of_status(dataset, study, LOADED_RUNS) if labels.model == wanted]
@@ -95,7 +89,7 @@ def select_runs(
 
 
 def asked_seeds(study: xr.Dataset, labels: RunLabels) -> int:
-    """Return the number of seeds that a study requests of a run's model, surface, slope and material."""
+    """Return the number of seeds that a study requests for the model, surface, slope and material of a run."""
     from icha.datasets.variables.campaign import COMPUTED_RUNS, MISSING
 
     at = place_of(study, {label: getattr(labels, label) for label in LABELS if label != "seed"})
@@ -103,23 +97,34 @@ def asked_seeds(study: xr.Dataset, labels: RunLabels) -> int:
 
 
 def is_applicable(run: xr.Dataset) -> bool:
-    """Return whether a run has no known reason against the use of the asperity model."""
+    """Return whether the asperity model is applicable to a run, as far as known."""
     return not run.attrs.get("applicability")
 
 
 def shown_model(study: xr.Dataset) -> str:
-    """Return the model that figures show first of a study: asperities, or else the study's first model."""
+    """Return the model that figures of a study show: asperities, or the study's first model if it has no asperities."""
     return first_model(study["model"].values.tolist())
 
 
-def pick(label: str, wanted, present: Sequence):
-    """Return `wanted`, or the first of the values that a label has in complete runs if `wanted` is None."""
-    if wanted is None:
-        return present[0]
-    if wanted not in present:
-        complete = ", ".join(map(str, dict.fromkeys(present)))
-        raise NothingToDraw(f"no run of {label} {wanted} is complete; complete runs have {label}: {complete}")
-    return wanted
+def select_by_labels(
+    runs: Iterable[tuple[RunLabels, xr.Dataset]], **wanted: object
+) -> list[tuple[RunLabels, xr.Dataset]]:
+    """Return the runs with the wanted labels; None stands for the label of the first run.
+
+    Raises
+    ------
+    NothingToDraw
+        If no run has a wanted label. The message lists the labels of the runs.
+    """
+    runs = list(runs)
+    for name, value in wanted.items():
+        present = [getattr(labels, name) for labels, _ in runs]
+        value = present[0] if value is None else value
+        if value not in present:
+            complete = ", ".join(map(str, dict.fromkeys(present)))
+            raise NothingToDraw(f"no run of {name} {value} is complete; complete runs have {name}: {complete}")
+        runs = [(labels, run) for labels, run in runs if getattr(labels, name) == value]
+    return runs
 
 
 def select_complete_run(campaign: xr.DataTree, labels: RunLabels) -> xr.Dataset:
@@ -134,7 +139,7 @@ def select_complete_run(campaign: xr.DataTree, labels: RunLabels) -> xr.Dataset:
 
 
 def path_steps(run: xr.Dataset) -> xr.Dataset:
-    """Return the first loading's steps at the study's targets, without those added for snapshots of another kind."""
+    """Return the steps of the first loading at the targets of the study, without targets added for snapshots."""
     from icha.datasets.campaign import loading_stops
 
     run = run.isel(step=loading_stops(run).values)
@@ -144,7 +149,7 @@ def path_steps(run: xr.Dataset) -> xr.Dataset:
 
 
 def branches(run: xr.Dataset) -> Iterator[tuple[str, xr.Dataset]]:
-    """Yield the branch and the steps of every leg of a run; a leg begins with the last step of the previous leg."""
+    """Yield the branch (loading or unloading) and the steps of every leg; a leg begins where the previous leg ends."""
     legs = run["leg"].values
     for leg in np.unique(legs):
         steps = np.flatnonzero(legs == leg)
@@ -152,18 +157,18 @@ def branches(run: xr.Dataset) -> Iterator[tuple[str, xr.Dataset]]:
 
 
 def unloading_legs(run: xr.Dataset) -> list[xr.Dataset]:
-    """Return the legs of a run that unload, each from its turning point on."""
+    """Return the unloading legs of a run; each begins at its turning point."""
     return [leg for branch, leg in branches(run) if branch == "unloading"]
 
 
 class Snapshots(NamedTuple):
-    """The runs of one contact, and the snapshots of the same state that they keep.
+    """The runs of one contact, and the position of a snapshot of the same state in each run.
 
     Attributes
     ----------
     runs : the runs.
     members : each run, and the position of its snapshot.
-    truths : the same with boundary elements, of the seeds that have it; empty if `runs` are boundary elements.
+    truths : the same for runs with boundary elements, if they have the snapshot. Empty if `runs` are boundary elements.
     """
 
     runs: ContactRuns
@@ -175,21 +180,21 @@ def select_snapshots(
     campaign: xr.DataTree, study: str, kind: str | None = None, target: float | None = None
 ) -> list[Snapshots]:
     """Return a snapshot of every run of the `shown_model` on the first surface and slope of a study."""
+    from icha.analysis.model_error import snapshot_if_any
     from icha.datasets.campaign import find_snapshot
 
     groups = group_by_contact(campaign, select_runs(campaign, study))
-    reference = [] if groups[0].labels.model == REFERENCE_MODEL else select_runs(campaign, study, model=REFERENCE_MODEL)
+    alone = groups[0].labels.model == REFERENCE_MODEL
+    reference = [] if alone else group_by_contact(campaign, select_runs(campaign, study, model=REFERENCE_MODEL))
     found = []
     for group in groups:
         if group.contact[1:] == groups[0].contact[1:]:
             members = [(run, find_snapshot(run, kind, target)) for run in group.by_seed.values()]
             run, at = members[0]
             state = str(run["snapshot_kind"].values[at]), float(run["snapshot_target"].values[at])
-            found.append(Snapshots(group, members, []))
-            for labels, truth in reference:
-                if labels._replace(model=group.labels.model, seed=group.labels.seed) == group.labels:
-                    with contextlib.suppress(ValueError):  # if the run does not keep the snapshot
-                        found[-1].truths.append((truth, find_snapshot(truth, *state)))
+            beside = [run for each in reference if each.contact == group.contact for run in each.by_seed.values()]
+            truths = [(truth, snapshot_if_any(truth, *state)) for truth in beside]
+            found.append(Snapshots(group, members, [truth for truth in truths if truth[1] is not None]))
     return found
 
 
@@ -202,17 +207,15 @@ _KIND_LABELS = {
 
 
 def snapshot_label(run: xr.Dataset, snapshot: int) -> str:
-    """Return load, area or separation of a snapshot in words."""
+    """Return the target of a snapshot as text, such as an area fraction with its value."""
     kind, value = str(run["snapshot_kind"].values[snapshot]), float(run["snapshot_target"].values[snapshot])
     if kind == "pull_off":
         return "pull-off"
     return f"{_KIND_LABELS[kind]} = {format_number(value)}"
 
 
-def select_errors(
-    model_error: xr.DataTree | None, study: str
-) -> Iterator[tuple[str, tuple[str, str, float], xr.Dataset]]:
-    """Yield the errors of each contact of a study, along seeds and loads.
+def select_errors(model_error: xr.DataTree | None, study: str) -> Iterator[tuple[tuple[str, str, float], xr.Dataset]]:
+    """Yield the errors of each contact of a study from all entries of a model error, along seeds and loads.
 
     Parameters
     ----------
@@ -220,124 +223,79 @@ def select_errors(
 
     Yields
     ------
-    Name of an entry of the model error; material, surface and rms slope; errors of this entry and contact. A campaign
-    need not request all combinations of the labels of an entry, so that all errors of a contact may be NaN.
+    Material, surface and rms slope; errors of one entry for this contact, all NaN if the entry does not have it.
     """
-    for name, node in model_error.children.items() if model_error is not None else ():
+    for node in model_error.children.values() if model_error is not None else ():
         if node.attrs["study"] != study:
             continue
         errors = node.to_dataset().transpose("seed", ...)
         for material, (surface, slope) in itertools.product(errors["material"].values, surfaces_and_slopes(errors)):
             labels = {"surface": surface, "rms_slope": slope, "material": material}
-            yield name, (str(material), surface, slope), errors.isel(place_of(errors, labels))
+            yield (str(material), surface, slope), errors.isel(place_of(errors, labels))
 
 
 def asked_of_entry(errors: xr.Dataset) -> int:
-    """Return the number of seeds, complete or not, for which an entry of a model error compares a contact."""
+    """Return the number of seeds that an entry of a model error requests for a contact."""
     from icha.datasets.variables.campaign import NOT_IN_DESIGN
 
     return int((errors["status"] != NOT_IN_DESIGN).sum("seed"))
 
 
-# --- runs that were unloaded: legs, and pull-offs and losses as lines of points ---
+# --- runs that were unloaded ---
 
-# Tension below this fraction of the largest pressure is rounding.
+# Tension below this fraction of the largest pressure is a rounding error.
 ROUNDING = 1e-9
 
 
-class Leg(NamedTuple):
-    """A leg of a run, or the mean of the legs of several seeds.
-
-    Attributes
-    ----------
-    branch : `loading` or `unloading`.
-    values : reduced separation, reduced pressure and contact area fraction along the leg.
-    members : reduced pressure and contact area fraction of every seed, (seeds, k) each; empty for a single run.
-    """
-
-    branch: str
-    values: xr.Dataset
-    members: dict[str, np.ndarray]
-
-
-def average_legs(runs: Sequence[Sequence[tuple[str, xr.Dataset]]]) -> list[Leg]:
-    """Return means over the seeds, at common separations, of the legs of runs, given by branch and steps.
-
-    If the runs differ in their number of legs, return all legs.
-    """
-    from icha.analysis.common_loads import at_common_displacements
-
-    if len(runs) == 1 or len({len(legs) for legs in runs}) > 1:
-        return [Leg(branch, leg, {}) for legs in runs for branch, leg in legs]
-    found = []
-    for members in zip(*runs, strict=True):
-        branch, first = members[0]
-        separation, values = at_common_displacements([leg for _, leg in members])
-        means = {name: ("step", of_seeds.mean(axis=0)) for name, of_seeds in values.items()}
-        means["reduced_separation"] = ("step", separation)
-        found.append(Leg(branch, first.drop_dims("step").assign(means), values))
-    return found
-
-
 def select_unloaded_runs(campaign: xr.DataTree, study: str) -> list[tuple[RunLabels, xr.Dataset]]:
-    """Return the runs of a study that unload, without their spots and events, along their mean separation.
+    """Return the runs of a study that unload, without their spots and events.
 
-    The work of the load is the integral over the mean separation, also on a free square, whose mean gap is different.
+    Their reduced separation is the mean separation over the rms height, because the integral of the pressure over the
+    mean separation is the work. On a free square, the mean gap is different from the mean separation.
 
     Raises
     ------
     NothingToDraw
-        If no run is complete, or none was unloaded.
+        If no run is complete, or none unloads.
     """
     runs = [(labels, run) for labels, run in select_runs(campaign, study, ragged=False) if unloading_legs(run)]
     if not runs:
         raise NothingToDraw(f"study {study}: no run was unloaded; expected a study that unloads")
-    return [
-        (labels, run.assign(reduced_separation=run["mean_separation"] / run["rms_height"]))
-        if str(run["boundary"].values) == "free"
-        else (labels, run)
-        for labels, run in runs
-    ]
+    return [(labels, run.assign(reduced_separation=run["mean_separation"] / run["rms_height"])) for labels, run in runs]
 
 
 def select_detached_lines(
     campaign: xr.DataTree, studies: Sequence[str], *, along_slopes: bool = False
 ) -> dict[tuple[tuple[str, str, float | None], bool], list[ContactRuns]]:
-    """Return the runs of some studies that were unloaded to complete separation, as lines of points.
+    """Return the runs of some studies that were unloaded to complete separation, arranged as lines of points.
 
     Parameters
     ----------
-    along_slopes : whether rms slopes are points on a line, and not different lines.
+    along_slopes : whether a line has points at several rms slopes. If not, every rms slope has its own line.
 
     Returns
     -------
-    The runs of every point, by contact and whether the asperity model is applicable.
+    For each line, the runs of its points. A line is given by its contact, and whether the asperity model is applicable.
 
     Raises
     ------
     NothingToDraw
-        If no study has any such run.
+        If there is no such run, or if no run of a study is complete.
     """
-    found, reasons = {}, []
+    found = {}
     for study in studies:
-        try:
-            runs = [each for each in select_unloaded_runs(campaign, study) if "hysteresis_loss" in each[1]]
-        except NothingToDraw as reason:
-            reasons.append(str(reason))
-            continue
-        if not runs:
-            reasons.append(f"study {study}: no run was unloaded to complete separation")
+        runs = [each for each in select_runs(campaign, study, ragged=False) if "hysteresis_loss" in each[1]]
         for point in group_by_contact(campaign, runs):
             material, surface, slope = point.contact
             line = (material, surface, None if along_slopes else slope), point.applicable
             found.setdefault(line, []).append(point)
-    if reasons and not found:
-        raise NothingToDraw("; ".join(reasons))
+    if studies and not found:
+        raise NothingToDraw(f"studies {', '.join(studies)}: no run was unloaded to complete separation")
     return found
 
 
 def pull_off_step(run: xr.Dataset) -> int | None:
-    """Return the step of largest tension on the last unloading, or None without tension."""
+    """Return the step of the largest tension in the last unloading; None if there is no tension."""
     last = unloading_legs(run)[-1]
     lowest = int(np.argmin(last["nominal_pressure"].values))
     step = np.flatnonzero(run["step"].values == last["step"].values[lowest])[0]
@@ -346,6 +304,6 @@ def pull_off_step(run: xr.Dataset) -> int | None:
 
 
 def name_model(axes: Axes, campaign: xr.DataTree, studies: Iterable[str]) -> None:
-    """Write the model of some studies above a panel."""
+    """Write the name of the model of some studies above a panel."""
     models = dict.fromkeys(shown_model(campaign[study].to_dataset()) for study in studies)
     axes.set_title(", ".join(MODELS[model].words for model in models), loc="right")

@@ -59,7 +59,6 @@ RC = {
     "figure.dpi": 100,
     "savefig.dpi": 300,
     "pdf.fonttype": 42,
-    "svg.hashsalt": "icha",
 }
 
 

@@ -1,13 +1,14 @@
 """Ewald sums for the displacement of a half-space by forces at points and by their periodic images.
 
-A point force F displaces the half-space by F/(pi E* r). All periodic images are summed, with the uniform
-counter-pressure that keeps the mean displacement zero. The sum is split as Ewald's. The smooth half, erf(alpha r)/r, is
-evaluated by its Fourier series, (2/(E* q)) erfc(q/(2 alpha)) per mode and cell area, with non-uniform FFTs. The
-short-ranged half is summed pairwise.
+A point force F displaces the half-space by F/(pi E* r). The sum includes all periodic images, and a uniform
+counter-pressure that keeps the mean displacement zero. Ewald's method splits 1/r into two halves. The smooth half,
+erf(alpha r)/r, is summed as a Fourier series with non-uniform FFTs; each mode is (2/(E* q)) erfc(q/(2 alpha)) over the
+area of the cell. The short-ranged half, erfc(alpha r)/r, is summed over near pairs. Forces at points have moments: the
+k-th moment acts by the k-th power of the plane Laplacian of 1/r (`icha.half_space.grid_displacement`).
 
-A square on a free half-space is not loaded outside the square. The square is put into a periodic cell of twice its
-side. In this cell two points of the square are closer to each other than to any image. The displacement by images and
-counter-pressure is subtracted (`icha.half_space.free_square`), so that the sum of F/(pi E* r) over the square remains.
+A single square on a free half-space has no images. It is put into a periodic cell of twice its side, in which two
+points of the square are closer to each other than to any image. Then the displacement by images and counter-pressure
+is subtracted (`icha.half_space.free_square`), so that the sum of F/(pi E* r) over the square remains.
 """
 
 from __future__ import annotations
@@ -27,10 +28,10 @@ from icha.surfaces.square import cell_of, periodic_difference
 # Value of alpha r at which both halves of the Ewald sum are cut off, erfc(4.3) = 1.2e-9, and tolerance of the FFTs.
 _CUT = 4.3
 _NUFFT_TOLERANCE = 1e-9
-# The same for the approximate operator of a linear solve: erfc(2.75) = 1e-4.
+# The same for the approximate sum that a linear solve uses: erfc(2.75) = 1e-4.
 _LOOSE_CUT = 2.75
 _LOOSE_NUFFT_TOLERANCE = 1e-4
-# Number of points within the near field if its pairs are used in many sums, and if they are used once.
+# Mean number of points in the near field of a point: if the pairs are used in many sums, and if they are used once.
 NEIGHBOURS = 60
 NEIGHBOURS_ONCE = 20
 # Distance, in mean spacings of the points, below which the fields of the moments are constant. They are singular at
@@ -38,8 +39,8 @@ NEIGHBOURS_ONCE = 20
 _FLOOR = 0.05
 
 
-def _smooth(r, alpha):
-    """Return erf(alpha r)/r and its plane Laplacian; r >= 0."""
+def _smooth_kernel(r, alpha):
+    """Return erf(alpha r)/r and its plane Laplacian at distances r >= 0, two arrays."""
     x = alpha * r
     tiny = x < 0.05
     safe = np.where(tiny, 1.0, r)
@@ -55,23 +56,23 @@ def _smooth(r, alpha):
 
 
 def smooth_mode(q, alpha, contact_modulus, period):
-    """Return the smooth half of the displacement by a unit point force and its images, at wave number q > 0."""
+    """Return the Fourier mode of the smooth half of the displacement by a unit force, at wave number q > 0, m/N."""
     return 2 / (contact_modulus * q * period**2) * erfc(q / (2 * alpha))
 
 
 def short_mean(alpha, contact_modulus, period):
-    """Return the mean of the short-ranged half of the displacement by a unit point force and its images."""
+    """Return the mean over the cell of the short-ranged half of the displacement by a unit force, m/N."""
     return 2 / (np.sqrt(np.pi) * contact_modulus * alpha * period**2)
 
 
 class _SmoothSum:
-    """Smooth half of the Ewald sum, as non-uniform FFTs between points.
+    """Function that sums the smooth half of the displacement with non-uniform FFTs.
 
-    The FFT plans are expensive and depend on the number of modes alone; points are set when they change.
+    Making the FFT plans takes long. They depend only on the number of modes; points are set when they change.
     """
 
     def __init__(self, period, alpha, contact_modulus, cut, tolerance, dtype=np.complex128):
-        """Prepare the FFTs; dtype: complex type of the sums."""
+        """Make the FFT plans; `cut` is the largest q/(2 alpha), `dtype` the complex type of the sums."""
         self._period, self._dtype, self._real = period, np.dtype(dtype), np.empty(0, dtype).real.dtype
         highest = int(np.ceil(cut * alpha * period / np.pi))
         k = np.arange(-highest, highest + 1) * (2 * np.pi / period)
@@ -82,12 +83,13 @@ class _SmoothSum:
         self._unit = float(green.max())
         self._green = (green / self._unit).astype(self._real)
         self._laplacian = -q2 * self._green
-        # One thread: the order of summation, and with it every bit of the result, is then fixed.
+        # With one thread the order of summation, and with it every bit of the result, is fixed.
         options = {"eps": tolerance, "nthreads": 1, "upsampfac": 1.25, "dtype": self._dtype.name}
         self._plans = [finufft.Plan(kind, q2.shape, isign=sign, **options) for kind, sign in ((1, -1), (2, 1))]
         self._points = [None, None]
 
     def _set_points(self, which, points):
+        """Set the points (n, 2), m, of plan 0 (sources) or plan 1 (targets), unless they are set already."""
         if self._points[which] is not points:
             angle = (points * (2 * np.pi / self._period)).astype(self._real)
             self._plans[which].setpts(np.ascontiguousarray(angle[:, 1]), np.ascontiguousarray(angle[:, 0]))
@@ -104,8 +106,8 @@ class _SmoothSum:
         if not second:
             modes = collect.execute((force / largest).astype(self._dtype)) * self._green
             return self._unit * largest * distribute.execute(modes).real
-        # Both real sets are transformed as one complex set. In its spectrum c the part with c(-k) = conj c(k) belongs
-        # to the forces.
+        # Forces and moments are transformed together, as real and imaginary parts. In the spectrum c the part with
+        # c(-k) = conj c(k) belongs to the forces.
         scale = largest / second or 1.0
         c = collect.execute(force + 1j * (scale * moment))
         mirrored = np.conj(c[::-1, ::-1])
@@ -115,11 +117,11 @@ class _SmoothSum:
 
 @dataclass(frozen=True, eq=False)
 class Ewald:
-    """Split of the sum into a smooth and a short-ranged half.
+    """Split of the sum over images into a smooth and a short-ranged half.
 
     Attributes
     ----------
-    period : period of the sum, m.
+    period : period of the sum, m; on a free half-space twice the side of the square.
     contact_modulus : E*, Pa.
     reach : radius of the near field, in which the short-ranged half is summed, m.
     floor : distance below which the fields of the moments are constant, m.
@@ -134,7 +136,7 @@ class Ewald:
 
     @classmethod
     def choose(cls, period, contact_modulus, count, neighbours, free=False):
-        """Choose the split for `count` points, with some neighbours in the near field.
+        """Choose the split for `count` points of which `neighbours` on average are in the near field of a point.
 
         period : side of the square, m; free : whether the square is single.
         """
@@ -149,58 +151,53 @@ class Ewald:
         return 0.5 * self.period if self.free else self.period
 
     def bases(self, points):
-        """Return the polynomials for the displacement by images at points (n, 2); None on a periodic surface."""
+        """Return `free_square.basis` of the y and the x of points (n, 2); None on a periodic surface."""
         return (basis(points[:, 1], self.period), basis(points[:, 0], self.period)) if self.free else None
 
     def image_displacement(self, sources, targets, moments):
-        """Return the displacement (n,) at the targets by the images of the sources; both given by their `bases`."""
+        """Return the displacement (n,), m, at the targets by the images of the sources; both are given by `bases`."""
         field = image_field(*sources, moments, self.period, self.contact_modulus)
         by, bx = targets
         return np.einsum("ia,ia->i", by @ field, bx)
 
     @cached_property
     def alpha(self):
-        """Wave number of the split, 1/m."""
+        """Parameter alpha of the split, 1/m."""
         return _CUT / self.reach
 
     @cached_property
     def smooth(self):
-        """Accurate smooth sum."""
+        """Accurate function for the smooth half."""
         return _SmoothSum(self.period, self.alpha, self.contact_modulus, _CUT, _NUFFT_TOLERANCE)
 
     @cached_property
     def loose(self):
-        """Smooth sum that is accurate to a thousandth."""
+        """Fast function for the smooth half, accurate to a thousandth."""
         return _SmoothSum(
             self.period, self.alpha, self.contact_modulus, _LOOSE_CUT, _LOOSE_NUFFT_TOLERANCE, np.complex64
         )
 
-    @property
-    def loose_reach(self):
-        """Radius of the near field of the loose sum, m."""
-        return self.reach * _LOOSE_CUT / _CUT
-
     @cached_property
     def once(self):
-        """Split for a sum whose pairs are used only once."""
+        """Split with a smaller near field, for a sum whose pairs are used only once."""
         return replace(self, reach=self.reach * np.sqrt(NEIGHBOURS_ONCE / NEIGHBOURS))
 
     @cached_property
     def mean(self):
-        """Mean of the short-ranged half by a unit force, m/N."""
+        """Value of `short_mean` for this split, m/N."""
         return short_mean(self.alpha, self.contact_modulus, self.period)
 
     @cached_property
     def self_displacement(self):
-        """Smooth half at r = 0 by a unit force and second moment, which the Fourier series includes."""
-        value, laplacian = _smooth(np.zeros(1), self.alpha)
+        """Smooth half at r = 0 by a unit force and by a unit second moment, m/N and 1/(N m): a point's own part."""
+        value, laplacian = _smooth_kernel(np.zeros(1), self.alpha)
         scale = 1 / (np.pi * self.contact_modulus)
         return scale * value[0], scale * laplacian[0]
 
     def kernels(self, r):
         """Return the short-ranged displacement at distances r by unit moments k = 0, 1, 2, three arrays.
 
-        They are erfc(alpha r)/r, its plane Laplacian, and 1/r^5, over pi E*.
+        They are erfc(alpha r)/r, its plane Laplacian, and 1/r^5, divided by pi E*.
         """
         r, alpha, scale = np.maximum(r, self.floor), self.alpha, 1 / (np.pi * self.contact_modulus)
         inverse, x2 = 1 / r, (alpha * r) ** 2
@@ -212,15 +209,15 @@ class Ewald:
         moment += 2 * alpha**2 * gauss
         return force, moment, scale * inverse**2 / r
 
-    def replaced(self, r):
-        """Return the whole displacement at distances r by unit moments k = 0, 1, 2, as the Ewald sum gives it."""
+    def point_displacement(self, r):
+        """Return the displacement at distances r by unit moments k = 0, 1, 2 that this sum contains, three arrays."""
         raised = np.maximum(r, self.floor)
         force, moment = 1 / raised, 1 / raised**3
         fourth = np.where(r <= self.reach, 1 / raised**5, 0.0)
         low = np.flatnonzero(r < self.floor)
         if len(low):
             # Below the floor only the short-ranged half is constant.
-            smooth, smooth_at_floor = _smooth(r[low], self.alpha), _smooth(raised[low], self.alpha)
+            smooth, smooth_at_floor = _smooth_kernel(r[low], self.alpha), _smooth_kernel(raised[low], self.alpha)
             force[low] += smooth[0] - smooth_at_floor[0]
             moment[low] += smooth[1] - smooth_at_floor[1]
         scale = 1 / (np.pi * self.contact_modulus)
@@ -231,17 +228,17 @@ class Ewald:
 class PointHalfSpace:
     """Half-space with forces and moments at n points, and its displacement at the same points.
 
-    The displacement at a point leaves out that by the point's own force.
+    The displacement at a point does not include that by the point's own force, but that by its images.
 
     Attributes
     ----------
     ewald : split of the sum.
     points : (n, 2) float, m.
-    pairs : near pairs as three arrays (later, earlier, distance), each pair once.
-    near : the short-ranged displacement by the moments k = 0, 1, 2; three pairs of an (n, n) lower triangular matrix
-        and its transpose.
-    near_loose : the same by forces, accurate to a thousandth, one such pair.
-    bases : polynomials of the points for their images on a free half-space; None on a periodic surface.
+    pairs : near pairs of points as three arrays (later, earlier, distance), each pair once.
+    near : matrices of the short-ranged displacement by unit moments k = 0, 1, 2: for each k an (n, n) lower triangular
+        matrix and its transpose.
+    near_loose : the same for forces alone, accurate to a thousandth.
+    bases : `Ewald.bases` of the points; None on a periodic surface.
     """
 
     ewald: Ewald
@@ -277,7 +274,7 @@ class PointHalfSpace:
 
     @classmethod
     def _assemble(cls, ewald, points, before, later, earlier):
-        """Append the pairs of the points that the half-space `before` does not have; without one, all pairs."""
+        """Build the half-space from these pairs of points and those of the half-space `before`, if it is not None."""
         n, known = len(points), 0 if before is None else len(before.points)
         difference = periodic_difference(points[later], points[earlier], ewald.period)
         r = np.sqrt(difference[:, 0] ** 2 + difference[:, 1] ** 2)
@@ -290,32 +287,32 @@ class PointHalfSpace:
             kernels = [np.concatenate([m.data, k]) for (m, _), k in zip(before.near, kernels, strict=True)]
             later, earlier, r = (np.concatenate(p) for p in zip(before.pairs, (later, earlier, r), strict=True))
         near = [scipy.sparse.csr_matrix((kernel, earlier, start), shape=(n, n)) for kernel in kernels]
-        counts = r <= ewald.loose_reach
+        counts = r <= ewald.reach * _LOOSE_CUT / _CUT
         ends = np.append(0, np.cumsum(counts))[start]
         loose = scipy.sparse.csr_matrix((kernels[0][counts], earlier[counts], ends), shape=(n, n))
         pairs, near = (later, earlier, r), tuple((matrix, matrix.T) for matrix in near)
         return cls(ewald, points, pairs, near, (loose, loose.T), ewald.bases(points))
 
     def displacement(self, force, moment, fourth):
-        """Return the displacement (n,), m, by forces (N), second (N m^2) and fourth moments (N m^4), each (n,)."""
+        """Return the displacement (n,), m, by forces (N), second (N m^2) and fourth moments (N m^4), all (n,)."""
         w = self.ewald.smooth(self.points, self.points, force, moment)
         for halves, strength in zip(self.near, (force, moment, fourth), strict=True):
             for half in halves:
                 w += half @ strength
         by_force, by_moment = self.ewald.self_displacement
         w -= by_force * force + by_moment * moment
-        return self._less_uniform_and_images(w, force, moment)
+        return self._subtract_mean_and_images(w, force, moment)
 
     def approximate_displacement(self, force):
-        """Return the displacement by forces alone to a thousandth, which suffices for a linear solve."""
+        """Return the displacement (n,), m, by forces alone, accurate to a thousandth, which a linear solve needs."""
         w = self.ewald.loose(self.points, self.points, force)
         for half in self.near_loose:
             w += half @ force
         w -= self.ewald.self_displacement[0] * force
-        return self._less_uniform_and_images(w, force)
+        return self._subtract_mean_and_images(w, force)
 
-    def _less_uniform_and_images(self, w, *moments):
-        """Subtract the mean of the short-ranged half and, on a free half-space, the displacement by images."""
+    def _subtract_mean_and_images(self, w, *moments):
+        """Subtract from w the mean of the short-ranged half and, on a free half-space, the displacement by images."""
         w -= self.ewald.mean * np.sum(moments[0])
         if self.bases is not None:
             w -= self.ewald.image_displacement(self.bases, self.bases, moments)

@@ -1,8 +1,8 @@
 """Single square on a free half-space: removal of the images from a periodic sum.
 
-The square lies in a periodic cell of twice its side. The nearest image of a point is as far from the square as the
-square is wide, so that the displacement by images is smooth. It is interpolated by Lagrange polynomials through a few
-Chebyshev nodes (the error falls as 5.8^-n) and subtracted from the periodic sum; the plain sum of 1/r remains.
+The square lies in a periodic cell of twice its side. The nearest image of a point is at least one side of the square
+away, so that the displacement by images is smooth. It is interpolated by Lagrange polynomials through n Chebyshev nodes
+along each side (the error falls as 5.8^-n) and subtracted from the periodic sum; the plain sum of 1/r remains.
 """
 
 from functools import lru_cache
@@ -12,14 +12,17 @@ from scipy.special import erf, erfc
 
 # Number of Chebyshev nodes along a side; the remainder is 2e-14 of the displacement by images.
 _NODES = 18
-# Wave number of the Ewald sum of the table, in 1/cell, and cuts of its halves, in cells and modes: erfc(6) = 2e-17.
+# Parameter alpha of the Ewald sum of the table, in 1/cell, and cuts of its halves, in cells and modes: erfc(6) = 2e-17.
 _ALPHA = 3.0
 _REACH = 3
 _HIGHEST = 6
 
 
 def basis(x, cell: float) -> np.ndarray:
-    """Return the Lagrange polynomials at x (n,), m, in [0, cell/2]: (n, nodes)."""
+    """Return the values of the Lagrange polynomials through the Chebyshev nodes at x (n,), m: (n, nodes).
+
+    cell : period of the sum, m; x is in [0, cell/2].
+    """
     nodes, weight, _ = _chebyshev()
     distance = np.asarray(x)[:, None] / cell - nodes
     on_node = distance == 0
@@ -31,7 +34,7 @@ def basis(x, cell: float) -> np.ndarray:
 
 
 def image_field(by, bx, moments, cell: float, contact_modulus: float) -> np.ndarray:
-    """Return the displacement (nodes, nodes), m, by all images of some spots at the Chebyshev nodes of y and x.
+    """Return the displacement by all images of m spots at the Chebyshev nodes of y and x, (nodes, nodes), m.
 
     It includes the uniform displacement that makes the mean of the periodic sum zero.
 
@@ -43,18 +46,18 @@ def image_field(by, bx, moments, cell: float, contact_modulus: float) -> np.ndar
     """
     _, _, second = _chebyshev()
     field = np.zeros((_NODES, _NODES))
-    # The k-th moment acts by the k-th power of the Laplacian: Horner's rule.
+    # The k-th moment acts by the k-th power of the Laplacian: they are summed by Horner's rule.
     for k, moment in enumerate(reversed(moments)):
         if k:
             field = (second @ field + field @ second.T) / cell**2
         collected = by.T @ (moment[:, None] * bx)
-        field = field + (_table() @ collected.ravel()).reshape(field.shape)
+        field = field + (_image_potential_matrix() @ collected.ravel()).reshape(field.shape)
     return field / (np.pi * contact_modulus * cell)
 
 
 @lru_cache(maxsize=1)
 def _chebyshev():
-    """Return the nodes in [0, 1/2], the barycentric weights, and the matrix of the second derivative."""
+    """Return the Chebyshev nodes in [0, 1/2], their barycentric weights, and the matrix of the second derivative."""
     k = np.arange(_NODES)
     nodes = 0.25 * (1 - np.cos(np.pi * k / (_NODES - 1)))
     weight = (-1.0) ** k
@@ -67,8 +70,8 @@ def _chebyshev():
 
 
 @lru_cache(maxsize=1)
-def _table():
-    """Return the potential by images at every node by a unit source at every node, in a unit cell, as a matrix."""
+def _image_potential_matrix():
+    """Return `image_potential` at every node by a unit source at every node, (nodes^2, nodes^2)."""
     nodes, _, _ = _chebyshev()
     distance, index = np.unique(np.round(np.abs(nodes[:, None] - nodes), 15), return_inverse=True)
     index = index.reshape(_NODES, _NODES)
@@ -77,7 +80,7 @@ def _table():
 
 
 def image_potential(y, x):
-    """Return the sum of 1/r over all images of a unit cell less the uniform background; |x|, |y| <= 1/2."""
+    """Return the sum of 1/r over all images in cells of side 1, minus a uniform background; |x|, |y| <= 1/2."""
     r = np.hypot(y, x)
     safe = np.where(r > 0, r, 1.0)
     potential = -np.where(r > 0, erf(_ALPHA * safe) / safe, 2 * _ALPHA / np.sqrt(np.pi))
@@ -97,8 +100,8 @@ def image_potential(y, x):
 def mean_displacement(side: float, contact_modulus: float, position, force) -> float:
     """Return the mean displacement of a square of a free half-space by point forces (n,) at (n, 2) in it, m.
 
-    By reciprocity it is the displacement of the points by a uniform pressure on the square. Each of the four rectangles
-    around a point contributes x asinh(y/x) + y asinh(x/y).
+    By reciprocity it follows from the displacement of the points by a uniform pressure on the square. Each of the four
+    rectangles around a point contributes x asinh(y/x) + y asinh(x/y).
     """
     x, y = ([distance, side - distance] for distance in np.clip(position.T, 0.0, side))
     potential = sum(_corner_potential(width, height) for width in x for height in y)
@@ -106,6 +109,6 @@ def mean_displacement(side: float, contact_modulus: float, position, force) -> f
 
 
 def _corner_potential(x, y):
-    """Integrate 1/r over a rectangle of sides x, y; r is the distance from a corner."""
+    """Return the integral of 1/r over a rectangle of sides x, y; r is the distance from one of its corners."""
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.where(x > 0, x * np.arcsinh(y / x), 0.0) + np.where(y > 0, y * np.arcsinh(x / y), 0.0)

@@ -1,13 +1,13 @@
 """Displacement of the half-space at all nodes of a grid, and the nodes around every spot.
 
 The sum over spots and images is split as in `icha.half_space.ewald`: a smooth half by its Fourier series, and a
-short-ranged half in a window around every spot. The time depends on the total area of the windows, since the
-displacement is needed at every node. Four moments of the pressure represent a spot beyond five radii, which makes the
-windows small. But the smooth half of a large spot must be smooth on the scale of that spot. So spots of similar size
-form groups, and every group has a Fourier series of its own length.
+short-ranged half in a window around every spot. The time depends on the total area of the windows. Four moments of the
+pressure represent a spot beyond five radii, so that small spots have small windows. The smooth half of a large spot
+must be smooth on the scale of that spot. So spots of similar size form groups, and every group has a Fourier series of
+its own length.
 
 With the moments M_k = integral of p r^(2k) / (4^k k!^2) a spot displaces points far away by the sum over k of
-M_k Lap^k (1/(pi E* r)). Its Fourier transform is that of a point with the sum of M_k (-q^2)^k in place of its force.
+M_k Lap^k (1/(pi E* r)). Its Fourier transform is that of a point force, with the sum of M_k (-q^2)^k as the force.
 """
 
 import math
@@ -31,9 +31,9 @@ _NUFFT_TOLERANCE = 1e-12
 # Distance, in radii of a spot, beyond which its four moments represent it, up to 1e-8 of the displacement at its edge.
 _WINDOW = 5.0
 _MOMENTS = 4
-# Ratio of the windows of neighbouring groups of spots.
+# Ratio of the widths of windows of neighbouring groups of spots.
 _LADDER = math.sqrt(2)
-# Number of nodes in a block of rows, and in the windows that are evaluated at a time: what fits the processor's cache.
+# Number of nodes in a block of rows, and in the windows that are evaluated at a time, so that they fit into the cache.
 _BLOCK = 2**19
 _BATCH = 2**15
 # Value of (alpha r)^2 below which the smooth half is a power series, and number of terms of that series.
@@ -42,16 +42,16 @@ _SERIES_LENGTH = 15
 
 
 def row_blocks(grid: int) -> list[slice]:
-    """Divide the rows of a grid into blocks whose size depends on the grid alone."""
+    """Divide the rows of a grid into blocks; their size depends on the grid alone, not on the number of cores."""
     return blocks(grid, max(_BLOCK // grid, 1))
 
 
 @dataclass(frozen=True, eq=False)
 class DisplacementField:
-    """Displacement w of the half-space at the nodes of a regular grid, due to m spots: the sum of eq. (9).
+    """Displacement w of the half-space at the nodes of a regular grid by m spots: the sum of eq. (9).
 
-    It is periodic and has zero mean; on a free half-space it is the plain sum over the spots. Inside a spot its own
-    part is the displacement under its contact.
+    It is periodic and has zero mean; on a free half-space it is the sum over the spots without images. At a node under
+    a spot it includes the displacement by this spot.
 
     Attributes
     ----------
@@ -82,7 +82,10 @@ class DisplacementField:
         return cell_of(self.grid, self.free)
 
     def map_blocks(self, function) -> list:
-        """Return the results of `function(rows, w)` for all blocks of rows in order; several threads work on them."""
+        """Call `function(rows, w)` with the displacement of every block of rows, in threads; return the results.
+
+        rows : slice; w : (rows.stop - rows.start, grid) float, m.
+        """
         if len(self.contact_radius):
             # Evaluate these once, before several threads need them.
             _ = self._smooth_half, self.free and self._images
@@ -92,14 +95,16 @@ class DisplacementField:
         """Return the displacement (rows.stop - rows.start, grid) at the nodes of a range of rows, m."""
         if not len(self.contact_radius):
             return np.zeros((rows.stop - rows.start, self.grid))
-        # A grid that is too coarse for the Fourier series is a part of a finer one.
+        # A grid that is too coarse for the Fourier series consists of some nodes of a finer one.
         finer, half = self._smooth_half
         nodes = np.arange(rows.start, rows.stop) * finer
         w = scipy.fft.irfft(half[nodes], n=finer * self._nodes, axis=1, norm="forward", workers=1)[:, ::finer]
-        w = np.ascontiguousarray(w) - self._short_mean
+        modulus = self.law.material.contact_modulus
+        mean = sum(np.sum(g.moments[:, 0]) * short_mean(g.alpha, modulus, self._cell) for g in self._groups)
+        w = np.ascontiguousarray(w) - mean
         for group in self._groups:
             for spot, dy, dx, node in windows(self.centres[group.spots], group.reach, self._nodes, self._cell, rows):
-                np.add.at(w.reshape(-1), node.ravel(), self._short_half(group, spot, dy, dx).ravel())
+                np.add.at(w.reshape(-1), node.ravel(), self._evaluate_short_half(group, spot, dy, dx).ravel())
         if self.free:
             w = w[:, : self.grid]
             by, bx, field = self._images
@@ -108,7 +113,7 @@ class DisplacementField:
 
     @cached_property
     def _images(self):
-        """Polynomials of the rows and columns, and the displacement by images at the nodes of the polynomials."""
+        """Displacement by images on a free half-space: `basis` of the rows and of the columns, and `image_field`."""
         nodes = basis(np.arange(self.grid) * (self.period / self.grid), self._cell)
         field = 0.0
         for group in self._groups:
@@ -119,16 +124,19 @@ class DisplacementField:
 
     @cached_property
     def _groups(self):
-        """Groups of spots by the width of their windows: wide enough for their radii, and for few Fourier modes."""
+        """Groups of spots whose windows have the same width, which suits their radii; a list of `_Group`."""
         count, widest = len(self.contact_radius), 0.5 * self._cell
         # This number of modes makes the Fourier series and the windows about equally costly.
         modes = min((2.0 * count * self._nodes**2) ** 0.25, (self._nodes - 1) // 2)
         narrowest = min(_CUT**2 / np.pi * self._cell / modes, widest)
         needed = np.clip(_WINDOW * self.contact_radius, narrowest, widest)
         rung = np.ceil(np.log(needed / narrowest) / math.log(_LADDER) - 1e-9).astype(int)
-        return [self._group(np.flatnonzero(rung == k), min(narrowest * _LADDER**k, widest)) for k in np.unique(rung)]
+        return [
+            self._make_group(np.flatnonzero(rung == k), min(narrowest * _LADDER**k, widest)) for k in np.unique(rung)
+        ]
 
-    def _group(self, spots, reach):
+    def _make_group(self, spots, reach):
+        """Make the group of the spots with these indices, with windows of half width `reach`, m."""
         a, R, alpha = self.contact_radius[spots], self.radius_of_curvature[spots], _CUT / reach
         order = np.arange(_MOMENTS)
         factorial = np.cumprod(np.maximum(order, 1))
@@ -136,36 +144,33 @@ class DisplacementField:
         return _Group(spots, reach, alpha, moments)
 
     @cached_property
-    def _short_mean(self):
-        modulus = self.law.material.contact_modulus
-        return sum(np.sum(g.moments[:, 0]) * short_mean(g.alpha, modulus, self._cell) for g in self._groups)
-
-    @cached_property
     def _smooth_half(self):
-        """Factor of the finer grid, and the Fourier series along x at the rows of that finer grid."""
-        modes = on_cores(self._modes, self._groups)
+        """Smooth half of all groups: factor by which its grid is finer, and Fourier series along x of all its rows."""
+        modes = on_cores(self._compute_modes, self._groups)
         highest = [each.shape[1] - 1 for each in modes]
         finer = -(-(2 * max(highest) + 1) // self._nodes)
         half = np.zeros((finer * self._nodes, max(highest) + 1), dtype=complex)
         for k, each in zip(highest, modes, strict=True):
             half[np.arange(-k, k + 1) % len(half), : k + 1] += each
 
-        def along_y(columns):
+        def transform_along_y(columns):
+            """Replace some columns of Fourier coefficients by their values at the rows."""
             half[:, columns] = scipy.fft.ifft(half[:, columns], axis=0, norm="forward", workers=1)
 
-        on_cores(along_y, blocks(half.shape[1], 64))
+        on_cores(transform_along_y, blocks(half.shape[1], 64))
         return finer, half
 
-    def _modes(self, group):
-        """Fourier coefficients (2k + 1, k + 1) of the smooth half by one group of spots."""
+    def _compute_modes(self, group):
+        """Return the Fourier coefficients (2k + 1, k + 1) of the smooth half of one group of spots, m."""
         highest = math.ceil(_CUT * group.alpha * self._cell / np.pi - 1e-9)
         y, x = (np.ascontiguousarray(self.centres[group.spots, axis]) * (2 * np.pi / self._cell) for axis in (1, 0))
         k = np.arange(-highest, highest + 1) * (2 * np.pi / self._cell)
         q2 = k[:, None] ** 2 + k[None, highest:] ** 2
         strength, factor = np.zeros(q2.shape, dtype=complex), np.ones(q2.shape)
         for even, odd in group.moments.T.reshape(-1, 2, len(group.spots)):
-            # Two real sets are transformed as one complex set. In its spectrum c the part with c(-k) = conj c(k)
-            # belongs to the first. With one thread the order of summation, and with it every bit, is fixed.
+            # Two moments are transformed together, as real and imaginary parts. In the spectrum c the part with
+            # c(-k) = conj c(k) belongs to the first. With one thread the order of summation, and with it every bit, is
+            # fixed.
             c = finufft.nufft2d1(y, x, even + 1j * odd, (len(k), len(k)), eps=_NUFFT_TOLERANCE, isign=-1, nthreads=1)
             mirrored = np.conj(c[::-1, ::-1])[:, highest:]
             c = c[:, highest:]
@@ -178,8 +183,8 @@ class DisplacementField:
         strength[highest, 0] = 0.0
         return strength
 
-    def _short_half(self, group, of_group, dy, dx):
-        """Return the exact displacement less the smooth half in the windows of spots, shaped as the windows."""
+    def _evaluate_short_half(self, group, of_group, dy, dx):
+        """Return the exact displacement minus the smooth half in windows of a group; arguments as from `windows`."""
         spot, r2 = group.spots[of_group], dy[:, None] ** 2 + dx**2
         a, R = self.contact_radius[spot][:, None], self.radius_of_curvature[spot][:, None]
         w = self.law.displacement(np.sqrt(r2), a, R)
@@ -198,7 +203,7 @@ class _Group:
     ----------
     spots : (m,) int, indices of the spots.
     reach : half the width of their windows, m.
-    alpha : wave number of the split, 1/m.
+    alpha : parameter of the split, 1/m.
     moments : (m, 4) float, M_k alpha^(2k), N.
     """
 
@@ -209,7 +214,10 @@ class _Group:
 
 
 def smooth_half(y, moments):
-    """Return the sum over k of moments[:, k] Lap^k (erf(x)/x), Lap in the plane, at y = x^2 (m, n); moments (m, 4)."""
+    """Return the sum over k of moments[:, k] Lap^k (erf(x)/x) at y = x^2, (m, n), with the plane Laplacian Lap.
+
+    y : (m, n) float; moments : (m, 4) float.
+    """
     coefficients = np.einsum("mk,kj->mj", moments, _SMOOTH_HALF)
     multipole, gauss, series = np.split(coefficients, [_MOMENTS, 3 * _MOMENTS - 2], axis=1)
     safe = np.maximum(y, _SERIES_BELOW)
@@ -229,7 +237,7 @@ def smooth_half(y, moments):
 
 
 def _horner(coefficients, x):
-    """Evaluate polynomials in x with coefficients along axis 1, lowest power first."""
+    """Return the values of polynomials at x; their coefficients are along axis 1, lowest power first."""
     value = coefficients[:, -1] * x
     for k in range(coefficients.shape[1] - 2, 0, -1):
         value += coefficients[:, k]
@@ -241,12 +249,12 @@ def _horner(coefficients, x):
 def _smooth_half_table():
     """Return the coefficients of Lap^k (erf(x)/x), k = 0..3 (rows), in powers of y = x^2.
 
-    They belong to (1) the factor of erf(x)/x, falling from y^0, (2) the factor of exp(-y), from y^-3 to y^2, and (3)
-    the power series of the whole, rising from y^0.
+    The columns are the coefficients of (1) the factor of erf(x)/x, y^0 to y^-3, (2) the factor of exp(-y), y^-3 to y^2,
+    and (3) the power series of the whole, from y^0 on.
 
     Lap^k (erf(x)/x) = (d_k y^-k) erf(x)/x - exp(-y) g_k(y) with Laurent polynomials g_k. In the plane
-    Lap y^j = 4 j^2 y^(j-1), from which d_(k+1) = (2k+1)^2 d_k; with 2/sqrt(pi) exp(-y), the derivative of erf, the
-    recurrence for g_k below follows.
+    Lap y^j = 4 j^2 y^(j-1); therefore d_(k+1) = (2k+1)^2 d_k. The derivative of erf, 2/sqrt(pi) exp(-y), gives the
+    recurrence for g_k below.
     """
     multipole = np.zeros((_MOMENTS, _MOMENTS))
     gauss = np.zeros((_MOMENTS, 2 * _MOMENTS - 2))
@@ -274,14 +282,14 @@ _SMOOTH_HALF = _smooth_half_table()
 
 
 def windows(centres, reach: float, grid: int, period: float, rows: slice):
-    """Yield the nodes of a range of rows within `reach` (m) of each of the centres (m, 2), in x and in y.
+    """Yield the nodes in squares of half width `reach`, m, around centres (m, 2), m, as far as they lie in some rows.
 
     Some nodes are a little farther away; no node occurs twice for one centre.
 
     Yields
     ------
-    Strips of nodes, which are parts of rows: indices of their centres (k,); distances from these along y (k,) and
-    along x (k, n), m; and indices of the nodes (k, n) in the flattened block of rows.
+    Parts of k rows with n nodes each: indices of their centres (k,); distances of the nodes from the centre along y
+    (k,) and along x (k, n), m; and indices of the nodes (k, n) in the flattened block of rows.
     """
     spacing = period / grid
     ahead = int(reach / spacing) + 1

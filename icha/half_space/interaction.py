@@ -1,10 +1,9 @@
 """Elastic interaction of contact spots: the displacement at each by all others and all images, the sum of eq. (4).
 
 Within eight radii of a spot its exact displacement is used. Farther away, the moments of its axisymmetric pressure
-represent the spot: the integrals of p s^(2k) (k = 0, 1, 2) with the weights 1, 1/4 and 9/64, whose fields fall as 1/r,
-1/r^3 and 1/r^5. The third moment is used only in pairwise sums. Images farther than half the cell act by the first two
-moments. `icha.half_space.ewald` computes once what depends on the positions alone, which is nearly everything. Only the
-pairs with exact displacement depend on the radii.
+represent the spot: force, second moment and fourth moment, whose fields fall as 1/r, 1/r^3 and 1/r^5. The fourth moment
+acts only in the near field of the Ewald sum. Most of the sum depends on the positions alone, and
+`icha.half_space.ewald` computes that part once. Only the exact displacements depend on the radii.
 """
 
 from __future__ import annotations
@@ -18,16 +17,16 @@ from scipy.spatial import cKDTree
 from icha.asperity.jkr import JKR
 from icha.half_space.ewald import NEIGHBOURS_ONCE, Ewald, PointHalfSpace
 
-# Distances, in radii of a spot, within which its displacement is exact, and beyond which force and second moment
-# suffice. In both cases the remainder is below 1e-6 of the spot's displacement there, and below 1e-7 of its approach.
+# Distances, in radii of a spot: up to the first one its displacement is exact, beyond the second one force and second
+# moment suffice. The error is then below 1e-6 of the spot's displacement there, and below 1e-7 of its approach.
 _WINDOW = 8.0
 _WINDOW_OF_MOMENTS = 16.0
 
 
 def _find_distant_pairs(tree, position, radius, ewald):
-    """Return (target, source, distance) of the pairs beyond the near field at which large spots act exactly.
+    """Return target, source and distance of the pairs beyond the near field in which a large spot acts exactly.
 
-    tree : of the targets; position (m, 2), radius (m,): centres and contact radii of the sources, m.
+    tree : search tree of the targets; position, radius : (m, 2) and (m,), centres and contact radii of the sources, m.
     """
     reach = np.minimum(_WINDOW_OF_MOMENTS * radius, 0.5 * ewald.period)
     wide = np.flatnonzero(reach > ewald.reach)
@@ -58,9 +57,9 @@ class Interaction:
     half_space : half-space with a point at every spot.
     radius_of_curvature : (n,) float, m.
     largest_radius : (n,) float, contact radii up to which the exact pairs suffice, m.
-    target, source : (k,) int, pairs of spots at which the source acts by its exact displacement.
+    target, source : (k,) int, exact pairs: spots at which another one, the source, acts by its exact displacement.
     r : (k,) float, distances of these pairs, m.
-    replaced : three (k,) arrays, displacement by unit moments, which the exact displacement replaces there.
+    by_moments : three (k,) arrays, displacement by unit moments of the source, which the exact one replaces.
     """
 
     law: JKR
@@ -70,11 +69,11 @@ class Interaction:
     target: np.ndarray
     source: np.ndarray
     r: np.ndarray
-    replaced: tuple
+    by_moments: tuple
 
     @classmethod
     def between(cls, law: JKR, half_space: PointHalfSpace, radius_of_curvature, largest_radius) -> Interaction:
-        """Find the exact pairs for contact radii up to `largest_radius` (n,), m; zero for spots without any."""
+        """Prepare the interaction for contact radii up to `largest_radius` (n,), m: find the exact pairs."""
         ewald = half_space.ewald
         later, earlier, r = half_space.pairs
         window = _exact_window(largest_radius, ewald)
@@ -91,28 +90,23 @@ class Interaction:
             np.concatenate([later[by_earlier], earlier[by_later], distant[0]]),
             np.concatenate([earlier[by_earlier], later[by_later], distant[1]]),
             r,
-            ewald.replaced(r),
+            ewald.point_displacement(r),
         )
 
     def displacement(self, a):
-        """Return the displacement w (n,) at the spots for contact radii a (n,), m.
-
-        A spot's own displacement is left out, that of its images is included.
-        """
+        """Return the displacement w (n,) at each spot by all others and all images, for contact radii a (n,), m."""
         law, R, j = self.law, self.radius_of_curvature, self.source
         moments = law.force(a, R), law.second_moment(a, R), law.fourth_moment(a, R)
         exact = law.displacement(self.r, a[j], R[j])
-        for moment, replaced in zip(moments, self.replaced, strict=True):
-            exact -= moment[j] * replaced
+        for moment, displacement in zip(moments, self.by_moments, strict=True):
+            exact -= moment[j] * displacement
         return self.half_space.displacement(*moments) + np.bincount(self.target, exact, len(a))
 
     def tangent(self, a) -> tuple[Callable, Callable]:
-        """Linearise the displacement at contact radii a (n,), m; a change of a spot of radius zero does not count.
+        """Linearise the displacement at contact radii a (n,), m; changes of spots of radius zero are ignored.
 
-        Returns
-        -------
-        Two functions from changes of the radii to changes of the displacement, both (n,), m. The second one is accurate
-        to a thousandth and several times faster.
+        Return two functions that turn changes of the radii (n,), m, into changes of the displacement (n,), m. The first
+        one is exact; the second one is accurate to a thousandth and several times faster.
         """
         law, R, half_space = self.law, self.radius_of_curvature, self.half_space
         present = a > 0
@@ -123,18 +117,18 @@ class Interaction:
         ]
         counts = np.flatnonzero(present[self.source])
         j, r, target = self.source[counts], self.r[counts], self.target[counts]
-        fields = [moment[j] * replaced[counts] for moment, replaced in zip(moments, self.replaced, strict=True)]
-        # Exact derivatives at the pairs, less those of the fields that the half-space has there.
-        less_forces = law.displacement_derivative(r, a[j], R[j]) - fields[0]
-        less_moments = less_forces - fields[1] - fields[2]
+        fields = [moment[j] * field[counts] for moment, field in zip(moments, self.by_moments, strict=True)]
+        # Exact derivatives at the pairs, minus those by the forces alone and by all moments.
+        beyond_forces = law.displacement_derivative(r, a[j], R[j]) - fields[0]
+        beyond_moments = beyond_forces - fields[1] - fields[2]
 
         def exact(da):
             w = half_space.displacement(*(moment * da for moment in moments))
-            return w + np.bincount(target, less_moments * da[j], len(da))
+            return w + np.bincount(target, beyond_moments * da[j], len(da))
 
         def approximate(da):
             w = half_space.approximate_displacement(moments[0] * da)
-            return w + np.bincount(target, less_forces * da[j], len(da))
+            return w + np.bincount(target, beyond_forces * da[j], len(da))
 
         return exact, approximate
 
@@ -142,10 +136,10 @@ class Interaction:
 def displacement_at(
     law: JKR, period: float, points, position, a, R, ewald: Ewald | None = None, *, free: bool = False
 ) -> np.ndarray:
-    """Return the displacement w (n,) at any points by spots, the sum of eq. (9), m.
+    """Return the displacement w (n,), m, of the half-space at n points by m spots, the sum of eq. (9).
 
-    It is periodic and has zero mean; on a free half-space it is the plain sum at points of the same square. Inside a
-    spot its own part is the displacement under its contact.
+    It is periodic and has zero mean; on a free half-space it is the sum over the spots without images. At a point under
+    a spot it includes the displacement by this spot.
 
     Parameters
     ----------
@@ -153,7 +147,7 @@ def displacement_at(
     points : (n, 2) float, m.
     position : (m, 2) float, centres of the spots, m.
     a, R : (m,) float, contact radii and radii of curvature, m.
-    ewald : split of the sum, which then defines period and free; None chooses one for the number of spots.
+    ewald : split of the sum, whose period and free are then used; None chooses one for the number of spots.
     free : whether the square is single.
     """
     if not len(points) or not len(a):
@@ -171,8 +165,8 @@ def displacement_at(
     distant = _find_distant_pairs(tree, position, a, ewald)
     target, source, r = (np.append(x[close], y) for x, y in zip((target, source, r), distant, strict=True))
     exact = law.displacement(r, a[source], R[source])
-    for moment, replaced in zip(moments, ewald.replaced(r), strict=True):
-        exact -= moment[source] * replaced
+    for moment, displacement in zip(moments, ewald.point_displacement(r), strict=True):
+        exact -= moment[source] * displacement
     w += np.bincount(target, exact, len(points))
     w += ewald.smooth(position, points, *moments[:2])
     w -= ewald.mean * np.sum(moments[0])

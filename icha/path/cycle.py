@@ -1,8 +1,8 @@
 """Cycles of loading and unloading: all equilibria of a path that continues after the first loading.
 
-On unloading every spot follows its stable branch until it jumps off, up to complete separation or a turning point.
-Unloading visits the separations of the first loading again, the stations, so that both curves can be compared. Where an
-event changes the pressure, steps become so short that the work lost in the event is known.
+On unloading every spot follows its stable branch until it jumps off. Unloading ends at complete separation or at a
+turning point. It visits the separations of the first loading again, which are called stations, so that both curves can
+be compared. Where an event changes the pressure, steps become so short that the work lost in the event is known.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from icha.contact.model import ContactModel, NotConverged, State
-from icha.path.energy_balance import Step, Waypoint, waypoint_between
+from icha.path.energy_balance import Step, Waypoint, waypoint_without_target
 from icha.path.loading import PathProgress
 from icha.path.step_accuracy import StepAccuracy
 from icha.path.stops import (
@@ -30,7 +30,7 @@ from icha.path.stops import (
 )
 from icha.path.targets import LOADS, MEAN_SEPARATION, Path
 
-# Distance of the last station above first contact, in h_rms, without adhesion: at first contact itself the error of an
+# Distance of the last station above first contact, in h_rms, without adhesion. At first contact itself the error of an
 # equilibrium may leave a spot in contact.
 _ABOVE_CONTACT = 1e-8
 
@@ -38,20 +38,13 @@ _ABOVE_CONTACT = 1e-8
 def follow_cycle(
     contact: ContactModel, path: Path, longest: float, progress: PathProgress
 ) -> Generator[Waypoint, TargetFunction | None, None]:
-    """Yield all equilibria of a path that continues after the first loading, without their energy balances.
+    """Yield all equilibria of a path that continues after the first loading; errors as of `icha.path.follow.follow`.
 
-    After a waypoint the caller may send one more target (`generator.send`). The path meets it too if it comes before
-    the other targets, and yields its waypoint.
+    After a waypoint the caller may send one more target (`generator.send`). If this target comes before the others, the
+    path meets it too and yields its waypoint. The waypoints have no energy balances.
 
-    Parameters
-    ----------
     longest : longest step of the separation, m.
     progress : record of the path.
-
-    Raises
-    ------
-    NotConverged
-        As in `icha.path.follow.follow`.
     """
     start, targets = contact.untouched(), [TargetFunction(target, contact) for target in path.targets]
     # Targets at separations above first contact, where nothing touches.
@@ -61,7 +54,7 @@ def follow_cycle(
         targets.remove(each)
         progress.record_target(each.target, state)
         yield Waypoint(each.target, state, 0)
-    yield waypoint_between(start, 0)
+    yield waypoint_without_target(start, 0)
     cycle = _Cycle(contact, longest, progress, start)
     if contact.adhesive:
         cycle.step_length = cycle.event_length
@@ -69,13 +62,13 @@ def follow_cycle(
         cycle.stations = [start.separation + _ABOVE_CONTACT * contact.rms_height]
     yield from cycle.follow_leg(0, targets)
     if progress.skipped:
-        raise cycle.path_error()
+        raise cycle.make_path_error()
     for leg, turn in enumerate(path.turning_points, start=1):
         target = TargetFunction(turn, contact)
         if (target.excess(cycle.state) > 0) != (leg % 2 == 1):
             cycle.leg, name = leg, "unloading" if leg % 2 else "loading"
             reason = f"leg {leg} ({name}) starts already beyond the turning point {turn.describe()}"
-            raise cycle.path_error(NotConverged(reason))
+            raise cycle.make_path_error(NotConverged(reason))
         yield from cycle.follow_leg(leg, [target])
         progress.report_position(f"turning point {turn.describe()}", cycle.state)
     if path.unload:
@@ -88,7 +81,7 @@ def follow_cycle(
 
 @dataclass(eq=False)
 class _Cycle:
-    """Contact on a cyclic path: its state and the step that it takes next.
+    """Contact on a cyclic path: its state, and what decides the length of its next step.
 
     Attributes
     ----------
@@ -98,11 +91,12 @@ class _Cycle:
     state : last equilibrium.
     leg : number of the leg, even on loading and odd on unloading.
     step_length : length of the next step, m.
-    event_at : end of the shortest step that is known to contain an unresolved event, as direction times separation, m.
-    ahead : equilibria at the ends of steps that were too long, the next one last, if the model predicts steps.
-    longest_part : longest step since there were none ahead, m.
+    event_at : end of the shortest step found so far that contains the next event, as direction times separation, m; inf
+        if no event is known. Only of models that do not predict steps.
+    ahead : equilibria at the ends of steps that were too long, the next one last; only of models that predict steps.
+    longest_part : longest step since there were no such equilibria, m.
     accuracy : sums over all steps so far, and the accuracy that further steps need.
-    stations : separations visited on loading, which the path will visit again, ascending, m.
+    stations : separations visited on loading, which unloading will visit again, ascending, m.
     """
 
     contact: ContactModel
@@ -136,9 +130,9 @@ class _Cycle:
         """Direction of the separation: -1 on loading, 1 on unloading."""
         return -1 if self.loading else 1
 
-    def path_error(self, *failures: NotConverged) -> NotConverged:
-        """Return the exception for a path that cannot continue."""
-        return self.progress.path_error(self.state, self.loading, *failures)
+    def make_path_error(self, *failures: NotConverged) -> NotConverged:
+        """Return the exception for a path that cannot continue after the present state."""
+        return self.progress.make_path_error(self.state, self.loading, *failures)
 
     def follow_leg(
         self, leg: int, targets: list[TargetFunction], until_apart: bool = False
@@ -152,8 +146,8 @@ class _Cycle:
             if not self.loading and self._is_apart():
                 if until_apart:
                     return
-                raise self.path_error(self._apart_too_early(pending[0]))
-            state, step = self.find_next(min(self._distance_to_station(), length_limit))
+                raise self.make_path_error(self._make_separation_error(pending[0]))
+            state, step = self.find_next_equilibrium(min(self._distance_to_station(), length_limit))
             candidates = next_of_each_kind(pending) + ([sent] if sent else [])
             try:
                 target, met = find_first_target(candidates, self.state, state, self.direction)
@@ -166,11 +160,11 @@ class _Cycle:
                 if not until_apart:
                     self.progress.skipped.append(jump)
                     if leg:
-                        raise self.path_error() from None
+                        raise self.make_path_error() from None
                 self._keep(state)
                 continue
             except NotConverged as failure:
-                length_limit = self._halve(abs(step.separation_change), failure)
+                length_limit = self._halve_step(abs(step.separation_change), failure)
                 self._keep(state)
                 continue
             if met is not state:
@@ -181,10 +175,10 @@ class _Cycle:
                     self._keep(state)
                 step = Step.between(self.contact, self.state, met)
             listed = None if target is sent else target
-            self.progress.require_validity(self.state, met, listed, pending, self.loading)
+            self.progress.require_valid_state(self.state, met, listed, pending, self.loading)
             # The first contact forms in a step of `event_length`; the next step is the longest one.
             first = leg == 0 and len(visited) == 1
-            self.step_length = self.longest if first else self._next_length(step)
+            self.step_length = self.longest if first else self._choose_next_length(step)
             between, length_limit = self._advance(step, met), np.inf
             if self._is_new_station(met.separation, visited[-1]):
                 visited.append(met.separation)
@@ -200,12 +194,12 @@ class _Cycle:
             self.stations = sorted({*self.stations, *new})
 
     def _advance(self, step, state):
-        """Move on to the state at the end of a step, and return its waypoint between targets."""
+        """Move on to the state at the end of a step, and return its waypoint without a target."""
         self.accuracy.add(step, state)
         self.progress.record_equilibrium(state, self.loading)
         self.state = state
         self.ahead = [each for each in self.ahead if self.direction * (each.separation - state.separation) > 0]
-        return waypoint_between(state, self.leg, step)
+        return waypoint_without_target(state, self.leg, step)
 
     def _keep(self, state):
         """Keep an equilibrium ahead of the path as the end of a later step, if the model predicts steps."""
@@ -216,8 +210,8 @@ class _Cycle:
         """Return whether a state lies behind the present one in the direction of the leg."""
         return self.direction * (state.separation - self.state.separation) < 0
 
-    def find_next(self, length: float) -> tuple[State, Step]:
-        """Find the next equilibrium and the step to it, so short that its work is known.
+    def find_next_equilibrium(self, length: float) -> tuple[State, Step]:
+        """Find the next equilibrium by a step that is so short that its work is known; return it and the step.
 
         The step is halved until an equilibrium is found, and until its work is known or its length is at most
         `event_length`. If the tension has a new maximum within the step, the step ends at the maximum. If the model
@@ -234,10 +228,10 @@ class _Cycle:
             try:
                 state = self._find_equilibrium(start.separation + self.direction * length, length, ahead)
             except NotConverged as failure:
-                length = self._halve(length, failure)
+                length = self._halve_step(length, failure)
                 continue
             step = Step.between(self.contact, start, state)
-            # Because of the error of an equilibrium, an event may happen in a long step and not in a short one.
+            # Because equilibria have errors, an event may happen in a long step and not in a short one.
             passed = step.has_jump and self.direction * start.separation + self.event_length >= self.event_at
             sharp = length <= self.event_length or passed
             if sharp or (accuracy.is_work_known(state, step) and accuracy.is_tension_known(start, state, step)):
@@ -259,10 +253,11 @@ class _Cycle:
             self.step_length = min(self.step_length, length)
 
     def _find_equilibrium(self, separation, length, ahead=None):
-        """Find the equilibrium at a separation, or take one that was found from an earlier state.
+        """Find the equilibrium at the end of a step of this length, or take the one ahead; separation and length in m.
 
         On unloading all spots may lose their equilibrium together before any of them has reached its own jump-off. Then
-        the spot closest to jump-off breaks contact; if no equilibrium is found, the closest two, four, … spots.
+        the spot closest to jump-off breaks contact. If there is still no equilibrium, the closest two, four, … spots
+        break contact.
         """
         contact, start = self.contact, self.state
         if ahead is not None:
@@ -281,17 +276,18 @@ class _Cycle:
                 count *= 2
         raise first
 
-    def _halve(self, length, failure):
-        """Halve the step after a failed solve."""
-        length = self.progress.halve(length, failure, self.state, self.loading)
+    def _halve_step(self, length, failure):
+        """Return half the length of a step whose solve failed, m; the next step is not longer either."""
+        length = self.progress.halve_step(length, failure, self.state, self.loading)
         self.step_length = min(self.step_length, length)
         return length
 
-    def _next_length(self, step):
+    def _choose_next_length(self, step):
         """Return the length of the next step after a step, m.
 
-        If the model does not predict steps, it is twice the last length. Otherwise it is twice the longest of the steps
-        into which the last trial step was divided, or its length if this was one step whose error grows too much.
+        If the model does not predict steps, a step is twice as long as the last one. Otherwise it is twice as long as
+        the longest of the steps into which the last trial step was divided. If the last trial step was not divided, the
+        next one is as long, or twice as long if its error would not be too large.
         """
         longer = min(self.longest, 2 * self.step_length)
         if not self.contact.path_accuracy.predicts_steps:
@@ -306,31 +302,31 @@ class _Cycle:
         return min(self.longest, 2 * part)
 
     def _is_apart(self):
-        """Return whether nothing touches, and the separation is at least that of first contact."""
+        """Return whether there are no spots and the separation is at least that of first contact."""
         if self.contact.spot_count(self.state):
             return False
         highest = self.contact.untouched().separation - SAME_SEPARATION * self.contact.rms_height
         return self.state.separation >= highest
 
     def _is_new_station(self, separation, last):
-        """Return whether a separation is a new station, that is far enough from the last one.
+        """Return whether a separation is so far from the last station that it is a new one.
 
-        The many short steps around an event do not all become stations.
+        So not all of the short steps around an event become stations.
         """
         contact = self.contact
         between = self.longest / 64 if contact.adhesive else SAME_SEPARATION * contact.rms_height
         return abs(separation - last) > between
 
     def _distance_to_station(self):
-        """Return the distance to the next equilibrium ahead or station, m; the length of a step if there is none."""
+        """Return the distance to the next equilibrium ahead or station, m, or `step_length` if there is neither."""
         if self.ahead:
             return abs(self.ahead[-1].separation - self.state.separation)
         at, same, stations = self.state.separation, SAME_SEPARATION * self.contact.rms_height, self.stations
         k = bisect_left(stations, at - same) - 1 if self.loading else bisect_right(stations, at + same)
         return abs(stations[k] - at) if 0 <= k < len(stations) else self.step_length
 
-    def _apart_too_early(self, target):
-        """Return the exception for surfaces that are apart before a turning point."""
+    def _make_separation_error(self, target):
+        """Return the exception for a path on which the surfaces separate before a turning point."""
         reason = f"the surfaces are apart before the turning point {target.target.describe()}"
         if target.target.kind in LOADS:
             tension = max(0.0, -self.accuracy.lowest_pressure / target.target.quantity.scale(self.contact))

@@ -2,7 +2,7 @@
 
 Between two events the stored energy changes by the work done. An event changes the stored energy at constant
 separation, and the energy that it releases is lost. Over a closed path the losses of all events add up to the area of
-the hysteresis loop, the integral of p over u.
+the hysteresis loop in a diagram of pressure against separation.
 """
 
 from __future__ import annotations
@@ -21,26 +21,26 @@ from icha.path.targets import BETWEEN, Target
 
 
 def pressure_jump(du, dp, slope, end_slope):
-    """Return the part of a change of pressure that the tangents at both ends of the step do not explain, Pa."""
+    """Return the change of pressure in a step minus that by the mean stiffness of its ends: the part by events, Pa."""
     return dp - 0.5 * du * (slope + end_slope)
 
 
 def unresolved_work(du, pressure_jump):
-    """Bound the error of the work of a step whose events may happen anywhere in it, J/m^2."""
+    """Return the largest error of the work of a step whose events may happen anywhere in it, J/m^2."""
     return 0.5 * abs(du * pressure_jump)
 
 
 def integration_error(du, slope, end_slope):
-    """Estimate the error of the work of a step without events, J/m^2."""
+    """Return the estimated error of the work of a step without events, J/m^2."""
     return du**2 * abs(end_slope - slope) / 24
 
 
-# If the loss of a step exceeds this fraction of its work, its cause is a jump and not the error of the interaction.
+# If the loss of a step exceeds this fraction of its work, a jump causes it, and not the error of the interaction.
 _CERTAIN_LOSS = 0.1
 
 
-def _beside_full_contact(du, p, q, slope, end_slope):
-    """Return pressures, slopes and integration error of a step from or to full contact.
+def _extrapolate_to_full_contact(du, p, q, slope, end_slope):
+    """Return finite pressures p, q and slopes at both ends of a step from or to full contact, and its work error.
 
     Full contact is infinitely stiff: its pressure does no work, and jumps where contact closes or opens. At the end of
     the step that is in full contact, the pressure is extrapolated along the tangent at the other end.
@@ -77,10 +77,10 @@ class Step:
 
     @classmethod
     def between(cls, contact: ContactModel, before: State, after: State) -> Step:
-        """Evaluate the step from one state to the next.
+        """Return the step from one state to the next.
 
-        The pressure is integrated as the cubic with the pressures and stiffnesses of both ends. This places jumps of
-        the pressure in the middle of the step.
+        The work is the integral of the cubic with the pressures and stiffnesses of both ends. This is exact if jumps of
+        the pressure are in the middle of the step.
         """
         events = events_between(before, after)
         du = after.separation - before.separation
@@ -88,7 +88,7 @@ class Step:
         slope, end_slope = -contact.stiffness(before), -contact.stiffness(after)
         error = integration_error(du, slope, end_slope)
         if np.isinf(slope) or np.isinf(end_slope):
-            p, q, slope, end_slope, error = _beside_full_contact(du, p, q, slope, end_slope)
+            p, q, slope, end_slope, error = _extrapolate_to_full_contact(du, p, q, slope, end_slope)
         # Without adhesion contact forms and breaks without a jump of the pressure.
         jumps = len(events) if contact.adhesive else events.count(COALESCENCE) + events.count(SPLIT)
         return cls(
@@ -113,12 +113,12 @@ class Step:
 
     @property
     def unresolved(self) -> float:
-        """Bound of the error of the work because events may happen anywhere in the step, J/m^2."""
+        """Largest error of the work because events may happen anywhere in the step, J/m^2."""
         return unresolved_work(self.separation_change, self.pressure_jump) if self.has_jump else 0.0
 
     @property
     def unknown_work(self) -> float:
-        """Bound of the error of the work, J/m^2, where the pressure may also jump without an event.
+        """Largest error of the work if the pressure may also jump anywhere without an event, J/m^2.
 
         If nothing is lost, the work is the change of the stored energy, which is exact.
         """
@@ -126,7 +126,7 @@ class Step:
         return min(max(jump, self.integration_error), abs(self.loss))
 
     def jump_energy(self, contact: ContactModel) -> float:
-        """Return the energy that the jumps release, each as if its spot were alone, J/m^2."""
+        """Return the energy that the jumps of the step would release if every spot were alone, J/m^2."""
         return float(np.abs(self.events.energy).sum()) / contact.area
 
 
@@ -140,7 +140,7 @@ class EnergyBalance:
     jump_in, jump_off : losses by jumps into and out of contact.
     coalescence : loss by unions of spots and by their splitting.
     load_jump : loss by jumps at constant load, under load control.
-    unattributed : all other losses: errors of the integration, and what is not reciprocal in the interaction.
+    unattributed : all other losses: errors of the integration, and errors because the interaction is not reciprocal.
     """
 
     work: float = 0.0
@@ -150,19 +150,14 @@ class EnergyBalance:
     load_jump: float = 0.0
     unattributed: float = 0.0
 
-    @property
-    def loss(self) -> float:
-        """Sum of all losses, J/m^2."""
-        return self.jump_in + self.jump_off + self.coalescence + self.load_jump + self.unattributed
-
     def add_step(self, contact: ContactModel, step: Step) -> EnergyBalance:
         """Return the balance after one more step.
 
-        In a step without unions the whole loss is attributed to the jumps if it is within a factor of two of what the
-        same spots would lose alone, or not small compared with the work. Both kinds of jumps then share it in
-        proportion to what they would lose alone. In all other steps, and if one kind of jump gains energy and the other
-        loses energy, each jump is attributed what its spot would lose alone. The rest is a loss by coalescence if spots
-        united or split, and otherwise unattributed.
+        In a step without unions the whole loss is attributed to its jumps if it is within a factor of two of the energy
+        that the same spots would lose alone, or more than a tenth of the work. Jumps in and jumps off then share it in
+        proportion to the energy that they would lose alone. In all other steps, and if one kind of jump gains energy
+        and the other loses energy, each jump is attributed the energy that its spot would lose alone. The rest is a
+        loss by coalescence if spots have united or split, and otherwise unattributed.
         """
         events, united = step.events, step.has_union
         jump_in, jump_off = (
@@ -215,8 +210,8 @@ class Waypoint:
         return self.leg % 2 == 0
 
 
-def waypoint_between(state: State, leg: int, step: Step | None = None) -> Waypoint:
-    """Return the waypoint of an equilibrium between two targets."""
+def waypoint_without_target(state: State, leg: int, step: Step | None = None) -> Waypoint:
+    """Return the waypoint of an equilibrium that meets no target."""
     return Waypoint(Target(BETWEEN, state.separation), state, leg, step)
 
 
@@ -236,8 +231,8 @@ def summarise_loop(
     ----------
     rows : equilibria of the path in order, each with pressure, separation, area and energies by their names.
     pull_off_row : index of the row with the largest tension of the last unloading.
-    material : half-space and interface.
-    summit_pull_off_pressure : tension of all summits pulling their most at once, Pa.
+    material : material of the contact.
+    summit_pull_off_pressure : tension if all summits pulled with their pull-off force at once, Pa.
     unattributed : loss that belongs to no kind of event, J/m^2.
     """
     last, adhesive = rows[-1], material.surface_energy > 0

@@ -1,11 +1,11 @@
-"""Follow a path from first contact to its targets, which it meets exactly, and through unloading."""
+"""Follow a path from first contact to its targets, which are met exactly, and through unloading."""
 
 from collections.abc import Callable, Generator, Iterator
 from dataclasses import replace
 
 from icha.contact.model import ContactModel, State
 from icha.path.cycle import follow_cycle
-from icha.path.energy_balance import EnergyBalance, Waypoint, waypoint_between
+from icha.path.energy_balance import EnergyBalance, Waypoint, waypoint_without_target
 from icha.path.loading import PathProgress, first_loading
 from icha.path.stops import SAME_EXCESS, TargetFunction
 from icha.path.targets import BETWEEN, LOAD_CONTROL, REDUCED_PRESSURE, Path, Target
@@ -25,9 +25,9 @@ def follow(contact: ContactModel, path: Path, report: Callable[[str], None] | No
     Raises
     ------
     NotConverged
-        If an equilibrium is not found even with short steps, or the model does not cover a state of the path. If a
-        target lies inside a jump: on the first loading after the other targets have been met; at a turning point at
-        once. The last unloading leaves such targets out without an error.
+        If an equilibrium is not found even with short steps, if the model does not cover a state of the path, or if a
+        target lies inside a jump. On the first loading, this last error is raised after the other targets have been
+        met. The last unloading omits targets inside jumps without an error.
     """
     longest = path.max_step * contact.rms_height
     record = PathProgress(contact, len(path.targets), longest, report)
@@ -40,7 +40,7 @@ def follow(contact: ContactModel, path: Path, report: Callable[[str], None] | No
 
 
 def _add_balances(contact, waypoints):
-    """Yield the same waypoints with their energy balances."""
+    """Yield the waypoints of a path under separation control, with the energy balance added to each."""
     balance = EnergyBalance()
     for waypoint in waypoints:
         if waypoint.step is not None:
@@ -55,8 +55,8 @@ def select_load_control(
 
     Where the pressure turns back, load control cannot follow the curve. The state then jumps at constant pressure to
     the next state of the curve with the same pressure, or to the state without contact. The states between are left
-    out. The cycle meets the pressure after the jump exactly, as an additional target. The events of the states that
-    were left out belong to the state after the jump.
+    out; their events belong to the state after the jump. To meet this state exactly, its pressure is sent to the cycle
+    as an additional target.
 
     Parameters
     ----------
@@ -88,7 +88,7 @@ def select_load_control(
             balance = balance.add_load_jump(contact, visited, state, level)
         elif waypoint.step is not None:
             balance = balance.add_step(contact, waypoint.step)
-        yield replace(waypoint_between(state, waypoint.leg) if landed else waypoint, balance=balance)
+        yield replace(waypoint_without_target(state, waypoint.leg) if landed else waypoint, balance=balance)
         visited, left_out, landing, level = state, None, None, pressure
     if visited is not None and left_out is not None:
         yield replace(left_out, balance=balance.add_load_jump(contact, visited, left_out.state, level))

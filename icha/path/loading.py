@@ -1,4 +1,4 @@
-"""First loading from target to target, and the progress of a path."""
+"""First loading from target to target, and the record of a path's progress."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _MOST_EQUILIBRIA = 2000
 
 @dataclass(eq=False)
 class PathProgress:
-    """Record of the progress of a path; it raises the error of a path that cannot continue.
+    """Record of a path's progress, which makes the error of a path that cannot continue.
 
     Attributes
     ----------
@@ -39,7 +39,7 @@ class PathProgress:
     report : function that is called with a line of text at every target; None for no reports.
     reached : number of targets met so far.
     skipped : errors of the targets that lie inside jumps.
-    mark : separation from which equilibria are counted, m.
+    mark : separation that a path without progress does not leave by one longest step, m.
     idle : number of equilibria since the last target or since `mark` was set.
     """
 
@@ -59,11 +59,13 @@ class PathProgress:
             return
         if self.idle == _MOST_EQUILIBRIA:
             within = f"{self.longest / self.contact.rms_height:.3g} h_rms"
-            raise self.path_error(state, loading, NotConverged(f"no progress: {self.idle} equilibria within {within}"))
+            raise self.make_path_error(
+                state, loading, NotConverged(f"no progress: {self.idle} equilibria within {within}")
+            )
         self.idle += 1
 
     def record_target(self, target: Target, state: State) -> None:
-        """Count and report one more target."""
+        """Count and report a target that the path has met."""
         self.reached, self.idle = self.reached + 1, 0
         self.report_position(f"stop {self.reached} of {self.total}: {target.describe(6)}", state)
 
@@ -76,15 +78,15 @@ class PathProgress:
                 f"A/A0 {contact.area_fraction(state):.4e}, {contact.spot_count(state)} spots"
             )
 
-    def require_validity(
+    def require_valid_state(
         self, before: State, after: State, target: TargetFunction | None, pending: list[TargetFunction], loading: bool
     ) -> None:
-        """Raise `NotConverged` if the model does not cover the state after a step.
+        """Raise `NotConverged` if the model is not valid in the state after a step.
 
-        The mean planes must not meet between targets, unless the model covers full contact. At a target they may meet,
-        because the range of targets is limited already.
+        The mean planes must not meet between targets, unless the model is valid up to full contact. At a target they
+        may meet, because the range of targets is limited already.
 
-        target : the target that the state meets, if there is one; pending : sorted targets that are still to be met.
+        target : the target that the state meets, if there is one; pending : sorted targets that are not met yet.
         """
         contact = self.contact
         ahead = target or (pending[0] if pending else None)
@@ -92,25 +94,25 @@ class PathProgress:
         area = contact.area_fraction(after)
         if area > contact.largest_area_fraction:
             reason = f"the contact area grows to {area:.2f} of the nominal area, outside the range of the model,"
-            raise self.path_error(before, loading, NotConverged(f"{reason} before {name}"))
+            raise self.make_path_error(before, loading, NotConverged(f"{reason} before {name}"))
         if target is None and contact.largest_area_fraction < 1 and contact.mean_gap(after) <= 0:
             reason = f"the mean planes meet before {name}, outside the range of the model"
-            raise self.path_error(after, loading, NotConverged(reason))
+            raise self.make_path_error(after, loading, NotConverged(reason))
 
-    def halve(self, step: float, failure: NotConverged, state: State, loading: bool) -> float:
-        """Return half the step after a failed solve; raise the error of the path if the step is the shortest."""
+    def halve_step(self, step: float, failure: NotConverged, state: State, loading: bool) -> float:
+        """Return half the length of a step, m, whose solve failed; raise the path's error if this is too short."""
         if step / 2 < _SMALLEST_STEP * self.longest:
-            raise self.path_error(state, loading, failure) from failure
+            raise self.make_path_error(state, loading, failure) from failure
         return step / 2
 
-    def path_error(self, state: State, loading: bool, *failures: NotConverged) -> NotConverged:
-        """Return the exception for a path that cannot continue, with a note if the surface is sticky."""
+    def make_path_error(self, state: State, loading: bool, *failures: NotConverged) -> NotConverged:
+        """Return the exception for a path that cannot continue after a state; it states if the surface is sticky."""
         contact, failures = self.contact, (*self.skipped, *failures)
         sticky = ""
         # Adhesion alone has spread the contact, or prevents the first equilibrium.
         no_equilibrium = contact.spot_count(state) == 0 and not any(isinstance(each, InsideJump) for each in failures)
         if contact.adhesive and loading and (contact.pressure(state) < 0 or no_equilibrium):
-            reason = "there is no equilibrium after first contact" if no_equilibrium else "the load is still tensile"
+            reason = "no equilibrium exists after first contact" if no_equilibrium else "the load is still tensile"
             sticky = f"; {reason}: the surface is sticky, adhesion pulls it towards full contact"
         return NotConverged(
             f"at a mean separation of {state.separation / contact.rms_height:.4f} h_rms, "
@@ -121,7 +123,7 @@ class PathProgress:
 
 # Number of attempts to reach a target in one step before two states bracket it.
 _DIRECT_ATTEMPTS = 2
-# If a step to a target fails and is longer than `_LONG` longest steps, it is shortened to `_FIRST_FRACTION`.
+# If a step to a target fails and is longer than `_LONG` longest steps, it is multiplied by `_FIRST_FRACTION`.
 _FIRST_FRACTION, _LONG = 0.6, 0.1
 # Number of equilibria after a failed step before steps become longer again, because a longer step usually fails again.
 _PATIENCE = 8
@@ -130,19 +132,10 @@ _PATIENCE = 8
 def first_loading(
     contact: ContactModel, targets: list[TargetFunction], longest: float, progress: PathProgress
 ) -> Iterator[Waypoint]:
-    """Yield the targets of a path that ends with the first loading.
+    """Yield the waypoint at every target of a path that ends with the first loading; errors as of `follow`.
 
-    If a target is expected within the next step, the solver looks for it directly; otherwise the separation falls by
-    one step.
-
-    Parameters
-    ----------
-    longest : longest step of the separation, m.
-
-    Raises
-    ------
-    NotConverged
-        As in `icha.path.follow.follow`.
+    If a target is expected within the next step, the solver looks for it directly. Otherwise the separation decreases
+    by one step, m, which is at most `longest`.
     """
     state = first_contact = contact.untouched()
     pending, step, failed_trials, successes = sort_targets(targets, -1), longest, 0, 0
@@ -156,7 +149,7 @@ def first_loading(
         try:
             if distance <= step and failed_trials < _DIRECT_ATTEMPTS:
                 target = nearest
-                after = _solve_directly(nearest, expected, following, state, step)
+                after = _solve_within_step(nearest, expected, following, state, step)
                 if after is None:
                     # Try a shorter step first. If this fails too, two states bracket the target.
                     failed_trials = failed_trials + 1 if distance > _LONG * longest else _DIRECT_ATTEMPTS
@@ -172,11 +165,11 @@ def first_loading(
             state, failed_trials = jump.before, 0
             continue
         except NotConverged as failure:
-            step, successes = progress.halve(step, failure, state, loading=True), 0
+            step, successes = progress.halve_step(step, failure, state, loading=True), 0
             continue
         successes += 1
         step = min(longest, 2 * step) if successes >= _PATIENCE else step
-        progress.require_validity(state, after, target, pending, loading=True)
+        progress.require_valid_state(state, after, target, pending, loading=True)
         state = after
         progress.record_equilibrium(state, loading=True)
         if target is not None:
@@ -185,11 +178,11 @@ def first_loading(
             progress.record_target(target.target, state)
             yield Waypoint(target.target, state)
     if progress.skipped:
-        raise progress.path_error(state, True)
+        raise progress.make_path_error(state, True)
 
 
-def _solve_directly(target, expected, pending, state, step) -> State | None:
-    """Solve for the state at a target within a step, m; return None if there is none, or another target comes first."""
+def _solve_within_step(target, expected, pending, state, step) -> State | None:
+    """Return the state at a target; None if it is not within a step, m, or another pending target comes first."""
     try:
         found = target.solve(state, expected)
     except NotConverged:

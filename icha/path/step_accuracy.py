@@ -1,4 +1,4 @@
-"""Accuracy of the steps of a cyclic path: whether the work and the largest tension of a step are known."""
+"""Accuracy of the steps of a cyclic path: whether work and largest tension of a step are known well enough."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from icha.contact.model import ContactModel, State
 from icha.path.energy_balance import Step
 from icha.path.targets import UNRESOLVED_LOSS
 
-# Largest unknown work of a step where jumps have released no energy, relative to the work so far.
+# Largest uncertainty of the work of a step if jumps have released no energy, relative to the work so far.
 UNRESOLVED_WORK = 2e-4
 # Longest step in which spots may coalesce or split, relative to the longest step of the path.
 UNION_STEP = 1 / 16
-# Largest integration error of a step without events, relative to the work so far, unless work and change of energy
-# agree.
+# Largest integration error of a step without events, relative to the work so far. It may be larger if the work agrees
+# with the change of the stored energy.
 _CURVED_WORK = 1e-4
-# Scale of the losses in tension, relative to the energy that jumps have released: errors of the work up to 1e-3 of that
-# energy (10 times `_CURVED_WORK`) are allowed. And its smallest value, relative to the work so far.
+# Scale of errors in tension, relative to the energy that jumps have released: the error of the work may be 1e-3 of that
+# energy (10 times `_CURVED_WORK`). And its smallest value, relative to the work so far.
 _LOSS_SCALE, _LEAST_LOSS = 10.0, 1e-2
-# Longest step, relative to the longest one of the path, whose balance of energy is not examined.
+# Longest step, relative to the longest step of the path, whose integration error is not examined.
 _UNEXAMINED_STEP = 1 / 256
 # Largest error of the largest tension at an event, relative to it.
 _MISSED_TENSION = 1e-3
@@ -28,7 +28,7 @@ _MISSED_TENSION = 1e-3
 
 @dataclass(eq=False)
 class StepAccuracy:
-    """Sums over all steps of a path so far, and how accurate a further step is relative to them.
+    """Sums over all steps of a path so far, by which the accuracy of a further step is judged.
 
     Attributes
     ----------
@@ -46,25 +46,26 @@ class StepAccuracy:
     lowest_pressure: float = 0.0
 
     def add(self, step: Step, state: State) -> None:
-        """Update the sums with a step; `state` is its end."""
+        """Add a step that ends in a state to the sums."""
         self.total_work = self.total_work_after(step)
         self.jump_energy += step.jump_energy(self.contact)
         self.lowest_pressure = min(self.lowest_pressure, self.contact.pressure(state))
 
     def total_work_after(self, step: Step) -> float:
-        """Return the sum of work and losses with one more step, J/m^2."""
+        """Return the value of `total_work` after one more step, J/m^2."""
         return self.total_work + (abs(step.work) + abs(step.loss))
 
     def allows_twice_the_length(self, step: Step) -> bool:
-        """Return whether a step of twice the length would be accurate: its error grows with the cube of its length."""
+        """Return whether a step of twice the length would be accurate: its error would be eight times as large."""
         return 8 * step.unknown_work <= self.allowed_unknown_work(step)
 
     def is_work_known(self, state, step):
-        """Return whether the work of a step is known well enough.
+        """Return whether the work of a step that ends in a state is known well enough.
 
-        The work is not known in three cases: the events of the step, which may happen anywhere in it, make the work too
-        uncertain; spots unite in a long step; or, in a step without events, the integral of the pressure is inaccurate
-        and differs from the change of the stored energy. The last test is omitted for steps up to 1/256 of the longest.
+        It is not in three cases. The events of the step, which may happen anywhere in it, make the work too uncertain.
+        Spots unite or split in a long step. Or, in a step without events, the integral of the pressure is inaccurate
+        and differs from the change of the stored energy. Steps up to 1/256 of the longest step are not examined for
+        this last case.
         """
         if self.contact.path_accuracy.predicts_steps:
             return step.unknown_work <= self.allowed_unknown_work(step)
@@ -84,7 +85,7 @@ class StepAccuracy:
         return step.has_jump or not unbalanced or length <= _UNEXAMINED_STEP * self.longest
 
     def allowed_unknown_work(self, step):
-        """Return the largest work that the events of a step may leave unknown, J/m^2."""
+        """Return the largest uncertainty that the events of a step may give its work, J/m^2."""
         total_work, accuracy = self.total_work_after(step), self.contact.path_accuracy
         if accuracy.predicts_steps:
             return accuracy.loss * max(total_work, accuracy.least_work)
@@ -92,16 +93,16 @@ class StepAccuracy:
         return max(released, accuracy.loss * total_work) if released else UNRESOLVED_WORK * total_work
 
     def is_tension_known(self, start, state, step):
-        """Return whether the largest tension of a step is known well enough.
+        """Return whether the largest tension of a step between two states is known well enough.
 
-        It is not if events may have hidden a larger tension.
+        It is not if the tension may have been larger just before an event.
         """
         contact = self.contact
         if step.separation_change < 0 or not step.has_jump:
             return True
         if contact.adhesive and contact.spot_count(start) and not contact.spot_count(state):
-            return False  # the last contact breaks: found as sharply as possible
-        # The pressure may have fallen along its tangent up to the event.
+            return False  # the last contact breaks, and this event must be found as exactly as possible
+        # The pressure may have decreased along its tangent up to the event.
         p, slope = contact.pressure(start), -contact.stiffness(start)
         lowest, found = min(p, p + step.separation_change * slope), min(p, contact.pressure(state))
         return lowest >= self.lowest_pressure or found - lowest <= _MISSED_TENSION * abs(lowest)
@@ -109,8 +110,8 @@ class StepAccuracy:
     def locate_largest_tension(self, start, state, step):
         """Return the separation at which the tension is largest between two states without an event, m.
 
-        None if the tension has no maximum there, a smaller one than before, or one that the ends already give to the
-        required accuracy.
+        Return None if the tension has no maximum there, if it was larger earlier on the path, or if it is as large at
+        one of the states to the required accuracy.
         """
         contact = self.contact
         slope, end_slope = (-contact.stiffness(each) for each in (start, state))
@@ -128,7 +129,7 @@ class StepAccuracy:
 
 
 def _minimum_of_cubic(length, values, slopes):
-    """Return the lowest stationary point of the cubic with these values and slopes at 0 and `length`, or None."""
+    """Return the lowest stationary point of the cubic with these values and slopes at 0 and `length`; None if none."""
     # The import takes long, and loading does not need it.
     from scipy.interpolate import CubicHermiteSpline
 

@@ -11,14 +11,14 @@ from icha.path.targets import LEAST_PRESSURE, MEAN_SEPARATION, Target
 
 # Largest relative excess over a target that rounding can cause.
 SAME_EXCESS = 1e-9
-# Largest difference of two separations, in h_rms, that rounding can cause. A bracket as narrow as this holds a jump.
+# Largest difference of two separations, in h_rms, that rounding can cause. A narrower bracket contains a jump.
 SAME_SEPARATION = 1e-10
-# Widest bracket, in h_rms, in which a failed solve means that there is a jump, where da/d(delta) is infinite.
+# Widest bracket, in h_rms, in which a failed solve means that there is a jump, because da/d(delta) is infinite there.
 CLOSE_TO_A_JUMP = 1e-4
 # Largest number of times that a bracket is halved.
 _MAX_HALVINGS = 80
-# The solver tries the target before each of the first nine halvings, then only before the 17th, 33rd and 65th, because
-# a target that was missed so often usually lies inside a jump.
+# The solver tries to meet the target before each of the first nine halvings, then only before the 17th, 33rd and 65th,
+# because a target that was missed so often usually lies inside a jump.
 _TRIALS = 8
 # Largest change of load or area between two states without a jump, over that by the slope at one of them.
 _LARGEST_BEND = 4.0
@@ -26,15 +26,15 @@ _LARGEST_BEND = 4.0
 
 @dataclass(frozen=True, eq=False)
 class TargetFunction:
-    """Distance of a contact from a target, as a function of its state: zero at the target, rising on loading."""
+    """Target of a contact as a function of its state: the excess is zero at the target and increases on loading."""
 
     target: Target
     contact: ContactModel
 
     def excess(self, state: State) -> float:
-        """Return the relative excess over the target.
+        """Return by how much the state exceeds the target, relative to the target; negative before the target.
 
-        The unit of a separation is h_rms; the unit of a zero load is LEAST_PRESSURE.
+        For a separation it is relative to h_rms, for a load of zero to LEAST_PRESSURE.
         """
         quantity, value = self.target.quantity, self.target.value
         if quantity.controlled is None:
@@ -46,11 +46,11 @@ class TargetFunction:
 
     @property
     def control(self) -> Control | None:
-        """Load or area that the solver keeps constant to meet the target; None for a separation."""
+        """Load or area that the solver prescribes to meet the target; None for a separation."""
         return self.target.quantity.control(self.contact, self.target.value)
 
     def predict_separation(self, state: State) -> float:
-        """Extrapolate load or area exponentially to the target; return the separation there, m, or -inf."""
+        """Return the separation, m, at which an exponential extrapolation of load or area meets the target, or -inf."""
         control = self.control
         if control is None:
             return self.target.value
@@ -58,7 +58,7 @@ class TargetFunction:
         return state.separation - np.log(value) / (slope / value) if value > 0 and slope < 0 else -np.inf
 
     def solve(self, state: State, separation: float) -> State:
-        """Return the equilibrium at the target, starting from a nearby state and a guess of the separation, m."""
+        """Find the equilibrium at the target, starting from a nearby state and a guess of the separation, m."""
         return self.contact.equilibrium(state, separation, self.control)
 
 
@@ -69,6 +69,7 @@ def sort_targets(targets: Iterable[TargetFunction], direction: int) -> list[Targ
     """
 
     def place(function):
+        """Return a number that is smaller for targets that the path meets earlier."""
         value = function.target.value
         return direction * (value if function.target.kind == MEAN_SEPARATION else -value)
 
@@ -76,7 +77,7 @@ def sort_targets(targets: Iterable[TargetFunction], direction: int) -> list[Targ
 
 
 def next_of_each_kind(pending: Iterable[TargetFunction]) -> list[TargetFunction]:
-    """Select the first target of every kind from sorted targets."""
+    """Return the first target of every kind from sorted targets, as a list."""
     first: dict[str, TargetFunction] = {}
     for each in pending:
         first.setdefault(each.target.kind, each)
@@ -102,16 +103,10 @@ class InsideJump(NotConverged):
 def find_target_state(target: TargetFunction, before: State, after: State) -> State:
     """Find the state at a target that lies between two states of the path, on loading or unloading.
 
-    The two states bracket the target. The bracket is halved until the solver meets the target inside the bracket. An
-    event may change the quantity beyond its target. Then the bracket becomes very narrow, and the solver looks for the
-    target on the branch after the event, where load control would continue.
-
-    Raises
-    ------
-    InsideJump
-        If no equilibrium on that branch meets the target.
-    NotConverged
-        If an equilibrium far from any jump is not found.
+    The bracket of the two states is halved until the solver meets the target inside it. If an event changes the
+    quantity beyond its target, the bracket becomes very narrow. Then the solver looks for the target on the branch
+    after the event, where load control would continue. Raise `InsideJump` if no equilibrium on that branch meets the
+    target, and `NotConverged` if an equilibrium far from any jump is not found.
     """
     contact = target.contact
     if target.control is None:
@@ -154,7 +149,7 @@ def _is_near(target, before, after):
 
 
 def _solve_after_jump(target, before, after):
-    """Solve for a target on the branch after a jump; raise `InsideJump` if the branch does not meet it."""
+    """Find the state at a target on the branch after a jump; raise `InsideJump` if the branch does not meet it."""
     try:
         return target.solve(after, after.separation)
     except NotConverged:
@@ -162,7 +157,10 @@ def _solve_after_jump(target, before, after):
 
 
 def _guess_separation(target, before, after):
-    """Extrapolate to a positive target on loading, else interpolate between the two states; m."""
+    """Return a guess of the separation at a target between two states, m.
+
+    It is extrapolated to a positive target on loading, and otherwise interpolated.
+    """
     if after.separation < before.separation and target.target.value > 0:
         return max(target.predict_separation(before), after.separation)
     start, end = target.excess(before), target.excess(after)
@@ -172,13 +170,10 @@ def _guess_separation(target, before, after):
 def find_first_target(
     targets: Iterable[TargetFunction], before: State, after: State, direction: int
 ) -> tuple[TargetFunction | None, State]:
-    """Find the target that the path meets first between two states.
+    """Find the target that the path meets first between two states, and the state at this target.
 
+    If there is no target between the states, return None and `after`.
     direction : direction of the separation: -1 on loading, 1 on unloading.
-
-    Returns
-    -------
-    The target and the state that meets it; None and `after` if there is no target between the states.
     """
     first: tuple[TargetFunction | None, State] = None, after
     for target in targets:

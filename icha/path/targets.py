@@ -4,27 +4,27 @@ from __future__ import annotations
 
 import copy
 import itertools
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from icha.contact.model import AREA_FRACTION as CONTROLLED_AREA
 from icha.contact.model import PRESSURE, ContactModel, Control, State
 from icha.support.rules import LENGTH, NUMBER, POSITIVE, FloatRange
 
-# Largest reduced pressure and area fraction of a target with the asperity model. At larger ones spots are no longer
-# separate, and soon the mean planes of a surface without adhesion meet.
+# Largest reduced pressure and area fraction of a target with the asperity model. Above them spots are not separate, and
+# the mean planes of a surface without adhesion soon meet.
 MAX_REDUCED_PRESSURE = 0.15
 MAX_AREA_FRACTION = 0.25
 # Largest reduced pressure of any target. Rough surfaces are in full contact at about 1.
 LARGEST_REDUCED_PRESSURE = 100.0
-# Smallest reduced pressure (other than zero) and area fraction. Smaller ones are less than the error of an equilibrium.
+# Smallest reduced pressure (other than zero) and area fraction. Smaller ones are below the error of an equilibrium.
 LEAST_PRESSURE, LEAST_AREA = 1e-12, 1e-9
-# Limits of the longest step of the mean separation, in h_rms, and its default value. With the smallest step a path has
-# about ten thousand equilibria.
+# Limits and default value of the longest step of the mean separation, in h_rms. With the smallest step a path has about
+# ten thousand equilibria.
 MIN_STEP, MAX_STEP = 1e-4, 0.5
 DEFAULT_STEP = 0.15
-# Largest unknown work of one step, relative to the energy that jumps have released so far. The work is unknown because
-# the events of a step may happen anywhere in it.
+# Largest uncertainty of the work of one step, relative to the energy that jumps have released so far. The work is
+# uncertain because the events of a step may happen anywhere in it.
 UNRESOLVED_LOSS = 5e-4
 
 STEP = FloatRange("h_rms", least=MIN_STEP, most=MAX_STEP)
@@ -36,31 +36,29 @@ class TargetQuantity:
 
     Attributes
     ----------
-    name : name in targets and in files.
+    name : name in targets and in files; with an s at the end, the argument of `Path` for a list of such targets.
     rule : range of values that a target may have.
-    argument : argument of `Path` that lists such targets; empty if there is none.
-    controlled : quantity that the solver keeps constant; None if the separation is prescribed.
+    controlled : PRESSURE or AREA_FRACTION if the solver prescribes it; None if the quantity is the mean separation.
     pressure_unit : name of the attribute of the contact by which a pressure is divided; empty for other quantities.
     """
 
     name: str
     rule: FloatRange
-    argument: str = ""
     controlled: str | None = None
     pressure_unit: str = ""
 
     def scale(self, contact: ContactModel) -> float:
-        """Return the controlled quantity divided by the value of the target."""
+        """Return the unit of the value of a target: a pressure, Pa, or 1."""
         return getattr(contact, self.pressure_unit) if self.pressure_unit else 1.0
 
     def evaluate(self, contact: ContactModel, state: State) -> float:
-        """Return the value of the quantity in a state."""
+        """Return the value of the quantity in a state, in the unit of targets."""
         if self.controlled == PRESSURE:
             return contact.pressure(state) / self.scale(contact)
         return state.separation if self.controlled is None else contact.area_fraction(state)
 
     def control(self, contact: ContactModel, value: float) -> Control | None:
-        """Return the load or area that the solver keeps constant at a value; None for a separation."""
+        """Return the load or area that the solver prescribes for a value of a target; None for a separation."""
         return None if self.controlled is None else Control(self.controlled, value * self.scale(contact))
 
 
@@ -76,14 +74,14 @@ ASPERITY_RANGES = {
 QUANTITIES = {
     quantity.name: quantity
     for quantity in (
-        TargetQuantity(REDUCED_PRESSURE, _PRESSURES, "reduced_pressures", PRESSURE, "pressure_unit"),
-        TargetQuantity(RELATIVE_LOAD, POSITIVE, "", PRESSURE, "contact_modulus"),
-        TargetQuantity(AREA_FRACTION, _AREAS, "area_fractions", CONTROLLED_AREA),
-        TargetQuantity(MEAN_SEPARATION, LENGTH, "mean_separations"),
+        TargetQuantity(REDUCED_PRESSURE, _PRESSURES, PRESSURE, "pressure_unit"),
+        TargetQuantity(RELATIVE_LOAD, POSITIVE, PRESSURE, "contact_modulus"),
+        TargetQuantity(AREA_FRACTION, _AREAS, CONTROLLED_AREA),
+        TargetQuantity(MEAN_SEPARATION, LENGTH),
     )
 }
 LOADS = (REDUCED_PRESSURE, RELATIVE_LOAD)
-# Kind of waypoints between targets. Their value is the mean separation.
+# Kind of the target of an equilibrium between two targets. Its value is the mean separation.
 BETWEEN = "path"
 # Kinds whose values are in m; all others have no unit.
 IN_METRES = (MEAN_SEPARATION, BETWEEN)
@@ -93,13 +91,13 @@ SEPARATION_CONTROL, LOAD_CONTROL = "separation", "load"
 
 @dataclass(frozen=True)
 class Target:
-    """A state that a path has to reach.
+    """A state that a path must reach.
 
     Attributes
     ----------
     kind : name of the prescribed quantity, a key of `QUANTITIES`; or BETWEEN.
     value : prescribed value, SI units.
-    snapshot : whether the fields and spots of the state are stored.
+    snapshot : whether the distributions and spots of the state are stored.
     """
 
     kind: str
@@ -112,30 +110,30 @@ class Target:
         return QUANTITIES[self.kind]
 
     def describe(self, digits: int | None = None) -> str:
-        """Return kind and value as text."""
+        """Return a text such as `area_fraction = 0.01`, for messages."""
         return f"{self.kind} = {self.value:{f'.{digits}' if digits else ''}g}"
 
 
 @dataclass(frozen=True, init=False)
 class Path:
-    """Targets of a path, and the longest step between them.
+    """Path of loading and unloading: its targets, its turning points, and its longest step.
 
     Parameters
     ----------
     reduced_pressures : p/(E* h'_rms), increasing, in [1e-12, 100]; with the asperity model up to 0.15.
     area_fractions : A/A0, increasing, in [1e-9, 1]; with the asperity model up to 0.25.
     mean_separations : u in m, decreasing, in [1e-24, 1e9]. Exactly one of these three lists is given.
-    snapshots : pairs (kind, value), in any order, of states whose fields and spots are stored. The kind is
+    snapshots : pairs (kind, value), in any order, of states whose distributions and spots are stored. The kind is
         "reduced_pressure", "relative_load" (F/(E* A0)), "area_fraction" or "mean_separation" (m). A snapshot is an
         additional target unless the list contains the same kind and value. Snapshots are in the dataset in the order
         in which the path reaches them. None: the last target of the list.
     turning_points : pairs (kind, value) at which the path turns after its last target: the first one ends unloading,
-        the second one loading, and so on. Kinds as for snapshots; loads may be tensile (negative) or zero.
-    unload : whether the path ends with complete separation. Unloading meets the targets once more, except those above
+        the second one ends loading, and so on. Kinds as for snapshots; loads may be tensile (negative) or zero.
+    unload : whether the path ends with complete separation. Unloading meets the targets again, except those above
         first contact.
     control : "separation": the mean separation is prescribed. "load": the load is prescribed, and all targets and
-        turning points must be loads. The path follows the same curve of pressure against separation; where this curve
-        turns back, the state jumps at constant load.
+        turning points must be loads. The path follows the same curve of pressure against separation, but where the
+        pressure of this curve turns back, the state jumps at constant load.
     max_step : longest change of the mean separation between two equilibria, in units of h_rms, in [1e-4, 0.5].
 
     Raises
@@ -166,7 +164,7 @@ class Path:
         lists = {REDUCED_PRESSURE: reduced_pressures, AREA_FRACTION: area_fractions, MEAN_SEPARATION: mean_separations}
         given = [kind for kind, values in lists.items() if values is not None]
         if len(given) != 1:
-            names, found = (", ".join(QUANTITIES[kind].argument for kind in kinds) for kinds in (lists, given))
+            names, found = (", ".join(f"{kind}s" for kind in kinds) for kinds in (lists, given))
             raise ValueError(f"{names}: expected exactly one of them, got {found or 'none'}")
         (kind,) = given
         if not isinstance(unload, bool):
@@ -189,10 +187,11 @@ class Path:
             targets=tuple(targets), turning_points=turns, unload=unload, control=control, max_step=max_step
         )
 
-    def up_to(self, admits: Callable[[Target], bool]) -> Path:
-        """Return the path with those of its targets that are admitted."""
-        path = copy.copy(self)
-        vars(path).update(targets=tuple(filter(admits, self.targets)))
+    def within_asperity_range(self) -> Path:
+        """Return the path without the targets above the range of the asperity model."""
+        path, ranges = copy.copy(self), ASPERITY_RANGES
+        within = (t for t in self.targets if t.kind not in ranges or ranges[t.kind].contains(t.value))
+        vars(path).update(targets=tuple(within))
         return path
 
     @property
@@ -202,8 +201,8 @@ class Path:
 
 
 def _validate_list(kind, values):
-    """Return the values of the list of targets, in strict order."""
-    name, rule, falls = QUANTITIES[kind].argument, QUANTITIES[kind].rule, kind == MEAN_SEPARATION
+    """Return the values of a list of targets as floats; raise `ValueError` if one is out of range or out of order."""
+    name, rule, falls = f"{kind}s", QUANTITIES[kind].rule, kind == MEAN_SEPARATION
     if isinstance(values, str | bytes) or not isinstance(values, Iterable):
         raise ValueError(f"{name}: expected a list of numbers, got {values!r}")
     values = [rule.validate(f"{name}[{k}]", value) for k, value in enumerate(values)]
@@ -217,7 +216,7 @@ def _validate_list(kind, values):
 
 
 def _validate_snapshots(snapshots):
-    """Return kind and value of every snapshot."""
+    """Return kind and value of every snapshot as a list; raise `ValueError` if one is out of range or given twice."""
     recorded = []
     for label, kind, value in _label_pairs("snapshots", snapshots):
         pair = kind, QUANTITIES[kind].rule.validate(label, value)
@@ -228,10 +227,10 @@ def _validate_snapshots(snapshots):
 
 
 def _validate_turning_points(turning_points, last):
-    """Return the turning points.
+    """Return the turning points as targets; raise `ValueError` if one is out of range or cannot follow the one before.
 
-    On unloading a turning point must have a smaller load or area than the one before, and on loading a larger one. For
-    separations it is the reverse. Only turning points of the same kind are compared.
+    A turning point that ends unloading must have a smaller load or area than the one before, or a larger separation. A
+    turning point that ends loading is the reverse. Only those of the same kind are compared; `last` is the last target.
     """
     turns = []
     for k, (label, kind, value) in enumerate(_label_pairs("turning_points", turning_points)):
@@ -255,7 +254,7 @@ def _validate_turning_points(turning_points, last):
 
 
 def _label_pairs(name, pairs):
-    """Yield label, kind and value of every pair of a list."""
+    """Yield name in messages, kind and value of every pair of a list; raise `ValueError` if it is not a valid pair."""
     if not isinstance(pairs, list | tuple):
         raise ValueError(f"{name}: expected a list of pairs (kind, value), got {pairs!r}")
     for index, pair in enumerate(pairs):
@@ -270,7 +269,7 @@ def _label_pairs(name, pairs):
 
 
 def _require_loads(targets, continues):
-    """Require load targets only, and a path that unloads or turns."""
+    """Raise `ValueError` if a path under load control has other targets than loads, or ends with the first loading."""
     for target in targets:
         if target.kind not in LOADS:
             raise ValueError(

@@ -1,1 +1,1 @@
-"""What a campaign will compute and cost, before it does."""
+"""Files, time and memory of a campaign before it runs."""

@@ -12,7 +12,6 @@ import statistics
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from icha.datasets.results import COMPRESSED_SIZES
 from icha.path.targets import DEFAULT_STEP
 from icha.support.parallel import LARGE_GRID
 
@@ -22,22 +21,21 @@ _DOUBLE = 8
 
 @dataclass(frozen=True)
 class Workflow:
-    """Time (s) and memory (bytes) of a campaign outside the work of its jobs.
+    """Time (s) and memory (bytes) that a campaign takes in addition to the work of its jobs.
 
     Attributes
     ----------
-    start : time from the call to the first job: `icha run`, Snakemake, the plan.
+    start : time from the call to the first job: `icha run`, Snakemake, and the imports of the process that jobs are
+        forked from.
     planned : further time for each file of the plan.
-    environment : time of the imports of the process that jobs are forked from, once.
     job : time of a job outside its work: scheduling, fork, log, checksums.
-    memory : of Snakemake, `icha run` and the process that jobs are forked from.
+    memory : memory of Snakemake, `icha run` and the process that jobs are forked from.
     forked : memory of a job that is a fork, before its work.
     program : memory of a job that is a process of its own, before its work.
     """
 
-    start: float = 2.6
+    start: float = 4.6
     planned: float = 0.0012
-    environment: float = 2.0
     job: float = 0.17
     memory: float = 310 * MiB
     forked: float = 22 * MiB
@@ -63,13 +61,13 @@ class PowerLaw:
     powers: Mapping[str, float]
 
     def seconds(self, **quantities: float) -> float:
-        """Time of a job with these quantities, s; quantities without a power are ignored."""
+        """Return the time of a job with these quantities, s; quantities without a power are ignored."""
         return self.base + self.scale * math.prod(quantities[name] ** power for name, power in self.powers.items())
 
 
-# Laws of runs are named by the model, adhesion and unloading. Quantities are `nodes` of the grid of the surface or the
-# solver, `spots` at the largest load, `stops` (targets of the path), `load` p/(E* h'rms), `step` of the mean gap in
-# h_rms, and `runs` of a campaign.
+# Laws of runs are named by the model, adhesion and unloading; others by the rule of Snakemake. Quantities are: `nodes`
+# of the grid of the surface or the solver, `spots` at the largest load, `stops` (targets of the path), `load`
+# p/(E* h'rms), `step` of the mean gap in h_rms, and `runs` of a campaign.
 LAWS = {
     "surface": PowerLaw(0.015, 2.4e-7, {"nodes": 1}),
     "asperities": PowerLaw(0.14, 1.6e-3, {"spots": 1.06}),
@@ -84,19 +82,19 @@ LAWS = {
     "finite range, adhesion": PowerLaw(0, 1.2e-8, {"nodes": 1.56, "load": -0.5}),
     "finite range, cycle": PowerLaw(0, 2.8e-7, {"nodes": 1.72, "step": -0.1}),
     "finite range, adhesion, cycle": PowerLaw(0, 1.4e-6, {"nodes": 1.72, "step": -0.1}),
-    "theories": PowerLaw(0.28, 0, {}),
-    "dataset": PowerLaw(0.07, 0.015, {"runs": 1}),
+    "reference": PowerLaw(0.28, 0, {}),
+    "campaign_dataset": PowerLaw(0.07, 0.015, {"runs": 1}),
     "comparison": PowerLaw(0.07, 0.003, {"runs": 1}),
-    "model error": PowerLaw(0.07, 0.05, {"runs": 1}),
+    "model_error": PowerLaw(0.07, 0.05, {"runs": 1}),
     "checks": PowerLaw(0.06, 0.006, {"runs": 1}),
     "figure": PowerLaw(1.3, 0.007, {"runs": 1}),
     "map": PowerLaw(0, 9.5e-8, {"nodes": 1}),
-    "report": PowerLaw(0.25, 0.01, {"runs": 1}),
+    "report_page": PowerLaw(0.25, 0.01, {"runs": 1}),
 }
 
 
 def _law(solver: str, *, adhesive: bool, cycle: bool = False) -> PowerLaw:
-    """Power law of a solver, with or without adhesion, for loading alone or a cycle."""
+    """Return the power law of a solver, with or without adhesion, for loading alone or a cycle."""
     return LAWS[", ".join([solver, *["adhesion"] * adhesive, *["cycle"] * cycle])]
 
 
@@ -106,9 +104,9 @@ class Cost:
 
     Attributes
     ----------
-    seconds : on the cores that it gets.
+    seconds : time on the cores that it gets.
     memory : largest memory of the job itself, bytes.
-    disk : bytes.
+    disk : size of its file, bytes.
     values : part of `disk` that a run adds to the campaign dataset, bytes.
     """
 
@@ -124,17 +122,15 @@ def job_threads(grid: int) -> int:
 
 
 def _memory_before(grid):
-    """Memory of the job of a surface before its work, bytes. Only jobs of one core are forks of a common process."""
+    """Return the memory of a job before its work, bytes. Only jobs on one core are forks of a common process."""
     return WORKFLOW.program if job_threads(grid) > 1 else WORKFLOW.forked
 
 
 def surface_cost(grid: int) -> Cost:
     """Return the cost of a topography with `grid` nodes along a side."""
     heights = _DOUBLE * grid**2
-    # Compression saves about a sixth of the heights.
-    compression = 0.84 if grid**2 in COMPRESSED_SIZES else 1.0
     seconds = LAWS["surface"].seconds(nodes=grid**2)
-    return Cost(seconds, _memory_before(grid) + 2.7 * heights, 18e3 + compression * heights)
+    return Cost(seconds, _memory_before(grid) + 2.7 * heights, 18e3 + heights)
 
 
 def spots(summits: float, load: float) -> float:
@@ -151,7 +147,7 @@ class RunSize:
     arrays : number of arrays of the grid that a run holds at a time.
     summit : memory of a run per summit, bytes.
     maps : size of the maps in the file per cell and snapshot, compressed, bytes.
-    sticky : U_full/dgamma below which the time of a run grows as its inverse.
+    sticky : value of U_full/dgamma below which the time of a run is proportional to 1/(U_full/dgamma).
     minutes : time limit of a loading, of a cycle, and of a run on several cores.
     """
 
@@ -182,18 +178,18 @@ def run_cost(
     max_step: float = DEFAULT_STEP,
     energy_ratio: float = math.inf,
 ) -> Cost:
-    """Cost of a run of `icha.simulate`.
+    """Return the cost of a run of `icha.simulate`.
 
     Parameters
     ----------
     model : contact model.
-    grid : nodes a side of the surface.
+    grid : nodes along a side of the surface.
     summits : number of its summits.
     load : largest reduced pressure p/(E* h'_rms) of the first loading.
     stops : number of targets of the first loading.
     snapshots : number of targets with a snapshot.
     adhesive : whether the surface energy is not zero.
-    legs : legs after the first loading: 0, or 1 and more for unloading and loading again.
+    legs : number of legs after the first loading, such as 1 for unloading.
     max_step : longest step of the mean separation, in h_rms.
     energy_ratio : elastic energy of full contact over the adhesion energy, U_full/dgamma.
     """
@@ -217,7 +213,7 @@ def run_cost(
 
 
 def finite_range_cost(nodes: int, *, adhesive: bool, **quantity: float) -> Cost:
-    """Cost of boundary elements at a finite range, on `nodes` a side.
+    """Return the cost of boundary elements at a finite range, with `nodes` along a side of the grid.
 
     `quantity` is the `load` of a single solution, or the `step` of the mean gap of a loop.
     """
@@ -233,29 +229,29 @@ _BLOCKS = 35 * MiB
 # Arrays of a topography that a contact map holds at a time, by the number of models that it shows.
 MAP_ARRAYS = {1: 2, 2: 7}
 # Memory of the libraries and pages of a job, bytes.
-_LIBRARIES = {"figure": 85 * MiB, "report": 18 * MiB}
+_LIBRARIES = {"figure": 85 * MiB, "report_page": 18 * MiB}
 
 
-def derived_cost(kind: str, runs: int, disk: float, values: float = 0.0, *, nodes: int = 0, models: int = 1) -> Cost:
-    """Cost of a file that is computed from a surface or from runs.
+def derived_cost(rule: str, runs: int, disk: float, values: float = 0.0, *, nodes: int = 0, models: int = 1) -> Cost:
+    """Return the cost of a file that is computed from a surface or from runs.
 
     Parameters
     ----------
-    kind : name of its law in `LAWS`.
+    rule : the rule that makes it, which is the name of its law in `LAWS`.
     runs : number of runs that it contains or shows.
     disk : size of the file, bytes.
     values : sum of the `values` of all runs of the campaign, bytes.
     nodes : nodes of the topography that a figure shows, 0 without one.
     models : number of models whose contacts a figure shows.
     """
-    seconds = LAWS[kind].seconds(runs=runs) + LAWS["map"].seconds(nodes=nodes)
-    read = min(_COPIES * values, _BLOCKS if kind == "dataset" else _MOST_READ)
-    memory = _LIBRARIES.get(kind, 4 * MiB) + MAP_ARRAYS[models] * _DOUBLE * nodes + read
+    seconds = LAWS[rule].seconds(runs=runs) + LAWS["map"].seconds(nodes=nodes)
+    read = min(_COPIES * values, _BLOCKS if rule == "campaign_dataset" else _MOST_READ)
+    memory = _LIBRARIES.get(rule, 4 * MiB) + MAP_ARRAYS[models] * _DOUBLE * nodes + read
     return Cost(seconds, WORKFLOW.forked + memory, disk)
 
 
 def correction(pairs: Sequence[tuple[float, float]]) -> float:
-    """Factor on the expected times of jobs, from pairs (expected, measured) of jobs of the same kind.
+    """Return the factor on the expected times of jobs, from pairs (expected, measured) of jobs of the same kind.
 
     The factor is the median of measured over expected times. Few pairs move it towards 1; without pairs it is 1.
     """

@@ -1,15 +1,15 @@
-"""Ownership of results: the configuration file that results belong to, so that files of one name cannot replace them.
+"""Ownership of results: each folder of results belongs to one configuration file, and no other file may replace them.
 
-The record holds the path of the file, relative to the folder that holds results/, or to the workflow if the file came
-with it, so it stays valid if these folders move. Results without a record, as of older versions, belong to the first
-file that is run.
+The record contains the path of the file. The path is relative to the folder that holds results/, or to the workflow if
+the file came with the workflow. So the record stays valid if these folders move. Results without a record, as of older
+versions, belong to the first file that is run.
 """
 
 import os
 from pathlib import Path
 
 from icha.datasets.results import CONFIGURATION
-from icha.support.atomic_files import find_obstacle, whole_file
+from icha.support.atomic_files import whole_file
 
 RECORD = "belongs_to.txt"
 
@@ -24,8 +24,6 @@ def find_conflict(results: Path, name: str, file: Path, workflow: Path) -> str |
     file : its configuration file.
     workflow : folder of the workflow.
     """
-    if obstacle := find_obstacle(results):
-        return f"{obstacle}: results cannot be written there. Remove it or repair it."
     owner, record = _read_owner(results), _record_of(results, file, workflow)
     if owner in (None, record) or _is_copy(results, file):
         return None
@@ -56,7 +54,7 @@ def _is_copy(results: Path, file: Path) -> bool:
 
 
 def _record_of(results: Path, file: Path, workflow: Path) -> str:
-    """Path of a configuration file as the record holds it."""
+    """Return the path of a configuration file as the record holds it."""
     folder = Path(os.path.abspath(results)).parent.parent
     folder, workflow, file = (Path(path).resolve() for path in (folder, workflow, file))
     if file.is_relative_to(workflow) and not file.is_relative_to(folder):

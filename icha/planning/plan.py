@@ -2,7 +2,6 @@
 
 import json
 import math
-import statistics
 from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import cache
@@ -37,15 +36,17 @@ class Item:
     Attributes
     ----------
     part : part of the campaign that it belongs to, as `icha describe` lists them.
+    rule : the rule of Snakemake that makes it.
     path : in the folder of results.
     state : DONE, TO_DO, CHANGED, FAILED or DAMAGED.
     cost : of its job.
-    threads : cores that its job takes.
-    reason : why the run failed.
+    threads : number of cores that its job uses.
+    reason : reason why the run failed.
     stage : jobs of a stage wait for those of earlier stages.
     """
 
     part: str
+    rule: str
     path: str
     state: str
     cost: costs.Cost
@@ -55,19 +56,24 @@ class Item:
 
     @property
     def is_run(self) -> bool:
-        """Whether the file is a run of a study."""
-        return self.path.startswith("runs/")
+        """Return whether the file is a run of a study."""
+        return self.rule == "run"
 
     @property
     def to_do(self) -> bool:
-        """Whether the file must be computed; not for a failed run, which would fail again."""
+        """Return whether the file must be computed; False for a failed run, which would fail again."""
         return self.state in (TO_DO, CHANGED, DAMAGED)
+
+    @property
+    def work(self) -> float:
+        """Return the expected work of the job, core-seconds."""
+        return self.cost.seconds * self.threads
 
 
 def plan(campaign: Campaign, results: Path) -> list[Item]:
     """List all files of a campaign, except those of negligible cost, in the order in which they are made.
 
-    A run is done if its file exists and has the present settings (`config_sha256`); only Snakemake knows whether the
+    A run is done if its file exists and has the present settings (`config_sha256`); only Snakemake detects whether the
     program has changed since. Another file is done if it and its inputs exist. A file that differs from its record
     (`icha.support.checksums`) is damaged.
 
@@ -77,16 +83,12 @@ def plan(campaign: Campaign, results: Path) -> list[Item]:
     results : its folder of results, whose benchmarks calibrate the expected times for this machine.
     """
     items = _items(campaign, results)
-    kinds: dict[str, list[Item]] = {}
+    kinds: dict[tuple[str, str], list[Item]] = {}
     for item in items:
-        kinds.setdefault(_kind(item), []).append(item)
+        kinds.setdefault((item.part, item.rule), []).append(item)
     factors = {kind: _correction(members, results) for kind, members in kinds.items()}
-    return [replace(item, cost=replace(item.cost, seconds=item.cost.seconds * factors[_kind(item)])) for item in items]
-
-
-def _kind(item: Item) -> str:
-    """Return the name of the jobs that take similar times: a study, or a part and a folder of results."""
-    return item.part if item.part.startswith("study ") else item.path.split("/")[0] + item.part
+    seconds = (item.cost.seconds * factors[item.part, item.rule] for item in items)
+    return [replace(item, cost=replace(item.cost, seconds=each)) for item, each in zip(items, seconds, strict=True)]
 
 
 def _correction(items: list[Item], results: Path) -> float:
@@ -97,7 +99,7 @@ def _correction(items: list[Item], results: Path) -> float:
 
 
 def _benchmark(results: Path, item: Item) -> float | None:
-    """Time of the last job of a file, s; None if it is unknown."""
+    """Return the measured time of the last job of a file, s; None if it is unknown."""
     try:
         lines = (results / job_file(item.path, "benchmarks", ".jsonl")).read_text(encoding="utf-8").splitlines()
         return float(json.loads(lines[-1])["s"])
@@ -109,11 +111,11 @@ def _items(campaign, results) -> list[Item]:
     files = campaign_files(campaign)
     items = list(_computed_files(campaign, results, files))
     outdated = {item.path for item in items if item.to_do}
-    for part, path, stage, inputs, cost in _derived_files(campaign, files, items):
+    for part, rule, path, stage, inputs, cost in _derived_files(campaign, files, items):
         state = _state(results, path)
         if state == DONE and not outdated.isdisjoint(inputs):
             state = TO_DO
-        items.append(Item(part, path, state, cost, stage=stage))
+        items.append(Item(part, rule, path, state, cost, stage=stage))
         if items[-1].to_do:
             outdated.add(path)
     return items
@@ -128,7 +130,8 @@ def _computed_files(campaign, results, files) -> Iterator[Item]:
     summits, run_cost = cache(lambda surface: surface_facts(campaign, surface)["summits"]), cache(costs.run_cost)
     for path, (name, _) in files.surfaces.items():
         grid = campaign.grid(name)
-        yield Item("surfaces", path, _state(results, path), costs.surface_cost(grid), costs.job_threads(grid))
+        cost, threads = costs.surface_cost(grid), costs.job_threads(grid)
+        yield Item("surfaces", "surface", path, _state(results, path), cost, threads)
     for path, case in files.runs.items():
         state, reason = run_state(results / path, run_sha256(campaign, case))
         if not is_whole(results, path):
@@ -138,9 +141,10 @@ def _computed_files(campaign, results, files) -> Iterator[Item]:
         ratio = energy_ratio(campaign, case) if sweep["adhesive"] else math.inf
         cost = run_cost(case.model, grid, summits(case.surface), energy_ratio=ratio, **sweep)
         part = f"study {case.study}" + (f", {MODELS[case.model].words}" if case.model != DEFAULT_MODEL else "")
-        yield Item(part, path, state, cost, costs.job_threads(grid), reason)
+        yield Item(part, "run", path, state, cost, costs.job_threads(grid), reason)
     for path in files.theories:
-        yield Item("theories", path, _state(results, path), costs.derived_cost("theories", 0, 35e3))
+        cost = costs.derived_cost("reference", 0, 35e3)
+        yield Item("theories", "reference", path, _state(results, path), cost)
     for path, solution in files.solutions.items():
         load = {"load": solution.reduced_pressure}
         yield _finite_range(campaign, results, path, campaign.finite_range[solution.entry], solution, load)
@@ -150,45 +154,49 @@ def _computed_files(campaign, results, files) -> Iterator[Item]:
 
 
 def _finite_range(campaign, results, path, entry, case, quantity) -> Item:
-    """Return the file of a solution or a loop by boundary elements at a finite range."""
+    """Return the file of a solution or a loop of boundary elements at a finite range."""
     adhesive = campaign.materials[case.material].surface_energy > 0
     cost = costs.finite_range_cost(campaign.grid(case.surface) * entry.refinement, adhesive=adhesive, **quantity)
-    part = f"boundary elements{', cycle' if 'step' in quantity else ''} {case.entry}"
-    return Item(part, path, _state(results, path), cost)
+    part, rule = "boundary elements", "boundary_elements"
+    if "step" in quantity:
+        part, rule = f"{part}, cycle", "boundary_element_loop"
+    return Item(f"{part} {case.entry}", rule, path, _state(results, path), cost)
 
 
 def _derived_files(campaign, files: CampaignFiles, computed: list[Item]) -> Iterator[tuple]:
-    """Yield part, path, stage, inputs and cost of the files that are derived from runs."""
+    """Yield part, rule, path, stage, inputs and cost of the files that are derived from runs."""
     runs, cost = len(files.runs), costs.derived_cost
     disk = sum(item.cost.disk for item in computed if item.is_run)
     values = sum(item.cost.values for item in computed)
     beside = [*files.compared, *files.solutions]
     tables = [
-        ("dataset", [files.dataset], 1, files.runs, runs, 0.5 * disk),
+        ("campaign_dataset", [files.dataset], 1, files.runs, runs, 0.5 * disk),
         ("comparison", [files.comparison], 2, [files.dataset], runs, 0.03 * disk + 90e3),
-        ("model error", files.model_error, 2, [files.dataset, *beside], len(beside), 150e3),
+        ("model_error", files.model_error, 2, [files.dataset, *beside], len(beside), 150e3),
         ("checks", [files.checks], 2, [files.dataset, *files.solutions], runs, 5e3 * runs),
     ]
-    for kind, paths, stage, inputs, count, disk_of_table in tables:
+    for rule, paths, stage, inputs, count, disk_of_table in tables:
         for path in paths:
-            yield "dataset and checks", path, stage, inputs, cost(kind, count, disk_of_table, values)
+            yield "dataset and checks", rule, path, stage, inputs, cost(rule, count, disk_of_table, values)
     result_files = ResultFiles(campaign.name)
-    for name in campaign.figures.by_name():
+    for name, options in campaign.figures.by_name().items():
         path = result_files.path(results_files.FIGURE, name=name, ending="png")
-        inputs = campaign.figures.inputs(name, campaign, result_files).values()
-        shown = set(campaign.figures.studies_of(name, campaign))
+        inputs = DECLARATIONS[name].inputs(campaign, options, result_files).values()
+        shown = set(options.studies_of(campaign))
         count = sum(case.study in shown for case in files.runs.values())
         grids = [campaign.grid(surface) for study in shown for surface in campaign.studies[study].surfaces]
         nodes = max(grids) ** 2 if DECLARATIONS[name].holds_topography else 0
         models = max((len(campaign.studies[study].models) for study in shown), default=1)
         flat = [path for each in inputs for path in ([each] if isinstance(each, str) else each)]
-        yield "figures", path, 3, flat, cost("figure", count, 400e3, values, nodes=nodes, models=models)
+        cost_of_figure = cost("figure", count, 400e3, values, nodes=nodes, models=models)
+        yield "figures", "figure", path, 3, flat, cost_of_figure
     disk_of_report = 700e3 + 250e3 * len(files.figures) // 2
-    yield "report", files.report, 4, files.computed, cost("report", runs, disk_of_report, values)
+    cost_of_report = cost("report_page", runs, disk_of_report, values)
+    yield "report", "report_page", files.report, 4, files.computed, cost_of_report
 
 
 def _cost_parameters(settings, rms_slope) -> dict:
-    """Arguments of `run_cost` from the settings of a run."""
+    """Return the arguments of `run_cost` from the settings of a run."""
     path, snapshots = settings["path"], settings["path"]["snapshots"]
     # Estimates of the reduced pressure: half of an area fraction; a guess for separations.
     factors = {"reduced_pressure": 1, "relative_load": 1 / rms_slope, "area_fraction": 1 / 2, "mean_separation": 0}
@@ -204,48 +212,33 @@ def _cost_parameters(settings, rms_slope) -> dict:
     }
 
 
-# Attributes of the file of a run that determine its state.
-_OF_STATE = ("config_sha256", "incomplete", "failed_checks")
-
-
 def run_state(file: Path, sha256: str) -> tuple[str, str]:
-    """State of the file of a run, and the reason if the run failed."""
+    """Return the state of the file of a run, and the reason if the run failed; `sha256`: checksum of its settings."""
+    import h5py
+
     if not file.is_file():
         return TO_DO, ""
-    attributes = read_attributes(file)
-    if attributes is None:
-        return DAMAGED, ""
+    try:
+        with h5py.File(file, "r") as data:
+            names = ("config_sha256", "incomplete", "failed_checks")
+            attributes = {name: text(data.attrs[name]) for name in names if name in data.attrs}
+    except OSError as error:
+        if error.errno is not None:  # such as missing permission, which does not depend on the content
+            raise
+        return DAMAGED, ""  # not a valid netCDF-4 file
     if attributes.get("config_sha256") != sha256:
         return CHANGED, ""
     reason = why_no_result(attributes)
     return (FAILED, reason) if reason else (DONE, "")
 
 
-def read_attributes(file: Path) -> dict[str, str] | None:
-    """Read the attributes of a run that determine its state; None if the file is not valid netCDF-4."""
-    import h5py
-
-    try:
-        with h5py.File(file, "r") as data:
-            return {name: text(data.attrs[name]) for name in _OF_STATE if name in data.attrs}
-    except OSError as error:
-        if error.errno is not None:  # such as missing permission, which says nothing about the content
-            raise
-        return None
-
-
 def failed_runs(campaign: Campaign, results: Path) -> dict[str, str]:
-    """Paths of the runs that failed with the present settings, with their reasons."""
+    """Return the paths of the runs that failed with the present settings, with their reasons."""
     states = {
         case.path: run_state(results / path, run_sha256(campaign, case))
         for path, case in campaign_files(campaign).runs.items()
     }
     return {path: reason for path, (state, reason) in states.items() if state == FAILED}
-
-
-def expected_seconds(items: Iterable[Item], folder: str) -> dict[str, float]:
-    """Return the expected core-seconds of each job, with scheduling; keys are the paths of files in `folder`."""
-    return {f"{folder}/{item.path}": item.cost.seconds * item.threads + WORKFLOW.job for item in items}
 
 
 def whole_cost(campaign: Campaign, results: Path) -> costs.Cost:
@@ -254,53 +247,14 @@ def whole_cost(campaign: Campaign, results: Path) -> costs.Cost:
     The cost is not calibrated by finished jobs, so every machine gives the same value.
     """
     items = [replace(item, state=TO_DO) for item in _items(campaign, results)]
-    return costs.Cost(time_on(items, 1), memory_on(items, 1), total(items).disk)
-
-
-@dataclass(frozen=True)
-class Total:
-    """Totals of several items.
-
-    Attributes
-    ----------
-    count, done, failed, to_do : numbers of items, of all and by state.
-    work : of items to do, core-seconds.
-    memory : of the largest job, bytes.
-    disk : of all files, bytes.
-    typical : median time of a job, s.
-    """
-
-    count: int
-    done: int
-    failed: int
-    to_do: int
-    work: float
-    memory: float
-    disk: float
-    typical: float
-
-
-def total(items: Iterable[Item]) -> Total:
-    """Add up items."""
-    items = list(items)
-    left = [item for item in items if item.to_do]
-    return Total(
-        len(items),
-        sum(item.state == DONE for item in items),
-        sum(item.state == FAILED for item in items),
-        len(left),
-        sum(item.cost.seconds * item.threads for item in left),
-        max((item.cost.memory for item in items), default=0.0),
-        sum(item.cost.disk for item in items),
-        statistics.median(item.cost.seconds for item in items) if items else 0.0,
-    )
+    return costs.Cost(time_on(items, 1), memory_on(items, 1), sum(item.cost.disk for item in items))
 
 
 def time_on(items: Iterable[Item], cores: int) -> float:
     """Return the expected time from the call to the end on some cores, s; 0 if nothing is to be done.
 
-    The work of a stage is divided among the cores, but takes at least the time of its longest job, and that of
-    scheduling all its jobs one by one.
+    The work of a stage is divided among the cores. A stage takes at least the time of its longest job, and at least the
+    time of scheduling all its jobs one by one.
     """
     items = list(items)
     seconds = start_up(items)
@@ -308,24 +262,19 @@ def time_on(items: Iterable[Item], cores: int) -> float:
         left = [item for item in items if item.stage == stage and item.to_do]
         scheduling = WORKFLOW.job * len(left)
         longest = max((item.cost.seconds for item in left), default=0.0)
-        seconds += max((total(left).work + scheduling) / cores, longest, scheduling)
+        seconds += max((sum(item.work for item in left) + scheduling) / cores, longest, scheduling)
     return seconds
 
 
 def start_up(items: Collection[Item]) -> float:
-    """Time until the first job, s: start of Snakemake, its plan, and imports of the jobs."""
+    """Return the time until the first job, s: start of Snakemake, its plan, and imports of the jobs."""
     if not any(item.to_do for item in items):
         return 0.0
-    return WORKFLOW.start + WORKFLOW.planned * len(items) + WORKFLOW.environment
-
-
-def overhead(items: Collection[Item]) -> float:
-    """Time of starting and scheduling the jobs to be done, core-seconds."""
-    return start_up(items) + WORKFLOW.job * sum(item.to_do for item in items)
+    return WORKFLOW.start + WORKFLOW.planned * len(items)
 
 
 def memory_on(items: Iterable[Item], cores: int, most: float = math.inf) -> float:
-    """Memory of Snakemake and of the largest jobs to be done that run in parallel, bytes.
+    """Return the memory of Snakemake and of the largest jobs that will run in parallel, bytes.
 
     Parallel jobs take at most `most`, unless a single one needs more.
     """

@@ -7,8 +7,8 @@ import shutil
 from collections.abc import Collection, Mapping
 from pathlib import Path
 
-from icha.configuration.boundary_elements import BesideStudy
 from icha.configuration.campaign import Campaign
+from icha.configuration.studies import BesideStudy
 from icha.datasets.labels import RunLabels
 from icha.planning.costs import MAP_ARRAYS, RUN_SIZES, job_threads
 from icha.planning.plan import Item, memory_on
@@ -26,7 +26,7 @@ def further_software(campaign: Campaign) -> tuple[str, ...]:
 
 
 def missing_software(campaign: Campaign) -> str | None:
-    """Describe the optional package that a campaign needs and that is not installed; None if there is none."""
+    """Describe the optional package that a campaign needs and that is not installed; None if it is installed."""
     if not further_software(campaign) or importlib.util.find_spec(TAMAAS):
         return None
     return (
@@ -40,39 +40,39 @@ def _sections(campaign):
 
 
 def surface_threads(campaign: Campaign, surface: str) -> int:
-    """Cores for a surface and its runs: one, unless its arrays are so large that several threads pay."""
+    """Return the number of cores for a surface and for each of its runs: two on large grids, otherwise one."""
     return job_threads(campaign.grid(surface))
 
 
 def _megabytes(program: float, arrays: float, nodes: int) -> int:
-    """Memory of a job, MB: the memory of its program plus a number of arrays of nodes x nodes values."""
+    """Return the memory of a job, MB: that of its program plus a number of arrays of nodes x nodes values."""
     return int(program + arrays * 8e-6 * nodes**2)
 
 
 def surface_memory(campaign: Campaign, surface: str) -> int:
-    """Memory for making a surface, MB."""
+    """Return the memory for making a surface, MB."""
     return _megabytes(600, 4, campaign.grid(surface))
 
 
 def run_memory(campaign: Campaign, case: RunLabels) -> int:
-    """Memory for a run, MB."""
+    """Return the memory for a run, MB."""
     arrays = max(4, 1.25 * RUN_SIZES[case.model].arrays)
     return _megabytes(600, arrays, campaign.grid(case.surface))
 
 
 def solver_memory(campaign: Campaign, surface: str, entry: BesideStudy) -> int:
-    """Memory for boundary elements at a finite range, MB."""
+    """Return the memory for boundary elements at a finite range, MB."""
     return _megabytes(400, 30, campaign.grid(surface) * entry.refinement)
 
 
 def figure_memory(campaign: Campaign, *, holds_topography: bool) -> int:
-    """Memory for a figure, MB, which may hold the largest topography and the contact maps of both models."""
+    """Return the memory for a figure, MB. The figure may show the largest topography and the maps of both models."""
     largest = max(campaign.grid(surface) for study in campaign.studies.values() for surface in study.surfaces)
     return _megabytes(1000, max(MAP_ARRAYS.values()) * holds_topography, largest)
 
 
 def run_minutes(campaign: Campaign, case: RunLabels) -> int:
-    """Time limit of a run, minutes: many times the longest measured time of such runs."""
+    """Return the time limit of a run, minutes: many times the longest measured time of such runs."""
     loading, cycle, several_cores = RUN_SIZES[case.model].minutes
     if surface_threads(campaign, case.surface) > 1:
         return several_cores
@@ -81,12 +81,12 @@ def run_minutes(campaign: Campaign, case: RunLabels) -> int:
 
 
 def memory_of_machine() -> int:
-    """Memory of this machine, bytes."""
+    """Return the memory of this machine, bytes."""
     return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
 
 
 def free_disk(folder: Path) -> int:
-    """Free disk space where a folder is or will be, bytes."""
+    """Return the free disk space where a folder is or will be, bytes."""
     existing = next(path for path in (folder, *folder.resolve().parents) if path.exists())
     return shutil.disk_usage(existing).free
 
@@ -94,7 +94,7 @@ def free_disk(folder: Path) -> int:
 def find_shortages(items: Collection[Item], cores: int, results: Path, profile: Mapping) -> list[str]:
     """Describe the memory or disk space that this machine lacks for the remaining jobs.
 
-    `profile` holds the settings of a profile of Snakemake: the executor, and the memory that jobs may take together.
+    `profile` contains the settings of a Snakemake profile: the executor, and the largest memory of all parallel jobs.
     """
     shortages = []
     disk, free = sum(item.cost.disk for item in items if item.to_do), free_disk(results)
@@ -113,9 +113,8 @@ def find_shortages(items: Collection[Item], cores: int, results: Path, profile: 
             f"about {formatting.size(needed)} of memory are needed on {format_count(cores, 'core')}, and this machine "
             f"has {formatting.size(available)}"
         )
-        for fewer in range(cores - 1, 0, -1):
-            if (less := memory_on(items, fewer, most)) <= available:
-                message += f"; --cores {fewer} needs {formatting.size(less)}"
-                break
+        fewer = [number for number in range(1, cores) if memory_on(items, number, most) <= available]
+        if fewer:
+            message += f"; --cores {fewer[-1]} needs {formatting.size(memory_on(items, fewer[-1], most))}"
         shortages.append(message)
     return shortages

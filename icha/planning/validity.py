@@ -2,7 +2,6 @@
 
 import math
 from functools import cache
-from pathlib import Path
 
 from icha.analysis.validity import (
     COMPLETE,
@@ -15,7 +14,6 @@ from icha.analysis.validity import (
     describe_sticky,
     join_first,
     statements,
-    statements_on_dataset,
 )
 from icha.asperity.full_contact import gaussian_complete_pressure
 from icha.asperity.material import WU_HOLDS_FROM, Material
@@ -31,39 +29,34 @@ from icha.surfaces.moments import (
     SpectralMoments,
     cells_per_short_wave,
     height_statistics,
+    self_affine_integral,
     slope_anisotropy,
     spectral_moments,
     summit_density,
 )
 
 # Radius of the mean curvature of the summits of a Gaussian surface times its rms curvature (McCool 1986).
-# icha.references.summit_theories has it, too, but takes long to import.
+# The module icha.references.summit_theories contains it, too, but takes long to import.
 _SUMMIT_RADIUS = 3 * math.sqrt(math.pi) / 8
 
-# Tabor parameter, over that of the mean curvature, which one in twenty of the first spots falls below.
+# Tabor parameter of the 5 % of the first spots with the smallest one, over that of the mean curvature.
 _SMALLEST_TABOR = 0.84
 
 
 def self_affine_moments(
     period: float, rolloff_wavelength: float, short_wavelength: float, hurst: float
 ) -> SpectralMoments:
-    """Moments of a self-affine surface with roll-off, up to a common factor; lengths in m.
+    """Return the moments of a self-affine surface with roll-off, up to a common factor; lengths in m.
 
     They are integrals over the plane of wave vectors: m0 = int C, m2 = 1/2 int q^2 C, m4 = 3/8 int q^4 C.
     """
     q_l, q_0, q_1 = (2 * math.pi / length for length in (period, rolloff_wavelength, short_wavelength))
-
-    def moment(order):
-        # int q^(order + 1) C dq, where C is constant up to the roll-off and then falls as q^(-2 (1 + H)).
-        power = order - 2 * hurst
-        falling = math.log(q_1 / q_0) if power == 0 else math.expm1(power * math.log(q_1 / q_0)) / power
-        return (q_0 ** (order + 2) - q_l ** (order + 2)) / (order + 2) + q_0 ** (order + 2) * falling
-
-    return SpectralMoments(moment(0), moment(2) / 2, 3 / 8 * moment(4))
+    m0, m2, m4 = (self_affine_integral(order, q_l, q_1, q_0, hurst) for order in (1, 3, 5))
+    return SpectralMoments(m0, m2 / 2, 3 / 8 * m4)
 
 
 def surface_facts(campaign: Campaign, name: str) -> dict[str, float]:
-    """Properties of a surface at rms slope 1: those of `icha.analysis.validity.VALIDATED`, and three more.
+    """Return properties of a surface at rms slope 1: those of `icha.analysis.validity.VALIDATED`, and three more.
 
     A random surface is Gaussian and isotropic; the properties of a surface from a file are computed from its heights.
 
@@ -141,11 +134,3 @@ def _describe_outside(tabor):
             ends = dict.fromkeys(f"{float(f'{mu:.2g}'):g}" for mu in (min(values), max(values)))
             cases.append(f"{material} on {surface} (about {' to '.join(ends)})")
     return f"some or all spots expected outside: {join_first(cases)}" if cases else ""
-
-
-def found_validity(dataset: Path) -> list[Statement]:
-    """State the validity of the campaign dataset in a file."""
-    import xarray as xr
-
-    with xr.open_datatree(dataset, engine="netcdf4") as tree:
-        return statements_on_dataset(tree)

@@ -1,1 +1,1 @@
-"""What ICHA is compared with: theories of rough contact, published points and boundary elements."""
+"""References for comparison with ICHA: theories of rough contact, published points, boundary elements by Tamaas."""

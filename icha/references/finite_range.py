@@ -1,20 +1,18 @@
 """Contact at a finite range of attraction, solved by the boundary-element code Tamaas.
 
-Tamaas is installed with the extra `tamaas` and shares no code with ICHA; nothing outside `icha.references` needs
-Tamaas.
+Tamaas is installed with the extra `tamaas` and shares no code with ICHA; nothing outside `icha.references` needs it.
+The constant `REFERENCES` lists the publications of its methods.
 
-Tamaas (L. Frérot et al., J. Open Source Softw. 5 (2020) 2121, doi:10.21105/joss.02121) minimises the energy of an
-elastic half-space against the nodes of the topography. Without adhesion it minimises over the pressures at a given load
-(I. A. Polonsky and L. M. Keer, Wear 231 (1999) 206, doi:10.1016/S0043-1648(99)00113-1). With adhesion it minimises over
-the gaps at a given mean gap (V. Rey, G. Anciaux and J.-F. Molinari, Comput. Mech. 60 (2017) 69,
-doi:10.1007/s00466-017-1392-5); the traction outside a hard wall is (dgamma/rho) exp(-u/rho). With adhesion the load
-control of Tamaas converges to wrong states, so ICHA searches for the mean gap that carries a given load.
+Tamaas minimises the energy of an elastic half-space against the nodes of the topography. Without adhesion it minimises
+over the pressures at a given load (Polonsky & Keer). With adhesion it minimises over the gaps at a given mean gap (Rey
+et al.); the traction at a gap u is -(dgamma/rho) exp(-u/rho). With adhesion the load control of Tamaas converges to
+wrong states, so ICHA searches for the mean gap that carries a given load.
 
-The gap is zero in contact, and there is attraction in a cohesive zone around the contact. In the law of Johnson,
-Kendall and Roberts the contact area lowers the energy by dgamma times the area. At a finite range the energetic area
-has this property: it is the integral of exp(-u/rho), minus the derivative of the energy with respect to the surface
-energy at fixed mean gap. It is larger than the area of zero gap. As the range decreases, both tend to the area of JKR,
-the energetic area much sooner.
+The gap is zero in contact, and attraction acts in a cohesive zone around the contact. In the law of Johnson, Kendall
+and Roberts a contact area A lowers the energy by dgamma A. At a finite range the energetic area has this property: the
+integral of exp(-u/rho) over the nominal area, which is minus the derivative of the energy with respect to dgamma at
+fixed mean gap. It is larger than the area of zero gap. As the range decreases, both areas tend to that of JKR, the
+energetic area much sooner.
 """
 
 import math
@@ -45,11 +43,11 @@ DEFAULT_TOLERANCE = 1e-8
 LOAD_TOLERANCE = 2e-4
 _MAX_SOLVES = 20
 _MAX_ITERATIONS = 100_000
-# Iterations between two checks of the gap: while it is open everywhere, and otherwise.
+# Numbers of iterations between two checks of the gap: while it is open everywhere, and otherwise.
 _OPEN_ITERATIONS, _TOUCHING_ITERATIONS = 50, 1000
-# First step of the search, in h_rms. On rough surfaces the load falls by a factor e over about this distance.
-_DECAY = 0.4
-_LONGEST_STEP = 0.3
+# Distance over which the load on rough surfaces decreases by about a factor e, for the first step of a search; and
+# longest step of the search. Both are in h_rms.
+_DECAY, _LONGEST_STEP = 0.4, 0.3
 
 REFERENCES = (
     "L. Frérot et al., J. Open Source Softw. 5 (2020) 2121, doi:10.21105/joss.02121; "
@@ -66,7 +64,7 @@ class NotSolved(RuntimeError):
 
 @dataclass(frozen=True, eq=False)
 class NodalState:
-    """A contact at the nodes of its grid.
+    """State of a contact at the nodes of its grid.
 
     Attributes
     ----------
@@ -75,7 +73,7 @@ class NodalState:
     traction : (n, n), Pa, positive in compression.
     contact : (n, n) bool, whether the gap is zero.
     residual : relative error that the solver reports.
-    solves : number of solutions that it took.
+    solves : number of solutions that the state took.
     """
 
     surface: Surface
@@ -101,7 +99,7 @@ class NodalState:
         return float(self.traction[~self.contact].sum()) / self.contact.size
 
     def energetic_area_fraction(self, material: Material) -> float:
-        """Return the energy of adhesion over that of full contact: the mean of exp(-u/rho), which is 1 in contact."""
+        """Return the energetic area over the nominal area: the mean of exp(-u/rho), which is 1 in contact."""
         raw = np.count_nonzero(self.contact) / self.contact.size
         if material.surface_energy == 0:
             return raw
@@ -110,8 +108,7 @@ class NodalState:
     def stored_energy(self, material: Material) -> float:
         """Return the elastic energy minus the energy of adhesion, over the nominal area, J/m^2; 0 far apart.
 
-        The elastic energy is half the mean of traction times displacement. Between jumps the derivative of the stored
-        energy with respect to the mean gap is minus the nominal pressure.
+        The elastic energy is half the mean of traction times displacement.
         """
         displacement = self.gap + self.surface.heights
         displacement -= displacement.mean()
@@ -129,7 +126,7 @@ def finite_range_solution(
     seed: int = -1,
     progress: Callable[[str], None] | None = None,
 ) -> xr.Dataset:
-    """Press the surface against the half-space at one load, by boundary elements.
+    """Return the dataset of a rough surface that is pressed against a half-space with one load, solved by Tamaas.
 
     Parameters
     ----------
@@ -138,13 +135,13 @@ def finite_range_solution(
     refinement : nodes per node of the surface's grid, along a side.
     tolerance : relative error at which the solver stops.
     seed : recorded in the dataset.
-    progress : called with lines of text; the first one has the numbers by which the grid resolves the attraction.
+    progress : called with a line of text for every mean gap of the search.
 
     Returns
     -------
     xarray.Dataset of one state (`icha.datasets.variables.boundary_elements.SOLUTION`). Densities refer to the nominal
-    area: the integral of `gap_density` plus the raw area is 1, that of `pressure_density` is the raw area. The bins are
-    those of `icha.simulate`.
+    area: the integral of `pressure_density` is the area fraction of the nodes in contact, and that of `gap_density` is
+    1 minus this fraction. The bins are those of `icha.simulate`.
 
     Raises
     ------
@@ -168,9 +165,9 @@ def contact_state(
     tolerance: float = DEFAULT_TOLERANCE,
     progress: Callable[[str], None] | None = None,
 ) -> NodalState:
-    """Solve the contact at one load, as `finite_range_solution` does; return the state at all nodes."""
+    """Return the state of a contact under one load at all nodes; the arguments are those of `finite_range_solution`."""
     target = POSITIVE.validate("reduced_pressure", reduced_pressure) * surface.rms_slope * material.contact_modulus
-    fine = refine(surface, material, refinement, progress)
+    fine = refine(surface, material, refinement)
     state = _solve_nonadhesive(fine, material, target, TOLERANCE.validate("tolerance", tolerance))
     if material.surface_energy == 0:
         return state
@@ -178,32 +175,20 @@ def contact_state(
     return _find_gap_at_load(contact, target, state.mean_separation, progress)
 
 
-def refine(
-    surface: Surface, material: Material, refinement: int, progress: Callable[[str], None] | None = None
-) -> Surface:
-    """Return the surface on the grid of the solution; raise `ValueError` if it does not resolve the attraction."""
-    surface.require_periodic("the solution by boundary elements")
+def refine(surface: Surface, material: Material, refinement: int) -> Surface:
+    """Return the surface on a finer grid for the solver; raise `ValueError` if it does not resolve the attraction."""
+    surface.require_periodic("the solver for finite ranges")
     fine = surface.refined(REFINEMENT.validate("refinement", refinement))
-    numbers = f"{fine.grid} nodes a side, spacing {fine.spacing:.4g} m"
-    if material.surface_energy > 0:
-        numbers += (
-            f"; with adhesion at most {longest_spacing(material):.4g} m; sqrt(dgamma dx/E*)/range = "
-            f"{strength_number(material, fine.spacing):.3g}"
-        )
-    if progress:
-        progress(numbers)
     if problem := resolution_problem(material, fine.spacing):
         raise ValueError(f"interaction_range: {problem}")
     return fine
 
 
 class _Solver:
-    """Tamaas on one surface, in units of h_rms for lengths and E* for pressures.
-
-    `variable` is the unknown, whose mean is prescribed: tamaas.PolonskyKeerRey.pressure or .gap.
-    """
+    """Solver of Tamaas for one surface, in units of h_rms for lengths and E* for pressures."""
 
     def __init__(self, fine, variable, tolerance):
+        """Set up the solver; its unknown is tamaas.PolonskyKeerRey.pressure or .gap, whose mean is prescribed."""
         # With one thread sums keep their order, and results their bytes.
         tamaas.initialize(1)
         self.tolerance = tolerance
@@ -215,7 +200,7 @@ class _Solver:
         self.solver.max_iter = _MAX_ITERATIONS
 
     def iterate(self, mean):
-        """Iterate at most `max_iter` times towards a mean pressure or gap; return the error."""
+        """Iterate at most `max_iter` times towards a mean pressure or gap; return the relative error."""
         try:
             with tamaas.utils.log_context(tamaas.LogLevel.error):
                 return self.solver.solve(mean)
@@ -223,14 +208,14 @@ class _Solver:
             raise NotSolved(f"boundary elements: {error}") from None
 
     def require_converged(self, residual):
-        """Return the error; raise `NotSolved` if it exceeds the tolerance."""
+        """Return the relative error `residual`; raise `NotSolved` if it exceeds the tolerance."""
         if not residual <= self.tolerance:
             raise NotSolved(f"boundary elements did not converge: error {residual:.3g}, tolerance {self.tolerance:g}")
         return residual
 
 
 def _solve_nonadhesive(fine, material, pressure, tolerance):
-    """Solve the contact without adhesion at a mean pressure, Pa."""
+    """Return the state without adhesion at a mean pressure, Pa."""
     solver = _Solver(fine, tamaas.PolonskyKeerRey.pressure, tolerance)
     residual = solver.require_converged(solver.iterate(pressure / material.contact_modulus))
     traction = np.array(solver.model.traction)
@@ -242,15 +227,15 @@ def _solve_nonadhesive(fine, material, pressure, tolerance):
 
 
 class GapContact:
-    """Contact at given mean gaps. Each solution starts from the one before, the first one from `gap`, m.
+    """Contact at given mean gaps; each solution starts from the gaps of the one before.
 
     Tamaas divides its error by the load of the contact, so its solver does not stop if no node is in contact. Therefore
-    ICHA interrupts the solver from time to time. If the gap is open everywhere, ICHA checks the traction against the
-    law of the interface.
+    ICHA interrupts the solver from time to time. If the gap is open everywhere, ICHA compares the traction with the
+    law of attraction.
     """
 
     def __init__(self, fine, material, tolerance, gap=None):
-        """Set up the solver."""
+        """Set up the solver; the first solution starts from `gap`, (n, n), m."""
         self.fine, self.material = fine, material
         self.solver = _Solver(fine, tamaas.PolonskyKeerRey.gap, tolerance)
         unit = self.solver.unit
@@ -267,11 +252,11 @@ class GapContact:
         self.solves = 0
 
     def start_from(self, gap):
-        """Start the next solution from a gap, m."""
+        """Start the next solution from these gaps (n, n), m."""
         self.solver.model["gap"][:] = np.maximum(gap, 0.0) / self.solver.unit
 
     def solve(self, separation):
-        """Solve the contact at a mean gap, m."""
+        """Return the state at a mean gap, m."""
         unit, model = self.solver.unit, self.solver.model
         self.solves += 1
         if self.material.surface_energy == 0 and separation >= self.fine.heights.max():
@@ -285,7 +270,7 @@ class GapContact:
         )
 
     def _iterate(self, mean):
-        """Solve for a mean gap with checks of the gap in between; return the error."""
+        """Iterate to convergence at a mean gap, in h_rms, with checks of the gap in between; return the error."""
         iterations = 0
         while iterations < _MAX_ITERATIONS:
             self.solver.solver.max_iter = _OPEN_ITERATIONS if self._is_open() else _TOUCHING_ITERATIONS
@@ -298,10 +283,11 @@ class GapContact:
         return self.solver.require_converged(residual)
 
     def _is_open(self):
+        """Return whether no node is in contact."""
         return np.min(self.solver.model["gap"]) > 0
 
     def _imbalance(self):
-        """Return the largest difference between traction and attraction, over the strength, if no node is in contact.
+        """Return the error if no node is in contact: largest difference of traction and attraction, over the strength.
 
         Each mode of the traction is E* q/2 times the same mode of the displacement; the mean traction is unknown.
         """
@@ -316,7 +302,7 @@ class GapContact:
 
 
 def _find_gap_at_load(contact, pressure, separation, progress):
-    """Search for the mean gap at which the mean traction is `pressure` (Pa), from a first guess (m)."""
+    """Return the state whose mean traction is `pressure`, Pa, by a search for its mean gap from a first guess, m."""
     unit = contact.fine.rms_height
     tried: list[tuple[float, float]] = []
     mean_gap = separation / unit
@@ -337,7 +323,10 @@ def _find_gap_at_load(contact, pressure, separation, progress):
 
 
 def _next_gap(tried):
-    """Return the next mean gap: a secant step in the load, between the gaps with too much and too little load."""
+    """Return the next mean gap, in h_rms: a secant step that stays between gaps with too much and too little load.
+
+    tried : pairs of mean gap and relative error of the load.
+    """
     gap, error = tried[-1]
     step = _DECAY * (math.log1p(error) if error > -0.9 else -1.0)
     if len(tried) > 1:
@@ -354,16 +343,17 @@ def _next_gap(tried):
 
 
 def perimeter_correction(contact: np.ndarray) -> tuple[float, float]:
-    """Return the contact area fraction corrected by the perimeter, and the perimeter in spacings, of a periodic map.
+    """Return the area fraction of a periodic contact map (n, n) without the error of its edges, and its perimeter.
 
     Nodes along the edge overestimate the area by (pi - 1 + ln 2)/24 of the perimeter times the spacing (Yastrebov,
-    Anciaux & Molinari 2017, their eq. 9).
+    Anciaux & Molinari 2017, their eq. 9). The perimeter is in spacings.
     """
     edges = sum(int(np.count_nonzero(contact != np.roll(contact, 1, axis))) for axis in (0, 1))
     return (np.count_nonzero(contact) - BEYOND_EDGES * edges) / contact.size, float(edges)
 
 
 def _dataset(surface, material, state, target, tolerance, seed):
+    """Build the dataset of a state; `target` is the prescribed reduced pressure."""
     fine, gap, contact = state.surface, state.gap, state.contact
     height, unit = surface.rms_height, material.contact_modulus * surface.rms_slope
     area, edges = perimeter_correction(contact)
@@ -403,7 +393,7 @@ def _dataset(surface, material, state, target, tolerance, seed):
     attrs = attributes(
         material,
         "Rough contact {} adhesion, boundary elements at finite range",
-        "One state of a periodic rough surface against an elastic half-space, by boundary elements.",
+        "One state of a periodic rough surface against an elastic half-space, solved with boundary elements.",
     )
     return build_dataset(SOLUTION, values, attrs)
 
@@ -411,7 +401,7 @@ def _dataset(surface, material, state, target, tolerance, seed):
 def describe_problem(
     surface: Surface, fine: Surface, material: Material, tolerance: float, seed: int
 ) -> dict[str, Any]:
-    """Return the variables that describe a problem: surface, grid of the solution, material and settings."""
+    """Return the values, by name, that describe a problem: surface, grid of the solver, material and settings."""
     adhesive = material.surface_energy > 0
     return {
         "tolerance": tolerance,
@@ -427,7 +417,7 @@ def describe_problem(
 
 
 def attributes(material: Material, title: str, summary: str) -> dict[str, str]:
-    """Return the attributes of a dataset by Tamaas; braces in the title are replaced by `with` or `without`."""
+    """Return the attributes of a dataset by Tamaas; `{}` in the title is replaced by `with` or `without`."""
     return file_attributes(
         title.format("with" if material.surface_energy > 0 else "without"),
         summary,

@@ -1,11 +1,10 @@
 """Loading and unloading at a finite range of attraction, with boundary elements, from no contact to no contact.
 
 The mean gap is prescribed, as in a stiff machine. Each solution starts from the one before and so stays on its branch
-until the branch ends. At the end of a branch the surfaces jump, and the energy that the jump releases is lost. The work
-done on the contact is minus the integral of the nominal pressure over the mean gap. Between jumps the work equals the
-change of the stored energy. In a step with a jump they differ by the energy that the jump dissipates. They also differ
-by the error of the trapezoidal rule. Steps with a difference are halved, at most five times; where a jump lies within
-the smallest step remains unknown.
+until the branch ends. There the surfaces jump, and the energy that the jump releases is lost. The work done on the
+contact is minus the integral of the nominal pressure over the mean gap, by the trapezoidal rule. It differs from the
+change of the stored energy by the energy that jumps dissipate, and by the error of the trapezoidal rule. Steps with a
+difference are halved, at most five times; the position of a jump within the smallest step remains unknown.
 """
 
 import math
@@ -54,7 +53,7 @@ def finite_range_loop(
     seed: int = -1,
     progress: Callable[[str], None] | None = None,
 ) -> xr.Dataset:
-    """Compute a loop with boundary elements: from surfaces that are apart to a load, and back until they are apart.
+    """Return the dataset of a loop, solved by Tamaas: from separated surfaces to a load, and until they separate again.
 
     Parameters
     ----------
@@ -77,7 +76,7 @@ def finite_range_loop(
     """
     target = POSITIVE.validate("largest_reduced_pressure", largest_reduced_pressure)
     step = POSITIVE.validate("separation_step", separation_step) * surface.rms_height
-    fine = refine(surface, material, refinement, progress)
+    fine = refine(surface, material, refinement)
     solver = _LoopSolver(fine, material, TOLERANCE.validate("tolerance", tolerance))
     legs = _load_and_unload(solver, step, target * surface.rms_slope * material.contact_modulus, progress)
     return _dataset(surface, solver, legs, separation_step, seed)
@@ -94,7 +93,7 @@ class _LoopSolver:
         self.range = material.interaction_range if adhesive else 0.0
 
     def solve_from_undeformed(self, separation):
-        """Solve at a mean gap, m; start from the undeformed surfaces."""
+        """Return the state at a mean gap, m, starting from the undeformed surfaces."""
         return self.solve(separation - self.fine.heights, separation)
 
     def is_apart(self, state):
@@ -102,14 +101,14 @@ class _LoopSolver:
         return not state.contact.any() and state.gap.min() >= _APART * self.range
 
     def solve(self, gap, separation):
-        """Solve at a mean gap, m; start from the gaps (n, n) of another state."""
+        """Return the state at a mean gap, m, starting from the gaps (n, n), m, of another state."""
         if self.contact.solves >= _MAX_SOLVES:
             raise NotSolved(f"the loop has not ended after {self.contact.solves} solutions")
         self.contact.start_from(gap)
         return self.contact.solve(separation)
 
     def steps(self, state, separation, halvings=_MAX_HALVINGS):
-        """Yield states up to a mean gap, m; halve each step until its work is known or it is the smallest step."""
+        """Yield states from one state to a mean gap, m, in steps that are halved until their work is known well."""
         after = self.solve(state.gap, separation)
         if halvings == 0 or self.work_error(state, after) <= self.work_tolerance:
             yield after
@@ -119,7 +118,7 @@ class _LoopSolver:
         yield from self.steps(middle, separation, halvings - 1)
 
     def work_error(self, before, after):
-        """Return the error of the work of a step by the trapezoidal rule, J/m^2: the smaller of two estimates.
+        """Return the error of the work of a step, J/m^2: the smaller of two estimates.
 
         On a branch the error is the work minus the change of the stored energy. In a step with a jump the error is at
         most half the change of the pressure times the step.
@@ -128,7 +127,7 @@ class _LoopSolver:
         return min(abs(_dissipated(records)[0]), _jump_position_error(records)[0])
 
     def total_work_error(self, records):
-        """Return the error of the work of all steps, J/m^2: dissipation without jumps plus positions of jumps."""
+        """Return the error of the work of all steps, J/m^2: dissipation in steps without jumps, and errors of jumps."""
         dissipated = _dissipated(records)
         jump = dissipated > self.work_tolerance
         return abs(dissipated[~jump].sum()) + _jump_position_error(records)[jump].sum()
@@ -146,13 +145,13 @@ class _LoopSolver:
         }
 
     def describe(self, state):
-        """Describe a state in a message."""
+        """Return a text with mean gap and load of a state, for messages."""
         reduced = state.nominal_pressure / (self.material.contact_modulus * self.fine.rms_slope)
         return f"mean gap {state.mean_separation / self.fine.rms_height:.6g} h_rms, load {reduced:.4g} E* h'rms"
 
 
 def _load_and_unload(solver, step, target, progress):
-    """Return records of both legs of the loop, from apart until apart."""
+    """Return the records of all states of loading and of unloading, two lists; `target` is the largest load, Pa."""
     start = float(solver.fine.heights.max()) + _START * solver.range
     last, legs = None, ([], [])
     try:
@@ -163,7 +162,7 @@ def _load_and_unload(solver, step, target, progress):
                     area = f"contact area {leg[-1]['contact_area_fraction']:.4g} A0"
                     progress(f"{solver.describe(state)}, {area}, error {state.residual:.2g}")
                 last = state
-        # If contact breaks at a larger gap than that of the start, loading begins at the larger gap too.
+        # If contact breaks at a larger gap than that of the start, states from that gap on are added to loading.
         count = round((last.mean_separation - start) / step)
         farther = [solver.solve_from_undeformed(start + step * k) for k in range(count, 0, -1)]
         legs[0][:0] = map(solver.record, farther)
@@ -174,7 +173,7 @@ def _load_and_unload(solver, step, target, progress):
 
 
 def _load(solver, _, start, step, target):
-    """Yield states from apart to the largest load."""
+    """Yield the states of loading from the mean gap `start`, m, up to the load `target`, Pa, in steps of the gap, m."""
     state, count = solver.solve_from_undeformed(start), 0
     yield state
     while state.nominal_pressure < target * (1 - _LOAD_TOLERANCE):
@@ -190,7 +189,7 @@ def _load(solver, _, start, step, target):
 
 
 def _search_load(solver, before, after, target):
-    """Yield states between two states, up to the load; if the load lies within a jump, end with the second state."""
+    """Yield states between two states, up to the load, Pa; if it lies within a jump, the last one is `after`."""
     for _ in range(_MAX_LOAD_SEARCHES):
         share = (target - before.nominal_pressure) / (after.nominal_pressure - before.nominal_pressure)
         separation = before.mean_separation + share * (after.mean_separation - before.mean_separation)
@@ -206,7 +205,7 @@ def _search_load(solver, before, after, target):
 
 
 def _unload(solver, state, start, step, target):
-    """Yield states from the largest load until the surfaces are apart, at the mean gaps of loading."""
+    """Yield the states of unloading until the surfaces are apart, at the mean gaps of loading; as `_load`."""
     count = math.ceil((start - state.mean_separation) / step) - 1
     while count >= 0 or not solver.is_apart(state):
         for after in solver.steps(state, start - count * step):
@@ -221,22 +220,23 @@ def _column(records, name):
 
 
 def _work(records):
-    """Integrate the work on each step by the trapezoidal rule, J/m^2."""
+    """Return the work of each step between n records by the trapezoidal rule, (n - 1,), J/m^2."""
     pressure = _column(records, "nominal_pressure")
     return -np.diff(_column(records, "mean_separation")) * (pressure[1:] + pressure[:-1]) / 2
 
 
 def _dissipated(records):
-    """Return the work on each step minus the change of the stored energy, J/m^2."""
+    """Return the work of each step minus the change of the stored energy, (n - 1,), J/m^2."""
     return _work(records) - np.diff(_column(records, "stored_energy"))
 
 
 def _jump_position_error(records):
-    """Return the error of the work on each step if the pressure jumps at one of its ends, J/m^2."""
+    """Return the error of the work of each step if the pressure jumps at one of its ends, (n - 1,), J/m^2."""
     return np.abs(np.diff(_column(records, "mean_separation")) * np.diff(_column(records, "nominal_pressure"))) / 2
 
 
 def _dataset(surface, solver, legs, separation_step, seed):
+    """Build the dataset of a loop from the records of its two legs."""
     material = solver.material
     records = [*legs[0], *legs[1]]
     columns = {name: _column(records, name) for name in records[0]}
@@ -266,7 +266,7 @@ def _dataset(surface, solver, legs, separation_step, seed):
     }
     attrs = attributes(
         material,
-        "Rough contact {} adhesion both ways, boundary elements at finite range",
+        "Loading and unloading of a rough contact {} adhesion, boundary elements at finite range",
         "A periodic rough surface against an elastic half-space, from apart to a load and apart again.",
     )
     return build_dataset(LOOP, values, attrs)

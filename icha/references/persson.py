@@ -1,23 +1,20 @@
 """Persson's theory of the adhesionless contact of a nominally flat rough surface.
 
-Pressures are reduced, p* = p/(E* h'_rms). Sources:
-
-- Persson: B. N. J. Persson, J. Chem. Phys. 115 (2001) 3840-3861, doi:10.1063/1.1388626; in the form with the rms
-  slope, A/A0 = erf(sqrt(2) p*), e.g. M. H. Muser et al., Tribol. Lett. 65 (2017) 118, doi:10.1007/s11249-017-0900-2.
-- Xu et al.: Y. Xu, L. Zhu, F. Xiao and Y. Zhou, Tribol. Lett. 72 (2024), doi:10.1007/s11249-024-01838-4; equation and
-  gamma = 0.45 from the programs of their public data, https://github.com/xylcsi/PerssonModelFudgeFactor.
-- Yang & Persson: C. Yang and B. N. J. Persson, J. Phys.: Condens. Matter 20 (2008) 215214,
-  doi:10.1088/0953-8984/20/21/215214.
-- Stiffness proportional to pressure: B. N. J. Persson, Phys. Rev. Lett. 99 (2007) 125502,
-  doi:10.1103/PhysRevLett.99.125502.
+Pressures are reduced, p* = p/(E* h'_rms). The constants below name the sources. The form of Persson's theory with the
+rms slope is in M. H. Muser et al., Tribol. Lett. 65 (2017) 118, doi:10.1007/s11249-017-0900-2. Equation and gamma of Xu
+et al. are from the programs of their public data, https://github.com/xylcsi/PerssonModelFudgeFactor. Stiffness in
+proportion to pressure: B. N. J. Persson, Phys. Rev. Lett. 99 (2007) 125502, doi:10.1103/PhysRevLett.99.125502.
 """
 
 import numpy as np
 from scipy.integrate import simpson
 from scipy.special import erf
 
-# Share of the full-contact elastic energy that a small contact stores (Yang & Persson, gamma); and share of the
-# variance of the pressure of full contact that it has (Xu et al., gamma).
+PERSSON = "B. N. J. Persson, J. Chem. Phys. 115 (2001) 3840, doi:10.1063/1.1388626"
+XU = "Y. Xu, L. Zhu, F. Xiao and Y. Zhou, Tribol. Lett. 72 (2024), doi:10.1007/s11249-024-01838-4, gamma = 0.45"
+YANG_PERSSON = "C. Yang and B. N. J. Persson, J. Phys.: Condens. Matter 20 (2008) 215214, gamma = 0.45"
+# Elastic energy of a small contact over that of full contact on the same area (Yang & Persson, gamma); and the same
+# ratio of the variances of the pressure (Xu et al., gamma).
 YANG_PERSSON_GAMMA, XU_GAMMA = 0.45, 0.45
 # Iterations for the area of Xu et al.; each one reduces its error to less than a quarter.
 _AREA_ITERATIONS = 40
@@ -26,12 +23,12 @@ _POINTS = 401
 
 
 def persson_area(reduced_pressure):
-    """Compute the contact area fraction erf(sqrt(2) p*) for an array of reduced pressures (Persson 2001)."""
+    """Return the contact area fraction erf(sqrt(2) p*) at reduced pressures, an array (Persson 2001)."""
     return erf(np.sqrt(2) * np.asarray(reduced_pressure, float))
 
 
 def corrected_persson_area(reduced_pressure):
-    r"""Compute the contact area fraction for an array of reduced pressures, Persson's theory corrected by Xu et al.
+    r"""Return the contact area fraction at reduced pressures, an array, by Persson's theory as Xu et al. corrected it.
 
     Partial contact has a smaller variance of the pressure than full contact, V = (gamma + (1 - gamma) A/A0) V_full with
     V_full = (E* h'_rms)^2/4, so that A/A0 = erf(p/sqrt(2 V)) is an equation for A/A0.
@@ -44,9 +41,9 @@ def corrected_persson_area(reduced_pressure):
 
 
 def persson_pressure_density(pressure, reduced_pressure):
-    """P(p) over the nominal area, in units of E* h'_rms, at pressures `pressure` in that unit (Persson 2001).
+    """Return P(p) over the nominal area at the pressures `pressure`, both in units of E* h'_rms (Persson 2001).
 
-    Two Gaussians of standard deviation 1/2, centred at p* and mirrored at -p*; their integral over p > 0 is
+    A Gaussian of standard deviation 1/2 around p*, minus the same one around -p*. The integral over p > 0 is
     `persson_area`.
     """
     pressure = np.asarray(pressure, float)
@@ -55,7 +52,7 @@ def persson_pressure_density(pressure, reduced_pressure):
 
 
 def persson_mean_separation(reduced_pressure, spectrum):
-    r"""Compute the mean separation over h_rms from the spectrum of the surface, for an array of reduced pressures.
+    r"""Return the mean separation over h_rms at reduced pressures, an array, from the spectrum of the surface.
 
     Yang & Persson (2008): with w(q) = (pi int_{q_L}^q k^3 C(k) dk)^(-1/2) and P = erf(w p/E*),
 
@@ -73,9 +70,9 @@ def persson_mean_separation(reduced_pressure, spectrum):
 
 
 def persson_stiffness(reduced_pressure, spectrum):
-    r"""Contact stiffness -dp/du times h_rms/(E* h'_rms) at reduced pressures, in the theory of Yang & Persson (2008).
+    r"""Return the contact stiffness -dp/du times h_rms/(E* h'_rms) at reduced pressures (Yang & Persson 2008).
 
-    Derivative of `persson_mean_separation`, in closed form except for the integral over the wave numbers:
+    It is a derivative of `persson_mean_separation`; only the integral over the wave numbers remains:
 
         -p du/dp = sqrt(pi) int dq q^2 C(q) w(q) [gamma + 3 (1 - gamma) P^2] exp(-(w p/E*)^2).
 
@@ -87,7 +84,7 @@ def persson_stiffness(reduced_pressure, spectrum):
 
 
 def _over_wave_numbers(share, reduced_pressure, spectrum):
-    """sqrt(pi) int dq q^2 C(q) w(q) share(w p/E*), over h_rms."""
+    """Return sqrt(pi) int dq q^2 C(q) w(q) share(w p/E*) over h_rms at reduced pressures, an array."""
     pressure = np.asarray(reduced_pressure, float)
     if np.any(pressure <= 0):
         raise ValueError("reduced_pressure: must be greater than 0")
@@ -105,7 +102,7 @@ def _over_wave_numbers(share, reduced_pressure, spectrum):
     shape = np.maximum(q / rolloff, 1.0) ** falling
 
     def moment(power, q):
-        """2 pi times the integral of k^power C from q_L to q; q - 1 instead of q limits rounding errors."""
+        """Return 2 pi times the integral of k^power C from q_L to q, without rounding errors of q - 1."""
         flat = np.expm1((power + 1) * np.log1p(np.minimum(q - 1, rolloff - 1))) / (power + 1)
         steep = np.log(np.maximum(q / rolloff, 1.0)) if rolloff > 1 else np.log1p(q - 1)
         exponent = power + falling + 1
@@ -122,12 +119,12 @@ def _over_wave_numbers(share, reduced_pressure, spectrum):
 
 
 def _share_density(t):
-    """[gamma + 3 (1 - gamma) erf(t)^2] exp(-t^2)."""
+    """Return [gamma + 3 (1 - gamma) erf(t)^2] exp(-t^2)."""
     return (YANG_PERSSON_GAMMA + 3 * (1 - YANG_PERSSON_GAMMA) * erf(t) ** 2) * np.exp(-(t**2))
 
 
 def _stored_share(t):
-    """Integral of `_share_density`(s)/s over s from t to infinity."""
+    """Return the integral of `_share_density`(s)/s over s from t to infinity, interpolated in a table."""
     s = np.geomspace(1e-12, 12, 6001)
     integrand = _share_density(s)
     log_s = np.log(s)

@@ -1,14 +1,10 @@
 r"""Theories of separate summits: spheres at given heights, each in contact with a plane as if it were alone.
 
 Pressures are reduced, p* = p/(E* h'_rms). Separations are distances between the plane and the mean plane of the rough
-surface over h_rms; they are mean separations, because only the summits deform in these theories. Sources:
-
-- Bush, Gibson & Thomas: Wear 35 (1975) 87-111, doi:10.1016/0043-1648(75)90145-3.
-- Greenwood & Williamson: Proc. R. Soc. Lond. A 295 (1966) 300-319, doi:10.1098/rspa.1966.0242; with the summits of a
-  Gaussian surface as in J. I. McCool, Wear 107 (1986) 37-60, doi:10.1016/0043-1648(86)90045-1, after P. R. Nayak, J.
-  Lubr. Technol. 93 (1971) 398-407, doi:10.1115/1.3451608.
-- Fuller & Tabor: Proc. R. Soc. Lond. A 345 (1975) 327-342, doi:10.1098/rspa.1975.0138; its loading: J. A. Greenwood,
-  Tribol. Lett. 65 (2017) 159, doi:10.1007/s11249-017-0938-1.
+surface over h_rms; they are mean separations, because only the summits deform in these theories. The constants below
+name the sources. Further ones: P. R. Nayak, J. Lubr. Technol. 93 (1971) 398, doi:10.1115/1.3451608, for the summits of
+a Gaussian surface; J. A. Greenwood, Tribol. Lett. 65 (2017) 159, doi:10.1007/s11249-017-0938-1, for Fuller & Tabor on
+loading.
 """
 
 import math
@@ -23,13 +19,22 @@ from icha.asperity.jkr import JKR
 from icha.asperity.material import Material
 from icha.surfaces.moments import SpectralMoments, summit_density
 
+BUSH_GIBSON_THOMAS = "A. W. Bush, R. D. Gibson and T. R. Thomas, Wear 35 (1975) 87, doi:10.1016/0043-1648(75)90145-3"
+GREENWOOD_WILLIAMSON = (
+    "J. A. Greenwood and J. B. P. Williamson, Proc. R. Soc. Lond. A 295 (1966) 300, doi:10.1098/rspa.1966.0242; "
+    "J. I. McCool, Wear 107 (1986) 37, doi:10.1016/0043-1648(86)90045-1"
+)
+FULLER_TABOR = (
+    "K. N. G. Fuller and D. Tabor, Proc. R. Soc. Lond. A 345 (1975) 327, doi:10.1098/rspa.1975.0138, on loading: "
+    "summits are in contact from approach 0 on"
+)
 # Contact area fraction above which summits are no longer separate.
 SEPARATE_SUMMITS_AREA_LIMIT = 0.1
 
-# McCool's 0.8968: relative reduction of the variance of summit heights against that of all heights, times alpha.
+# McCool's 0.8968: alpha times the relative difference between the variances of all heights and of the summit heights.
 _SUMMIT_VARIANCE = 1 - 3 * math.sqrt(3) + 16 / math.pi
 
-# Largest distances from the mean summit, in standard deviations: of the summits in the sum, and of the plane.
+# Largest distances from the mean summit height, in standard deviations: of the summits in the sum, and of the plane.
 _FARTHEST_SUMMIT = 12.0
 _FARTHEST_PLANE = 10.0
 # Gauss-Legendre quadrature of the sum, on [-1, 1].
@@ -37,7 +42,7 @@ _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(400)
 
 
 def bush_gibson_thomas_area(reduced_pressure):
-    """Compute A/A0 = sqrt(2 pi) p*, the limit of small areas (Bush, Gibson & Thomas 1975)."""
+    """Return A/A0 = sqrt(2 pi) p* at reduced pressures, an array: the limit of small areas of this theory."""
     return np.sqrt(2 * np.pi) * np.asarray(reduced_pressure, float)
 
 
@@ -46,10 +51,10 @@ class GaussianSummits(NamedTuple):
 
     Attributes
     ----------
-    density : number per area, m^-2.
-    mean_height : above the mean plane of the surface, m.
+    density : number of summits per area, m^-2.
+    mean_height : mean height above the mean plane of the surface, m.
     deviation : standard deviation of the heights, m.
-    radius_of_curvature : m.
+    radius_of_curvature : radius of all spheres, m.
     """
 
     density: float
@@ -59,15 +64,11 @@ class GaussianSummits(NamedTuple):
 
 
 def gaussian_summits(moments: SpectralMoments) -> GaussianSummits:
-    """Return the summits of an isotropic Gaussian surface: the means of Nayak, as McCool (1986) uses them.
+    """Return the summits of an isotropic Gaussian surface with Nayak's mean values, as McCool (1986) uses them.
 
     Density m4/(6 pi sqrt(3) m2), mean height 4 sqrt(m0/(pi alpha)), variance (1 - 0.8968/alpha) m0, and the radius of
-    their mean curvature, 3 sqrt(pi)/(8 sqrt(m4)).
-
-    Raises
-    ------
-    ValueError
-        If Nayak's parameter is less than 3/2, the least of isotropic surfaces.
+    their mean curvature, 3 sqrt(pi)/(8 sqrt(m4)). Raise `ValueError` if Nayak's parameter alpha is less than 3/2, the
+    smallest value of an isotropic surface.
     """
     alpha = moments.nayak_parameter
     if alpha < 1.5 * (1 - 1e-9):
@@ -83,7 +84,7 @@ def gaussian_summits(moments: SpectralMoments) -> GaussianSummits:
 
 
 def greenwood_williamson_area(reduced_separation, moments: SpectralMoments):
-    """Compute A/A0 = pi eta R sigma F_1(d/sigma) of an array of separations.
+    """Return A/A0 = pi eta R sigma F_1(d/sigma) at reduced separations, an array.
 
     eta is the density of the summits, R their radius of curvature, sigma the standard deviation of their heights, and d
     the height of the plane above their mean height.
@@ -94,44 +95,35 @@ def greenwood_williamson_area(reduced_separation, moments: SpectralMoments):
 
 
 def greenwood_williamson_pressure(reduced_separation, moments: SpectralMoments):
-    """Compute p* = 4/3 eta R^(1/2) sigma^(3/2) F_3/2(d/sigma)/h'_rms of an array of separations."""
+    """Return p* = 4/3 eta R^(1/2) sigma^(3/2) F_3/2(d/sigma)/h'_rms at reduced separations, an array."""
     summits = gaussian_summits(moments)
     scale = 4 / 3 * summits.density * math.sqrt(summits.radius_of_curvature * summits.deviation**3) / moments.rms_slope
     return scale * _mean_power_above(_height_above_summits(reduced_separation, moments, summits), 1.5)
 
 
 def fuller_tabor_area(reduced_separation, moments: SpectralMoments, material: Material):
-    """Compute A/A0 of the same summits with the law of Johnson, Kendall & Roberts, on loading (Fuller & Tabor 1975).
+    """Return A/A0 of Gaussian summits that follow the JKR law, on loading (Fuller & Tabor 1975).
 
     Without attraction at a distance a summit makes contact at approach 0, where it jumps to the radius
-    (2 pi dgamma R^2/E*)^(1/3) and is in tension.
-
-    Parameters
-    ----------
-    reduced_separation : separation of the plane over h_rms, any shape.
-    moments : spectral moments of the surface, at its own rms slope.
-    material : modulus and surface energy; the range of attraction is not used.
+    (2 pi dgamma R^2/E*)^(1/3) and is in tension. `moments` are those of the surface at its own rms slope; the range of
+    attraction of the material is not used.
     """
     law = JKR(material)
     return _sum_over_summits(lambda a, R: np.pi * a**2, law, reduced_separation, moments)
 
 
 def fuller_tabor_pressure(reduced_separation, moments: SpectralMoments, material: Material):
-    """Compute p* of the same summits, negative in tension; the parameters are those of `fuller_tabor_area`."""
+    """Return p* of Gaussian summits that follow the JKR law, negative in tension; as `fuller_tabor_area`."""
     law = JKR(material)
     pressure = _sum_over_summits(law.force, law, reduced_separation, moments)
     return pressure / (material.contact_modulus * moments.rms_slope)
 
 
 def separation_at(quantity: Callable, value, moments: SpectralMoments, *arguments):
-    """Find the separations at which quantity(separation, moments, *arguments) has the values `value`.
+    """Return the reduced separations at which quantity(separation, moments, *arguments) has the values `value`.
 
-    The quantity must decrease with the separation.
-
-    Raises
-    ------
-    ValueError
-        If a value is not positive, or not found within 10 standard deviations of the mean summit.
+    The quantity must decrease with the separation. Raise `ValueError` if a value is not positive, or not found within
+    10 standard deviations of the mean summit height.
     """
     summits = gaussian_summits(moments)
     middle, reach = summits.mean_height / moments.rms_height, _FARTHEST_PLANE * summits.deviation / moments.rms_height
@@ -152,17 +144,17 @@ def separation_at(quantity: Callable, value, moments: SpectralMoments, *argument
 
 
 def _height_above_summits(reduced_separation, moments, summits):
-    """Return the height of the plane above the mean summit, in standard deviations."""
+    """Return the height of the plane above the mean summit height, in standard deviations of the summit heights."""
     return (np.asarray(reduced_separation, float) * moments.rms_height - summits.mean_height) / summits.deviation
 
 
 def _mean_power_above(t, n):
-    """Return F_n(t), the mean of (s - t)^n over standard normal s, where s exceeds t."""
+    """Return F_n(t): the integral of (s - t)^n over s > t, with the standard normal distribution of s."""
     return gamma(n + 1) / math.sqrt(2 * np.pi) * np.exp(-(t**2) / 4) * pbdv(-n - 1, t)[0]
 
 
 def _sum_over_summits(of_summit, law, reduced_separation, moments):
-    """Sum a function of the contact radius and the radius of curvature over the summits in contact, per area.
+    """Return the sum over the summits in contact, per area, of a function of contact radius and radius of curvature.
 
     The variable of integration is the contact radius, which gives the approach of a summit and so its height.
     """

@@ -7,11 +7,10 @@ results and choices always give exactly the same file.
 from __future__ import annotations
 
 import base64
-import contextlib
 import io
+import itertools
 import json
 import os
-from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -25,7 +24,7 @@ from icha.datasets.attributes import why_no_result
 from icha.datasets.campaign import find_snapshot, reduced_gap, run_labels, select_run, spots_of
 from icha.datasets.files import read_campaign, read_dataset, readable
 from icha.datasets.labels import RunLabels, path_fields
-from icha.figures.fig3_distributions import gap_densities, joined_pressure_densities, pressure_densities
+from icha.figures.fig3_distributions import gap_densities, pressure_densities
 from icha.figures.fig8_patch_sizes import patch_areas, patch_density, patches_above
 from icha.figures.maps import average_blocks
 from icha.path.targets import BETWEEN
@@ -77,7 +76,7 @@ def write_explorer(
     Raises
     ------
     ValueError
-        If the campaign dataset or everything in `only` is missing, no contact fits, or a file cannot be read.
+        If the dataset is missing, a choice in `only` does not exist, no contact fits, or a file cannot be read.
     """
     from plotly.offline import get_plotlyjs
 
@@ -131,15 +130,11 @@ def _contacts(labels: list[RunLabels], only: Mapping[str, Collection]) -> list[l
     for run in labels:
         if all(getattr(run, name) in values for name, values in only.items()):
             contacts.setdefault(run._replace(model=""), []).append(run)
-    seeds: Counter = Counter()
-    ranks = {}
-    for contact in contacts:
-        ranks[contact] = seeds[contact._replace(seed=0)]
-        seeds[contact._replace(seed=0)] += 1
-    return [
-        sorted(contacts[contact], key=lambda run: list(MODELS).index(run.model))
-        for contact in sorted(contacts, key=ranks.get)
-    ]
+    seeds: dict[RunLabels, list] = {}
+    for contact, runs in contacts.items():
+        runs.sort(key=lambda run: list(MODELS).index(run.model))
+        seeds.setdefault(contact._replace(seed=0), []).append(runs)
+    return [runs for each in itertools.zip_longest(*seeds.values()) for runs in each if runs]
 
 
 def _contact(campaign: xr.DataTree, folder: Path, labels: list[RunLabels]) -> dict | None:
@@ -253,8 +248,7 @@ def _snapshot(run: xr.Dataset, snapshot: int, maps: Sequence[str] | None) -> dic
     by_cells = model_of(run.attrs).by_cells
     cell = float(run["period"]) ** 2
     areas = [patch_areas(run, snapshot)]
-    densities = joined_pressure_densities if by_cells else pressure_densities
-    pressure, (density,) = densities([(run, snapshot)])
+    pressure, (density,) = pressure_densities([(run, snapshot)], joined=by_cells)
     visible = density > LEAST_DENSITY * density.max(initial=0)
     data = {
         "step": int(run["snapshot_step"].values[snapshot]),
@@ -263,8 +257,9 @@ def _snapshot(run: xr.Dataset, snapshot: int, maps: Sequence[str] | None) -> dic
         "sizes": _points(patch_density(areas, cell)),
         "larger": _points(patches_above(areas, cell)),
     }
-    with contextlib.suppress(ValueError):  # near full contact there are too few gaps for a distribution
-        data["gap"] = _points(gap_densities([(run, snapshot)]))
+    gap, densities = gap_densities([(run, snapshot)])
+    if len(gap):  # near full contact, too few gaps for a distribution remain
+        data["gap"] = _points((gap, densities))
     if maps is not None:
         data["map"] = maps[snapshot]
     elif not by_cells:
@@ -298,7 +293,7 @@ def encode_map(contact: np.ndarray) -> str:
 
 
 def find_partners(one: xr.Dataset, other: xr.Dataset) -> list[int]:
-    """Find, for every step of a run, the step of another run at the same state of the path; -1 if there is none.
+    """Find, for every step of a run, the step of another run at the same state of the path; -1 without such a step.
 
     A step that reaches a target corresponds to the step of the other run at the same target on the same leg. Any other
     step corresponds to the step on the same leg with the nearest mean separation.

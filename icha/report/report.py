@@ -1,8 +1,7 @@
 """The report of a campaign: one HTML page that needs neither network nor other files.
 
-The same data always give exactly the same file. Times and memory differ from one execution to the next, so they are on
-another page, which the report embeds. Long tables contain only their first rows; the page links to the data, which
-contain all rows.
+The same data always give exactly the same file. Long tables contain only their first rows; the page links to the data,
+which contain all rows.
 """
 
 from __future__ import annotations
@@ -11,7 +10,6 @@ import base64
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 
@@ -24,7 +22,7 @@ from icha.contact.models import MODEL_PAPER
 from icha.datasets.results import EXPLORER
 from icha.figures.captions import count_runs
 from icha.figures.registry import figure_number
-from icha.report.sections import draw_spectra, list_sources, summarise_errors, summarise_surface
+from icha.report.sections import list_sources, picture_of_spectra, summarise_errors, summarise_surface
 from icha.report.studies import summarise_study
 from icha.report.template import MOST_ROWS, write_page
 
@@ -58,10 +56,8 @@ def write_report(
     campaign: xr.DataTree,
     figures: Sequence[ReportFigure],
     checks: Iterable[Check],
-    comparison: xr.DataTree | None = None,
     model_error: xr.DataTree | None = None,
     surfaces: Iterable[xr.Dataset] = (),
-    times_path: str | os.PathLike | None = None,
     configuration: str = "",
     dataset_path: str | os.PathLike | None = None,
     files: Mapping[str, str | os.PathLike] = {},
@@ -77,10 +73,8 @@ def write_report(
     campaign : the campaign dataset, with title, summary and licence.
     figures : in order; figures of one study are in its section, the others precede all studies.
     checks : results of `icha.analysis.checks.check_campaign`.
-    comparison : `icha.analysis.common_loads.compare_campaign` of the campaign, if available.
     model_error : `icha.analysis.model_error.model_error` of the campaign, if it has boundary elements.
     surfaces : surface files, with or without their heights, for statistics and power spectra.
-    times_path : the page of times (`write_times_page`), which is embedded.
     configuration : text of the configuration as used.
     dataset_path : file of the campaign dataset, for a link.
     files : further files to link, by their titles.
@@ -88,15 +82,26 @@ def write_report(
     citations : further sources to cite, such as those of measurements.
     further_software : packages that this campaign needs besides `SOFTWARE`.
     """
-    link = partial(_link, Path(path).parent)
+
+    def link(target):
+        """Return the path of a file relative to the folder of the page."""
+        return None if target is None else Path(os.path.relpath(target, Path(path).parent)).as_posix()
+
     checks, surfaces = list(checks), list(surfaces)
-    studies = [summarise_study(campaign, name, comparison) for name in campaign.children]
+    studies = [summarise_study(campaign, name) for name in campaign.children]
     errors = list(model_error.children.values()) if model_error is not None else []
     texts = ";".join(node.attrs.get("references", "") for node in [*campaign.children.values(), *errors])
+    counted = ("asked", "complete", "beyond_model", "failed", "missing")
+    totals = {name: sum(study[name] for study in studies) for name in counted}
     write_page(
         path,
         "report.html",
-        **_campaign_values(campaign, studies),
+        title=campaign.attrs.get("title", "Rough contact campaign"),
+        summary=campaign.attrs.get("summary", ""),
+        attributes=campaign.attrs,
+        studies=studies,
+        totals=totals | {"not_applicable": sum(len(study["not_applicable"]) for study in studies)},
+        validity=statements_on_dataset(campaign),
         most_rows=MOST_ROWS,
         folded=FOLDED_ROWS,
         paper=MODEL_PAPER.line,
@@ -106,12 +111,11 @@ def write_report(
         surfaces=[summarise_surface(surface) for surface in surfaces[:MOST_ROWS]],
         surface_count=len(surfaces),
         sources=list_sources(surfaces),
-        spectra=draw_spectra(surfaces),
+        spectra=picture_of_spectra(surfaces),
         figures=_pictures(figures, campaign, link),
         entries=[summarise_errors(node.to_dataset()) for node in errors],
         references=list(dict.fromkeys(source.strip() for source in texts.split(";") if source.strip())),
         dataset=link(dataset_path),
-        times=link(times_path),
         results=link(results),
         explorer=link(Path(results, EXPLORER)) if results is not None else None,
         files={name: link(target) for name, target in files.items()},
@@ -119,25 +123,6 @@ def write_report(
         citations=citations,
         software={name: version(name) for name in (*SOFTWARE, *further_software)},
     )
-
-
-def _campaign_values(campaign: xr.DataTree, studies: list[dict]) -> dict:
-    """Return what the page prints about the campaign as a whole."""
-    counted = ("asked", "complete", "beyond_model", "failed", "missing")
-    totals = {name: sum(study[name] for study in studies) for name in counted}
-    return {
-        "title": campaign.attrs.get("title", "Rough contact campaign"),
-        "summary": campaign.attrs.get("summary", ""),
-        "attributes": campaign.attrs,
-        "studies": studies,
-        "totals": totals | {"not_applicable": sum(len(study["not_applicable"]) for study in studies)},
-        "validity": statements_on_dataset(campaign),
-    }
-
-
-def _link(folder: Path, target: str | os.PathLike | None) -> str | None:
-    """Return the path of a file relative to the folder of the page."""
-    return None if target is None else Path(os.path.relpath(target, folder)).as_posix()
 
 
 def _pictures(figures: Sequence[ReportFigure], campaign: xr.DataTree, link) -> list[dict]:

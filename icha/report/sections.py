@@ -16,8 +16,8 @@ from icha.datasets.surface_file import measured_scale
 from icha.datasets.variables.model_error import SHORT_RANGE
 from icha.figures.looks import MOST_COLOURS, graded_colours, legend_below, named_handles, some_of
 from icha.figures.style import COLOURS, TWO_COLUMNS, in_style, logarithmic_axes, new_figure
+from icha.report.template import format_mean, per_cent
 from icha.support.formatting import format_quantity
-from icha.support.statistics import ENOUGH, ensemble
 
 LEAST_POWER = 1e-16  # smaller fractions of the largest power are rounding errors
 
@@ -53,7 +53,7 @@ def list_sources(surfaces) -> list[dict[str, str]]:
     return [dict(zip(keys, row, strict=True)) for row in dict.fromkeys(rows)]
 
 
-def draw_spectra(surfaces) -> str | None:
+def picture_of_spectra(surfaces) -> str | None:
     """Draw the power spectra, averaged over the seeds of each surface: a PNG in base64; None if no file has one."""
     members: dict[str, list] = {}
     for surface in surfaces:
@@ -62,12 +62,12 @@ def draw_spectra(surfaces) -> str | None:
     if not members:
         return None
     file = io.BytesIO()
-    _draw_spectra(members).savefig(file, format="png", dpi=150, metadata={"Software": None})
+    draw_spectra(members).savefig(file, format="png", dpi=150, metadata={"Software": None})
     return base64.b64encode(file.getvalue()).decode("ascii")
 
 
 @in_style
-def _draw_spectra(members):
+def draw_spectra(members):
     """Draw a curve for each surface; many surfaces have graded colours, and the legend names some of them."""
     colours = graded_colours(len(members)) if len(members) > MOST_COLOURS else COLOURS
     named = some_of(list(members))
@@ -100,8 +100,13 @@ def summarise_errors(errors: xr.Dataset) -> dict:
                     "area": float(state["contact_area_fraction"].mean()),
                     "true_area": float(state["contact_area_fraction_boundary_elements"].mean()),
                 }
-                scatter = {name: _scatter(_finite(state[name])) for name in SUMMARISED}
-                rows.append(contact | {"reduced_pressure": p} | areas | scatter)
+                known = {name: _finite(state[name]) for name in SUMMARISED}
+                means = {
+                    name: format_mean(values, per_cent if name.endswith("error") else "{:.3f}".format)
+                    for name, values in known.items()
+                    if len(values)
+                }
+                rows.append(contact | {"reduced_pressure": p} | areas | means)
     tabor = errors["tabor_parameter"].values
     return {
         "name": errors.attrs["entry"],
@@ -122,16 +127,6 @@ def summarise_errors(errors: xr.Dataset) -> dict:
 
 def _finite(variable: xr.DataArray) -> np.ndarray:
     return variable.values[np.isfinite(variable.values)]
-
-
-def _scatter(values: np.ndarray) -> dict[str, float] | None:
-    """Return the mean, and half its 95 % interval for five seeds or more, else the smallest and largest value."""
-    if not len(values):
-        return None
-    scatter = {"mean": float(values.mean())}
-    if len(values) >= ENOUGH:
-        return scatter | {"confidence": float(ensemble(values).confidence)}
-    return scatter | ({"least": float(values.min()), "most": float(values.max())} if len(values) > 1 else {})
 
 
 def _spread(values: np.ndarray) -> dict[str, float] | None:

@@ -11,7 +11,6 @@ from icha.datasets.campaign import loading_stops, reduced_gap, run_place, runs_o
 from icha.datasets.labels import LABELS, RunLabels, slopes_of
 from icha.datasets.variables.campaign import (
     BEYOND_MODEL,
-    COMPLETE,
     COMPUTED_RUNS,
     FAILED_CHECKS,
     INCOMPLETE,
@@ -20,9 +19,8 @@ from icha.datasets.variables.campaign import (
     RAGGED,
 )
 from icha.figures.select import asked_seeds, path_steps
-from icha.report.template import MOST_ROWS, format_scientific
+from icha.report.template import MOST_ROWS, format_mean, format_range, format_scientific
 from icha.support.formatting import choose_unit, format_quantity
-from icha.support.statistics import ENOUGH, ensemble
 
 # Quantities in a table by the kind of its stops: two of pressure, contact area and mean gap.
 SHOWN_AT = {
@@ -37,19 +35,15 @@ EVENT_COUNTS = ("spot_count", "jump_in_count", "jump_off_count", "coalescence_co
 STATISTICS = ("asperity_count", "nayak_parameter", "stickiness", "tabor_parameter", "full_contact_energy_ratio")
 # Contributions to a loss, and their names on the page.
 LOSS_NAMES = {
-    "loss_by_jump_in": "jumping in",
-    "loss_by_jump_off": "jumping off",
-    "loss_by_coalescence": "unions",
-    "loss_by_load_jump": "at fixed load",
-    "loss_unattributed": "no event",
-}
-EVENT_NAMES = {
-    "Contacts formed, broken": ("jump_in_count", "jump_off_count"),
-    "Unions, undone": ("coalescence_count", "split_count"),
+    "loss_by_jump_in": "jump-in",
+    "loss_by_jump_off": "jump-off",
+    "loss_by_coalescence": "coalescence",
+    "loss_by_load_jump": "jumps at fixed load",
+    "loss_unattributed": "without event",
 }
 
 
-def summarise_study(campaign: xr.DataTree, name: str, comparison: xr.DataTree | None) -> dict:
+def summarise_study(campaign: xr.DataTree, name: str) -> dict:
     """Return what the page prints about one study."""
     dataset = campaign[name].to_dataset()
     status = dataset["status"].values
@@ -81,7 +75,6 @@ def summarise_study(campaign: xr.DataTree, name: str, comparison: xr.DataTree | 
         "table": _table(runs),
         "means": _means(dataset, complete),
         "loops": _loops(small, dataset, complete),
-        "spread": _spread(comparison[name].to_dataset()) if comparison and name in comparison else None,
     }
 
 
@@ -99,7 +92,7 @@ def _material(dataset: xr.Dataset) -> dict[str, str]:
 
 
 def _run(labels: RunLabels, run: xr.Dataset) -> dict:
-    """Return the statistics of a run; events up to the end of its first loading, since none remain after separation."""
+    """Return the statistics of a run; the numbers of events are those at the end of its first loading."""
     loaded = np.flatnonzero(loading_stops(run).values)[-1:]
     return {
         "labels": labels,
@@ -116,7 +109,7 @@ def _run(labels: RunLabels, run: xr.Dataset) -> dict:
 
 
 def collect_states(run: xr.Dataset) -> dict[tuple[str, float], dict[str, float]]:
-    """Return reduced pressure, A/A0 and mean gap over h_rms at the stops of a loading, by kind and target."""
+    """Return reduced pressure, A/A0 and mean gap over h_rms at the targets of a loading, by kind and value."""
     stops = path_steps(run)
     keys = zip(stops["step_kind"].values.tolist(), stops["step_target"].values.tolist(), strict=True)
     values = {
@@ -154,23 +147,23 @@ def _table(runs) -> dict:
     return table | {"rows": [(labels, [cell(stops, target) for target in table["stops"]]) for labels, stops in states]}
 
 
-def _ensembles(dataset: xr.Dataset, runs: list[RunLabels]) -> dict[tuple[RunLabels, bool], list[RunLabels]]:
-    """Group runs that differ only in their seed, by their labels with seed 0 and whether the model is applicable."""
+def _ensembles(dataset: xr.Dataset, runs: list[RunLabels]) -> list[tuple[dict, list[RunLabels]]]:
+    """Group runs that differ only in their seed; runs to which the model is not applicable are apart.
+
+    Return the start of a table row for each group (labels, numbers of seeds and of requested seeds), and its runs.
+    """
     groups: dict[tuple[RunLabels, bool], list[RunLabels]] = {}
     for run in runs:
         groups.setdefault((run._replace(seed=0), not _reason(dataset, "applicability", run)), []).append(run)
-    return groups
-
-
-def _ensemble_row(dataset: xr.Dataset, labels: RunLabels, applicable: bool, runs: list[RunLabels]) -> dict:
-    """Return what identifies a row of means, with the numbers of its seeds and of all requested seeds."""
-    return {"labels": labels, "applicable": applicable, "count": len(runs), "asked": asked_seeds(dataset, labels)}
+    return [
+        ({"labels": labels, "applicable": fit, "count": len(group), "asked": asked_seeds(dataset, labels)}, group)
+        for (labels, fit), group in groups.items()
+    ]
 
 
 def _means(dataset: xr.Dataset, complete: list[RunLabels]) -> dict:
     """Return rows with means over seeds and their accuracy."""
-    groups = [(_ensemble_row(dataset, *key, runs), runs) for key, runs in _ensembles(dataset, complete).items()]
-    groups = [(row, runs) for row, runs in groups if row["asked"] > 1]
+    groups = [(row, runs) for row, runs in _ensembles(dataset, complete) if row["asked"] > 1]
     variables = ["reduced_pressure", "contact_area_fraction", "reduced_separation", "leg", "step_kind", "step_target"]
     steps = dataset[[*variables, "step_count", "mean_gap", "rms_height", "boundary"]]
     members = []
@@ -184,35 +177,11 @@ def _means(dataset: xr.Dataset, complete: list[RunLabels]) -> dict:
         if len(at_stop) < len(states):
             return None
         return Markup("<br>").join(
-            _mean(np.array([state[name] for state in at_stop]), FORMATS[name]) for name in table["shown"]
+            format_mean(np.array([state[name] for state in at_stop]), FORMATS[name]) for name in table["shown"]
         )
 
     rows = [row | {"cells": [cell(states, target) for target in table["stops"]]} for row, states in members]
     return table | {"count": len(groups), "rows": rows}
-
-
-def _mean(values: np.ndarray, form) -> Markup:
-    """Format a mean and its accuracy."""
-    mean = Markup(form(float(np.mean(values))))
-    return mean + (Markup(" ") + text if (text := _range(values, form)) else "")
-
-
-def _range(values: np.ndarray, form) -> Markup | str:
-    """Format the 95 % interval of a mean, or the extremes of fewer than five values; empty if all values are equal.
-
-    If the interval of positive values would reach below zero, the interval of the logarithm is used.
-    """
-    over = ensemble(values)
-    # Loads are met exactly, but for rounding errors.
-    if len(values) < 2 or np.ptp(values) <= 1e-6 * abs(over.mean):
-        return ""
-    if len(values) < ENOUGH:
-        low, high = np.min(values), np.max(values)
-    elif np.all(values > 0) and over.confidence >= over.mean:
-        low, high = over.band(positive=True)
-    else:
-        return Markup("±&thinsp;") + form(float(over.confidence))
-    return Markup("({} … {})").format(form(float(low)), form(float(high)))
 
 
 # --- tables of pull-off and loss ---
@@ -225,10 +194,7 @@ def _loops(campaign: xr.DataTree, dataset: xr.Dataset, complete: list[RunLabels]
     runs = {labels: select_run(campaign, labels) for labels in complete}
     # The path of a run beyond its model ends before it unloads.
     groups = _ensembles(dataset, [labels for labels, run in runs.items() if "hysteresis_loss" in run])
-    rows = [
-        _ensemble_row(dataset, *key, members) | _loop([runs[labels] for labels in members])
-        for key, members in list(groups.items())[:MOST_ROWS]
-    ]
+    rows = [row | _loop([runs[labels] for labels in members]) for row, members in groups[:MOST_ROWS]]
     shown = {name for row in rows for name, share in row["shares"].items() if share}
     parts = {name: text for name, text in LOSS_NAMES.items() if name in shown}
     return {"rows": rows, "parts": parts, "count": len(groups)}
@@ -260,10 +226,6 @@ def _loop(runs: list[xr.Dataset]) -> dict:
         }
     return cells | {
         "shares": {name: values(name).sum() / loss.sum() if lost.any() else None for name in LOSS_NAMES},
-        "events": {
-            text: [np.mean([float(run[name][-1]) for run in runs]) for name in names]
-            for text, names in EVENT_NAMES.items()
-        },
     }
 
 
@@ -271,23 +233,5 @@ def _with_unit(values: np.ndarray, unit: str = "") -> Markup:
     """Format a mean with its unit, and its accuracy below it."""
     factor, unit = choose_unit(float(np.mean(values)), unit) if unit else (1.0, "")
     mean = format_scientific(float(np.mean(values)) * factor) + (f" {unit}" if unit else "")
-    text = _range(values * factor, format_scientific)
+    text = format_range(values * factor, format_scientific)
     return (mean + (Markup("<br>") + text if text else "")).replace("-", "−")
-
-
-def _spread(comparison: xr.Dataset) -> dict[str, float | None]:
-    """Return the largest differences of the area between materials and slopes, at equal pressure and at equal load.
-
-    None if no two complete runs differ in this label only, or share a load.
-    """
-    complete = comparison["status"] == COMPLETE
-
-    def largest(name, label):
-        values = comparison[name].where(complete.sum(label) > 1).values
-        return float(np.nanmax(values)) if np.isfinite(values).any() else None
-
-    return {
-        f"{short}_spread{suffix}": largest(f"{short}_spread{suffix}", label)
-        for label, short in (("material", "material"), ("rms_slope", "slope"))
-        for suffix in ("", "_at_load")
-    }

@@ -1,4 +1,4 @@
-"""Templates of the pages, and how they print numbers and symbols."""
+"""Templates of the pages, and the formats of numbers and symbols on them."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ import jinja2
 import numpy as np
 from markupsafe import Markup, escape
 
-from icha.support import formatting
 from icha.support.atomic_files import whole_file
 from icha.support.formatting import printable_lines
+from icha.support.statistics import ENOUGH, ensemble
 
 MOST_ROWS = 300  # of a table
 # Symbols in captions and attributes, and their form on a page.
@@ -44,10 +44,34 @@ def format_scientific(value: float | None) -> Markup:
     return Markup(f"{value / 10.0**exponent:.2f}&thinsp;×&thinsp;10<sup>{str(exponent).replace('-', '−')}</sup>")
 
 
-def _per_cent(value: float, *, signed: bool = True) -> str:
+def per_cent(value: float, *, signed: bool = True) -> str:
     """Format a fraction in per cent, to a tenth, with a typographic minus sign."""
     text = f"{100 * value:+.1f}" if signed else f"{100 * value:.1f}"
     return text.replace("+0.0", "0.0").replace("-0.0", "0.0").replace("-", "−")
+
+
+def format_mean(values: np.ndarray, form) -> Markup:
+    """Format a mean and its accuracy; `form` formats a number."""
+    text = format_range(values, form)
+    return Markup(form(float(np.mean(values)))) + (Markup(" ") + text if text else "")
+
+
+def format_range(values: np.ndarray, form) -> Markup | str:
+    """Format the 95 % interval of a mean, or the extremes of fewer than five values; empty if all values are equal.
+
+    If the interval of positive values would reach below zero, the interval of the logarithm is used.
+    """
+    over = ensemble(values)
+    # Loads are met exactly, but for rounding errors.
+    if len(values) < 2 or np.ptp(values) <= 1e-6 * abs(over.mean):
+        return ""
+    if len(values) < ENOUGH:
+        low, high = np.min(values), np.max(values)
+    elif np.all(values > 0) and over.confidence >= over.mean:
+        low, high = over.band(positive=True)
+    else:
+        return Markup("±&thinsp;") + form(float(over.confidence)).lstrip("+")
+    return Markup("({} … {})").format(form(float(low)), form(float(high)))
 
 
 def template(name: str) -> jinja2.Template:
@@ -64,9 +88,8 @@ def template(name: str) -> jinja2.Template:
     environment.filters |= {
         "symbols": _symbols,
         "scientific": format_scientific,
-        "per_cent": _per_cent,
+        "per_cent": per_cent,
         "number": "{:g}".format,
-        "duration": formatting.duration,
     }
     return environment.get_template(name)
 

@@ -31,7 +31,7 @@ def whole_file(path: str | os.PathLike, *, lasting: bool = True) -> Iterator[Pat
     Raises
     ------
     Superseded
-        If files are moved only while owned, and a later call owns the results.
+        If this process is a job (`move_only_while_owned`), and a later call owns the results.
     OSError
         If the folder cannot be written to. It replaces the errors of libraries for data files, which do not mention a
         full disk.
@@ -62,7 +62,7 @@ def whole_file(path: str | os.PathLike, *, lasting: bool = True) -> Iterator[Pat
 
 
 def move_only_while_owned() -> None:
-    """Let this process, a job, write results only while the call that started it owns the results."""
+    """Make this process a job: it writes results only while the call that started it owns the results."""
     global _moving
     _moving = while_owned
 
@@ -73,7 +73,7 @@ def moving() -> AbstractContextManager:
 
 
 def is_left_over(name: str) -> bool:
-    """Return whether a file name is that of a temporary file, which a killed program leaves behind."""
+    """Return whether a file name is that of a temporary file; a killed program leaves such files behind."""
     return name.startswith(".") and name.endswith(_ENDING)
 
 
@@ -84,17 +84,6 @@ def sync_folder(folder: Path) -> None:
             _sync(Path(top, name))
         with suppress(OSError):
             _sync(Path(top))
-
-
-def find_obstacle(folder: Path) -> str | None:
-    """Describe the file or broken link that prevents a folder; None if the folder exists or can be created."""
-    for path in (folder, *folder.parents):
-        # The methods of Path raise errors below a folder that may not be entered.
-        if os.path.exists(path):
-            return None if os.path.isdir(path) else f"{path} is a file, not a folder"
-        if os.path.islink(path):
-            return f"{path} is a link to {os.readlink(path)}, which does not exist or cannot be reached"
-    return None
 
 
 def probe_folder(folder: Path) -> OSError | None:

@@ -1,4 +1,4 @@
-"""Checksum sidecars of results, which record whether a result is whole and from what it was made.
+"""Checksum sidecars of results. A sidecar shows whether its result is whole, and from which files it was made.
 
 The sidecar of `results/<campaign>/<path>` is `results/<campaign>/checksums/<path>.json`. It contains the SHA-256, size
 and modification time of the file or folder. A file with the same size and time is trusted; any other file is hashed.
@@ -31,7 +31,7 @@ class Checksum(NamedTuple):
     Attributes
     ----------
     sha256 : checksum of the content.
-    size, mtime_ns : size and modification time; of a folder the sum and the latest time of its files.
+    size, mtime_ns : size and modification time; for a folder, the sum of the sizes and the latest time of its files.
     asked : checksum of the parameters of its job (`hash_parameters`).
     inputs : checksums of the results that its job read, by path.
     """
@@ -44,7 +44,7 @@ class Checksum(NamedTuple):
 
 
 def hash_parameters(parameters: Iterable[str]) -> str:
-    """Return the checksum of the parameters of a job, given as Python represents them, in any order."""
+    """Return the checksum of the parameters of a job; `parameters` are their Python representations in any order."""
     return hashlib.sha256("\n".join(sorted(parameters)).encode()).hexdigest()
 
 
@@ -61,7 +61,7 @@ def begin(results: str | os.PathLike, path: str) -> None:
 
 
 def distrust(results: str | os.PathLike, path: str) -> None:
-    """Make the next check hash a result even if its size and time are unchanged."""
+    """Let the next check compute the checksum of a result, even if its size and time are unchanged."""
     written = _read(results, path)
     if written not in (None, _BEGUN):
         _write(results, path, written._replace(mtime_ns=0))
@@ -126,7 +126,7 @@ def stale(
             continue
         written = known(path)
         if not written.asked:
-            yield path, "there is no record of what it was made from"
+            yield path, "its record of settings and inputs is missing"
         elif asked is not None and asked(path) != written.asked:
             yield path, OTHER_SETTINGS
         else:

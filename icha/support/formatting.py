@@ -79,10 +79,5 @@ def printable_lines(text: object) -> str:
     return _IN_LINES.sub(_escaped, str(text))
 
 
-def is_printable(text: str) -> bool:
-    """Return whether `printable` leaves a text unchanged."""
-    return not _IN_A_LINE.search(text)
-
-
 def _escaped(found: re.Match) -> str:
     return found[0].encode("unicode_escape").decode("ascii")

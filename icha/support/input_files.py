@@ -1,4 +1,4 @@
-"""Checks of input files from unknown sources: kind of file, memory limit of reading, traps in HDF5 files; CSV tables.
+"""Checks of input files from unknown sources: kind of file, memory limit of reading, dangerous HDF5 files; CSV tables.
 
 A small file can declare a very large array, or unpack to one. Readers compare declared sizes with the limit
 (`require_room`), and limit the memory of the libraries that read the file (`bounded_memory`).
@@ -25,21 +25,13 @@ _COPIES = 3
 _MOST_NAMES, _DEEPEST = 100_000, 50
 _WHOLE = "expected a file that holds all of its data"
 
-_KINDS = {
-    stat.S_IFDIR: "is a folder",
-    stat.S_IFIFO: "is a pipe",
-    stat.S_IFCHR: "is a device",
-    stat.S_IFBLK: "is a device",
-    stat.S_IFSOCK: "is a socket",
-}
-
 
 class RefusedFile(ValueError):
-    """A file that is not read because it might do harm; the message says why, and what is expected."""
+    """A file that is not read because it might do harm; the message gives the reason and what is expected."""
 
 
 class TooLarge(RefusedFile):
-    """A file that would take more memory than the limit; the message says how to raise it."""
+    """A file that would take more memory than the limit; the message explains how to raise the limit."""
 
     def __init__(self, needed: str, most: int):
         """Describe the memory `needed`, the limit of `most` bytes, and how to raise it."""
@@ -52,12 +44,14 @@ class TooLarge(RefusedFile):
 def problem_with_path(path: str | os.PathLike) -> str | None:
     """Describe why a path cannot be opened as a file; None if it can. Reading a pipe or device might never end."""
     try:
-        kind = stat.S_IFMT(os.stat(path).st_mode)
+        mode = os.stat(path).st_mode
     except (FileNotFoundError, NotADirectoryError, ValueError):  # ValueError for zero bytes in a path
         return "no such file"
     except OSError as error:
         return f"cannot be read ({error.strerror})"
-    return _KINDS.get(kind)
+    if stat.S_ISDIR(mode):
+        return "is a folder"
+    return None if stat.S_ISREG(mode) else "is not a file but a device, a pipe or a socket"
 
 
 def most_memory(file: str | os.PathLike | None = None) -> int:
@@ -110,7 +104,7 @@ def bounded_memory(most: int | None = None) -> Iterator[None]:
 
 
 def text(attribute: bytes | str | Iterable[bytes | str]) -> str:
-    """Convert a text attribute to str, as bytes or in an array of one, as netCDF stores non-ASCII texts."""
+    """Convert a text attribute to str; netCDF stores non-ASCII texts as bytes or as an array with one text."""
     if not isinstance(attribute, bytes | str):
         (attribute,) = attribute
     return attribute.decode() if isinstance(attribute, bytes) else str(attribute)
@@ -175,7 +169,7 @@ def read_columns(path: str | Path, columns: dict[str, float]) -> list:
     Raises
     ------
     ValueError
-        If the file cannot be read, or a column is missing or holds anything but positive numbers.
+        If the file cannot be read, a column is missing, or a value is not a positive number.
     """
     import numpy as np  # imported here because most commands read no table
 
@@ -189,17 +183,14 @@ def read_columns(path: str | Path, columns: dict[str, float]) -> list:
         raise ValueError(f"cannot be read ({reason}); expected a CSV file") from None
     if not rows:
         raise ValueError("holds no values; expected a CSV file with a line of headings and at least one of numbers")
-    found = []
-    for heading, factor in columns.items():
+    found = {heading: [] for heading in columns}
+    for heading, numbers in found.items():
         if heading not in rows[0]:
             raise ValueError(f"has no column {heading!r}; expected one of {', '.join(map(str, rows[0]))}")
-        numbers = []
         for number, row in enumerate(rows, start=1):
+            place = f"column {heading!r}, row {number}: {row[heading]!r}"
             try:
                 numbers.append(POSITIVE.validate("", float(row[heading])))
             except (TypeError, ValueError):
-                raise ValueError(
-                    f"column {heading!r}, row {number}: {row[heading]!r}; expected a number greater than 0"
-                ) from None
-        found.append(np.array(numbers) * factor)
-    return found
+                raise ValueError(f"{place}; expected a number greater than 0") from None
+    return [np.array(found[heading]) * factor for heading, factor in columns.items()]

@@ -4,12 +4,12 @@ import os
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 
-# Nodes a side of a grid from which several threads pay.
+# Nodes along a side of a grid above which several threads save time.
 LARGE_GRID = 2048
 
 
 def cores() -> int:
-    """Return number of threads: OMP_NUM_THREADS if it is set, otherwise the processors that the process may use.
+    """Return the number of threads: OMP_NUM_THREADS if it is set, otherwise that of the processors for this process.
 
     Snakemake sets OMP_NUM_THREADS to the `threads` of a rule.
     """
@@ -43,5 +43,5 @@ def on_cores(function: Callable, items: Iterable) -> list:
 
 
 def blocks(length: int, size: int) -> list[slice]:
-    """Slices of at most `size` that cover range(length)."""
+    """Return slices of at most `size` that cover range(length)."""
     return [slice(first, min(first + size, length)) for first in range(0, length, size)]

@@ -15,7 +15,7 @@ _PR_SET_PDEATHSIG = 1  # of prctl(2)
 
 
 def own_workflow() -> Path:
-    """Folder with the Snakefile: the repository of an editable installation, otherwise the installed folder."""
+    """Return the folder with the Snakefile: the repository of an editable installation, else the installed folder."""
     beside = _PACKAGE.parent
     return beside if (beside / "Snakefile").is_file() else beside / INSTALLED
 
@@ -35,9 +35,9 @@ if __name__ == "__main__":
 
 
 def beginning_of(process: int) -> str:
-    """Start time of a process in system ticks, which with its number identifies it.
+    """Return the start time of a process in system ticks. The number and the start time identify a process.
 
-    Raises FileNotFoundError or ProcessLookupError if there is no such process.
+    Raises FileNotFoundError or ProcessLookupError if the process does not exist.
     """
     # The name of the program, in parentheses, may contain any characters.
     status = Path(f"/proc/{process}/stat").read_text(encoding="utf-8", errors="replace")

@@ -15,9 +15,9 @@ class Ensemble(NamedTuple):
 
     Attributes
     ----------
-    mean : needs one member.
-    deviation : standard deviation of the members (with Bessel's correction); needs two.
-    confidence : half the width of the 95 % confidence interval of the mean; needs two.
+    mean : mean of the members; needs one member.
+    deviation : standard deviation of the members (with Bessel's correction); needs two members.
+    confidence : half the width of the 95 % confidence interval of the mean; needs two members.
     count : number of members.
     """
 
@@ -27,7 +27,7 @@ class Ensemble(NamedTuple):
     count: np.ndarray
 
     def band(self, *, positive: bool = False) -> tuple[np.ndarray, np.ndarray]:
-        """Confidence interval of the mean m: m ± c, or m exp(± c/m) for a `positive` quantity.
+        """Return the confidence interval of the mean m: m ± c, or m exp(± c/m) for a `positive` quantity.
 
         The second interval is that of the logarithm of the mean. The standard error of the logarithm is, to first
         order, the standard error of the mean divided by the mean (delta method). The second interval stays above zero,
@@ -40,7 +40,7 @@ class Ensemble(NamedTuple):
 
 
 def ensemble(samples, axis: int = 0) -> Ensemble:
-    """Mean over an axis and its confidence interval by Student's t, for normally distributed members.
+    """Compute the mean over an axis and its confidence interval by Student's t, for normally distributed members.
 
     Parameters
     ----------

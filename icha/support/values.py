@@ -1,5 +1,6 @@
 """Types of values in a configuration, such as `25 MPa`, which is kept as a float in SI units."""
 
+import contextlib
 import math
 import operator
 import re
@@ -14,7 +15,7 @@ from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Fie
 
 from icha.support.rules import CONTACT_MODULUS, LENGTH, POSITIVE, SEED, SURFACE_ENERGY, FloatRange, IntegerRange
 
-# A number as text: PyYAML reads `1.0e6` and `1e-3` as text, so text must be accepted.
+# A number as text. PyYAML reads `1.0e6` and `1e-3` as text, so text must be accepted as a number.
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _QUANTITY = re.compile(rf"\s*({_NUMBER})\s*(.*?)\s*", re.DOTALL)
 _UNIT = re.compile(r"[A-Za-zµμÅ°%²³⁻·][\w\s*/^().µμÅ°%²³⁻·-]*")
@@ -48,13 +49,6 @@ _LONG_NAMES |= {
 }
 _LONG_NAMES |= {f"{name}s": factor for name, factor in _LONG_NAMES.items()} | {"inches": "0.0254"}
 
-# Units to suggest for a wrong case or a missing ^.
-_SUGGESTED = {
-    "Pa": ("Pa", "hPa", "kPa", "MPa", "GPa", "N/m^2", "kN/m^2", "MN/m^2", "N/mm^2"),
-    "J/m^2": ("J/m^2", "mJ/m^2", "uJ/m^2", "N/m", "mN/m", "uN/m"),
-    "m": ("m", "dm", "cm", "mm", "um", "nm", "pm", "in", "mil"),
-}
-
 PATTERN = rf"^\s*{_NUMBER}\s*[A-Za-zµμÅ].*$"
 # Names become folders and files; commands would read one that begins with a hyphen as an option.
 NAME_PATTERN = r"^[a-z0-9_][a-z0-9_-]*$"
@@ -86,27 +80,18 @@ def _registry():
 
 @lru_cache(maxsize=1024)
 def conversion_factor(unit: str, si_unit: str) -> Decimal:
-    """Exact factor from `unit` to `si_unit`; raise ValueError if `unit` is unknown or of another dimension."""
+    """Return the exact factor from `unit` to `si_unit`; raise ValueError if `unit` is unknown or unsuitable."""
     if len(unit) > _LONGEST:
         raise ValueError(f"a text of {len(unit)} letters is not a unit")
     if unit == si_unit == "1":
         return Decimal(1)
     if (unit, si_unit) in USUAL:
         return Decimal(USUAL[unit, si_unit])
-    try:
-        return _length(unit) if si_unit == "m" else _by_pint(unit, si_unit)
-    except ValueError as error:
-        similar = [known for known in _SUGGESTED.get(si_unit, ()) if _letters(known) == _letters(unit)]
-        raise ValueError(f"{error} (did you mean {similar[0]!r}?)" if similar else str(error)) from None
-
-
-def _letters(unit):
-    """Return a unit in lower case, without blanks and signs of a power."""
-    return re.sub(r"[\s^*]", "", unicodedata.normalize("NFKC", unit)).replace("\u03bc", "u").lower()
+    return _length(unit) if si_unit == "m" else _by_pint(unit, si_unit)
 
 
 def _length(unit):
-    """Exact factor from a unit of length to metres; accepts both signs for micro and both for angstrom."""
+    """Return the exact factor from a unit of length to metres; accept both signs for micro and both for angstrom."""
     name = unicodedata.normalize("NFKC", unit.strip())
     factor = _SYMBOLS.get(name) or _LONG_NAMES.get(name.lower())
     if factor is None:
@@ -115,22 +100,14 @@ def _length(unit):
 
 
 def _by_pint(unit, si_unit):
-    import pint
-
-    registry = _registry()
-    if not _UNIT.fullmatch(unit):
-        raise ValueError(f"{unit!r} is not a unit")
-    try:
-        quantity = registry.Quantity(Decimal(1), registry.parse_units(unit))
-        factor = quantity.to("" if si_unit == "1" else si_unit).magnitude
-    except pint.UndefinedUnitError:
-        raise ValueError(f"{unit!r} is not a known unit") from None
-    except pint.DimensionalityError:
-        raise ValueError(f"{unit!r} is not a unit of {PHYSICAL_NAMES[si_unit]}") from None
-    except Exception:  # pint raises a dozen types of errors for text that is not a unit
-        raise ValueError(f"{unit!r} is not a unit") from None
+    """Return the exact factor by pint, which raises a dozen types of errors for text that is not a unit."""
+    factor = math.nan
+    if _UNIT.fullmatch(unit):
+        with contextlib.suppress(Exception):
+            quantity = _registry().Quantity(Decimal(1), _registry().parse_units(unit))
+            factor = quantity.to("" if si_unit == "1" else si_unit).magnitude
     if not 0 < float(factor) < math.inf:
-        raise ValueError(f"{unit!r} is a unit too large or too small for a number")
+        raise ValueError(f"{unit!r} is not a unit of {PHYSICAL_NAMES[si_unit]}")
     return factor
 
 
@@ -176,7 +153,7 @@ def finite(value) -> float:
 
 
 def quantity(rule: FloatRange, example: str):
-    """Type of a value with its unit, kept as a float in the unit of `rule`."""
+    """Return the type of a value with its unit; the value becomes a float in the unit of `rule`."""
     bounds = f"in {rule.interval} {rule.unit}" if rule.most is not None else "0 or greater"
     expected = f"{PHYSICAL_NAMES[rule.unit]} with its unit, {bounds}, such as {example!r}"
     schema = {"type": "string", "pattern": PATTERN, "examples": [example]}
@@ -184,14 +161,14 @@ def quantity(rule: FloatRange, example: str):
 
 
 def number(rule: FloatRange):
-    """Type of a number without a unit."""
+    """Return the type of a number without a unit."""
     bounds = {"exclusiveMinimum": rule.above, "minimum": rule.least, "maximum": rule.most}
     schema = {"type": "number"} | {key: bound for key, bound in bounds.items() if bound is not None}
     return _float(to_number, rule, rule.expected, schema)
 
 
 def _float(convert, rule, expected, schema, *metadata):
-    """Type of a float that `convert` reads and a rule checks; the message states what is expected."""
+    """Return the type of a float that `convert` reads and a rule checks; its message states what is expected."""
 
     def read(value: Any) -> float:
         try:
@@ -206,7 +183,7 @@ def _float(convert, rule, expected, schema, *metadata):
 
 
 def integer(rule: IntegerRange):
-    """Type of an integer."""
+    """Return the type of an integer."""
     least, most = rule.least, rule.most
 
     def read(value: Any) -> int:
@@ -216,13 +193,6 @@ def integer(rule: IntegerRange):
 
     schema = {"type": "integer", "minimum": least, "maximum": most}
     return Annotated[int, BeforeValidator(read), WithJsonSchema(schema)]
-
-
-def flag(value: Any) -> bool:
-    """Return true or false; refuse other values that YAML and Python accept for them."""
-    if not isinstance(value, bool):
-        raise ValueError("is neither true nor false; expected true or false")
-    return value
 
 
 def distinct(values):
@@ -235,21 +205,20 @@ def distinct(values):
     return values
 
 
-def increasing(values):
-    """Refuse a list of numbers that does not increase."""
-    return _require_order(values, operator.gt, "increasing")
+def _ordered(follows, order: str, unit: str = ""):
+    """Return a validator that refuses a list of numbers in another order."""
+
+    def check(values):
+        for before, after in pairwise(values):
+            if not follows(after, before):
+                raise ValueError(f"{after:g}{unit} comes after {before:g}{unit}; expected values in {order} order")
+        return values
+
+    return check
 
 
-def decreasing(values):
-    """Refuse a list of lengths that does not decrease."""
-    return _require_order(values, operator.lt, "decreasing", " m")
-
-
-def _require_order(values, follows, order, unit=""):
-    for before, after in pairwise(values):
-        if not follows(after, before):
-            raise ValueError(f"{after:g}{unit} comes after {before:g}{unit}; expected values in {order} order")
-    return values
+increasing = _ordered(operator.gt, "increasing")
+decreasing = _ordered(operator.lt, "decreasing", " m")
 
 
 def exactly_one(section):
@@ -298,16 +267,15 @@ Modulus = quantity(CONTACT_MODULUS, "25 MPa")
 SurfaceEnergy = quantity(SURFACE_ENERGY, "50 mJ/m^2")
 Positive = number(POSITIVE)
 Seed = integer(SEED)
-Flag = Annotated[bool, BeforeValidator(flag)]
 
 
 def stops(kind, in_order):
-    """Type of a list of at least one value that `in_order` accepts."""
+    """Return the type of a list of at least one value; `in_order` checks the order of the values."""
     return Annotated[list[kind], Field(min_length=1), AfterValidator(in_order)]
 
 
 def list_of_names(kind=Name):
-    """Type of a list of at least one name, each given once."""
+    """Return the type of a list of at least one name, in which each name is given once."""
     return Annotated[list[kind], Field(min_length=1), AfterValidator(distinct)]
 
 
@@ -320,8 +288,6 @@ class Section(BaseModel):
 def _seeds(value: Any) -> Any:
     """Expand seeds: a range such as `1..50`, or a list of integers and ranges."""
     expected = "expected integers from 0 and ranges of them, such as 1..50 or [1..5, 9]"
-    if isinstance(value, list) and not value:
-        return value
     found = []
     for entry in value if isinstance(value, list) else [value]:
         if not isinstance(entry, str):

@@ -1,4 +1,4 @@
-"""Spectral moments, with which statistical theories describe a rough surface, and its radial power spectrum.
+"""Spectral moments, which statistical theories use to describe a rough surface, and its radial power spectrum.
 
 Moments are averages over profiles in all directions, as for the isotropic surfaces of P. R. Nayak, J. Lubr. Technol. 93
 (1971) 398-407, doi:10.1115/1.3451608.
@@ -13,20 +13,20 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 if TYPE_CHECKING:
-    # Imports SciPy, which commands that only need moments should not wait for.
+    # This module imports SciPy, which takes time; commands that only need moments should not wait for it.
     from icha.surfaces.surface import Surface
 
 
-# Cells per wavelength with which the summits of a wave are resolved.
+# Cells per wavelength that resolve the summits of a wave.
 RESOLVED_CELLS = 8
 # Cells per summit of a surface with RESOLVED_CELLS / 2 cells per shortest wave. Isotropic surfaces have about 0.2
 # summits in a square with the side of the shortest wavelength.
 LEAST_CELLS_OF_SUMMIT = 80
-# Fewest cells per shortest wave with which boundary elements represent the surface.
+# Fewest cells per shortest wave on which boundary elements represent the surface.
 LEAST_CELLS_PER_WAVE = 1.5
-# Ratio of the mean square slopes along two directions below which the smaller one is rounding.
+# Ratio of the mean square slopes along two directions below which the smaller slope is rounding.
 _NO_SLOPE = 1e-12
-# Wave number, in 2 pi/L, above which waves are so dense that sums over them are integrals.
+# Wave number, in 2 pi/L, above which an integral replaces the sum over the waves.
 _DENSE = 64
 
 
@@ -49,20 +49,34 @@ def error_of_cells(cells_per_short_wave: float) -> str:
 
 
 def summit_density(m2: float, m4: float) -> float:
-    """Maxima of an isotropic Gaussian surface per area, m4/(6 sqrt(3) pi m2), m^-2 (Nayak 1971)."""
+    """Compute the summits of an isotropic Gaussian surface per area, m4/(6 sqrt(3) pi m2), m^-2 (Nayak 1971)."""
     return m4 / (6 * math.sqrt(3) * math.pi * m2)
+
+
+def self_affine_integral(order: int, start: float, end: float, roll: float, hurst: float) -> float:
+    """Integrate k^order C(k)/C0 from `start` to `end`, where C = C0 up to `roll`, then falls as k^(-2 - 2 hurst)."""
+
+    def up_to(end):
+        flat = min(end, roll) ** (order + 1) / (order + 1)
+        if end <= roll:
+            return flat
+        power = order - 1 - 2 * hurst
+        falling = math.log(end / roll) if power == 0 else math.expm1(power * math.log(end / roll)) / power
+        return flat + roll ** (order + 1) * falling
+
+    return up_to(end) - up_to(start)
 
 
 def self_affine_full_contact_energy(
     period: float, rolloff_wavelength: float, short_wavelength: float, hurst: float
 ) -> float:
-    """Elastic energy of full contact per area over E* (m) of a self-affine surface of rms slope 1; lengths in m.
+    """Compute the elastic energy of full contact per area over E* (m), for a self-affine surface of rms slope 1.
 
-    The value equals `Surface.full_contact_energy` of the realisations of a `SelfAffineSpectrum`, but needs no
-    realisation: long waves are summed, and the spectrum of the others is integrated.
+    Lengths are in m. The value equals `Surface.full_contact_energy` of the realisations of a `SelfAffineSpectrum`, but
+    needs no realisation: the function sums over the long waves and integrates the spectrum of the others.
     """
     roll, last = period / rolloff_wavelength, period / short_wavelength
-    # The cut-off itself is not part of the spectrum, whatever the rounding of the quotient.
+    # The cut-off itself is not part of the spectrum, even if the quotient is rounded up.
     dense = min(_DENSE, last * (1 - 1e-9))
     k = np.arange(-math.ceil(dense), math.ceil(dense) + 1)
     k = np.hypot(k[:, None], k).ravel()
@@ -70,16 +84,7 @@ def self_affine_full_contact_energy(
 
     def moment(order):
         total = np.sum(np.maximum(k / roll, 1.0) ** (-2 * (1 + hurst)) * k**order)
-        return float(total) + 2 * math.pi * (integral(order + 1, last) - integral(order + 1, dense))
-
-    def integral(order, end):
-        """Integral of k^order C/C0 from 0 to end; C is flat up to the roll-off, then falls as k^(-2 - 2 H)."""
-        flat = min(end, roll) ** (order + 1) / (order + 1)
-        if end <= roll:
-            return flat
-        power = order - 1 - 2 * hurst
-        falling = math.log(end / roll) if power == 0 else math.expm1(power * math.log(end / roll)) / power
-        return flat + roll ** (order + 1) * falling
+        return float(total) + 2 * math.pi * self_affine_integral(order + 1, dense, last, roll, hurst)
 
     return period * moment(1) / (8 * math.pi * moment(2))
 
@@ -112,7 +117,7 @@ class SpectralMoments(NamedTuple):
         return (8 / 3 * self.m4) ** 0.5
 
     def scaled_to_rms_slope(self, rms_slope: float) -> SpectralMoments:
-        """Return the moments of the same topography with its heights multiplied to the rms slope `rms_slope`."""
+        """Return the moments of the topography with its heights multiplied so that the rms slope is `rms_slope`."""
         factor = (rms_slope / self.rms_slope) ** 2
         return SpectralMoments(*(moment * factor for moment in self))
 
@@ -133,11 +138,11 @@ def height_statistics(surface: Surface) -> tuple[float, float]:
 def slope_anisotropy(surface: Surface) -> float:
     """Compute the ratio of the largest to the smallest rms slope of profiles over all directions.
 
-    It is 1 for isotropic surfaces and infinite for straight grooves. The two directions are the principal axes of the
-    slope tensor of the cells between four nodes.
+    The ratio is 1 for isotropic surfaces and infinite for straight grooves. The two directions are the principal axes
+    of the slope tensor, whose slopes are those of the cells between four nodes.
     """
     z = surface.heights if surface.free else np.pad(surface.heights, ((0, 1), (0, 1)), mode="wrap")
-    # Slopes between opposite corners are along axes turned by 45 degrees, which changes no principal value.
+    # Slopes between opposite corners are along axes turned by 45 degrees; the principal values stay the same.
     one, other = z[1:, 1:] - z[:-1, :-1], z[1:, :-1] - z[:-1, 1:]
     tensor = [[np.mean(one**2), np.mean(one * other)], [np.mean(one * other), np.mean(other**2)]]
     least, most = np.linalg.eigvalsh(tensor)
@@ -148,13 +153,13 @@ def radial_power_spectrum(surface: Surface) -> tuple[np.ndarray, np.ndarray, np.
     """Compute the isotropic power spectrum, the mean over the wave vectors of a ring.
 
     The integral of C over the plane of wave vectors is the mean square height. Rings are one wave number 2 pi/L wide,
-    from the tenth on a tenth of their wave number; the last one is the largest circle in the grid of wave vectors. A
-    free square is multiplied by Hann's window first, and C divided by its mean square, because the step from one edge
-    to the other would add waves.
+    from the tenth on a tenth of their wave number; the last ring ends at the largest circle in the grid of wave
+    vectors. A free square is multiplied by Hann's window first, because the step from one edge to the other would add
+    waves; C is then divided by the mean square of the window.
 
     Returns
     -------
-    mean wave numbers q of the rings (rad/m), C(q) (m^4), and the wave numbers between the rings, one more than rings.
+    mean wave numbers q of the rings (rad/m), C(q) (m^4), and the wave numbers at the edges of the rings.
     """
     last, edges = (surface.grid - 1) // 2, [0.5]
     while edges[-1] < last:

@@ -17,7 +17,7 @@ from icha.support.parallel import blocks, on_cores
 from icha.support.rules import GRID, HURST, LENGTH, SEED, SLOPE
 from icha.surfaces.surface import Surface
 
-# Relative rounding of wave numbers in units of 2 pi / L, so that a band that ends at L/lambda_s = 64 excludes |k| = 64.
+# Relative rounding of wave numbers in units of 2 pi / L. So a band that ends at L/lambda_s = 64 excludes |k| = 64.
 _ROUNDING = 1e-9
 
 # Rows or columns to transform at a time.
@@ -34,7 +34,7 @@ class SelfAffineSpectrum:
     rolloff_wavelength : 2 pi / q_0, m; at most the period.
     short_wavelength : 2 pi / q_1, the short cut-off, m; less than the roll-off wavelength.
     hurst : H, in (0, 1].
-    rms_slope : h'_rms, in [1e-9, 1e6]; the sum of q^2 |h_q|^2 over the lattice of the cell equals its square exactly.
+    rms_slope : h'_rms, in [1e-9, 1e6]; its square is exactly the sum of q^2 |h_q|^2 over the wave vectors of the cell.
 
     Raises
     ------
@@ -69,12 +69,12 @@ class SelfAffineSpectrum:
             )
 
     def psd(self, q: np.ndarray | float) -> np.ndarray:
-        """C(q) in m^4 for wave numbers `q` (any shape) in rad/m."""
+        """Compute C(q) in m^4 for wave numbers `q` (any shape) in rad/m."""
         q = np.asarray(q, dtype=float)
         return self.plateau * self._shape(q * self.period / (2 * np.pi))
 
     def _shape(self, k):
-        """C/C0 for wave numbers in units of 2 pi / L."""
+        """Compute C/C0 for wave numbers in units of 2 pi / L."""
         k0 = self.period / self.rolloff_wavelength
         k1 = self.period / self.short_wavelength
         falling = np.maximum(k / k0, 1.0) ** (-2 * (1 + self.hurst))
@@ -84,8 +84,8 @@ class SelfAffineSpectrum:
     def _band(self):
         """Wave vectors (kx, ky) of one half of the band, and |k|, in units of 2 pi / L.
 
-        They are ordered by max(|kx|, |ky|). So a mode receives the same random number on every grid and with every
-        short cut-off, and finer surfaces of one seed only add shorter waves.
+        The wave vectors are in the order of max(|kx|, |ky|). So a mode receives the same random number on every grid
+        and with every short cut-off: a finer surface of the same seed only adds shorter waves.
         """
         m = math.ceil(self.period / self.short_wavelength)
         kx, ky = np.meshgrid(np.arange(m + 1), np.arange(-m, m + 1))
@@ -100,7 +100,7 @@ class SelfAffineSpectrum:
 
     @cached_property
     def plateau(self) -> float:
-        """C0 in m^4, with which the modes of the periodic cell have exactly the rms slope."""
+        """C0 in m^4; with this value the modes of the periodic cell have exactly the rms slope."""
         _, _, k, _ = self._band
         q = 2 * np.pi / self.period
         slope2 = 2 * float(np.sum(self._shape(k) * k**2)) * q**4
@@ -112,10 +112,6 @@ class SelfAffineSpectrum:
         _, _, k, _ = self._band
         q = 2 * np.pi / self.period
         return math.sqrt(2 * self.plateau * float(np.sum(self._shape(k))) * q**2)
-
-    def cells_per_short_wave(self, grid: int) -> float:
-        """Grid cells per shortest wavelength on a grid of `grid` nodes a side."""
-        return grid * self.short_wavelength / self.period
 
     def realise(self, grid: int, seed: int, amplitudes: str = "fixed") -> Surface:
         """Draw a periodic surface by spectral synthesis with random phases.
@@ -139,11 +135,11 @@ class SelfAffineSpectrum:
         seed = SEED.validate("seed", seed)
         if amplitudes not in ("fixed", "gaussian"):
             raise ValueError(f"amplitudes: {amplitudes!r} must be one of fixed, gaussian")
-        cells = self.cells_per_short_wave(grid)
+        cells = grid * self.short_wavelength / self.period
         if cells < 2 * (1 - _ROUNDING):
             raise ValueError(
-                f"grid: {grid} nodes give {cells:.3g} cells per shortest wavelength; "
-                f"at least {math.ceil(2 * self.period / self.short_wavelength * (1 - _ROUNDING))} nodes are needed"
+                f"grid: {grid} nodes give {cells:.3g} cells per shortest wavelength; expected at least "
+                f"{math.ceil(2 * self.period / self.short_wavelength * (1 - _ROUNDING))} nodes"
             )
         if cells < 4 * (1 - _ROUNDING):
             warnings.warn(

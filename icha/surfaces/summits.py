@@ -1,4 +1,4 @@
-"""Summits of a surface, located between the nodes, and how well they represent its highest places."""
+"""Summits of a surface, located between its nodes, and measures of how well they represent its highest places."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from icha.support.parallel import blocks, on_cores
 from icha.surfaces.square import cell_of
 from icha.surfaces.surface import Surface
 
-# A quintic spline reproduces a parabola exactly, depends on distant nodes only weakly (0.43 per cell), and at eight
-# cells per wavelength has the second derivatives of a sine to 4e-4.
+# Degree of the spline. A quintic spline reproduces a parabola exactly; the influence of a node falls by 0.43 per cell.
+# At eight cells per wavelength, the second derivatives of a sine have an error of 4e-4.
 _DEGREE = 5
-# Weights of the coefficients of five nodes in value, slope and curvature of the quintic spline at the middle one.
+# Weights of the coefficients of five nodes in value, slope and curvature of the quintic spline at the middle node.
 _VALUE = np.array([1.0, 26.0, 66.0, 26.0, 1.0]) / 120
 _SLOPE = np.array([-1.0, -10.0, 0.0, 10.0, 1.0]) / 24
 _CURVATURE = np.array([1.0, 2.0, -6.0, 2.0, 1.0]) / 6
@@ -40,7 +40,8 @@ _BASIS_SLOPE = _BASIS[:, 1:] * np.arange(1, 6)
 _BASIS_CURVATURE = _BASIS_SLOPE[:, 1:] * np.arange(1, 5)
 
 _MAX_NEWTON_STEPS = 30
-# In cells: last step of a converged search, largest distance of a summit from its node, and of two equal summits.
+# In cells: last step of a converged search, largest distance of a summit from its node, and largest distance at which
+# two summits count as one.
 _CONVERGED = 1e-9
 _FARTHEST = 1.5
 _SAME_SUMMIT = 1e-3
@@ -50,15 +51,16 @@ _SAME_SUMMIT = 1e-3
 _MAX_RISE = 1.8
 # Rounding of a rise, in units of the range of heights.
 _ROUNDING = 1e-9
-# Curvature, relative to the mean of the surface, below which it is rounding on a plateau.
+# Curvature, relative to the mean of the surface, below which it is only rounding, as on a plateau.
 _FLAT = 1e-6
-# Nodes added beyond the edges of a free square; the influence of those farther away is 0.43^32 = 2e-12.
+# Nodes added beyond the edges of a free square; nodes farther away have an influence of 0.43^32 = 2e-12.
 _MARGIN = 32
 # Rows or columns of the grid, and points between them, in memory at a time.
 _LINES = 16
 _POINTS = 4096
-# Largest share of the load without a summit, and of summits without support, with which asperities represent a
-# surface. Smooth random surfaces with at least 5 nodes per shortest wave stay below 0.1 (`tests/surfaces`).
+# Largest share of the load on places without a summit, and largest share of summits without support, with which
+# asperities represent a surface. Smooth random surfaces with at least 5 nodes per shortest wave stay below 0.1
+# (`tests/surfaces`).
 MAX_SHARE = 0.1
 
 
@@ -73,8 +75,8 @@ class Asperities:
     radius_of_curvature : (n,) array, 1/sqrt(kappa1 kappa2), the geometric mean of the principal radii of curvature, m.
     period : side of the square, m.
     free : whether the square is single, on a free half-space; else it repeats.
-    unsupported_height : (m,) array, heights of the maxima of the spline without support of the nodes around them, m.
-        They are not asperities.
+    unsupported_height : (m,) array, m, heights of the maxima of the spline that the nodes around them do not support.
+        These maxima are not asperities.
     """
 
     position: np.ndarray
@@ -86,11 +88,11 @@ class Asperities:
 
     @property
     def cell(self) -> float:
-        """Period of positions, m: for a single square twice the side, so that differences are never wrapped."""
+        """Period of positions, m; for a single square twice its side, so that no difference of positions is wrapped."""
         return cell_of(self.period, self.free)
 
     def __len__(self) -> int:
-        """Return number of asperities."""
+        """Return the number of asperities."""
         return len(self.height)
 
 
@@ -116,16 +118,16 @@ def find_summits(surface: Surface) -> Asperities:
 def locate_summits(surface: Surface) -> Asperities:
     """Locate the summits of a surface: the maxima, with negative-definite curvature, of a quintic spline.
 
-    Comparing every node with its neighbours misses and misplaces elongated summits: on a crest oblique to the grid
-    the highest node can lie cells away from the summit, or no node is a maximum, and the contact area then depends on
-    the grid by some per cent. Instead Newton's method starts from every node whose parabola has its top within a cell.
-    Only starts that converge nearby count, because near-degenerate curvatures throw others far away.
+    A comparison of every node with its neighbours would miss and misplace elongated summits: on a crest oblique to the
+    grid, the highest node can lie cells away from the summit, or no node is a maximum. The contact area then depends on
+    the grid by some per cent. Instead, Newton's method starts from every node whose parabola has its top within a cell.
+    Only starts that converge nearby count, because some steps are very long where a principal curvature is nearly zero.
 
     Edges of a free square have no maxima, because a crest that crosses an edge has its top outside. Heights continue
     by point reflection at the edges, and summits between the outermost nodes count.
 
-    Beside steps, pits, single pixels and plateaus the spline rises where the surface does not. A maximum is a summit
-    only if the nodes around it support its height (`_is_supported`).
+    Near steps, pits, single pixels and plateaus the spline rises above the surface. A maximum is a summit only if the
+    nodes around it support its height (`_is_supported`).
 
     Returns
     -------
@@ -163,9 +165,9 @@ def locate_summits(surface: Surface) -> Asperities:
 def _is_supported(heights, summit, height):
     """Return whether the nodes around summits at points (k, 2), in cells, support the heights (k,) of the summits.
 
-    Along each axis a parabola through nodes of second difference -d rises at most d/8 above the higher of two
-    neighbours. The smaller second difference at the two nodes on either side of the summit counts, because at the edge
-    of a plateau only one of them is large (the limiter `minmod` of A. Suresh and H. T. Huynh, J. Comput. Phys. 136
+    Along each axis, a parabola through nodes with second difference -d rises at most d/8 above the higher of two
+    neighbours. Of the second differences at the two nodes beside the summit the smaller counts, because only one of
+    them is large at the edge of a plateau (the limiter `minmod` of A. Suresh and H. T. Huynh, J. Comput. Phys. 136
     (1997) 83-99, doi:10.1006/jcph.1997.5745).
     """
     grid = len(heights)
@@ -216,9 +218,9 @@ def _climb(coefficients, node, flat):
 
 
 def _nodes_near_summits(coefficients):
-    """Return the nodes (k, 2) whose Newton step to a maximum is at most a cell, and the curvature that counts as flat.
+    """Return the nodes (k, 2) from which Newton's step to a maximum is at most a cell long, and the limit of flatness.
 
-    Curvatures are in metres per squared cell.
+    The limit is the curvature below which a node counts as flat, in metres per squared cell.
     """
     grid = len(coefficients)
 
@@ -267,7 +269,7 @@ def _basis(t):
 
 
 def _newton_step(gy, gx, hyy, hyx, hxx, flat):
-    """Return whether the Hessian is negative definite, its determinant, and Newton's step (..., 2), else zero."""
+    """Return whether the Hessian is negative definite, its determinant, and Newton's step (..., 2) or else zero."""
     determinant = hyy * hxx - hyx**2
     concave = (determinant > flat**2) & (hyy + hxx < 0)
     safe = np.where(concave, -determinant, 1.0)
@@ -284,14 +286,14 @@ LARGEST_DEPARTURE = 0.3
 _DIRECTIONS = 16
 # Radius of a spot, in cells, below which the interpolated surface equals its paraboloid.
 _SMALLEST_SPOT = 0.25
-# Smallest ratio of the depth around a summit to that of its paraboloid; smaller ratios are raised to it.
+# Smallest ratio of the depth around a summit to that of its paraboloid; smaller ratios are replaced by it.
 _LEAST_DROP = 1e-2
 
 
 def paraboloid_departure(
     surface: Surface, position: np.ndarray, contact_radius: np.ndarray, radius_of_curvature: np.ndarray
 ) -> float:
-    """Measure how far the surface departs from the paraboloids of its summits at the edges of their contact spots.
+    """Measure how far the surface departs from the paraboloids of its summits at the edges of the contact spots.
 
     Parameters
     ----------
@@ -302,9 +304,10 @@ def paraboloid_departure(
 
     Returns
     -------
-    float, the mean of abs(ln(d / (a^2 / 2R))), weighted by area, with d the mean depth below the summit of the circle
-    of radius a around it; or that with 1/R the arithmetic mean of the principal curvatures, which elongated summits
-    obey at small a, if it is smaller. 0 if no spot is wider than half a cell.
+    float, the mean of abs(ln(d / (a^2 / 2R))) over the spots, weighted by area. Here d is the mean depth, below the
+    summit, of the circle of radius a around the summit. At small a, elongated summits follow another paraboloid, whose
+    curvature is the arithmetic mean of the principal curvatures; the smaller of the two values is returned. The value
+    is 0 if no spot is wider than half a cell.
     """
     mode = "mirror" if surface.free else "grid-wrap"
     spline = scipy.ndimage.spline_filter(surface.heights, order=3, mode=mode)
@@ -334,15 +337,15 @@ def paraboloid_departure(
 
 @dataclass(frozen=True, eq=False)
 class SummitCoverage:
-    """The highest places of a surface, and the summits that represent them.
+    """The highest places of a surface, and the summits that may represent them.
 
     Attributes
     ----------
-    peak_height : (k,) array, heights of the nodes not lower than any of their eight neighbours, m. Every node of a
-        plateau is one.
-    covered : (k,) array, whether a summit lies within two rows and columns of the node.
+    peak_height : (k,) array, m, heights of the peaks: nodes that are not lower than any of their eight neighbours.
+        Every node of a plateau is one.
+    covered : (k,) array, whether a summit lies within two rows and two columns of the peak.
     summit_height : (n,) array, heights of the summits, m.
-    unsupported_height : (m,) array, heights of the maxima without support of the nodes around them, m.
+    unsupported_height : (m,) array, m, heights of the maxima of the spline that the nodes around them do not support.
     """
 
     peak_height: np.ndarray
@@ -352,7 +355,7 @@ class SummitCoverage:
 
     @classmethod
     def of(cls, surface: Surface, asperities: Asperities) -> SummitCoverage:
-        """Compare the nodes of a surface with its summits; the edges of a free square have no peaks."""
+        """Find the peaks of a surface and the summits near them; the edges of a free square have no peaks."""
         heights, grid = surface.heights, surface.grid
 
         def examine(rows):
@@ -366,16 +369,16 @@ class SummitCoverage:
             row, column = row[inside], column[inside]
         x, y = np.mod(np.rint(asperities.position / surface.spacing).astype(int), grid).T
         occupied = np.zeros((grid, grid), dtype=bool)
-        # On a crest oblique to the grid two nodes beside one summit are higher than their neighbours.
+        # On a crest oblique to the grid, two nodes near the same summit can be peaks.
         for down, across in np.ndindex(5, 5):
             occupied[(y + down - 2) % grid, (x + across - 2) % grid] = True
         return cls(heights[row, column], occupied[row, column], asperities.height, asperities.unsupported_height)
 
     def uncovered_share(self, separation: float) -> float:
-        """Share of the load, at a mean separation (m), on places without a summit.
+        """Return the share of the load, at a mean separation (m), on peaks without a summit.
 
-        The load of a place is estimated as its height above the plane of separation to the power 3/2 (Hertz). If no
-        place is above this plane, only the highest place counts.
+        The load on a peak is estimated as its height above the plane of separation to the power 3/2 (Hertz). If no
+        peak is above this plane, only the highest peak counts.
         """
         load = np.maximum(self.peak_height - separation, 0.0) ** 1.5
         if not load.any():
@@ -383,7 +386,7 @@ class SummitCoverage:
         return float(np.sum(load[~self.covered]) / np.sum(load))
 
     def unsupported_share(self, separation: float) -> float:
-        """Share of the summits above the plane of separation (m) that their nodes do not support."""
+        """Return the share of the summits above the plane of separation (m) that their nodes do not support."""
         unsupported = int(np.count_nonzero(self.unsupported_height > separation))
         return unsupported / max(unsupported + int(np.count_nonzero(self.summit_height > separation)), 1)
 

@@ -1,7 +1,7 @@
-"""A square height map: the rigid rough surface, looking towards the half-space.
+"""A square height map of the rigid rough surface that faces the elastic half-space.
 
-Heights are in metres and positive towards the elastic body. The first axis of an array of heights is y,
-the second x; node (iy, ix) lies at (x, y) = (ix, iy) * spacing.
+Heights are in metres and positive towards the elastic body. The first axis of an array of heights is y, the second x;
+node (iy, ix) lies at (x, y) = (ix, iy) * spacing.
 """
 
 from __future__ import annotations
@@ -19,21 +19,21 @@ from icha.support.parallel import blocks, on_cores
 from icha.support.rules import LENGTH, SLOPE, FloatRange, IntegerRange
 from icha.surfaces.square import problem_with_heights
 
-# A square that repeats, or a single one on a half-space.
+# Values of `boundary`: a square that repeats, or a single square on a half-space.
 PERIODIC, FREE = "periodic", "free"
 
-# Range of heights over the period.
+# Bounds of the range of heights divided by the period.
 _STEEPNESS = FloatRange(least=1e-24, most=1e9)
 # Rows or columns that are transformed at a time.
 _LINES = 64
 # Largest number of lines inside a cell whose steps are compared with the step between cells.
 _COMPARED_LINES = 256
-# Smallest misfit of a step between cells over the largest one inside a cell; the misfit is a step less the mean of its
-# two neighbours, rms along a line. Measured on periodic surfaces: up to 1.3, and 2.4 on white noise of 8 x 8 nodes; on
-# halves of them with 4 nodes for the shortest wave: 3.2 and more.
+# Smallest ratio of the misfit between cells to the largest misfit inside a cell at which edges do not fit. The misfit
+# is a step less the mean of the two steps beside it, rms along a line. Measured on periodic surfaces: up to 1.3, and
+# 2.4 on white noise of 8 x 8 nodes; on halves of them with 4 nodes per shortest wave: 3.2 and more.
 _MISFIT = 3.0
-# Smallest ratio of the step between cells to the largest one inside a cell, rms along a line. Where the halves of a
-# symmetric dome meet it is 1.03: an edge, but no step.
+# Smallest such ratio of the steps themselves, rms along a line. It is 1.03 between the halves of a symmetric dome,
+# which meet in an edge without a step.
 _STEP = 1.1
 MISFIT_OF_EDGES = (
     f"boundary: {PERIODIC!r}, but opposite edges differ by much more than neighbouring nodes, so there is a step at "
@@ -47,19 +47,19 @@ class EdgeWarning(UserWarning):
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """A rough surface of zero mean height: one cell of a periodic one, or a single square.
+    """A rough surface of zero mean height: one cell of a periodic surface, or a single square.
 
     Parameters
     ----------
     heights : (n, n) array, metres. Its mean is removed; the array is copied and made read-only.
-    period : side of the square in metres, in [1e-24, 1e9]; of a periodic surface its period.
+    period : side of the square, which is the period of a periodic surface, metres, in [1e-24, 1e9].
     boundary : "periodic" in both directions, or "free": one square on a half-space that extends beyond it.
 
     Raises
     ------
     ValueError
-        If the heights are not a square array of at least 8 x 8 finite numbers, or all the same, or their range over
-        the period is not in [1e-24, 1e9], or the period is out of range, or the boundary is neither of the two.
+        If the heights are not a square array of at least 8 x 8 finite numbers, or are all the same; if their range
+        divided by the period is not in [1e-24, 1e9]; or if the period or the boundary is not one of those above.
     """
 
     heights: np.ndarray
@@ -104,11 +104,11 @@ class Surface:
 
     @property
     def free(self) -> bool:
-        """Whether the surface is a single square."""
+        """True if the surface is a single square."""
         return self.boundary == FREE
 
     def require_periodic(self, purpose: str) -> None:
-        """Raise ValueError, which names the purpose, if the surface is a free square."""
+        """Raise ValueError if the surface is a free square; the message names the purpose."""
         if self.free:
             raise ValueError(f"boundary: {FREE!r}; {purpose} needs a surface of boundary {PERIODIC!r}")
 
@@ -129,7 +129,7 @@ class Surface:
         def along_y(columns):
             modes = scipy.fft.fft(half[:, columns], axis=0, norm="forward", workers=1)
             power = modes.real**2 + modes.imag**2
-            # The half spectrum holds every column but the first (and, on even grids, the last) only once.
+            # The half spectrum omits the opposites of all columns but the first (and, on even grids, the last).
             kx = np.arange(columns.start, columns.stop)
             count = np.where((kx > 0) & (2 * kx < n), 2.0, 1.0)
             power *= count
@@ -199,7 +199,7 @@ class Surface:
         return -float(full_contact_pressure(self.heights, self.period, free=self.free).min())
 
     def scaled_to_rms_slope(self, rms_slope: float) -> Surface:
-        """Return the same topography with its heights multiplied to the spectral rms slope `rms_slope`."""
+        """Return the same topography with its heights multiplied so that the spectral rms slope is `rms_slope`."""
         rms_slope = SLOPE.validate("rms_slope", rms_slope)
         factor = rms_slope / self.rms_slope
         scaled = replace(self, heights=self.heights * factor)
@@ -244,7 +244,7 @@ def full_contact_pressure(heights: np.ndarray, period: float, *, free: bool = Fa
 
 
 def edges_fit(heights: np.ndarray) -> bool:
-    """Return whether heights (n, n) can be one cell of a periodic surface, without a step between cells."""
+    """Return whether heights (n, n) are one cell of a periodic surface without a step between cells."""
     n = len(heights)
     compared = np.unique(np.linspace(1, n - 3, min(n, _COMPARED_LINES)).astype(int))
     for lines in (heights, heights.T):
@@ -257,7 +257,7 @@ def edges_fit(heights: np.ndarray) -> bool:
 
 
 def _mean_squares(heights, spacing):
-    """Compute mean squares over the nodes of height, slope and Laplacian, by quintic splines along both axes."""
+    """Compute the mean squares of height, slope and Laplacian over the nodes, with quintic splines along both axes."""
     # Slow to import, and rarely needed.
     from scipy.interpolate import make_interp_spline
 

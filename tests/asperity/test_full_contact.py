@@ -11,7 +11,6 @@ from icha.asperity.full_contact import full_contact_energy_ratio, gaussian_compl
 from icha.datasets.campaign import campaign_tree, select_run
 from icha.datasets.files import read_run, write_dataset
 from icha.datasets.format import RUN, problems_with_file
-from icha.simulation import asperity_applicability
 from icha.surfaces.moments import self_affine_full_contact_energy
 
 L, A = 3e-6, 1e-8
@@ -60,14 +59,6 @@ def test_the_ratio_of_a_sticky_silicone_is_known():
     energy = self_affine_full_contact_energy(40e-6, 10e-6, 0.2e-6, 0.8) * (100e-9 / spectrum.rms_height) ** 2
     assert full_contact_energy_ratio(energy, 2.667e6, 0.05) == pytest.approx(0.138, abs=5e-4)
     assert full_contact_energy_ratio(energy, 2.667e6, 0.0) == math.inf
-
-
-def test_reasons_are_named_one_after_the_other():
-    assert asperity_applicability(math.inf) == asperity_applicability(1.0, (), 0.25) == ""
-    assert asperity_applicability(0.138, ["spikes", "pits"], 0.3) == (
-        "asperity model not applicable: full contact has the lower energy (U_full/dgamma = 0.138, less than 1); "
-        "spikes; pits; contact area A/A0 = 0.3, more than 0.25"
-    )
 
 
 def pressed(energy, model="asperities", **path):

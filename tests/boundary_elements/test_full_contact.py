@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 import icha
-from icha.asperity.full_contact import theoretical_strength
 from icha.boundary_elements.contact import contact_of
 from icha.checks.run import check_run
 from icha.contact.model import PRESSURE, Control
@@ -45,7 +44,7 @@ def test_johnson_s_wave_from_first_touch_to_full_contact_and_out():
     state = contact.equilibrium(state, state.separation, Control(PRESSURE, 0.6 * unit))
     assert contact.is_full(state) and contact.pressure(state) == pytest.approx(0.6 * unit)
     # Full contact bears tension up to the strength of the interface at the trough, where the wave tears with p*.
-    opening = unit - theoretical_strength(exact.material.surface_energy, exact.material.interaction_range)
+    opening = unit - exact.material.theoretical_strength
     assert contact.opening_pressure == pytest.approx(opening, abs=1e-4 * unit)
     state = contact.equilibrium(state, 0.0, Control(PRESSURE, 0.999 * opening))
     assert contact.is_full(state)

@@ -98,33 +98,6 @@ def test_a_run_that_fails_leaves_a_dataset_and_is_listed_with_its_reason(project
 
 
 @pytest.mark.slow
-def test_damaged_files_are_computed_again(project):
-    start(project, "dataset").communicate()  # if no other test has computed them
-    results = project / "results/tiny"
-    paths = [
-        "surfaces/rough/seed1.nc",
-        "runs/load/rough/seed1/slope1/bare.nc",
-        "dataset/tiny.nc",
-        "aggregated/tiny.nc",
-    ]
-    before = {path: (results / path).read_bytes() for path in paths}
-    for path in paths[:2]:
-        (results / path).write_bytes(b"")
-    for path in paths[2:]:
-        (results / path).write_bytes(before[path][:-1000])
-    plan = run(project, "--dry-run")
-    assert all(f"damaged: {path}: will be computed again" in plan for path in paths)
-    output = run(project, "dataset", status=1)
-    for path in paths:
-        aside = (results / path).with_name((results / path).name + ".damaged")
-        assert f"damaged, to be made again: results/tiny/{path} (the old file is {aside.name})\n" in output
-        assert len(aside.read_bytes()) < len(before[path])
-        assert (results / path).read_bytes() == before[path]
-    # Only the verdict fails, on the run that cannot be completed.
-    assert "1 job failed:\n  Verdict" in output
-
-
-@pytest.mark.slow
 def test_a_stopped_call_can_be_continued(project):
     def heed():
         # In the background of a script, the signal is ignored.
@@ -184,20 +157,6 @@ def test_the_table_of_jobs_of_snakemake_is_read():
     assert "Nothing would run" not in _planned_jobs(f"damaged, {outdated}\n{nothing}")
 
 
-@pytest.mark.parametrize(
-    ("target", "options"),
-    [
-        ("nosuchtarget", ["--dry-run"]),
-        pytest.param("results/tiny/runs/load/rough/seed9/slope1/bare.nc", [], marks=pytest.mark.slow),
-    ],
-)
-def test_unknown_targets_are_user_errors(project, target, options):
-    # The warning is on the confirmed sticky material.
-    warning, error = run(project, target, *options, status=2).splitlines()
-    assert warning.startswith("Warning: ") and "full contact has the lower energy" in warning
-    assert error.startswith(f"Error: {target}: not a target, and not a file of campaign tiny; expected all,")
-
-
 def contents(folder):
     return {file: (file.read_bytes(), file.stat().st_mtime_ns) for file in folder.rglob("*") if file.is_file()}
 
@@ -226,9 +185,3 @@ def test_the_reason_of_snakemake_is_printed_without_traceback():
     assert _reason_in(output) == ["Reason 1"]
     trace = 'Traceback (most recent call last):\n\n  File "a.py", line 3, in f\n    open(x)\n\nPermissionError: no\n'
     assert _reason_in(output + trace) == ["Reason 1", "PermissionError: no"]
-
-
-@pytest.mark.slow
-def test_errors_of_snakemake_are_printed(project):
-    output = run(project, "--", "--no-such-option", status=1)
-    assert "Snakemake could not start:" in output and "--no-such-option" in output

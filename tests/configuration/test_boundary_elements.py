@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from demo_configuration import LONG_RANGE, TRUTH, file_surface, measured_surface
+from demo_configuration import LONG_RANGE, TRUTH, file_surface
 
 from icha.configuration.cases import loop_cases, loop_settings, solution_cases, solution_settings
 from icha.configuration.errors import ConfigurationError
@@ -16,13 +16,6 @@ def test_boundary_elements_turn_where_their_study_does(load):
     assert case.path == "both/rough/seed2/slope1/soft"
     settings = loop_settings(campaign, case)
     assert settings["largest_reduced_pressure"] == 0.01 and settings["separation_step"] == 0.1
-
-
-def test_entries_and_compared_studies_have_names_of_their_own(load):
-    changes = {**LONG_RANGE, "finite_range": {"one": TRUTH}}
-    assert load(changes).campaign.finite_range
-    with pytest.raises(ConfigurationError, match=r"finite_range\.one: 'one' is the name of a study that has"):
-        load({**changes, "studies.one.models": ["asperities", "boundary_elements"]})
 
 
 def test_boundary_elements_are_a_product_of_the_studys_lists(load):
@@ -54,14 +47,6 @@ def test_loads_of_boundary_elements_are_snapshots_of_the_runs(load):
     assert load({"studies.one.snapshots": None}).campaign.snapshots_of("one") is None
     campaign = load({**LONG_RANGE, "finite_range": {"truth": TRUTH}, "studies.one.snapshots": "every_stop"}).campaign
     assert campaign.snapshots_of("one") == [("reduced_pressure", p) for p in (1e-3, 0.01, 0.003)]
-
-
-def test_boundary_elements_are_periodic(load):
-    changes = {"surfaces.rough": measured_surface(boundary="free"), "finite_range": {"truth": TRUTH}}
-    with pytest.raises(
-        ConfigurationError, match=r"finite_range\.truth\.study: 'one' has the surface 'rough' with free edges"
-    ):
-        load({**changes, "materials.soft.surface_energy": "0 J/m^2"})
 
 
 def test_ranges_are_held_against_the_grid_of_a_surface_file(load, tmp_path):

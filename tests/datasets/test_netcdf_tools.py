@@ -1,9 +1,7 @@
-"""Files are for the tools of others: plain netCDF4 and plain xarray agree on them, checkers accept them."""
+"""Files are for the tools of others: bounds, ragged arrays and units follow conventions, and checkers accept them."""
 
-import pickle
 import re
 import subprocess
-import sys
 
 import kinds_of_files as kinds
 import netCDF4
@@ -14,8 +12,6 @@ from outside_validators import REPOSITORY, python_of_validators
 
 from icha.datasets.format import CAMPAIGN, RUN, SOLUTION, SURFACE, identify_file
 from icha.datasets.labels import LABELS
-
-GROUPS = {"run.nc": "/", "campaign.nc": "/slopes"}
 
 
 @pytest.fixture(scope="module")
@@ -38,52 +34,6 @@ def every_variable(folder):
             for group in groups_of(data):
                 for name, variable in group.variables.items():
                     yield f"{path.name}:{group.path.rstrip('/')}/{name}", variable
-
-
-# --- two readers ----------------------------------------------------------------------------------------------
-
-
-def by_netcdf4(path, group):
-    """Values by plain netCDF4: masked where missing, texts as one text each."""
-    with netCDF4.Dataset(path) as data:
-        own = data if group == "/" else data[group]
-        return {name: variable[...] for name, variable in own.variables.items()}
-
-
-# Nothing of the package is there: what is read is read without it.
-BY_XARRAY = """
-import pickle, sys
-sys.modules["icha"] = None
-import xarray as xr
-path, group = sys.argv[1:]
-data = xr.open_dataset(path, group=group).load()
-pickle.dump(({name: v.values for name, v in data.variables.items()}, list(data.coords)), sys.stdout.buffer)
-"""
-
-
-def by_xarray(path, group):
-    """Values and the names of the coordinates, by xarray in a process without the package."""
-    command = [sys.executable, "-c", BY_XARRAY, str(path), group]
-    return pickle.loads(subprocess.run(command, check=True, capture_output=True, cwd=path.parent).stdout)
-
-
-@pytest.mark.parametrize(("file", "group"), GROUPS.items())
-def test_netcdf4_and_xarray_read_the_same(folder, file, group):
-    plain = by_netcdf4(folder / file, group)
-    labelled, coordinates = by_xarray(folder / file, group)
-    assert set(plain) == set(labelled)
-    for name, values in plain.items():
-        other = labelled[name]
-        if other.dtype.kind in "OUT":
-            np.testing.assert_array_equal(values.astype(str), other.astype(str), err_msg=name)
-            continue
-        missing = np.ma.getmaskarray(values)
-        np.testing.assert_array_equal(missing, np.isnan(other), err_msg=name)
-        np.testing.assert_array_equal(np.ma.getdata(values)[~missing], other[~missing], err_msg=name)
-    assert {"gap_bin_centre", "pressure_bin_centre"} <= set(coordinates)
-    if file == "campaign.nc":  # the run that failed lacks its second snapshot
-        failed = (0, 0, 0, 1, 0)
-        assert plain["failure"][failed] == "the path ends early" and plain["gap_density"][(*failed, 1)].mask.all()
 
 
 # --- conventions ------------------------------------------------------------------------------------------------

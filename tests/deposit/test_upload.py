@@ -168,13 +168,6 @@ def test_a_deposit_goes_to_zenodo_and_comes_back(tmp_path, deposit):
         got = {file["key"]: requests.get(file["links"]["download"]).content for file in record["files"]}
         assert set(got) == SENT and got[f"{NAME}.zip"] == deposit.read_bytes()
         assert got["README.md"] == FILES["README.md"]
-        # A draft of a new version, made on the page, is continued like any other.
-        answer = requests.post(f"{page}/{number}/actions/newversion", headers=token).json()
-        after = answer["links"]["latest_draft"].rpartition("/")[2]
-        (tmp_path / "next").mkdir()
-        other = make_deposit(tmp_path / "next", version="1.1.0").rename(tmp_path / "next/mine-1.1.0.zip")
-        status, output = upload(other, "--url", address, "--draft", after, "--yes")
-        assert status == 0 and f"{deposit.name}: another file of the draft, not changed" in output, output
 
 
 def test_another_call_continues_a_draft_and_sends_nothing_twice(server, deposit):

@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 from icha.cli import app
 from icha.deposit import verify
 from icha.deposit.verify import DamagedDeposit, files_of, problem_with_name, read_text, whole_deposit
-from icha.support.formatting import is_printable
+from icha.support.formatting import printable
 
 FILES = {"README.md": "# Tiny\n", "runs/load/soft.nc": bytes(range(256)) * 20, "inputs/Höhen (2).txt": "1 2\n"}
 
@@ -69,7 +69,7 @@ def test_a_whole_deposit_is_whole(ending, folder):
 def test_every_change_of_a_folder_is_found(spoil, problems, folder):
     spoil(folder)
     found = problems_with(folder)
-    assert len(found) == len(problems) and all(map(is_printable, found)), found
+    assert len(found) == len(problems) and all(printable(each) == each for each in found), found
     for line, (name, problem) in zip(sorted(found), sorted(problems.items()), strict=True):
         assert line.startswith(name) and problem in line
     assert CliRunner().invoke(app, ["verify", str(folder)]).exit_code == 1
@@ -114,7 +114,7 @@ def test_names_in_a_zip_lead_nowhere_else(name, tmp_path, monkeypatch):
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "temporary"))
     path = zipped(tmp_path, **{name: stat.S_IFREG | 0o644})
     found = problems_with(path)
-    assert found and all(map(is_printable, found))
+    assert found and all(printable(each) == each for each in found)
     assert sorted(each.name for each in tmp_path.rglob("*")) == ["a.zip", "temporary"]
 
 

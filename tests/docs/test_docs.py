@@ -27,7 +27,7 @@ ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
 TUTORIAL = DOCS / "tutorial.md"
 # Pages with instructions.
-GUIDES = [TUTORIAL, *sorted(DOCS.glob("howto/*.md"))]
+GUIDES = [TUTORIAL, ROOT / "README.md", *sorted(DOCS.glob("howto/*.md"))]
 EVERY = pytest.mark.parametrize("page", GUIDES, ids=lambda page: page.stem)
 PAGES = [*sorted(DOCS.rglob("*.md")), ROOT / "README.md", ROOT / "CONTRIBUTING.md"]
 
@@ -186,7 +186,7 @@ def with_results(folder):
 # The example on hysteresis takes a quarter of an hour.
 @pytest.mark.parametrize(
     "page",
-    [page for page in PAGES if blocks(page, "python") and page.stem not in ("hysteresis", "README")],
+    [page for page in PAGES if blocks(page, "python") and page.stem != "hysteresis"],
     ids=lambda page: page.stem,
 )
 def test_every_piece_of_python_runs(page, with_results, monkeypatch, tmp_path):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import scipy.optimize
-from half_space import all_pairs, jkr_approach, jkr_force, periodic_displacement
+from half_space import all_pairs, jkr_approach, jkr_force, periodic_displacement, spot_of_asperity
 from hypothesis import example, given
 from hypothesis import strategies as st
 
@@ -22,9 +22,6 @@ MODULUS, ENERGY = 25e6, 0.05
 PERIOD, R = 100e-6, 100e-6
 # A Tabor parameter of three, so that Wu's formula holds.
 RANGE = ((ENERGY / MODULUS) ** 2 * R) ** (1 / 3) / 3
-
-
-# --- one asperity on a grid ---------------------------------------------------------------------------------
 
 
 def bump_heights(n=64, centre=(0.503, 0.4963)):
@@ -84,9 +81,6 @@ def test_jump_in_of_a_bump_happens_at_wus_gap():
     assert contact.pressure(after) < 0
 
 
-# --- several asperities -------------------------------------------------------------------------------------
-
-
 def group(count, energy):
     position = np.array([[0.45, 0.5], [0.52, 0.53], [0.47, 0.58]])[:count] * PERIOD
     height = np.array([1.0e-6, 0.97e-6, 1.02e-6])[:count]
@@ -131,7 +125,7 @@ def test_interacting_spots_against_an_independent_solution(count, energy):
     state = contact.equilibrium(contact.untouched(), 0.85e-6)
     assert len(state.spots) == count
     spots = state.spots
-    np.testing.assert_array_equal(np.sort(state.spot_of_asperity), np.arange(count))
+    np.testing.assert_array_equal(np.sort(spot_of_asperity(state)), np.arange(count))
     order = [int(np.argmin(np.hypot(*(spots.position - p).T))) for p in contact.asperities.position]
     alone = contact.law.contact_radius(contact.asperities.height - 0.85e-6, contact.asperities.radius_of_curvature)
     expected = independent_solution(contact, 0.85e-6, energy, alone)
@@ -158,9 +152,6 @@ def test_a_shielded_asperity_does_not_touch():
     assert low - u - w < 0
 
 
-# --- a rough surface ----------------------------------------------------------------------------------------
-
-
 def rough(energy, grid=64, seed=1, ratio=16):
     surface = SelfAffineSpectrum(PERIOD, 0.2 * PERIOD, PERIOD / ratio, 0.8).realise(grid, seed)
     return contact_of(surface, Material(MODULUS, energy, 2.071e-9))
@@ -174,7 +165,7 @@ def test_stiffness_against_differences(energy):
         state = contact.equilibrium(state, level * contact.rms_height)
     step = 1e-6 * contact.rms_height
     ahead, behind = (contact.equilibrium(state, state.separation + s) for s in (-step, step))
-    np.testing.assert_array_equal(ahead.spot_of_asperity, behind.spot_of_asperity)
+    np.testing.assert_array_equal(spot_of_asperity(ahead), spot_of_asperity(behind))
     difference = (contact.pressure(ahead) - contact.pressure(behind)) / (2 * step)
     assert contact.stiffness(state) == pytest.approx(difference, rel=1e-5)
 
@@ -243,8 +234,8 @@ def assert_consistent(contact, state):
         np.isin(state.site_of_asperity[state.site_of_asperity >= 0], np.flatnonzero(state.contact_radius > 0))
     )
     # Every spot has an owner, and no free asperity is left beyond its jump-in but the pending ones.
-    assert set(state.spot_of_asperity[state.spot_of_asperity >= 0]) == set(range(len(spots)))
-    free = state.spot_of_asperity < 0
+    assert set(spot_of_asperity(state)[spot_of_asperity(state) >= 0]) == set(range(len(spots)))
+    free = spot_of_asperity(state) < 0
     there = contact.asperities.position[free]
     w = displacement_at(law, period, there, spots.position, a, R)
     approach = contact.asperities.height[free] - state.separation - w

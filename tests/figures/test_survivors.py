@@ -24,7 +24,6 @@ from icha.figures.style import new_figure
 SEEDS = range(1, 6)
 REASON = "asperity model not applicable: 40 % of the load is on summits that no node supports"
 LOADING = (fig2_area_and_gap, fig5_multi_slope)
-LOOPS = (fig13_loops, fig15_loss)
 
 
 def campaign(failed=None, checks=None, pale=(), lacking=(), run=small.run):
@@ -55,25 +54,18 @@ def crossed(axes):
     return [line for line in axes.get_lines() if line.get_label() == FEWER_SEEDS]
 
 
-def test_means_over_all_seeds_are_not_marked():
-    whole = draw(fig2_area_and_gap, campaign())
-    assert not any(crossed(axes) for axes in whole.axes)
-    assert FEWER_SEEDS not in legend(whole)
-
-
-@pytest.mark.parametrize("module", [*LOADING, *LOOPS])
+@pytest.mark.parametrize("module", [*LOADING, fig15_loss])
 def test_means_over_fewer_seeds_are_crossed_and_runs_not_applicable_are_pale(module):
-    figure = draw(
-        module, campaign(lacking=(2,), checks=(4,), pale=(5,), run=cyclic.run if module in LOOPS else small.run)
-    )
+    run = cyclic.run if module is fig15_loss else small.run
+    figure = draw(module, campaign(lacking=(2,), checks=(4,), pale=(5,), run=run))
     axes = figure.axes[0]
-    assert crossed(axes)
+    assert crossed(axes) and not crossed(draw(module, campaign(run=run)).axes[0])
     for cross in crossed(axes):
-        x, y = cross.get_data()
-        hollow = [line for line in lines_of(axes) if line.get_marker() not in ("x", ".")]
-        hollow = [line for line in hollow if line.get_markerfacecolor() == "white"]
-        assert any(np.array_equal(line.get_data(), (x, y)) for line in hollow)
+        marked = [line for line in lines_of(axes) if line.get_marker() != "x"]
+        assert any(np.isin(cross.get_xdata(), line.get_xdata()).all() for line in marked)
     assert legend(figure).count(FEWER_SEEDS) == legend(figure).count(NOT_APPLICABLE) == 1
+    if module is fig15_loss:
+        assert NOT_APPLICABLE in legend(draw(fig13_loops, campaign(pale=(1,), run=run)))
 
 
 def test_runs_that_failed_at_different_steps_are_in_no_mean():
@@ -102,7 +94,7 @@ def test_no_line_joins_means_over_different_seeds(few):
     (mean,) = [line for line in axes.get_lines() if line.get_linestyle() == "-" and line.get_marker() == "o"]
     assert segments(mean) == [(2.0, 3.0)]
     (cross,) = crossed(axes)
-    assert cross.get_xdata().tolist() == [1, 2, 3]
+    assert cross.get_xdata()[np.isfinite(cross.get_ydata())].tolist() == [1, 2, 3]
 
 
 def test_figures_of_one_run_say_that_the_model_is_not_applicable(surface):

@@ -16,7 +16,7 @@ from icha.checks.run import check_run
 from icha.contact.models import DEFAULT_MODEL, MODELS, REFERENCE_MODEL
 from icha.datasets.campaign import campaign_tree, run_labels, select_run
 from icha.datasets.campaign_file import write_campaign
-from icha.datasets.files import read_campaign, read_run, write_dataset
+from icha.datasets.files import read_campaign, write_dataset
 from icha.datasets.format import CAMPAIGN, RUN, identify_file, problems_with_file
 from icha.datasets.labels import LABELS, RunLabels
 from icha.datasets.variables.campaign import BEYOND_MODEL, COMPLETE
@@ -49,11 +49,6 @@ def runs():
 def test_other_models_are_refused_by_name(model):
     with pytest.raises(ValueError, match=r"^model: .* must be one of asperities, boundary_elements"):
         icha.simulate(small.surface(), small.MATERIALS["soft"], PATH, model=model)
-
-
-def test_asperities_are_what_is_meant_where_no_model_is_named(runs):
-    plain = icha.simulate(small.surface(), small.MATERIALS["soft"], PATH, seed=1)
-    xr.testing.assert_identical(plain, runs[labels(DEFAULT_MODEL)])
 
 
 def test_a_run_says_by_which_model_it_is(runs, tmp_path):
@@ -112,22 +107,6 @@ def test_every_run_of_both_models_is_taken_out_unchanged(runs):
             np.testing.assert_array_equal(taken[name].values, original[name].values, err_msg=f"{each} {name}")
     with pytest.raises(ValueError, match=r"no model 'other'; expected one of asperities, boundary_elements"):
         select_run(tree, labels("other"))
-
-
-def test_the_same_bytes_from_files_and_in_another_order(runs, tmp_path):
-    files = {}
-    for k, (each, own) in enumerate(runs.items()):
-        write_dataset(own, tmp_path / f"{k}.nc")
-        files[each] = tmp_path / f"{k}.nc"
-    write_campaign(runs.items(), tmp_path / "memory.nc", design=runs)
-    write_campaign(reversed(files.items()), tmp_path / "files.nc", design=runs)
-    assert (tmp_path / "memory.nc").read_bytes() == (tmp_path / "files.nc").read_bytes()
-    assert read_run(files[labels(REFERENCE_MODEL)])["contact_map"].sum() > 0
-
-
-def test_a_run_under_the_name_of_another_model_is_refused(runs):
-    with pytest.raises(ValueError, match=r"one/rough/seed1/slope1/boundary_elements/soft: the dataset's model is asp"):
-        campaign_tree([(labels(REFERENCE_MODEL), runs[labels(DEFAULT_MODEL)])])
 
 
 def test_a_failed_run_of_boundary_elements_leaves_the_others_whole(runs):

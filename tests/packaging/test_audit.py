@@ -26,18 +26,3 @@ def test_every_locked_file_has_a_checksum():
         if "editable" not in package["source"]:
             files = [*package.get("wheels", ()), *([package["sdist"]] if "sdist" in package else [])]
             assert files and all(re.fullmatch("sha256:[0-9a-f]{64}", file["hash"]) for file in files), package["name"]
-
-
-def test_make_installs_only_files_with_checksums():
-    """pip and `uv pip` need the option --require-hashes, `uv sync --locked` does not.
-
-    The executor of this repository and aspher, which is compiled, have no checksums.
-    """
-    makefile = (REPOSITORY / "Makefile").read_text()
-    calls = re.findall(r"^\t-?(.*pip (?:install|sync) .*)$", makefile, re.MULTILINE)
-    without = [call for call in calls if "--require-hashes" not in call]
-    assert len(calls) >= 4 and len(without) == 2
-    assert "--editable profiles/slurm/executor" in without[0] and "requirements-aspher.txt" in without[1]
-    assert not re.search(r"uv sync(?!.*--locked)", makefile)
-    assert re.search(r"^uv==\S+ \\\n( +--hash=sha256:[0-9a-f]{64}( \\)?\n)+$",
-                     (REPOSITORY / "workflow/envs/uv.txt").read_text(), re.MULTILINE)  # fmt: skip

@@ -22,12 +22,6 @@ def surface():
     return SelfAffineSpectrum(PERIOD, 0.2 * PERIOD, PERIOD / 16, 0.8).realise(64, 1)
 
 
-@pytest.fixture(scope="module")
-def large():
-    """Enough summits that one event is not a per cent of the area."""
-    return SelfAffineSpectrum(PERIOD, 0.2 * PERIOD, PERIOD / 32, 0.8).realise(128, 1)
-
-
 BOTH = pytest.mark.parametrize("material", [ADHESIVE, BARE], ids=["adhesive", "bare"])
 
 
@@ -82,14 +76,6 @@ def test_a_state_does_not_depend_on_the_kind_of_its_target(surface, material):
             assert float(other[name][0]) == pytest.approx(float(one[name][0]), rel=1e-7), name
 
 
-@BOTH
-def test_steps_of_half_the_length_and_more_targets_change_the_area_by_less_than_a_per_cent(large, material):
-    few = simulate(large, material, Path([1e-3, 1e-2], max_step=0.1))
-    many = simulate(large, material, Path([3e-4, 1e-3, 2e-3, 5e-3, 1e-2], max_step=0.05))
-    for name in ("contact_area_fraction", "mean_separation"):
-        np.testing.assert_allclose(many[name][[1, -1]], few[name], rtol=0.01)
-
-
 def test_a_target_inside_a_jump_is_met_on_the_branch_after_it_as_far_as_that_reaches_back(surface):
     """The first contact with adhesion jumps to a finite area, which shrinks to jump-off as the surfaces part again."""
     contact = contact_of(surface, ADHESIVE)
@@ -106,14 +92,6 @@ def test_a_target_inside_a_jump_is_met_on_the_branch_after_it_as_far_as_that_rea
     with pytest.raises(ConvergenceError, match="lies inside a jump") as caught:
         simulate(surface, ADHESIVE, Path(area_fractions=[0.1 * jumped]))
     assert caught.value.dataset.sizes["step"] == 0
-
-
-def test_the_path_starts_where_the_first_asperity_makes_contact(surface):
-    contact = contact_of(surface, ADHESIVE)
-    first = np.max(contact.asperities.height - contact.law.jump_in_approach(contact.asperities.radius_of_curvature))
-    assert contact.untouched().separation == pytest.approx(first, rel=1e-14)
-    run = simulate(surface, ADHESIVE, Path(mean_separations=[first * (1 + 1e-6), first * (1 - 1e-6)]))
-    assert run.spot_count.values.tolist() == [0, 1]
 
 
 def model_of(surface, model):
@@ -167,14 +145,9 @@ def test_progress_reports_every_target(surface):
         ({}, "exactly one"),
         ({"reduced_pressures": [0.1], "area_fractions": [0.1]}, "reduced_pressures, area_fractions"),
         ({"reduced_pressures": []}, "reduced_pressures: the list is empty"),
-        ({"reduced_pressures": 0.1}, "reduced_pressures"),
         ({"reduced_pressures": [1e-2, 1e-3]}, r"reduced_pressures\[1\].*increasing"),
         ({"mean_separations": [1e-6, 2e-6]}, r"mean_separations\[1\].*decreasing"),
-        ({"reduced_pressures": [-0.1]}, r"reduced_pressures\[0\]"),
-        ({"reduced_pressures": [float("nan")]}, r"reduced_pressures\[0\]"),
-        ({"reduced_pressures": ["0.1"]}, r"reduced_pressures\[0\]"),
         ({"reduced_pressures": [101.0]}, r"reduced_pressures\[0\]: .* in \[1e-12, 100\]"),
-        ({"area_fractions": [0.1, 1.001]}, r"area_fractions\[1\]: .* in \[1e-9, 1\]"),
         ({"reduced_pressures": [0.1], "unload": 1}, "unload: expected True or False, got 1"),
         ({"reduced_pressures": [0.1], "max_step": None}, "max_step"),
         ({"reduced_pressures": [0.1], "snapshots": [("pressure", 0.1)]}, r"snapshots\[0\].*kind"),
@@ -183,7 +156,6 @@ def test_progress_reports_every_target(surface):
         ({"reduced_pressures": [0.1], "snapshots": [0.1]}, r"snapshots\[0\]"),
         ({"reduced_pressures": [0.1], "snapshots": [("area_fraction", 1.1)]}, r"snapshots\[0\]: .* in "),
         ({"reduced_pressures": [0.1], "snapshots": [("area_fraction", 0.1)] * 2}, r"snapshots\[1\].*twice"),
-        ({"mean_separations": [1e100]}, r"^mean_separations\[0\]: 1e\+100 must be a number in \[1e-24, 1e9\]"),
         ({"reduced_pressures": [1e-2], "max_step": 5e-324}, r"^max_step: 5e-324 must be a number in \[1e-4, 0.5\]"),
         # Unloading.
         ({"reduced_pressures": [0.1], "control": "force", "unload": True}, "^control: 'force' must be one of sep"),
@@ -231,8 +203,6 @@ def test_a_snapshot_before_first_contact_is_all_gap(surface):
     assert float(run.contact_area_fraction[0]) == 0 and run.sizes["spot"] == 0
     assert float((run.gap_density * np.diff(run.gap_bin_edges)).sum()) == pytest.approx(1, abs=1e-12)
     assert all(check.passed for check in check_run(run))
-    with pytest.raises(ValueError, match=r"path: a snapshot at a mean separation of 1\.0 m"):
-        simulate(surface, ADHESIVE, Path(reduced_pressures=[1e-3], snapshots=[("mean_separation", 1.0)]))
 
 
 def egg_box(waves=4, grid=64):

@@ -1,4 +1,4 @@
-"""What is expected of the costs of a computation: against measured times, on real surfaces, and what corrects it."""
+"""Expected costs: compared with measured times and real surfaces, and corrected by finished jobs."""
 
 import csv
 from pathlib import Path
@@ -84,7 +84,7 @@ def test_memory_of_a_dataset_is_estimated_from_the_files_of_its_runs(tmp_path):
     assert memory == pytest.approx(2.7 * arrays, rel=0.5)
     # Large arrays stay in the file, and the dataset is written block by block.
     assert costs.derived_cost("checks", 10**5, 1.0, 1e12).memory < 2e9
-    assert costs.derived_cost("dataset", 60, 1.0, 1e9).memory < 1e8
+    assert costs.derived_cost("campaign_dataset", 60, 1.0, 1e9).memory < 1e8
 
 
 def test_what_jobs_took_corrects_what_is_expected_of_others():
@@ -92,5 +92,5 @@ def test_what_jobs_took_corrects_what_is_expected_of_others():
     assert costs.correction([(1.0, 4.0)]) == pytest.approx(2.0)
     many = [(t, 4 * t) for t in np.linspace(1, 2, 99)]
     assert costs.correction(many) == pytest.approx(4.0, rel=0.02)
-    # One job that was slow for a reason of its own does not matter.
+    # A single slow job has no effect.
     assert costs.correction([*many, (1.0, 1000.0)]) == pytest.approx(4.0, rel=0.02)

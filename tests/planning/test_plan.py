@@ -1,9 +1,9 @@
-"""What is planned: everything that is made, with what it costs; and what the machine must have for it."""
-
-from pathlib import Path
+"""The plan contains every file with its cost, and names what the machine lacks."""
 
 import numpy as np
 import pytest
+import yaml
+from conftest import REPOSITORY
 
 from icha.configuration.load import load_configuration
 from icha.planning import requirements
@@ -59,11 +59,11 @@ def test_the_summits_of_a_measured_surface_are_counted_in_its_file(campaign):
 def test_every_file_that_costs_something_is_planned(campaign, tmp_path):
     planned = {item.path for item in plan(campaign, tmp_path)}
     files = campaign_files(campaign)
-    # The other half of a figure is made by the same job; a verdict is a line.
+    # The PDF of a figure comes from the job of its PNG; a verdict is one line.
     assert planned == {path for path in files.computed if not path.endswith(".pdf")} - {files.verdict}
 
 
-def test_what_is_made_of_something_new_is_made_anew(campaign, tmp_path):
+def test_files_derived_from_new_files_are_made_again(campaign, tmp_path):
     files = campaign_files(campaign)
     for path in (*files.surfaces, files.dataset, files.comparison, files.checks, *files.figures, files.report):
         (tmp_path / path).parent.mkdir(parents=True, exist_ok=True)
@@ -75,26 +75,26 @@ def test_what_is_made_of_something_new_is_made_anew(campaign, tmp_path):
 
 
 def item(name, seconds=1.0, memory=1 * GB, stage=0, state=TO_DO, threads=1):
-    return Item("part", name, state, Cost(seconds, memory, 5 * GB), threads, stage=stage)
+    return Item("part", "run", name, state, Cost(seconds, memory, 5 * GB), threads, stage=stage)
 
 
 def test_time_is_that_of_the_start_and_of_one_stage_after_the_other():
     jobs = [item("a", 10), item("b", 2), item("c", 4, stage=1)]
     start, job = start_up(jobs), WORKFLOW.job
-    assert start > WORKFLOW.environment
+    assert start > WORKFLOW.start
     assert time_on(jobs, 1) == pytest.approx(start + 16 + 3 * job)
     assert time_on(jobs, 10**6) == pytest.approx(start + 10 + 4)
     assert time_on([item("a", state=DONE)], 1) == 0
 
 
-def test_memory_is_that_of_the_jobs_side_by_side_and_of_what_starts_them():
+def test_memory_is_that_of_parallel_jobs_and_of_snakemake():
     jobs = [item("a", memory=3 * GB), item("b", memory=2 * GB), item("c", memory=1 * GB)]
     around = WORKFLOW.memory
     assert [memory_on(jobs, cores) - around for cores in (1, 2, 4)] == pytest.approx([3 * GB, 5 * GB, 6 * GB])
     assert memory_on([item("a", state=DONE)], 2) == 0
 
 
-def test_too_much_memory_is_told_with_what_is_there_and_what_would_do(monkeypatch, tmp_path):
+def test_a_lack_of_memory_is_reported_with_a_sufficient_number_of_cores(monkeypatch, tmp_path):
     jobs = [item(name, memory=20 * GB) for name in "abc"]
     monkeypatch.setattr(requirements, "memory_of_machine", lambda: 24 * GB)
     monkeypatch.setattr(requirements, "free_disk", lambda folder: 100 * GB)
@@ -103,22 +103,28 @@ def test_too_much_memory_is_told_with_what_is_there_and_what_would_do(monkeypatc
         "about 40.3 GB of memory are needed on 2 cores, and this machine has 24 GB; --cores 1 needs 20"
     )
     assert requirements.find_shortages(jobs, 1, tmp_path, {}) == []
-    # Snakemake starts no more of them side by side than it is told.
+    # Snakemake limits the memory of parallel jobs.
     assert requirements.find_shortages(jobs, 2, tmp_path, {"executor": "icha", "resources": ["mem_mb=23000"]}) == []
-    # On a cluster it is the nodes that need it.
+    # On a cluster the memory of this machine does not matter.
     assert requirements.find_shortages(jobs, 2, tmp_path, {"executor": "slurm-batches"}) == []
     (said,) = requirements.find_shortages([item("a", memory=30 * GB)], 2, tmp_path, {"resources": ["mem_mb=14000"]})
     assert said.startswith("about 30.3 GB of memory") and "--cores" not in said
 
 
-def test_too_little_room_is_told_with_what_is_free(monkeypatch, tmp_path):
+def test_a_lack_of_disk_space_is_reported_with_the_free_space(monkeypatch, tmp_path):
     monkeypatch.setattr(requirements, "free_disk", lambda folder: 9 * GB)
     (said,) = requirements.find_shortages([item("a"), item("b")], 2, tmp_path, {})
     assert said.startswith(f"about 10 GB of disk are needed for {tmp_path}, and 9 GB are free there")
     assert requirements.find_shortages([item("a"), item("b", state=DONE)], 2, tmp_path, {}) == []
 
 
-def test_what_there_is_is_looked_at_where_results_will_be(tmp_path):
-    assert requirements.free_disk(tmp_path / "not" / "there") > 0
-    assert requirements.free_disk(Path("results")) > 0
-    assert requirements.memory_of_machine() > 1e8
+def test_runs_of_both_models_at_given_loads_are_compared(tmp_path):
+    content = yaml.safe_load((REPOSITORY / "config/campaigns/smoke.yaml").read_text(encoding="utf-8"))
+    del content["figures"]
+    for study in ("challenge", "multi_slope"):  # at given loads, and at given areas
+        content["studies"][study]["models"] = ["asperities", "boundary_elements"]
+    (tmp_path / "both.yaml").write_text(yaml.safe_dump(content), encoding="utf-8")
+    files = campaign_files(load_configuration(tmp_path / "both.yaml").campaign)
+    assert files.model_error == ["aggregated/model_error.nc"] and not files.solutions
+    assert {case.study for case in files.compared.values()} == {"challenge"}
+    assert set(files.compared) < set(files.runs) and all("/boundary_elements/" in file for file in files.compared)

@@ -1,4 +1,4 @@
-"""What only some campaigns need, and what becomes of them without it."""
+"""Optional software that only some campaigns need, and the message without it."""
 
 import os
 import re

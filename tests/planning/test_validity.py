@@ -1,4 +1,4 @@
-"""What is expected, before a run, of where the jump into contact lies outside what was verified."""
+"""Expected validity before a run: curvatures, Tabor parameters and stickiness of the surfaces."""
 
 import re
 
@@ -9,8 +9,7 @@ import small_campaign as small
 from icha.asperity.material import Material
 from icha.asperity.stickiness import stickiness
 from icha.configuration.load import load_configuration
-from icha.datasets.campaign_file import write_campaign
-from icha.planning.validity import expected_validity, found_validity, surface_facts
+from icha.planning.validity import expected_validity, surface_facts
 from icha.surfaces.measured.topography import prepared_topography
 from icha.surfaces.moments import spectral_moments
 
@@ -77,8 +76,3 @@ def test_surfaces_that_stick_are_named_before_the_run(tmp_path):
     exact = stickiness(moments, Material(1e6, 0.5, 8e-9))
     told = re.fullmatch(r"attraction outweighs repulsion: inside on rough \(stickiness (\S+)\); .*", said.text)
     assert exact > 1 and float(told.group(1)) == pytest.approx(exact, rel=0.1) and not said.good
-
-
-def test_afterwards_the_dataset_says_it(tmp_path):
-    write_campaign(small.runs(), tmp_path / "c.nc")
-    assert found_validity(tmp_path / "c.nc")[2].text.endswith("; all cases inside")

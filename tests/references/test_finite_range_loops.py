@@ -103,14 +103,7 @@ def test_a_gap_open_everywhere_is_solved_to_the_law_of_the_interface():
 
 
 @pytest.mark.parametrize(
-    ("name", "value"),
-    [
-        ("largest_reduced_pressure", 0.0),
-        ("largest_reduced_pressure", float("nan")),
-        ("separation_step", -0.1),
-        ("refinement", 0),
-        ("tolerance", 0.0),
-    ],
+    ("name", "value"), [("largest_reduced_pressure", 0.0), ("separation_step", -0.1), ("tolerance", 0.0)]
 )
 def test_wrong_values_are_refused_by_name(name, value):
     given = {"largest_reduced_pressure": 0.01, "separation_step": 0.1} | {name: value}

@@ -17,9 +17,6 @@ MOMENTS = SpectralMoments(2.4e-12, 0.5, 1.5e12)
 SEPARATIONS = np.array([0.5, 1.5, 3.0])
 
 
-# --- summits of Gaussian surfaces -----------------------------------------------------------------------------
-
-
 def test_summit_statistics_are_those_of_the_random_field():
     # At a point of zero slope, curvatures are drawn from the field's own covariances (units m0 = m2 = 1, m4 = alpha);
     # such a point counts by the Jacobian |det H| where the Hessian is negative definite.
@@ -42,16 +39,9 @@ def test_summit_statistics_are_those_of_the_random_field():
     assert 1 / found.radius_of_curvature == pytest.approx(curvature, rel=3e-3)
 
 
-# --- Greenwood & Williamson -----------------------------------------------------------------------------------
-
-
-def random_heights(count=2_000_000):
-    theory = theories.gaussian_summits(MOMENTS)
-    return theory, theory.mean_height + theory.deviation * np.random.default_rng(1).standard_normal(count)
-
-
 def test_greenwood_williamson_is_the_sum_over_random_summits():
-    theory, heights = random_heights()
+    theory = theories.gaussian_summits(MOMENTS)
+    heights = theory.mean_height + theory.deviation * np.random.default_rng(1).standard_normal(2_000_000)
     for u in SEPARATIONS:
         depth = heights - u * MOMENTS.rms_height
         depth = depth[depth > 0]
@@ -61,9 +51,6 @@ def test_greenwood_williamson_is_the_sum_over_random_summits():
         noise = 5 / math.sqrt(len(depth))
         assert float(theories.greenwood_williamson_area(u, MOMENTS)) == pytest.approx(area, rel=noise)
         assert float(theories.greenwood_williamson_pressure(u, MOMENTS)) == pytest.approx(force, rel=noise)
-
-
-# --- Fuller & Tabor -------------------------------------------------------------------------------------------
 
 
 def test_without_adhesion_it_is_greenwood_and_williamsons():

@@ -12,14 +12,12 @@ from explorer_results import write_results
 from PIL import Image
 
 from icha.analysis.checks import check_campaign
-from icha.analysis.common_loads import compare_campaign
 from icha.datasets.campaign import campaign_tree
 from icha.datasets.surface_file import write_surface
 from icha.figures import fig1_jkr, fig2_area_and_gap
 from icha.figures.style import save
 from icha.report.explorer import write_explorer
 from icha.report.report import ReportFigure, write_report
-from icha.report.run_times import Benchmark, write_times_page
 from icha.report.sections import read_surface_statistics
 
 pytestmark = WANTED
@@ -34,7 +32,7 @@ def explorer_file(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def report_file(tmp_path_factory):
-    """A report with figures, a failed run and run times, in a folder as results have it."""
+    """A report with figures and a failed run, in a folder as results have it."""
     folder = tmp_path_factory.mktemp("report")
     runs = list(small.runs())
     runs[1] = (runs[1][0], runs[1][1].assign_attrs(incomplete="no equilibrium at the second stop"))
@@ -48,16 +46,13 @@ def report_file(tmp_path_factory):
         files = [folder / "figures" / f"{name}.{ending}" for ending in ("png", "pdf")]
         save(figure, *files)
         pictures.append(ReportFigure(name, f"Caption of {name}.", *files, studies))
-    write_times_page(folder / "benchmarks" / "index.html", [Benchmark("runs/one", 75.0, 120.0)])
     write_report(
         folder / "report.html",
         campaign=tree,
         figures=pictures,
         checks=check_campaign(tree),
-        comparison=compare_campaign(tree),
         surfaces=[read_surface_statistics(folder / "s.nc")],
         dataset_path=folder / "dataset" / "small.nc",
-        times_path=folder / "benchmarks" / "index.html",
         results=folder,
     )
     return folder / "report.html"
@@ -178,11 +173,6 @@ def test_all_controls_can_be_used_with_keys(page):
     # From top to bottom, without lists of one entry.
     assert order == ["study", "material", "seed", "model", "log", "before", "stop"], order
     assert set(outlines) == {"solid3"}
-    # The first list with keys only.
-    page.value("document.getElementById('study').focus()")
-    before = page.value("document.getElementById('study').value")
-    page.press("ArrowUp")
-    assert page.value("document.getElementById('study').value") != before
     # The buttons move between snapshots.
     choose(page, study="one", material="soft")
     page.value("document.getElementById('before').focus()")
@@ -293,7 +283,7 @@ def test_every_link_of_the_contents_leads_to_its_heading(report):
       return found;
     })()""")
     there = {at for at, *_ in found}
-    assert {"#failures", "#studies", "#study-slopes", "#surfaces", "#checks", "#times", "#data"} <= there
+    assert {"#failures", "#studies", "#study-slopes", "#surfaces", "#checks", "#data"} <= there
     assert all(there and current == 1 for _, there, current in found), found
 
 

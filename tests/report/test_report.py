@@ -24,10 +24,10 @@ from icha.figures.select import path_steps
 from icha.figures.style import save
 from icha.report import report, studies
 from icha.report.report import ReportFigure, write_report
-from icha.report.run_times import Benchmark, read_benchmark, write_times, write_times_page
-from icha.report.sections import _draw_spectra, read_surface_statistics
-from icha.report.studies import _range, collect_states
-from icha.report.template import format_scientific
+from icha.report.run_times import write_times
+from icha.report.sections import draw_spectra, read_surface_statistics
+from icha.report.studies import collect_states
+from icha.report.template import format_range, format_scientific
 from icha.support.formatting import format_quantity
 
 FIGURES = tuple(f"figures/fig1_jkr.{ending}" for ending in ("png", "pdf"))
@@ -74,11 +74,11 @@ def seeds_of(study, seeds):
 
 @pytest.fixture(scope="module")
 def parts(tmp_path_factory):
-    """A folder with a figure and a surface; checks and comparison of the small campaign."""
+    """A folder with a figure and a surface, and the checks of the small campaign."""
     folder = tmp_path_factory.mktemp("parts")
     save(fig1_jkr.figure(), *(folder / name for name in FIGURES))
     write_surface(folder / "s.nc", small.surface(), name="rough", seed=1, spectrum=small.SPECTRUM)
-    return folder, check_campaign(small.tree()), compare_campaign(small.tree())
+    return folder, check_campaign(small.tree())
 
 
 @pytest.fixture
@@ -89,7 +89,7 @@ def picture(tmp_path):
 @pytest.fixture
 def write(tmp_path, parts, picture):
     """A function that writes the report of the small campaign, with other arguments on request; it returns the text."""
-    folder, checks, comparison = parts
+    folder, checks = parts
     shutil.copytree(folder, tmp_path, dirs_exist_ok=True)
 
     def written(name="report.html", **changes):
@@ -97,7 +97,6 @@ def write(tmp_path, parts, picture):
             "campaign": small.tree(),
             "figures": [picture("fig1_jkr", caption=caption_of("fig1_jkr"))],
             "checks": [] if "campaign" in changes else checks,
-            "comparison": None if "campaign" in changes else comparison,
             "surfaces": [read_dataset(tmp_path / "s.nc")],
             "configuration": "name: small\ntext: <script>alert('no')</script>\n",
             "dataset_path": tmp_path / "dataset" / "small.nc",
@@ -165,7 +164,7 @@ def test_error_of_surfaces_with_different_slopes_has_no_empty_rows(write):
 
 def test_unloaded_runs_have_tables_of_pull_off_and_loss(write):
     assert "Hysteresis loss" not in write()
-    text = write(campaign=cyclic.tree(), comparison=compare_campaign(cyclic.tree()))
+    text = write(campaign=cyclic.tree())
     Page(text)
     found = {}
     for name, table in re.findall(r"<caption>(Pull-off|Hysteresis loss)</caption>(.*?)</table>", text, flags=re.DOTALL):
@@ -179,14 +178,12 @@ def test_unloaded_runs_have_tables_of_pull_off_and_loss(write):
     assert pull_off["soft"]["Seeds"] == "2" and pull_off["soft"]["over all asperities"] == "0.250"
     assert pull_off["hertz"]["Pull-off"] == "0 Pa" and pull_off["hertz"]["Last contact"] == "–"
     # All is lost in jumps out of contact, and nothing without adhesion.
-    assert loss["soft"]["Jumping off, %"] == "100.0" and loss["hertz"]["Jumping off, %"] == "–"
+    assert loss["soft"]["Jump-off, %"] == "100.0" and loss["hertz"]["Jump-off, %"] == "–"
     assert loss["hertz"]["Loss"] == "0 J/m²" and loss["hertz"]["over Δγ"] == "–"
     over = np.array([float(run["hysteresis_loss"]) / 0.05 for run in runs])
     mean, low, high = (format_scientific(each) for each in (over.mean(), over.min(), over.max()))
     assert loss["soft"]["over Δγ"] == f"{mean}<br>({low} … {high})".replace("-", "−")
-    assert "Unions, %" not in loss["soft"], "a loss of zero in all rows has no column"
-    formed, broken = loss["soft"]["Contacts formed, broken"].split("<br>")
-    assert formed == broken == f"{np.mean([float(run['spot_count'].max()) for run in runs]):.4g}"
+    assert "Coalescence, %" not in loss["soft"], "a loss of zero in all rows has no column"
 
 
 def test_statistics_are_of_the_first_loading(write):
@@ -210,32 +207,11 @@ def test_checks_and_validity_are_separate(write):
     assert "U_full/dgamma is " in top and 'in this campaign <a href="#error">contact area ' in top
 
 
-def test_same_bytes_whatever_the_times(write, tmp_path):
-    times = tmp_path / "benchmarks" / "index.html"
-    text = write("a.html", times_path=times)
-    write_times_page(times, [Benchmark("runs/a/b", 3.0, 120.0)])
-    assert text == write("b.html", times_path=times)
-    assert '<object class="times" type="text/html" data="benchmarks/index.html"' in text
-    assert "benchmarks/index.html" not in write()
-
-
-def test_times_are_summed_by_kind_of_job(tmp_path):
-    jobs = [Benchmark("runs/a/1", 3.0, 120.0), Benchmark("runs/a/2", 90.0, None), Benchmark("dataset", 7300.0, 300.4)]
-    write_times_page(tmp_path / "t.html", jobs)
-    text = (tmp_path / "t.html").read_text(encoding="utf-8")
-    Page(text)
-    kinds, longest = (rows(table) for table in text.split("<table>")[1:])
-    assert [row[:3] for row in kinds] == [["dataset", "1", "2 h"], ["runs", "2", "1.6 min"]]
-    assert [row[0] for row in longest] == ["dataset", "runs/a/2", "runs/a/1"]
-
-
-def test_repetitions_in_benchmark_files_add_up(tmp_path):
+def test_times_and_memory_of_jobs_are_in_a_table(tmp_path):
     (tmp_path / "runs").mkdir()
-    (tmp_path / "runs/a.jsonl").write_text('{"s": 1.5, "max_rss": 120.5}\n{"s": 2.5, "max_rss": null}\n')
-    # The unique memory of a job, if it is known.
+    (tmp_path / "runs/a.jsonl").write_text('{"s": 1.5, "max_uss": 120.5}\n{"s": 2.5, "max_uss": null}\n')
     (tmp_path / "b.jsonl").write_text('{"s": 0.5, "max_rss": 180.0, "max_uss": 20.0}\n')
-    assert read_benchmark(tmp_path / "b.jsonl", "b") == Benchmark("b", 0.5, 20.0)
-    write_times(tmp_path / "t.tsv", tmp_path / "t.html", tmp_path)
+    write_times(tmp_path / "t.tsv", tmp_path)
     assert (tmp_path / "t.tsv").read_text().splitlines()[1:] == ["b\t0.50\t20", "runs/a\t4.00\t120"]
 
 
@@ -244,7 +220,7 @@ def test_failed_runs_are_listed_with_their_reasons(write, tmp_path):
     runs = list(small.runs())
     runs[1] = (runs[1][0], runs[1][1].assign_attrs(incomplete="no equilibrium: <residual> 1e-3"))
     tree = campaign_tree(runs)
-    text = write(campaign=tree, comparison=compare_campaign(tree), results=tmp_path)
+    text = write(campaign=tree, results=tmp_path)
     (row,) = rows(section(text, "failures", "figures"))
     assert row[1] == "no equilibrium: &lt;residual&gt; 1e-3" and f"runs/{runs[1][0].path}.nc" in row[0]
     assert "#failures" in Page(text).targets and "3 of 4 runs are complete" in text and "3 runs, 1 failed" in text
@@ -296,7 +272,7 @@ def test_means_over_remaining_seeds_have_their_number_and_no_confidence(write, p
     ("values", "expected"), [([1.0] + [1e-3] * 4, r"\(0\.0.*"), ([1.0, 1e-3], r"\(0\.001 … 1\.000\)"), ([2.0, 2.0], "")]
 )
 def test_no_interval_of_areas_reaches_below_zero(values, expected):
-    assert re.fullmatch(expected, _range(np.array(values), "{:.3f}".format))
+    assert re.fullmatch(expected, format_range(np.array(values), "{:.3f}".format))
 
 
 def test_figures_are_in_the_section_of_their_study_with_the_numbers_of_their_files(write, picture):
@@ -348,10 +324,10 @@ def test_surfaces_have_spectra_and_sources(write, tmp_path):
 def test_spectra_are_means_over_the_seeds_and_many_have_graded_colours(parts):
     plain = read_surface_statistics(parts[0] / "s.nc")
     twice = [plain, plain.assign(power_spectrum=3 * plain["power_spectrum"], seed=2)]
-    (axes,) = _draw_spectra({"rough": twice}).axes
+    (axes,) = draw_spectra({"rough": twice}).axes
     power = plain["power_spectrum"].values
     np.testing.assert_allclose(axes.get_lines()[0].get_ydata(), 2 * power[power > 1e-16 * power.max()])
-    many = _draw_spectra({f"rough-hurst0.{k}": [plain] for k in range(20, 60)})
+    many = draw_spectra({f"rough-hurst0.{k}": [plain] for k in range(20, 60)})
     assert len({line.get_color() for line in many.axes[0].get_lines()}) == 40 and len(many.legends[0].get_texts()) == 9
 
 
@@ -403,24 +379,6 @@ def test_comparison_of_slopes_without_adhesion_shows_no_spread():
     first, second = (path_steps(run)["contact_area_fraction"].values for _, run in runs)
     np.testing.assert_allclose(first, second, rtol=1e-6)
     assert float(comparison["slope_spread_at_load"].min()) > 1
-
-
-def test_differences_are_printed_if_runs_can_be_compared(write):
-    def slopes_of_their_own(*materials):
-        tree = campaign_tree(
-            (RunLabels("own", "asperities", f"patch{slope:g}", 1, slope, material), small.run(1, slope, material))
-            for slope in (1.0, 0.2)
-            for material in materials
-        )
-        return write(campaign=tree, comparison=compare_campaign(tree))
-
-    both = write()
-    assert "between materials" in both and "between rms slopes" in both
-    # If every surface has its own slope, no two runs differ in the slope only.
-    assert "Largest difference" not in slopes_of_their_own("soft")
-    several = slopes_of_their_own("soft", "hertz").partition("Largest difference")[2].partition("</p>")[0]
-    assert "between materials" in several and "between rms slopes" not in several
-    assert several.strip().endswith("at equal reduced pressure.")
 
 
 def test_studies_without_a_common_load_are_compared_where_possible(tmp_path):

@@ -1,43 +1,15 @@
-"""What is in the way of a folder, and what killed programs leave behind."""
+"""Temporary files of killed programs are recognised by their names; an owner writes from any folder."""
 
-import os
 from pathlib import Path
 
 import pytest
 
-from icha.support.atomic_files import find_obstacle, is_left_over, probe_folder, take_over, whole_file
+from icha.support.atomic_files import is_left_over, probe_folder, take_over, whole_file
 
 
-def test_what_is_where_a_folder_is_to_be_is_named(tmp_path):
-    (tmp_path / "file").write_text("something else")
-    (tmp_path / "link").symlink_to("nowhere")
-    (tmp_path / "folder").mkdir()
-    assert find_obstacle(tmp_path / "folder/results/mine") is None
-    assert find_obstacle(tmp_path / "file/mine") == f"{tmp_path}/file is a file, not a folder"
-    assert find_obstacle(tmp_path / "link/mine").startswith(
-        f"{tmp_path}/link is a link to nowhere, which does not exist"
-    )
-
-
-def test_a_link_into_a_folder_that_may_not_be_entered_is_in_the_way(tmp_path, monkeypatch):
-    closed, link = tmp_path / "closed", tmp_path / "results"
-    link.symlink_to(closed / "results")
-    found = os.stat
-
-    def stat(path, *args, follow_symlinks=True, **options):
-        if follow_symlinks and Path(path) in (link, link / "mine"):
-            raise PermissionError(13, "Permission denied")
-        return found(path, *args, follow_symlinks=follow_symlinks, **options)
-
-    monkeypatch.setattr(os, "stat", stat)
-    assert find_obstacle(link / "mine") == (
-        f"{link} is a link to {closed}/results, which does not exist or cannot be reached"
-    )
-
-
-def test_whatever_a_killed_program_leaves_is_known_by_its_name(tmp_path, monkeypatch):
+def test_files_of_a_killed_program_are_recognised_by_their_names(tmp_path, monkeypatch):
     with pytest.raises(KeyboardInterrupt), monkeypatch.context() as patch:
-        patch.setattr(Path, "unlink", lambda *_, **__: None)  # as by a kill, after which nothing is removed
+        patch.setattr(Path, "unlink", lambda *_, **__: None)  # a killed program removes nothing
         assert probe_folder(tmp_path) is None
         with whole_file(tmp_path / "a.txt") as temporary:
             temporary.write_text("half")
@@ -48,7 +20,7 @@ def test_whatever_a_killed_program_leaves_is_known_by_its_name(tmp_path, monkeyp
 
 
 def test_an_owner_writes_other_files_from_wherever_it_is(tmp_path, monkeypatch):
-    """As the program does at its end, in another folder than that of the campaign."""
+    """The program may end in another folder than that of the campaign."""
     monkeypatch.setenv("ICHA_OWNER", "")
     monkeypatch.chdir(tmp_path)
     take_over(".snakemake/tiny.owner")

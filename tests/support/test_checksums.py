@@ -1,4 +1,4 @@
-"""Results that are not what was written are found, and what only looks changed is not among them."""
+"""Damaged results are found; touched and copied results count as whole."""
 
 import hashlib
 import json
@@ -44,7 +44,7 @@ def flip(file, place, bit=0):
 
 
 def keep_time(file, change):
-    """Change a file as a failing disk does: its time of change stays."""
+    """Change a file as a failing disk does, without a change of its time."""
     status = file.stat()
     change(file)
     os.utime(file, ns=(status.st_atime_ns, status.st_mtime_ns))
@@ -71,7 +71,7 @@ def test_what_the_disk_has_spoilt_is_found_where_everything_is_hashed(results):
     keep_time(results / PATH, lambda file: flip(file, 100))
     assert is_whole(results, PATH) and not is_whole(results, PATH, thorough=True)
     assert damaged(results) == []
-    # Whoever has found it tells those that come after.
+    # After `distrust`, later checks find the damage as well.
     distrust(results, PATH)
     assert damaged(results) == [PATH]
 
@@ -79,7 +79,7 @@ def test_what_the_disk_has_spoilt_is_found_where_everything_is_hashed(results):
 def test_files_that_were_touched_or_copied_are_whole_and_hashed_but_once(results, tmp_path_factory):
     elsewhere = shutil.copytree(results, tmp_path_factory.mktemp("copy") / "results", copy_function=shutil.copyfile)
     assert damaged(elsewhere) == []
-    # Their sidecars have the new time: this change of content alone, in the same time, goes unseen.
+    # Their sidecars have the new time, so a change of the content without a change of the time is not detected.
     keep_time(elsewhere / PATH, lambda file: flip(file, 3))
     assert is_whole(elsewhere, PATH)
 
@@ -105,7 +105,7 @@ def test_results_without_sidecar_and_sidecars_without_result_are_no_damage(resul
 
 def test_a_result_that_was_not_finished_is_neither_damaged_nor_forgotten(results):
     begin(results, PATH)
-    (results / PATH).write_bytes(b"another one")  # and the job was killed before it could say so
+    (results / PATH).write_bytes(b"another one")  # and the job was killed before it wrote the checksum
     assert damaged(results, thorough=True) == []
     (results / PATH).write_bytes(CONTENT)
     write_checksum(results, PATH)
@@ -145,17 +145,17 @@ def test_results_that_are_not_of_what_is_asked_for_or_of_what_is_there_are_stale
     def found(now=asked.get):
         return dict(stale(results, asked, now))
 
-    assert set(found()) == {PATH, "checks.json"}  # nobody knows what they were made from
+    assert set(found()) == {PATH, "checks.json"}  # their sidecars do not contain the settings
     write_checksum(results, PATH, asked=asked[PATH])
     inputs = {PATH: sha256_as_written(results, PATH)}
     write_checksum(results, "checks.json", asked=asked["checks.json"], inputs=inputs)
     assert found() == found(None) == {} and recorded_hash(results, PATH) == asked[PATH]
     assert "other settings" in found(lambda path: hash_parameters(["30e6"]) if path == PATH else asked[path])[PATH]
-    # Another run in its place, asked for in the same way: what was made from the former one is not what is there.
+    # Another run with the same settings replaces the run: the result made from the former run is stale.
     (results / PATH).write_bytes(CONTENT[::-1])
     write_checksum(results, PATH, asked=asked[PATH])
     assert damaged(results) == [] and found() == {"checks.json": f"it was made from another version of {PATH}"}
-    # What was begun and not ended, and what is not there at all.
+    # A result that was begun is stale; a missing one is not.
     begin(results, PATH)
     assert PATH in found()
     (results / PATH).unlink()

@@ -1,4 +1,4 @@
-"""What comes from files and jobs acts on no terminal, log or page."""
+"""Texts from files and jobs have no effect on a terminal, a log or a page."""
 
 import sys
 import unicodedata
@@ -16,7 +16,7 @@ from icha.datasets.files import write_dataset
 from icha.datasets.surface_file import write_surface
 from icha.report.explorer import _filled
 from icha.report.template import template
-from icha.support.formatting import is_printable, printable, printable_lines
+from icha.support.formatting import printable, printable_lines
 
 EVIL = "a\x1b[2J\x9b1m\r\b\x07\x7f\u202eb\u2028c\u200b"
 
@@ -24,8 +24,8 @@ EVIL = "a\x1b[2J\x9b1m\r\b\x07\x7f\u202eb\u2028c\u200b"
 def test_nothing_acts_on_a_terminal():
     assert printable(EVIL) == r"a\x1b[2J\x9b1m\r\x08\x07\x7f\u202eb\u2028c\u200b"
     assert printable("a\nb\tc") == r"a\nb\tc" and printable_lines("a\nb\tc") == "a\nb\tc"
-    # The kinds of characters by the standard, not by the list of the module: whatever is left is none of them, but for
-    # joiners, and signs of Arabic, Syriac, Egyptian and music, which are seen.
+    # By the categories of the Unicode standard, no control character remains. Joiners, and signs of Arabic, Syriac,
+    # Egyptian and music, are visible and remain.
     left = printable("".join(map(chr, range(sys.maxunicode + 1))))
     kinds = {unicodedata.category(each) for each in left} - {"Cf"}
     assert not kinds & {"Cc", "Cs", "Zl", "Zp"}
@@ -35,7 +35,7 @@ def test_nothing_acts_on_a_terminal():
 
 @pytest.mark.parametrize("text", ["", "plain", "Höhe 25 µm", "می‌خواهم", "日本語", "👩‍🔬", "a  b", "A/A0 ≤ 0.1 – yes"])
 def test_what_people_write_stays(text):
-    assert printable(text) == printable_lines(text) == text and is_printable(text)
+    assert printable(text) == printable_lines(text) == text
 
 
 def test_commands_say_nothing_else(capsys):
@@ -50,8 +50,8 @@ def test_commands_say_nothing_else(capsys):
 
 def test_messages_of_jobs_are_printable(tmp_path):
     (tmp_path / "log").write_text(f"working\nError: {EVIL}\nmore \x1b[1A\n", encoding="utf-8")
-    job = JobRecord("run", "title", ("out",), ("log",), 0.0)
-    assert all(map(is_printable, [*read_error(job, tmp_path), read_last_line(job, tmp_path)]))
+    job = JobRecord("run", "title", ("out",), "log", 0.0)
+    assert all(printable(line) == line for line in [*read_error(job, tmp_path), read_last_line(job, tmp_path)])
     assert any(r"\x1b[2J" in line for line in read_error(job, tmp_path))
 
 
@@ -83,7 +83,7 @@ def test_pages_hold_no_overrides_and_no_control_characters():
     assert text.count(r"\u202e") == 2 and "<b>" not in text and text.endswith("3 <i>\u200d</i>")
 
 
-def test_what_the_page_of_paths_is_told_is_printable():
+def test_the_data_of_the_page_of_paths_are_printable():
     campaign = SimpleNamespace(attrs={"title": EVIL, "campaign": EVIL})
     page = _filled(campaign, {"contacts": [{"study": EVIL, "steps": [1.0, 2]}]}, library="", largest=1)
     assert not set("\x1b\x9b\b\u202e\u2028") & set(page) and page.count(r"\\u202e") == 1 and "[1.0, 2]" in page

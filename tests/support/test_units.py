@@ -1,6 +1,5 @@
 """Quantities with their units."""
 
-import re
 from decimal import Decimal
 
 import pint
@@ -49,18 +48,7 @@ def test_lengths_of_scans(units, metres):
         assert to_si(f"3 {unit}", "m") == float(3 * Decimal(metres))
 
 
-@pytest.mark.parametrize(
-    ("text", "si_unit", "suggestion"),
-    [
-        ("2 Mpa", "Pa", "MPa"),
-        ("2 kpa", "Pa", "kPa"),
-        ("50 J/m2", "J/m^2", "J/m^2"),
-        ("50 mj/m^2", "J/m^2", "mJ/m^2"),
-        ("50 MJ/M2", "J/m^2", "mJ/m^2"),
-        ("3 UM", "m", "um"),
-        ("3 Nm", "m", "nm"),
-    ],
-)
-def test_slips_of_case_and_powers_get_a_suggestion(text, si_unit, suggestion):
-    with pytest.raises(ValueError, match=re.escape(f"(did you mean {suggestion!r}?)")):
+@pytest.mark.parametrize(("text", "si_unit"), [("2 Mpa", "Pa"), ("50 J/m2", "J/m^2"), ("3 UM", "m"), ("3 Nm", "m")])
+def test_slips_of_case_and_powers_are_refused(text, si_unit):
+    with pytest.raises(ValueError, match="is not a"):
         to_si(text, si_unit)

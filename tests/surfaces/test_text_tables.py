@@ -60,7 +60,7 @@ def test_missing_points_keep_their_places(tmp_path, word, delimiter):
 def test_a_plane_is_not_a_table_with_numbered_rows(tmp_path):
     plane = np.add.outer(np.arange(GRID), 2.0 * np.arange(GRID))
     settings = Preparation("auto", "window", height_unit=NM, size=(SIDE, SIDE), detrend="tilt")
-    with pytest.raises(UnfitTopography, match="all the same but for the trend"):
+    with pytest.raises(UnfitTopography, match="all the same, apart from the trend"):
         prepared_topography(written(tmp_path, text(rows(plane))), vars(settings))
 
 
@@ -114,13 +114,10 @@ def test_points_with_a_column_too_many(tmp_path, further):
     path = written(tmp_path, text(points(further), " "), "scan.txt")
     with refused("columns", r"a line has 4 numbers.*\[1, 2, 3\]"):
         read(path)
-    assert_heights(read(path, columns=(1, 2, 3), size=None, lateral_unit=UM))
-
-
-def test_points_without_data(tmp_path):
-    lines = points()
+    lines = points(further)
     lines[50][2] = "no data"
-    assert_heights(read(written(tmp_path, text(lines, " "), "scan.xyz"), lateral_unit=UM), missing=1)
+    path = written(tmp_path, text(lines, ","), "scan.xyz")
+    assert_heights(read(path, columns=(1, 2, 3), size=None, lateral_unit=UM), missing=1)
 
 
 @pytest.mark.parametrize("damage", ["short", "long", "word"])
@@ -140,7 +137,7 @@ def with_coordinates(along, row, column, corner):
     return [[corner, *along] if column else list(along), *fields] if row else fields
 
 
-@pytest.mark.parametrize(("row", "column", "corner"), [(1, 0, ""), (0, 1, ""), (1, 1, ""), (1, 1, "0"), (1, 1, "y/x")])
+@pytest.mark.parametrize(("row", "column", "corner"), [(1, 0, ""), (0, 1, ""), (1, 1, ""), (1, 1, "0")])
 @pytest.mark.parametrize(("step", "write"), [(1, "{:g}"), (7.5 / 128, "{:.3f}"), (1 / 3, "{:.1f}"), (0.0586, "{:.1f}")])
 def test_numbers_and_coordinates_of_rows_and_columns_are_no_heights(tmp_path, step, write, row, column, corner):
     along = [write.format(step * k) for k in range(GRID)]
@@ -150,15 +147,17 @@ def test_numbers_and_coordinates_of_rows_and_columns_are_no_heights(tmp_path, st
     assert f"first {left_out} left out" in prepared.reading
 
 
-def test_an_empty_corner_between_blanks(tmp_path):
+def test_a_corner_without_a_number_is_refused(tmp_path):
     along = [f"{k / 3:.2f}" for k in range(GRID)]
-    assert_heights(read(written(tmp_path, text(with_coordinates(along, 1, 1, ""), " "), "scan.txt")))
+    for corner, delimiter, words in (("y/x", ",", "'y/x' in line 1"), ("", " ", "24 numbers in line 1 and 25")):
+        with refused("path", words):
+            read(written(tmp_path, text(with_coordinates(along, 1, 1, corner), delimiter), "scan.txt"))
 
 
 @pytest.mark.parametrize("place", [(1, 0), (0, 1)])
 def test_unequal_coordinates_are_asked_about(tmp_path, place):
     along = [f"{k**1.2:.3f}" for k in range(GRID)]
-    with refused("path", r"unequal steps.*Remove the"):
+    with refused("path", r"as coordinates do; expected.*Remove the"):
         read(written(tmp_path, text(with_coordinates(along, *place, ""))))
 
 
@@ -177,7 +176,7 @@ def test_several_images_in_a_text_are_refused(tmp_path):
 def test_arrays_without_names_have_no_data(tmp_path):
     np.save(tmp_path / "scan.npy", HEIGHTS)
     for path in (tmp_path / "scan.npy", written(tmp_path, text(rows()))):
-        with refused("data", "leave it out"):
+        with refused("data", "Remove the key"):
             read(path, data="Nonsense")
 
 
@@ -228,7 +227,7 @@ def test_a_size_with_three_digits_behind_a_comma_is_ambiguous(tmp_path):
 
 @pytest.mark.parametrize("line", ["nrows 30", "ncols 12", "Lines: 30", "Columns: 25"])
 def test_counts_of_a_heading_are_checked(tmp_path, line):
-    with refused("path", f"24 (rows|columns) of numbers and {line[-2:]} by its heading"):
+    with refused("path", f"24 (rows|columns) of numbers, but {line[-2:]} according to its heading"):
         read(written(tmp_path, text(rows(), " ", [line])))
     assert_heights(read(written(tmp_path, text(rows(), " ", [f"{line[:-2]}24"]))))
 

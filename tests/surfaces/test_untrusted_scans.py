@@ -40,15 +40,6 @@ def declare_netcdf(path):
         file.createVariable("height", "f8", ("y", "x"), chunksizes=(100, 100), compression="zlib")
 
 
-def declare_classic_netcdf(path):
-    """Write the old format, which is not HDF5."""
-    with netCDF4.Dataset(path, "w", format="NETCDF3_64BIT_DATA") as file:
-        file.set_fill_off()
-        for axis in "yx":
-            file.createDimension(axis, HUGE)
-        file.createVariable("height", "f8", ("y", "x"))
-
-
 def declare_hdf5(path):
     with h5py.File(path, "w") as file:
         file.create_dataset("height", (HUGE, HUGE), "f8", chunks=(100, 100), compression="gzip")
@@ -67,7 +58,6 @@ def declare_points(path):
 DECLARED = {
     "scan.npy": declare_npy,
     "scan.nc": declare_netcdf,
-    "old.nc": declare_classic_netcdf,
     "scan.h5": declare_hdf5,
     "scan.xyz": declare_points,
     "waves.txt": declare_waves,
@@ -247,18 +237,6 @@ def test_groups_that_lie_deep_in_one_another_are_refused_at_once(tmp_path):
         scan(tmp_path / "scan.h5", **LINES)
 
 
-def test_soft_links_are_no_datasets(tmp_path):
-    path = tmp_path / "scan.h5"
-    with h5py.File(path, "w") as file:
-        file["heights"] = HEIGHTS
-        file["other"] = h5py.SoftLink("/heights")
-        file["nowhere"] = h5py.SoftLink("/none")
-        file["itself"] = h5py.SoftLink("/itself")
-    assert scan(path, **LINES).heights.shape == HEIGHTS.shape
-    with pytest.raises(UnfitTopography, match="is not a dataset of the file; expected one of: heights"):
-        scan(path, **LINES, data="other")
-
-
 def test_paths_that_are_no_files_are_not_opened(tmp_path, monkeypatch):
     os.mkfifo(tmp_path / "pipe.npy")
     settings = {"format": "auto", "boundary": "free"}
@@ -266,9 +244,9 @@ def test_paths_that_are_no_files_are_not_opened(tmp_path, monkeypatch):
         monkeypatch.chdir(tmp_path)
         own.bind("socket.npy")
         for path, flaw in (
-            (tmp_path / "pipe.npy", "is a pipe"),
-            (tmp_path / "socket.npy", "is a socket"),
-            ("/dev/zero", "is a device"),
+            (tmp_path / "pipe.npy", "is not a file"),
+            (tmp_path / "socket.npy", "is not a file"),
+            ("/dev/zero", "is not a file"),
             (tmp_path, "is a folder"),
             (tmp_path / "none.npy", "no such file"),
             ("a\0b", "no such file"),
@@ -294,7 +272,7 @@ def test_the_name_tells_where_the_content_cannot(tmp_path):
 
 def test_waves_that_no_grid_has(tmp_path):
     (tmp_path / "waves.txt").write_text("1 0 1 0\n1e30 0 1 0\n")
-    with pytest.raises(UnfitTopography, match=r"waves 1e\+30 times as short as the period, but a grid has at most"):
+    with pytest.raises(UnfitTopography, match=r"expected waves up to 16384 times as short as the period"):
         scan(tmp_path / "waves.txt", **WAVES)
 
 
@@ -357,6 +335,6 @@ def test_damaged_and_changed_files_are_read_or_refused(whole, name, data):
     try:
         surface = prepared_topography(path, settings).surface
     except UnfitTopography as error:
-        assert re.search("expected|allowed: |leave it out", str(error))
+        assert re.search("expected|Remove", str(error))
     else:
         assert np.all(np.isfinite(surface.heights))

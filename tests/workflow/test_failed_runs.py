@@ -134,7 +134,7 @@ def test_a_campaign_of_failed_runs_has_a_dataset_and_an_empty_figure(sweep, data
 def test_a_surface_that_a_model_cannot_compute_affects_no_other_run(sweep, dataset):
     path, model = BOTH_WAYS, "asperities"
     odd, said = sweep("ridges", BARE, path, ridges(), model)
-    # A deep pit is no error.
+    # A deep pit does not cause an error.
     pit, _ = sweep("pit", BARE, path, pitted(), model)
     run = read_run(odd)
     assert run.attrs["incomplete"] == (

@@ -1,4 +1,4 @@
-"""What every job does besides its work: records of results, checks of inputs, its log, its end with Snakemake."""
+"""Every job records its results, checks its inputs, writes a log, and ends with Snakemake."""
 
 import json
 import os
@@ -197,6 +197,15 @@ def test_only_a_call_that_starts_jobs_takes_over_the_results(job, tmp_path, monk
     assert ended(job(WORK.replace("a result", "another result"), ICHA_OWNER=earlier))[0] == 1
     assert (job.results / "checksums/runs/b.nc.json").read_bytes() == record
     assert (job.results / "runs/b.nc").read_text() == "a result"
+
+
+@pytest.mark.parametrize("link", [True, False])
+def test_a_file_or_a_broken_link_instead_of_the_results_is_named(link, tmp_path, monkeypatch, before_jobs):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(before_jobs, "hold_lock", lambda path: None)
+    Path("results").symlink_to("nowhere") if link else Path("results").write_text("something else")
+    with pytest.raises(SystemExit, match="results/tiny cannot be written to: instead of a folder there is"):
+        campaign(before_jobs)
 
 
 def test_a_file_that_changed_after_its_inspection_is_neither_used_nor_copied(tmp_path, monkeypatch):

@@ -75,17 +75,17 @@ def test_jobs_do_not_depend_on_the_times_of_the_records(recorded_jobs, tmp_path)
 def test_a_result_without_a_record_is_named_with_the_command_to_use(recorded_jobs, tmp_path):
     records = recorded(tmp_path)
     unknown = f"{RESULTS}/report.html"
-    with pytest.raises(ValueError, match=rf"^{unknown}: there is no record of how it was made.*-- --touch --forceall"):
+    with pytest.raises(ValueError, match=rf"^{unknown}: its record in .* is missing, .*-- --touch --forceall"):
         recorded_jobs(records, MADE | {unknown: "report.html"}, GIVEN, scripts=WORKFLOW / "scripts")
-    with pytest.raises(ValueError, match=r"surfaces/a/seed1.nc: there is no record|fig.pdf: there is no record"):
+    with pytest.raises(ValueError, match=r"(surfaces/a/seed1.nc|fig.pdf): its record in .* is missing"):
         recorded_jobs(tmp_path / "nothing", MADE, GIVEN, scripts=WORKFLOW / "scripts")
     FilePersistence(path=tmp_path / ".snakemake")._write_record(SURFACE, MetadataRecord(incomplete=True))
-    with pytest.raises(ValueError, match=r"seed1.nc: there is no complete record"):
+    with pytest.raises(ValueError, match=r"seed1.nc: its record in .* is incomplete"):
         recorded_jobs(records, MADE, GIVEN, scripts=WORKFLOW / "scripts")
     for file in records.iterdir():
         if file.is_file():
             file.write_text("{")
-    with pytest.raises(ValueError, match=r": the record cannot be read"):
+    with pytest.raises(ValueError, match=r": its record in .* cannot be read"):
         recorded_jobs(records, MADE, GIVEN, scripts=WORKFLOW / "scripts")
 
 

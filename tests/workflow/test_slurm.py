@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 import yaml
 from conftest import REPOSITORY, copy_project, modules_of, snakemake
-from slurm.single_node import FOLDER, single_node, why_not
+from slurm.single_node import single_node, why_not
 from tiny_campaign import CAMPAIGN as TINY
 
 PYTHON = REPOSITORY / ".venv-slurm/bin/python"
@@ -169,24 +169,6 @@ def test_outdated_results_are_removed_even_if_their_jobs_never_ran(calls):
     outdated = {name for name in RUNS if name.endswith("soft.nc")}
     assert {name for name in refused.results if name.startswith("runs/")} == RUNS - outdated
     assert plan.returncode == 0 and f"run {len(outdated)}" in " ".join(plan.stdout.split())
-
-
-@pytest.mark.slow
-def test_a_slurm_of_the_machine_is_not_touched(monkeypatch, tmp_path):
-    monkeypatch.setattr("os.geteuid", lambda: 0)
-    monkeypatch.setattr("shutil.which", lambda name: f"/usr/sbin/{name}")
-    monkeypatch.delenv("SLURM_CONF", raising=False)
-    theirs = tmp_path / "slurm.conf"
-    monkeypatch.setattr("slurm.single_node.SYSTEM_CONFIGURATION", theirs)
-    assert why_not() is None
-    theirs.write_text("ClusterName=theirs\n")
-    with pytest.raises(RuntimeError, match="belongs to a Slurm"), single_node():
-        pass
-    assert theirs.read_text() == "ClusterName=theirs\n"
-    # The configuration of a killed test does not count as a Slurm of the machine.
-    theirs.unlink()
-    theirs.symlink_to(f"/tmp/{FOLDER}gone/slurm.conf")
-    assert why_not() is None
 
 
 def test_the_profile_names_existing_rules():

@@ -7,15 +7,21 @@ from icha.planning.requirements import figure_memory
 from icha.support.checksums import sha256_of
 
 RESULT_FILES = ResultFiles(CAMPAIGN.name, RESULTS)
+FIGURES = CAMPAIGN.figures.by_name()
+
+
+def figure_inputs(name):
+    """Return the input files of a figure, by the arguments of the function that draws it."""
+    return DECLARATIONS[name].inputs(CAMPAIGN, FIGURES[name], RESULT_FILES)
 
 
 wildcard_constraints:
-    name="|".join(CAMPAIGN.figures.by_name()) or "none",
+    name="|".join(FIGURES) or "none",
 
 
 rule figure:
     input:
-        unpack(lambda wildcards: CAMPAIGN.figures.inputs(wildcards.name, CAMPAIGN, RESULT_FILES)),
+        unpack(lambda wildcards: figure_inputs(wildcards.name)),
     output:
         png="<results>/figures/{name}.png",
         pdf="<results>/figures/{name}.pdf",
@@ -29,12 +35,9 @@ rule figure:
         mem_mb=lambda wildcards: figure_memory(CAMPAIGN, holds_topography=DECLARATIONS[wildcards.name].holds_topography),
         runtime=10,
     params:
-        arguments=lambda wildcards: CAMPAIGN.figures.arguments(wildcards.name, CAMPAIGN),
+        arguments=lambda wildcards: FIGURES[wildcards.name].arguments(CAMPAIGN),
         # Tables of measurements are compared by content, not by time.
-        sha256=lambda wildcards: [
-            sha256_of(Path(table))
-            for table in CAMPAIGN.figures.inputs(wildcards.name, CAMPAIGN, RESULT_FILES).get("tables", ())
-        ],
+        sha256=lambda wildcards: [sha256_of(Path(table)) for table in figure_inputs(wildcards.name).get("tables", ())],
         code=lambda wildcards: code_of("draw_figure.py", f"icha.figures.{wildcards.name}"),
     message:
         "Figure {wildcards.name}"

@@ -1,5 +1,5 @@
-# report.html: figures, tables, parameters and checks on one page. Times differ from one execution to the next, so they
-# are in a separate table, run_times.tsv, and the same data give the same bytes of the page.
+# report.html: figures, tables, parameters and checks on one page. The times of jobs differ from one execution to the
+# next. Therefore they are in a separate table, run_times.tsv, and the same data give the same bytes of the page.
 
 from icha.planning.requirements import further_software
 
@@ -26,7 +26,7 @@ rule report_page:
         mem_mb=4000,
         runtime=10,
     params:
-        figures={name: CAMPAIGN.figures.studies_of(name, CAMPAIGN) for name in CAMPAIGN.figures.by_name()},
+        figures={name: options.studies_of(CAMPAIGN) for name, options in CAMPAIGN.figures.by_name().items()},
         citations=as_it_is([measurement.citation for measurement in CAMPAIGN.measurements.values()]),
         benchmarks=f"{RESULTS}/benchmarks",
         further_software=further_software(CAMPAIGN),

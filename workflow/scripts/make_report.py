@@ -1,4 +1,4 @@
-"""Write the report of a campaign, and the times of its jobs."""
+"""Write the report of a campaign, and a table of the times of its jobs."""
 
 from pathlib import Path
 
@@ -13,10 +13,11 @@ from icha.report.sections import read_surface_statistics
 
 if "snakemake" in globals():
     with job_context(snakemake):
-        files, params, page = snakemake.input, snakemake.params, snakemake.output.page
+        files, params = snakemake.input, snakemake.params
+        page, times = snakemake.output.page, snakemake.output.times
         model_error = "".join(files.model_error)  # empty without boundary elements
-        times_page = Path(params.benchmarks, "index.html")
         linked = {"Configuration": files.configuration, "Comparison": files.comparison, "Checks": files.checks}
+        linked |= {"Times and memory of the jobs": times} | ({"Error of the model": model_error} if model_error else {})
         write_report(
             page,
             campaign=read_campaign(files.campaign),
@@ -27,15 +28,13 @@ if "snakemake" in globals():
                 )
             ],
             checks=read_checks(files.checks),
-            comparison=read_campaign(files.comparison),
             model_error=read_campaign(model_error) if model_error else None,
             surfaces=[read_surface_statistics(path) for path in files.surfaces],
             configuration=Path(files.configuration).read_text(encoding="utf-8"),
             dataset_path=files.campaign,
-            files=linked | ({"Error of the model": model_error} if model_error else {}),
+            files=linked,
             results=Path(page).parent,
             citations=params.citations,
             further_software=params.further_software,
-            times_path=times_page,
         )
-        write_times(snakemake.output.times, times_page, params.benchmarks)
+        write_times(times, params.benchmarks)

@@ -7,6 +7,8 @@ from icha.datasets.variables.terms import Variable, bin_table, read_tables
 # Complete runs are results. A run with failed checks has all its values, but they must not be used.
 COMPLETE, INCOMPLETE, MISSING, NOT_IN_DESIGN, FAILED_CHECKS, BEYOND_MODEL = range(6)
 STATUS_MEANINGS = ("complete", "incomplete", "missing", "not_in_design", "failed_checks", "beyond_the_model")
+# Attribute of a run that gives the reason of its status.
+STATUS_ATTRIBUTES = {INCOMPLETE: "incomplete", BEYOND_MODEL: "beyond_model", FAILED_CHECKS: "failed_checks"}
 # Status of runs that have a file.
 COMPUTED_RUNS = (COMPLETE, INCOMPLETE, FAILED_CHECKS, BEYOND_MODEL)
 # Status of runs whose first loading is a result. A run beyond its model has the loading up to there.

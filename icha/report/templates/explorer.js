@@ -49,7 +49,7 @@ function opened(run) {
   return { ...run, ...Object.fromEntries(["pressure", "area", "gap"].map((name) => [name, floats(run[name])])) };
 }
 
-// The step of a run at the position of the slider; -1 if there is none.
+// The step of a run at the position of the slider; -1 without such a step.
 const stepOf = (run) => (run === leading || !run.partners ? Number(stop.value) : run.partners[Number(stop.value)]);
 // The latest snapshot at or before a step, if there is any. Snapshots stand in the order of the campaign.
 function snapshotOf(run, step) {
@@ -211,11 +211,11 @@ function drawStop() {
     Plotly.restyle(id, { x: now.map(({ run, step }) => at(run.pressure, step)), y: now.map(({ run, step }) => at(run[name], step)) }, points);
   }
   drawDistributions(now);
-  tell(now);
+  printState(now);
 }
 
 // The state as text and numbers.
-function tell(now) {
+function printState(now) {
   const place = Number(stop.value), count = leading.pressure.length;
   const words = `${legOf(leading, place)}, p* = ${format(leading.pressure[place])}`;
   byId("state").textContent = `${place + 1} of ${count}: ${words}`;

@@ -14,17 +14,17 @@ from icha.surfaces.measured.settings import (
     Preparation,
     UnfitTopography,
     choose_name,
+    grid_indices,
     metres_of,
     put_y_first,
-    regular_ticks,
 )
 
-# Number of copies of an array, as floats, that are in memory while the array is read.
+# Number of copies of an array, as floats, in memory while the array is read.
 _COPIES = 3
-# Formats in which any bytes of the right number are heights; only the ending of the name identifies them.
+# Formats without a signature: every file of certain lengths fits, so the ending of the name must identify them.
 _WITHOUT_SIGNATURE = ("hgt", "nms")
-# Formats that do not identify an instrument. SurfaceTopography reads any text with numbers as the first one, and drops
-# fields that are not numbers; it reads any file of certain lengths as the others.
+# Formats that do not identify an instrument. SurfaceTopography reads any text with numbers as `asc`, and then drops
+# fields that are not numbers.
 _OF_ANY_TEXT = ("asc", *_WITHOUT_SIGNATURE)
 # Formats of arrays without a default one.
 _ARRAYS = ("mat", "npz")
@@ -36,7 +36,7 @@ _UNKNOWN = (
 
 def read_npy(file, settings: Preparation) -> FileContent:
     """Read a NumPy array, which has no names or units."""
-    # A mapped array cannot declare more than the file holds. NumPy warns of an overflow before it refuses the array.
+    # A mapped array cannot be larger than its file. NumPy warns of an overflow before it refuses the array.
     with np.errstate(over="ignore"):
         array = np.lib.format.open_memmap(file.path, mode="r")
     _require_room(array)
@@ -71,9 +71,9 @@ def read_netcdf(source, settings: Preparation) -> FileContent:
         heights = heights.reshape(heights.shape[-2:])
         dimensions, sides = chosen.dimensions[-2:], []
         for axis, dimension in enumerate(dimensions):
-            side, falls = _side(file.variables.get(dimension), heights.shape[axis])
+            side, decreases = _side(file.variables.get(dimension), heights.shape[axis])
             sides.append(side)
-            heights = np.flip(heights, axis) if falls else heights
+            heights = np.flip(heights, axis) if decreases else heights
         unit = _unit_of(chosen.__dict__)
     axes = [dimension.lower() for dimension in dimensions]
     x_first = axes[0] == "x" if set(axes) == {"x", "y"} else settings.first_axis == "x"
@@ -82,7 +82,7 @@ def read_netcdf(source, settings: Preparation) -> FileContent:
 
 
 def _side(coordinate, count):
-    """Return the length of a side in m, None if the file does not give it, and whether its coordinate falls."""
+    """Return the length of a side in m (None if the file does not contain it) and whether its coordinate decreases."""
     if coordinate is None or coordinate.ndim != 1:
         return None, False
     unit, values = _unit_of(coordinate.__dict__), _read_variable(coordinate)
@@ -90,16 +90,16 @@ def _side(coordinate, count):
         return float(coordinate.length) * unit, False
     if count < 2:
         return None, False
-    _, ticks, step = regular_ticks(values, coordinate.name)
-    if ticks != count:
-        raise UnfitTopography("path", f"has {coordinate.name} on no regular grid; expected equal distances")
+    _, lines, step = grid_indices(values, coordinate.name)
+    if lines != count:
+        raise UnfitTopography("path", f"has unequal distances along {coordinate.name}; expected equal distances")
     return (count * step * unit if unit is not None else None), values[0] > values[-1]
 
 
 def read_hdf5(source, settings: Preparation) -> FileContent:
     """Read the dataset `data`, or the only one of two dimensions; attributes have the same meaning as in netCDF.
 
-    MATLAB (from version 7.3) stores columns, so that HDF5 has the transpose of what MATLAB shows.
+    MATLAB (from version 7.3) stores arrays column by column, so the HDF5 file contains their transpose.
     """
     import h5py
 
@@ -125,10 +125,10 @@ def read_hdf5(source, settings: Preparation) -> FileContent:
 
 
 def _unpack(dataset):
-    """Read a dataset, nan where numbers are missing, by the attributes with which netCDF packs numbers."""
+    """Read a dataset and unpack its numbers as its attributes define, as in netCDF; nan where numbers are missing."""
     stored, attributes = dataset[...], dataset.attrs
     fills = [each for name in ("_FillValue", "missing_value") for each in np.ravel(attributes.get(name, []))]
-    # HDF5 fills with zero by default.
+    # The fill value 0 is the default of HDF5, so zeros are heights.
     fills += [dataset.fillvalue] if dataset.fillvalue else []
     scale, offset = (float(np.ravel(attributes.get(*each))[0]) for each in (("scale_factor", 1.0), ("add_offset", 0.0)))
     if not fills and (scale, offset) == (1.0, 0.0):
@@ -138,7 +138,7 @@ def _unpack(dataset):
 
 
 def format_of_hdf5(path: Path) -> str | None:
-    """Return the format of an HDF5 file, which netCDF-4 and Zygo's files are, too; None for other files."""
+    """Return the format of an HDF5 file, including netCDF-4 and Zygo's files; None for other files."""
     import h5py
 
     if not h5py.is_hdf5(path):
@@ -150,22 +150,21 @@ def format_of_hdf5(path: Path) -> str | None:
 
 
 def _is_map(shape):
-    """Tell whether an array has two dimensions, besides leading ones of length 1."""
+    """Return whether an array has two dimensions, besides leading ones of length 1."""
     return len(shape) >= 2 and all(count == 1 for count in shape[:-2])
 
 
 def find_maps(shapes: Mapping[Any, tuple[int, ...]]) -> list:
     """Return the names of the arrays that can be maps of heights.
 
-    MATLAB stores lines and single numbers as two-dimensional arrays. Their names are returned only if the file has no
-    other array.
+    MATLAB stores lines and single numbers as two-dimensional arrays, too. They count only if the file has no others.
     """
     maps = [name for name, shape in shapes.items() if _is_map(shape)]
     return [name for name in maps if min(shapes[name][-2:]) > 2] or maps
 
 
 def _unit_of(attributes):
-    """Return the unit in a variable's attributes, in metres; None without a unit of length."""
+    """Return the unit in the attributes of a variable, in metres; None without a unit of length."""
     text = attributes.get("units", attributes.get("unit"))
     if isinstance(text, bytes):
         text = text.decode("utf-8", "replace")
@@ -173,21 +172,21 @@ def _unit_of(attributes):
 
 
 def open_instrument(path: Path):
-    """Open a file with SurfaceTopography; None if it does not know the format."""
+    """Open a file with SurfaceTopography; return None if SurfaceTopography does not know the format."""
     from SurfaceTopography import open_topography
     from SurfaceTopography.Exceptions import CannotDetectFileFormat
 
     try:
         return open_topography(str(path))
-    except CannotDetectFileFormat:  # its message lists those of all readers
+    except CannotDetectFileFormat:
         return None
 
 
 def is_instrument_text(file) -> bool:
-    """Tell whether SurfaceTopography knows a text file as one of a certain instrument."""
+    """Return whether SurfaceTopography recognises a text file as that of a certain instrument."""
     try:
         return file.instrument is not None and file.instrument.format() not in _OF_ANY_TEXT
-    except Exception:  # a damaged file of a known format; reading it gives the message
+    except Exception:  # a damaged file of a known format, which the reader refuses
         return True
 
 
@@ -211,14 +210,14 @@ def read_instrument(file, settings: Preparation) -> FileContent:
 
 
 def _choose_channel(opened, settings):
-    """Return the channel that is asked for, or the default one, and its name, empty if it is the only map."""
+    """Return the channel that the settings name, else the default channel, and its name; "" if it is the only map."""
     channels = opened.channels
     names = [channel.name for channel in channels]
     maps = find_maps({k: tuple(channel.nb_grid_pts) for k, channel in enumerate(channels)})
     if settings.data is not None:
         channel = channels[names.index(choose_name(settings.data, names, (), "channel"))]
     elif opened.format() in _ARRAYS and maps:
-        # Arrays of a workspace have no default; the first one could be anything.
+        # Files of several arrays have no default; the first array could be anything.
         channel = channels[names.index(choose_name(None, [names[k] for k in maps], (), "array"))]
     else:
         channel = opened.default_channel

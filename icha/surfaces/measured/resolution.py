@@ -1,4 +1,4 @@
-"""Resolution of a scan: its summits, its spectrum with the noise of the instrument, and advice."""
+"""Resolution of a scan: its summits, the noise of the instrument in its spectrum, and recommended settings."""
 
 import math
 import os
@@ -9,8 +9,7 @@ from functools import cached_property
 import numpy as np
 import scipy.fft
 
-from icha.surfaces.measured.steps import LEAST_PIXELS
-from icha.surfaces.measured.topography import PreparedTopography, prepared_topography
+from icha.surfaces.measured.topography import LEAST_PIXELS, PreparedTopography, prepared_topography
 from icha.surfaces.moments import (
     LEAST_CELLS_OF_SUMMIT,
     RESOLVED_CELLS,
@@ -23,25 +22,23 @@ from icha.surfaces.surface import FREE, PERIODIC, Surface, edges_fit
 # Exponent of the steepest power law q^x of a noise floor, and smallest ratio of its last and first wave number. The
 # spectrum of a self-affine surface falls at least as q^-2; the spectrum of uncorrelated noise is flat.
 _FLOOR_FALLS, _FLOOR_SPANS = -1.0, 1.3
-# Power of a floor, relative to the largest power, below which it is rounding.
+# Power of a floor, relative to the largest power, below which the floor is rounding.
 _ROUNDING = 1e-20
-# Largest ratio of a coarser grid to the present one with which the coarser grid is advised.
+# A coarser grid is recommended if the ratio of its nodes a side to those of the present grid is at most this.
 _WORTH = 0.75
 
 
 @dataclass(frozen=True)
 class NoiseFloor:
-    """Noise floor at the end of short waves in the spectrum of a scan.
+    """Noise floor in which the spectrum of a scan ends at short waves.
 
     Attributes
     ----------
-    power : power of the noise, m^4.
-    wavelength : wavelength that has as much power as the noise, m; shorter waves are mostly noise.
+    wavelength : wavelength at which surface and noise have equal power, m; shorter waves are mostly noise.
     rms : rms height of the noise, m.
     slope_share : share of the shorter waves in the mean square slope.
     """
 
-    power: float
     wavelength: float
     rms: float
     slope_share: float
@@ -62,7 +59,7 @@ class ScanResolution(PreparedTopography):
 
     @property
     def edges_fit(self) -> bool:
-        """Whether the prepared surface is free, or periodic without a step between cells."""
+        """True if the prepared surface is free, or periodic without a step between cells."""
         return self.surface.free or edges_fit(self.surface.heights)
 
     @cached_property
@@ -98,7 +95,7 @@ class ScanResolution(PreparedTopography):
 
     @property
     def advice(self) -> dict[str, float | int]:
-        """Keys of the configuration that would resolve the surface, in SI units; empty if it is resolved."""
+        """Recommended values (SI units) of keys that make the surface resolved; empty if it is resolved already."""
         found = {}
         cutoff, pixel = self.cutoff or 0.0, self.measured.spacing
         if self.noise is not None and cutoff < self.noise.wavelength * (1 - 1e-9):
@@ -114,7 +111,7 @@ class ScanResolution(PreparedTopography):
 
 
 def filtered_slope_share(surface: Surface, cutoff: float) -> float:
-    """Estimate the fraction of the rms slope that the Gaussian filter of a nesting index (m) leaves."""
+    """Estimate the fraction of the rms slope that remains after the Gaussian filter with a nesting index (m)."""
     q, power, edges = radial_power_spectrum(surface)
     slopes = power * q**2 * np.diff(edges**2)
     transmission = 2.0 ** -((cutoff * q / (2 * np.pi)) ** 2)
@@ -122,7 +119,7 @@ def filtered_slope_share(surface: Surface, cutoff: float) -> float:
 
 
 def examine_scan(path: str | os.PathLike, preparation: Mapping) -> ScanResolution:
-    """Examine a scan; arguments and errors as `icha.surfaces.measured.topography.prepared_topography`."""
+    """Prepare a scan with and without its filter; arguments and errors as those of `prepared_topography`."""
     raw = {key: preparation[key] for key in preparation if key not in ("cutoff", "taper")}
     if preparation["boundary"] != PERIODIC:
         raw |= {"boundary": FREE, "grid": None}
@@ -133,10 +130,10 @@ def examine_scan(path: str | os.PathLike, preparation: Mapping) -> ScanResolutio
 
 
 def noise_floor(surface: Surface) -> NoiseFloor | None:
-    """Find the noise floor in which the radial power spectrum of a surface ends; None if it falls to its end.
+    """Find the noise floor in which the radial power spectrum of a surface ends; None if the spectrum has no floor.
 
-    The floor is the longest tail of the spectrum through which the best power law falls less steeply than 1/q. Its
-    power is the geometric mean of the shorter half of its waves.
+    The floor is the longest tail of the spectrum whose best power law falls less steeply than 1/q. The power of the
+    floor is the geometric mean over its half with the shorter waves.
     """
     q, power, edges = radial_power_spectrum(surface)
     log_q, log_power = np.log(q), np.log(np.maximum(power, np.finfo(float).tiny))
@@ -157,7 +154,6 @@ def noise_floor(surface: Surface) -> NoiseFloor | None:
     # Contributions of the rings to the mean square slope, up to a common factor.
     slopes = power * q**2 * np.diff(edges**2)
     return NoiseFloor(
-        power=floor,
         wavelength=float(2 * np.pi / limit),
         rms=math.sqrt(floor) * 2 * math.pi / surface.spacing,
         slope_share=float(np.sum(slopes[q > limit]) / np.sum(slopes)),

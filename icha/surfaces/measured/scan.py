@@ -11,11 +11,9 @@ from icha.support.formatting import printable
 from icha.support.input_files import RefusedFile, bounded_memory, problem_with_path, refuse_traps
 from icha.support.rules import LENGTH
 from icha.surfaces.measured.array_files import format_of_hdf5, read_hdf5, read_instrument, read_netcdf, read_npy
-from icha.surfaces.measured.fourier_files import read_fourier
-from icha.surfaces.measured.settings import LINE_SCAN, Preparation, UnfitTopography, WrongFormat
-from icha.surfaces.measured.text_files import format_of_text, read_matrix, read_xyz
+from icha.surfaces.measured.settings import LINE_SCAN, Preparation, UnfitTopography
+from icha.surfaces.measured.text_files import format_of_text, read_fourier, read_matrix, read_xyz
 from icha.surfaces.measured.text_tables import SourceFile, first_damaged_line
-from icha.surfaces.square import problem_with_heights
 
 READERS = {
     "npy": read_npy,
@@ -26,7 +24,7 @@ READERS = {
     "fourier": read_fourier,
     "instrument": read_instrument,
 }
-# Libraries of the readers. They are imported before memory is bounded, since theirs is not that of the file.
+# Libraries of the readers. They are imported before memory is bounded, so that their own memory does not count.
 _LIBRARIES = {"netcdf": "netCDF4", "hdf5": "h5py", "instrument": "SurfaceTopography"}
 
 
@@ -37,9 +35,9 @@ class Scan:
     Attributes
     ----------
     heights : (ny, nx), m, nan where missing, first axis y.
-    size : (x, y) of the whole, m.
-    steps : descriptions of what was read and done.
-    coordinate_unit : m, if the size follows from coordinates whose unit the file does not give.
+    size : (x, y) of the whole scan, m.
+    steps : descriptions of the reading and of the steps since then.
+    coordinate_unit : m, if the size follows from coordinates whose unit the file does not contain.
     format : format as which the file was read.
     data : name of the array or channel that was read; empty if the file has only one.
     """
@@ -58,12 +56,12 @@ class Scan:
         return self.size[0] / columns, self.size[1] / rows
 
     def after(self, heights: np.ndarray, *steps: str, size: tuple[float, float] | None = None) -> "Scan":
-        """Return the scan after a step: new heights, the description of the step, and the new size if it changed."""
+        """Return the scan after a step, with its new heights, the description of the step, and a new size if given."""
         return replace(self, heights=heights, size=size or self.size, steps=(*self.steps, *steps))
 
     @property
     def remark_on_unit(self) -> str:
-        """Remark for messages about a length of the scan."""
+        """Remark on the unit of coordinates, for messages about a length of the scan."""
         if self.coordinate_unit is None:
             return ""
         unit = formatting.length(self.coordinate_unit)
@@ -72,8 +70,8 @@ class Scan:
 
 def load_scan(path: Path, settings: Preparation) -> Scan:
     """Read a file of any format; raises errors as `icha.surfaces.measured.topography.prepared_topography`."""
-    if not path.stat().st_size:
-        raise UnfitTopography("path", "is empty; expected a file of heights")
+    if problem := problem_with_path(path) or ("" if path.stat().st_size else "is empty"):
+        raise UnfitTopography("path", f"{problem}; expected a file of heights")
     name, found = _read(path, settings)
     unit = settings.height_unit or found.unit
     if unit is None:
@@ -110,38 +108,21 @@ def load_scan(path: Path, settings: Preparation) -> Scan:
 
 
 def read_height_map(path: str | Path, metres_per_unit: float) -> np.ndarray:
-    """Read the heights of a surface of kind `file`, (n, n) in m, first axis y.
+    """Read the heights of a surface of kind `file`, (ny, nx) in m; raise UnfitTopography if the file has no heights.
 
     Parameters
     ----------
     path : `.npy`, or netCDF with a variable `height`.
     metres_per_unit : the unit of the heights in the file.
-
-    Raises
-    ------
-    ValueError
-        If the file cannot be read or its heights are not a square array of finite numbers.
     """
-    expected = "expected a square array of at least 8 x 8 finite heights (.npy, or .nc with a variable `height`)"
     path = Path(path)
     kind, data = ("netcdf", "height") if path.suffix == ".nc" else ("npy", None)
-    # The side of the surface is given elsewhere.
-    settings = Preparation(kind, "periodic", data, height_unit=metres_per_unit, size=(1.0, 1.0))
-    try:
-        if problem := problem_with_path(path):
-            raise UnfitTopography("path", problem)
-        heights = load_scan(path, settings).heights
-    except UnfitTopography as error:
-        raise ValueError(f"{error}; {expected}") from None
-    if problem := problem_with_heights(heights):
-        raise ValueError(f"holds {problem}; {expected}")
-    if not LENGTH.contains(float(np.ptp(heights))):
-        raise ValueError(f"holds heights that span {np.ptp(heights):g} m; {expected}, and another unit")
-    return heights
+    # The configuration contains the size, as `period`.
+    return load_scan(path, Preparation(kind, "periodic", data, height_unit=metres_per_unit, size=(1.0, 1.0))).heights
 
 
 def _read(path, settings):
-    """Return the format of a file and its content, after checking that these are heights."""
+    """Return the format of a file and its content, after checking that the content are heights."""
     file, name = SourceFile(path), settings.format
     try:
         with bounded_memory():
@@ -163,38 +144,34 @@ def _read(path, settings):
         raise
     except RefusedFile as error:
         raise UnfitTopography("path", str(error)) from None
-    except Exception as error:  # libraries raise all kinds for files that are damaged or of another format
+    except Exception:  # libraries raise many types of errors for files that are damaged or of another format
         as_format = "" if name in ("auto", "text") else f" as {name}"
-        reason = f" ({error})" if isinstance(error, WrongFormat) else ""
         raise UnfitTopography(
             "path",
-            f"cannot be read{as_format}{reason}: the file is damaged or of another format; expected a sound file, or "
-            "another `format`",
+            f"cannot be read{as_format}: the file is damaged or of another format; expected a sound file, or another "
+            "`format`",
         ) from None
     if settings.data is not None and name not in _LIBRARIES:
         raise UnfitTopography(
-            "data", f"is given, and a file that is read as {name} has one array without a name; leave it out"
+            "data", f"is given, but a file that is read as {name} has one array without a name. Remove the key"
         )
     heights = found.heights
     if heights.dtype.kind not in "iuf":
         raise UnfitTopography("path", f"holds {heights.dtype}, not real numbers; expected heights")
     if heights.ndim == 1 or (heights.ndim == 2 and 0 < min(heights.shape) <= 2 < max(heights.shape)):
-        # Two columns are x and z.
+        # Two columns are x and z of a profile.
         raise UnfitTopography("path", LINE_SCAN.format(max(heights.shape)))
     if heights.ndim != 2 or not heights.size:
-        nothing = "" if heights.size else ", no heights"
-        raise UnfitTopography(
-            "path", f"holds an array of shape {heights.shape}{nothing}; expected rows and columns of heights"
-        )
+        raise UnfitTopography("path", f"holds an array of shape {heights.shape}; expected rows and columns of heights")
     return name, found
 
 
 def _guess_format(path: Path) -> str:
-    """Guess the format of a file by its name or, for HDF5, by its content; else "text", which may be any other."""
-    suffix = path.suffix.lower()
+    """Guess the format of a file by its name or, for HDF5, by its content; "text" stands for any other format."""
+    suffix = Path(path.name.lower().removesuffix(".gz")).suffix
     known = {".npy": "npy", ".nc": "netcdf", ".nc4": "netcdf", ".h5": "hdf5", ".hdf5": "hdf5", ".xyz": "xyz"}
     if suffix in known:
         return known[suffix]
     if (hdf5 := format_of_hdf5(path)) is not None:
         return hdf5
-    return "xyz" if path.name.lower().endswith(".xyz.gz") else "text"
+    return "text"

@@ -1,42 +1,89 @@
-"""Readers of text files with a row of heights per line or with x y z per line; choice between the two."""
+"""Readers of text files with a row of heights, x y z, or a wave in every line, and of their headings."""
 
+import itertools
+import math
 import re
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
+import scipy.fft
 
 from icha.support.input_files import require_room
+from icha.support.rules import GRID
 from icha.surfaces.measured.array_files import is_instrument_text, read_instrument
-from icha.surfaces.measured.coordinate_lines import drop_coordinates
 from icha.surfaces.measured.settings import (
     LINE_SCAN,
     FileContent,
     Preparation,
     UnfitTopography,
-    WrongFormat,
+    grid_indices,
     metres_of,
     put_y_first,
-    regular_ticks,
 )
-from icha.surfaces.measured.text_headings import check_counts, image_sides, read_heading
-from icha.surfaces.measured.text_tables import SourceFile
+from icha.surfaces.measured.text_lines import AMBIGUOUS_COMMA, strip_remark
+from icha.surfaces.measured.text_tables import SourceFile, drop_coordinates
 
-# A surface has at least so many columns of heights.
+# Fewest columns of a table of heights.
 _FEWEST_COLUMNS = 8
 # Title of a column: its name and, in brackets, its unit.
 _TITLE = re.compile(r"([a-z]+)\s*(?:[\[(]\s*([^\])]+?)\s*[\])])?", re.IGNORECASE)
 _NAMES_OF_Z = ("z", "h", "height")
-# Numbers that are written with seven digits, or were of single precision, agree to this relative error.
+# Relative error of numbers that are written with seven digits, or that were of single precision.
 _FEW_DIGITS = 1e-6
+# The spectrum, its conjugate, their difference, the heights, and the masks of waves.
+_BYTES_OF_NODE = 64
+# Largest difference of conjugate amplitudes, relative to the largest amplitude.
+_CONJUGATE = 1e-4
+# First word of the line with the width of an image that Gwyddion exported, in the languages of its menus. The next line
+# contains the height of the image.
+_WIDTH = re.compile(r"^#?\s*(Width|Šířka|Breite|Anchura|Largeur|Larghezza|幅|폭|Largura|Ширина)\s*[:：]\s*(.*)$")
+_NUMBER = r"([-+]?\d+(?:[.,]\d+)?(?:[eE][-+]?\d+)?)"
+# One length or two, such as 12 µm x 12 µm.
+_LENGTHS = re.compile(rf"{_NUMBER}\s*(\S+?)?(?:\s*[x×*]\s*{_NUMBER}\s*(\S+)?)?$")
+# A name; a colon, an equals sign, a delimiter or blanks; and a value.
+_ENTRY = re.compile(r"^[#%/\s\"']*([A-Za-z][A-Za-z _./()-]*?)\s*(?:[:=,;\t]\s*|\s+(?=[-+]?\d))(.+?)[\s\"']*$")
+# Names in small letters, without punctuation.
+_SIZES = ("size", "scan size", "scan range", "scan area", "field of view")
+_PIXELS = ("pixel", "pixel size", "pixel spacing", "spacing", "point spacing", "cellsize", "cell size")
+_UNITS = ("unit", "units", "z unit", "z units", "value unit", "value units", "height unit", "height units", "data unit")
+_COUNTS = {
+    "rows": ("nrows", "rows", "lines", "number of rows", "number of lines"),
+    "columns": ("ncols", "cols", "columns", "samples", "number of columns"),
+}
+_MISSING = ("nodata value", "nodata", "no data value", "missing value", "bad value", "missing data value")
+# Missing height in grids of ESRI whose headings do not give one.
+_ESRI_MISSING = "-9999"
+
+
+@dataclass(frozen=True)
+class _Heading:
+    """Facts that a heading contains; an attribute is None if the heading does not contain the fact.
+
+    Attributes
+    ----------
+    height_unit, lateral_unit : m.
+    size : (x, y) of the scan, m.
+    coordinates : (x, y) of the scan in a unit that the heading does not contain.
+    missing : numbers that stand for a missing height.
+    """
+
+    height_unit: float | None
+    lateral_unit: float | None
+    size: tuple[float, float] | None
+    coordinates: tuple[float, float] | None
+    missing: tuple[float, ...]
 
 
 def format_of_text(file: SourceFile) -> str:
-    """Find the format of a text by its columns; "instrument" for that of an instrument, or without numbers."""
+    """Find the format of a text by its columns; "instrument" if it is that of an instrument, or has no numbers."""
     layout = file.layout
     if layout is not None and _titles(layout):
         return "xyz"
-    if layout is None or (layout.words and is_instrument_text(file)):
+    # Headings of instruments have lines that are not remarks.
+    if layout is None or (any(map(strip_remark, layout.heading)) and is_instrument_text(file)):
         return "instrument"
-    return "xyz" if 3 <= layout.columns < _FEWEST_COLUMNS and not image_sides(layout.heading) else "matrix"
+    return "xyz" if 3 <= layout.columns < _FEWEST_COLUMNS and not _image_sides(layout.heading) else "matrix"
 
 
 def read_matrix(file: SourceFile, settings: Preparation) -> FileContent:
@@ -44,17 +91,11 @@ def read_matrix(file: SourceFile, settings: Preparation) -> FileContent:
     values, layout = file.values, file.table_layout
     file.refuse_blocks()
     heights, steps, remark = drop_coordinates(values)
-    check_counts(layout.heading, (values.shape, heights.shape))
-    if layout.heading and not image_sides(layout.heading) and (known := _as_instrument_file(file, settings)):
+    _check_counts(layout.heading, (values.shape, heights.shape))
+    if layout.heading and not _image_sides(layout.heading) and (known := _as_instrument_file(file, settings)):
         return known
     rows, columns = heights.shape
-    heading = read_heading(layout.heading, heights.shape, layout.notation.decimal_comma)
-    if heading.ambiguous and settings.size is None:
-        raise UnfitTopography(
-            "size",
-            f"is {heading.ambiguous!r} in the file, where the comma may be decimal or separate thousands; expected the "
-            "size here",
-        )
+    heading = _read_heading(layout.heading, heights.shape, layout.notation.decimal_comma, settings)
     return FileContent(
         put_y_first(_mark_missing(heights, heading), settings),
         heading.height_unit,
@@ -65,13 +106,10 @@ def read_matrix(file: SourceFile, settings: Preparation) -> FileContent:
 
 
 def _as_instrument_file(file, settings):
-    """Read the file with SurfaceTopography; None if the heights have no unit or are not the numbers of the file.
-
-    SurfaceTopography raises all kinds of errors for texts of other formats.
-    """
+    """Read the file with SurfaceTopography; None if the heights have no unit or are not the numbers in the file."""
     try:
         found = read_instrument(file, settings)
-    except Exception:
+    except Exception:  # SurfaceTopography raises many types of errors for texts of other formats
         return None
     if found.unit is None or found.heights.shape != file.values.shape or np.isnan(file.values).any():
         return None
@@ -83,85 +121,217 @@ def _as_instrument_file(file, settings):
 def read_xyz(file: SourceFile, settings: Preparation) -> FileContent:
     """Read x y z in every line, in any order; points may be missing. A heading may give the units."""
     layout = file.table_layout
-    titles = _titles(layout, settings.columns)
-    points = _select_columns(file.values, settings, titles)
-    heading = read_heading(layout.heading, points.shape, layout.notation.decimal_comma)
+    titles = _titles(layout)
+    columns = _find_columns(file.values.shape[1], settings, [name for name, _ in titles])
+    points = file.values[:, [column - 1 for column in columns]]
     if len(points) > 1 and any(np.ptp(points[:, axis]) == 0 for axis in (0, 1)):
         raise UnfitTopography("path", LINE_SCAN.format(len(points)))
-    try:
-        (column, nx, dx), (row, ny, dy) = (regular_ticks(points[:, axis], "xy"[axis]) for axis in (0, 1))
-    except WrongFormat as error:
-        raise UnfitTopography(
-            "path",
-            f"holds points that are not on a regular grid ({error}); expected rows and columns of points. Interpolate "
-            "them onto a grid in the program of the instrument, such as Gwyddion",
-        ) from None
+    (column, nx, dx), (row, ny, dy) = (grid_indices(points[:, axis], "xy"[axis]) for axis in (0, 1))
     node = row * nx + column
     order = np.argsort(node, kind="stable")
     repeated = np.flatnonzero(np.diff(node[order]) == 0)
     if len(repeated):
         x, y = points[order[repeated[0]], :2]
-        raise WrongFormat(f"the point x = {x:g}, y = {y:g} is given twice")
+        raise UnfitTopography("path", f"has the point x = {x:g}, y = {y:g} twice; expected every point once")
     require_room(2 * 8 * nx * ny)
+    heading = _read_heading(layout.heading, points.shape, layout.notation.decimal_comma, settings)
     heights = np.full(nx * ny, np.nan)
     heights[node] = _mark_missing(points[:, 2], heading)
-    x_unit, y_unit, z_unit = (unit for _, unit in titles.values()) if titles else (None, None, None)
-    x_unit, y_unit = x_unit or heading.lateral_unit, y_unit or heading.lateral_unit
-    sides, size = (nx * dx, ny * dy), None
-    if x_unit and y_unit and settings.lateral_unit is None:
-        size = sides[0] * x_unit, sides[1] * y_unit
-    columns = [column for column, _ in titles.values()]
+    units = [titles[column - 1][1] if titles else None for column in columns]
+    x_unit, y_unit = units[0] or heading.lateral_unit, units[1] or heading.lateral_unit
+    remark = "columns x {}, y {}, z {} by their names".format(*columns)
     return FileContent(
         heights.reshape(ny, nx),
-        z_unit or heading.height_unit,
-        size,
-        sides,
-        remark="columns x {}, y {}, z {} by their names".format(*columns) if columns != sorted(columns) else "",
+        units[2] or heading.height_unit,
+        (nx * dx * x_unit, ny * dy * y_unit) if x_unit and y_unit and settings.lateral_unit is None else None,
+        (nx * dx, ny * dy),
+        remark=remark if titles and columns != sorted(columns) else "",
     )
 
 
-def _titles(layout, columns=None):
-    """Read the titles x, y and z above the columns.
+def _titles(layout):
+    """Read the titles of the columns, in the last line above the numbers.
 
     Returns
     -------
-    For x, y and z the number of the column, from 1, and its unit in m, None if the title gives none. Empty if a title
-    is missing, or if other columns are asked for.
+    Name and unit of every column, m or None; an empty list unless exactly one column is x, one y, and one z.
     """
     if not layout.heading:
-        return {}
+        return []
     delimiters = r"[,;\t]" if layout.notation.delimiter else r"\s+(?![\[(])"
     fields = re.split(delimiters, layout.heading[-1].strip(' \t\r\n#%"'))
     found = [_TITLE.fullmatch(field.strip(" \"'")) for field in fields]
     names = [match[1].lower() if match else "" for match in found]
     names = ["z" if name in _NAMES_OF_Z else name for name in names]
     if len(names) != layout.columns or any(names.count(axis) != 1 for axis in "xyz"):
-        return {}
-    at = [names.index(axis) for axis in "xyz"]
-    if columns is not None and [column - 1 for column in columns] != at:
-        return {}
-    return {axis: (k + 1, metres_of(found[k][2] or "")) for axis, k in zip("xyz", at, strict=True)}
+        return []
+    return [(name, metres_of(match[2] or "") if match else None) for name, match in zip(names, found, strict=True)]
 
 
-def _select_columns(values, settings, titles):
-    """Return the columns x, y and z (k, 3) of a table."""
-    count = values.shape[1]
-    columns = settings.columns or [column for column, _ in titles.values()] or [1, 2, 3]
-    if max(columns) > count:
-        raise UnfitTopography("columns", f"exceeds the {count} numbers of a line; expected 1 to {count}")
-    if settings.columns is None and not titles and count != 3:
-        if not 3 < count < _FEWEST_COLUMNS:
-            raise WrongFormat(f"{count} numbers in a line, not x y z")
+def _find_columns(count, settings, names):
+    """Return the numbers, from 1, of the columns x, y and z in a table of `count` columns with these names."""
+    if settings.columns is not None:
+        if max(settings.columns) > count:
+            raise UnfitTopography("columns", f"exceeds the {count} numbers of a line; expected 1 to {count}")
+        return list(settings.columns)
+    if names:
+        return [names.index(axis) + 1 for axis in "xyz"]
+    if count != 3:
         waves = ". For wave vectors and amplitudes use `format: fourier`" if count == 4 else ""
         raise UnfitTopography(
             "columns",
             f"is missing, and a line has {count} numbers; expected the columns x, y and z, such as [1, 2, 3]{waves}",
         )
-    return values[:, [column - 1 for column in columns]]
+    return [1, 2, 3]
 
 
 def _mark_missing(heights, heading):
-    """Replace by nan the numbers that stand for missing heights according to the heading."""
+    """Replace the numbers that stand for missing heights, according to the heading, by nan."""
     for number in heading.missing:
         heights = np.where(np.isclose(heights, number, rtol=_FEW_DIGITS, atol=0), np.nan, heights)
     return heights
+
+
+def _read_heading(lines: Sequence[str], shape: tuple[int, int], decimal_comma: bool, settings: Preparation) -> _Heading:
+    """Read the heading of a table of a shape (rows, columns), whose numbers have decimal commas or not.
+
+    Raises UnfitTopography if a comma in the size may be decimal or separate thousands, and the settings have no size.
+    """
+    entries, sides = _entries(lines), _image_sides(lines)
+    if {"ncols", "nrows", "cellsize"} <= entries.keys():
+        entries.setdefault(_MISSING[0], _ESRI_MISSING)
+
+    def values(names):
+        return [entries[name] for name in names if name in entries]
+
+    sizes, pixels = values(_SIZES), values(_PIXELS)
+    commas = [text for text in (*sizes, *pixels, *sides) if AMBIGUOUS_COMMA.match(text)]
+    if commas and not decimal_comma and settings.size is None:
+        raise UnfitTopography(
+            "size",
+            f"is {commas[0]!r} in the file; the comma may be decimal or separate thousands; expected the size here",
+        )
+    size, coordinates = _size([*([" x ".join(sides)] if sides else []), *sizes], pixels, shape)
+    return _Heading(
+        height_unit=next(filter(None, map(metres_of, values(_UNITS))), None),
+        lateral_unit=metres_of(entries.get("lateral units", "")),
+        size=size,
+        coordinates=coordinates,
+        missing=tuple(_number(found[1]) for found in map(_LENGTHS.match, values(_MISSING)) if found),
+    )
+
+
+def _image_sides(lines: Sequence[str]) -> list[str]:
+    """Return the texts of width and height of an image that Gwyddion exported; an empty list for other headings."""
+    for line, following in itertools.pairwise(lines):
+        if (found := _WIDTH.match(line)) and ":" in following:
+            return [found[2].strip(), following.partition(":")[2].strip()]
+    return []
+
+
+def _check_counts(lines: Sequence[str], shapes: Sequence[tuple[int, int]]) -> None:
+    """Raise UnfitTopography unless one of the shapes has as many rows and columns as the heading states."""
+    entries = _entries(lines)
+    for axis, (what, names) in enumerate(_COUNTS.items()):
+        counts = [int(entries[name]) for name in names if entries.get(name, "").isdecimal()]
+        if counts and counts[0] not in [shape[axis] for shape in shapes]:
+            raise UnfitTopography(
+                "path",
+                f"has {shapes[-1][axis]} {what} of numbers, but {counts[0]} according to its heading; expected a whole "
+                "table. Export it again, or correct the heading",
+            )
+
+
+def _entries(lines):
+    """Return the values in the lines of a heading, by their names in small letters."""
+    entries = {}
+    for line in lines:
+        if found := _ENTRY.match(line):
+            entries.setdefault(re.sub(r"[\s_.-]+", " ", found[1].lower()).strip(), found[2].strip())
+    return entries
+
+
+def _size(sizes, pixels, shape):
+    """Return the size (x, y) in m, and the size in an unknown unit; each is None if the heading does not contain it."""
+    rows, columns = shape
+    for texts, (nx, ny) in ((sizes, (1, 1)), (pixels, (columns, rows))):
+        for x, y, in_metres in filter(None, map(_lengths, texts)):
+            if in_metres:
+                return (x * nx, y * ny), None
+            if texts is pixels:
+                return None, (x * nx, y * ny)
+    return None, None
+
+
+def _lengths(text):
+    """Return the lengths x and y in a text, and whether they are in m or in an unknown unit; None for other text."""
+    if not (found := _LENGTHS.match(text)):
+        return None
+    x, y, units = _number(found[1]), _number(found[3] or found[1]), (found[2] or found[4], found[4] or found[2])
+    if units == (None, None):
+        return x, y, False
+    x_unit, y_unit = map(metres_of, units)
+    return (x * x_unit, y * y_unit, True) if x_unit and y_unit else None
+
+
+def _number(text):
+    return float(text.replace(",", "."))
+
+
+def read_fourier(file: SourceFile, settings: Preparation) -> FileContent:
+    """Sum h = sum h_q exp(i q.r) over all waves; a wave without its opposite stands for both of them."""
+    table = file.values
+    if table.shape[1] != 4 or not np.all(np.isfinite(table)):
+        raise _not_waves("expected four numbers in each line: qx qy Re Im")
+    k = _wave_numbers(table[:, :2], settings)
+    period = 2 * np.pi * np.max(np.abs(k)) / np.max(np.abs(table[:, :2]))
+    modes = table[:, 2] + 1j * table[:, 3]
+    if len(np.unique(k, axis=0)) < len(k):
+        raise _not_waves("a wave vector is given twice; expected every wave vector once")
+    highest = int(np.max(np.abs(k)))
+    n = settings.grid or 2 ** math.ceil(math.log2(max(4 * highest, 8)))
+    if 2 * highest >= n:
+        raise UnfitTopography(
+            "grid",
+            f"is too coarse for waves {highest} times as short as the period; expected at least {2 * highest + 2}, "
+            f"better {4 * highest} or more",
+        )
+    require_room(_BYTES_OF_NODE * n**2)
+    spectrum, present = np.zeros((n, n), dtype=complex), np.zeros((n, n), dtype=bool)
+    spectrum[k[:, 1], k[:, 0]] = modes
+    present[k[:, 1], k[:, 0]] = True
+    opposite = np.ix_(-np.arange(n) % n, -np.arange(n) % n)
+    conjugate, opposite_present = np.conj(spectrum[opposite]), present[opposite]
+    differences = np.abs(spectrum - conjugate)[present & opposite_present]
+    if np.max(differences, initial=0.0) > _CONJUGATE * np.max(np.abs(modes)):
+        raise _not_waves("the heights would be complex; expected conjugate amplitudes of opposite wave vectors")
+    spectrum = np.where(opposite_present & ~present, conjugate, spectrum)
+    heights = scipy.fft.ifft2(spectrum, norm="forward", workers=1).real
+    return FileContent(heights, coordinates=(period, period))
+
+
+def _not_waves(problem):
+    return UnfitTopography("path", f"cannot be read as fourier: {problem}")
+
+
+def _wave_numbers(q, settings):
+    """Return the wave vectors (n, 2) as multiples of 2 pi over the period; integers are such multiples already."""
+    largest = np.max(np.abs(q))
+    if settings.size is not None and settings.size[0] != settings.size[1]:
+        raise UnfitTopography("size", "has two sides that differ, for a Fourier series; expected one length")
+    if np.all(q == np.rint(q)):
+        if settings.size is None:
+            raise UnfitTopography(
+                "size",
+                "is missing, and the wave vectors are integers, multiples of 2 pi/L; expected L, such as '0.1 mm'",
+            )
+        k = q
+    else:
+        unit = np.min(np.abs(q)[np.abs(q) > 1e-9 * largest])
+        # The longest wave fixes the unit only to the digits that it is written with; the shortest is more accurate.
+        k = np.rint(q * (np.max(np.abs(np.rint(q / unit))) / largest))
+        if np.max(np.abs(q * (np.max(np.abs(k)) / largest) - k)) > 0.01:
+            raise _not_waves("expected wave vectors that are multiples of the smallest one")
+    if not 0 < np.max(np.abs(k)) <= GRID.most / 2:
+        raise _not_waves(f"expected waves up to {GRID.most // 2} times as short as the period")
+    return k.astype(int)

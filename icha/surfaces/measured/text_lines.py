@@ -10,13 +10,13 @@ from typing import TextIO
 
 import numpy as np
 
-# Words, in small letters, that mark a missing height.
+# Words, in small letters, that stand for a missing height.
 _MISSING = frozenset(
     "- -- --- * ** *** **** ? nan na n/a #n/a #na bad none null nil nodata no_data missing masked invalid void "
     "undefined undef #value! #num! #div/0! #null! #ref!".split()
 ) | {"", "no data"}
 _NO_DATA = re.compile(r"\bno data\b", re.IGNORECASE)
-# Windows writes nan as 1.#IND and 1.#QNAN.
+# Remarks begin with #; but Windows writes nan as 1.#IND and 1.#QNAN, and Excel writes errors such as #N/A.
 _REMARK = re.compile(r"(?<!1\.)#(?!N/A|NA\b|VALUE!|NUM!|DIV/0!|NULL!|REF!)", re.IGNORECASE)
 _NAN = re.compile(r"[-+]?(1\.#(ind|qnan|snan)\d*|nan\(.*\))|\*+", re.IGNORECASE)
 # An exponent of double precision in Fortran, such as 1.5D-3.
@@ -52,14 +52,14 @@ def _guess_encoding(start: bytes) -> str:
 
 
 def strip_remark(line: str) -> str:
-    """Return a line up to its remark (#), without blanks around it; tabs may stand for empty fields."""
+    """Return a line without its remark (#) and the blanks around it; tabs remain, because they may separate fields."""
     text = _REMARK.split(line, maxsplit=1)[0] if "#" in line else line
     return "" if text.isspace() else text.strip(" \r\n\x1a")
 
 
 @dataclass(frozen=True)
 class Notation:
-    """How the numbers of a line are written.
+    """Notation of the numbers in a line: how they are separated and written.
 
     Attributes
     ----------
@@ -78,7 +78,7 @@ class Notation:
         return cls(notation.delimiter, has_decimal_commas(notation.fields(text)))
 
     def fields(self, text: str) -> list[str]:
-        """Split a line into its fields, without blanks and quotes around them, and with the minus sign of programs."""
+        """Split a line into its fields, without blanks and quotes around them, and with an ASCII minus sign."""
         text = text.replace("−", "-")
         if self.delimiter is None:
             fields = _NO_DATA.sub("nan", text).split()
@@ -89,7 +89,7 @@ class Notation:
         return [field.strip().strip("\"'").strip() for field in fields]
 
     def number(self, field: str) -> float | None:
-        """Return the number in a field, nan if the field stands for a missing height; None for any other text."""
+        """Read the number in a field: nan if the field stands for a missing height, None if it is any other text."""
         text = field.replace(",", ".") if self.decimal_comma else field
         try:
             return float(text.replace("_", "?"))  # Python would read 1_000 as a thousand
@@ -99,7 +99,7 @@ class Notation:
             return np.nan if field.lower() in _MISSING or _NAN.fullmatch(field) else None
 
     def numbers(self, text: str) -> list[float | None]:
-        """Return the numbers in the fields of a line, as `number` does, but faster if the line has nothing else."""
+        """Read the numbers in the fields of a line, as `number` does, but faster if all fields are plain numbers."""
         try:
             return [*map(float, text.replace("_", "?").split(self.delimiter))]
         except ValueError:
@@ -118,13 +118,12 @@ def are_decimal_between_blanks(text: str) -> bool:
 
 
 def are_halves_of_decimals(rows: list[list[str]]) -> bool:
-    """Return whether columns contain, alternately, the digits before and after decimal commas.
+    """Return whether the columns contain, in turn, the digits before and the digits after decimal commas.
 
-    Digits after a comma have no sign, and a column of them has the same number of digits in every row. Such columns
-    differ from columns of integers: some numbers begin with a zero, or numbers in the column before it have other
-    lengths.
+    Digits after a comma have no sign, and in every row of a column there are equally many. Columns of integers differ
+    from this: they have no leading zeros, and their numbers are not all of one length.
     """
-    # A row whose last field is empty is shorter.
+    # A row is shorter if its last field is empty.
     width = max(map(len, rows))
     rows = [row for row in rows if len(row) == width]
     if width < 6 or width % 2:

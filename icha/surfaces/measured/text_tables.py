@@ -1,4 +1,4 @@
-"""Tables of numbers in text files: where the numbers begin, how they are written, and their values."""
+"""Tables of numbers in text files: where they begin, how numbers are written, their values, rows of coordinates."""
 
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 
 from icha.surfaces.measured.array_files import open_instrument
-from icha.surfaces.measured.coordinate_lines import is_scale
 from icha.surfaces.measured.settings import UnfitTopography
 from icha.surfaces.measured.text_lines import (
     AMBIGUOUS_COMMA,
@@ -20,10 +19,20 @@ from icha.surfaces.measured.text_lines import (
     strip_remark,
 )
 
-# Characters in which the first line of numbers is searched, and the largest number of lines of a heading.
+# Characters and lines at the beginning of a file in which the first line of numbers must be.
 _BEGINNING, _LONGEST_HEADING = 2**20, 1000
-# Fewest fields with which a line of mostly numbers counts as a damaged row, not as names of columns.
+# Fewest fields of a line that counts as a damaged row if most of its fields are numbers, not as titles of columns.
 _FEWEST_FIELDS = 8
+# Largest difference of two steps that count as equal, as a fraction of a step, if digits do not limit it.
+_EQUAL_STEPS = 1e-2
+# Smallest range of coordinates in units of their last digit.
+_FEWEST_UNITS = 4
+# Limits with which a first line of heights resembles the second and the third line. The first and second line differ by
+# at most `_DIFFERENCE` times the difference of second and third. Besides, the fraction `_SAME_SIGN` of the steps in the
+# first and second line has the same sign, or second and third differ by at most `_SMOOTH` times their heights.
+_DIFFERENCE, _SAME_SIGN, _SMOOTH = 3, 0.8, 0.2
+# Fewest numbers of a line that can be coordinates.
+_FEWEST_COORDINATES = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,18 +41,17 @@ class Layout:
 
     Attributes
     ----------
-    heading : lines above the numbers, remarks included.
-    words : whether the heading contains lines other than remarks (#).
+    heading : lines above the numbers, including remarks.
     notation : delimiter and decimal sign.
     columns : numbers in the first line of numbers.
     """
 
     heading: tuple[str, ...]
-    words: bool
     notation: Notation
     columns: int
 
 
+@dataclass(eq=False)
 class SourceFile:
     """The file of a scan; each attribute is read from the file once, at its first use.
 
@@ -52,9 +60,7 @@ class SourceFile:
     path : the file.
     """
 
-    def __init__(self, path: Path):
-        """Read nothing yet."""
-        self.path = path
+    path: Path
 
     @cached_property
     def layout(self) -> Layout | None:
@@ -76,17 +82,13 @@ class SourceFile:
     def values(self) -> np.ndarray:
         """Numbers (rows, columns) of a text, nan where one is missing.
 
-        Raises
-        ------
-        UnfitTopography
-            If the file has no numbers, a field that is not a number, or a row of another length; with the line's
-            number.
+        Raises UnfitTopography if the file has no numbers, a field that is not a number, or rows of different lengths.
         """
         return self._table[0]
 
     @cached_property
     def _table(self):
-        """Numbers (rows, columns), and the number of the line of each row, counted from 1."""
+        """Numbers (rows, columns), and the line in the file, from 1, of each row."""
         notation, columns = self.table_layout.notation, self.table_layout.columns
         rows, lines = [], []
         with open_text(self.path) as file:
@@ -94,8 +96,6 @@ class SourceFile:
                 if not text or line <= len(self.table_layout.heading):
                     continue
                 row = notation.numbers(text)
-                if not rows and row[0] is None and is_scale(row[1:]):
-                    row[0] = np.nan
                 if None in row:
                     raise _not_a_number(notation.fields(text), row.index(None), line)
                 rows.append(np.array(row))
@@ -105,9 +105,6 @@ class SourceFile:
         if usual == columns + 1 and all(np.isnan(row[-1]) for row in rows if len(row) == usual):
             rows = [row[:columns] if len(row) == usual else row for row in rows]
             usual = columns
-        # With blanks between fields an empty corner has no field.
-        if notation.delimiter is None and len(rows[0]) == usual - 1 and is_scale(list(rows[0])):
-            rows[0] = np.array([np.nan, *rows[0]])
         for line, row in zip(lines, rows, strict=True):
             if len(row) != usual:
                 raise UnfitTopography(
@@ -120,7 +117,7 @@ class SourceFile:
     def refuse_blocks(self) -> None:
         """Raise UnfitTopography if empty lines or remarks divide the rows into blocks, as in files of several images.
 
-        An empty line or a remark after every row is accepted.
+        Empty lines or remarks between all rows are accepted.
         """
         values, lines = self._table
         begins = np.flatnonzero(np.diff(lines) > 1) + 1
@@ -133,7 +130,7 @@ class SourceFile:
 
     @cached_property
     def instrument(self):
-        """The file as SurfaceTopography opens it; None if SurfaceTopography does not know its format."""
+        """The file, opened with SurfaceTopography; None if SurfaceTopography does not know its format."""
         return open_instrument(self.path)
 
 
@@ -160,10 +157,9 @@ def _count_columns(fields):
 def _find_layout(path: Path) -> Layout | None:
     """Find the first line of numbers and how numbers are written; None if the file is not a text with numbers.
 
-    Raises UnfitTopography if it is not clear whether commas are decimal, or if the line above the numbers is a damaged
-    row.
+    Raises UnfitTopography if commas may or may not be decimal, or if the line above the numbers is a damaged row.
     """
-    lines, words = _first_lines(path), False
+    lines = _first_lines(path)
     for number, line in enumerate(lines):
         if not (text := strip_remark(line)):
             continue
@@ -176,18 +172,16 @@ def _find_layout(path: Path) -> Layout | None:
             )
         fields = notation.fields(text)
         numbers = [notation.number(field) for field in fields]
-        corner = numbers[0] is None and is_scale(numbers[1:])
-        if corner or (None not in numbers and not np.isnan(np.array(numbers, dtype=float)).all()):
+        if None not in numbers and not np.isnan(np.array(numbers, dtype=float)).all():
             if number and (damage := _find_damage(strip_remark(lines[number - 1]), number, notation)):
                 raise damage
             notation = _decide_on_commas(notation, lines[number:], len(fields))
-            return Layout(tuple(lines[:number]), words, notation, _count_columns(fields))
-        words = True
+            return Layout(tuple(lines[:number]), notation, _count_columns(fields))
     return None
 
 
 def _find_damage(text, number, notation):
-    """Return the error for a line if it resembles a row of numbers and has other fields; None for other lines."""
+    """Return the error for a line that resembles a row of numbers but has other fields, too; None for other lines."""
     fields = notation.fields(text)
     wrong = [k for k, field in enumerate(fields) if notation.number(field) is None]
     words = [k for k in wrong if not LIKE_A_NUMBER.match(fields[k])]
@@ -197,7 +191,10 @@ def _find_damage(text, number, notation):
 
 
 def _decide_on_commas(notation, lines, count):
-    """Decide from all known lines with `count` fields whether commas are decimal; if unclear, raise UnfitTopography."""
+    """Return the notation after deciding, from all lines with `count` fields, whether their commas are decimal.
+
+    Raises UnfitTopography if this is not clear.
+    """
     rows = [notation.fields(text) for line in lines if (text := strip_remark(line))]
     rows = [row[: _count_columns(row)] for row in rows if len(row) == count]
     fields = [field for row in rows for field in row]
@@ -211,14 +208,102 @@ def _decide_on_commas(notation, lines, count):
     if notation.delimiter == "," and not with_comma and are_halves_of_decimals(rows):
         raise UnfitTopography(
             "path",
-            f"has commas that stand between numbers and seem to be decimal, too, as in {','.join(rows[0][:4])}; "
+            f"has commas between numbers and others that seem to be decimal, as in {','.join(rows[0][:4])}; "
             "expected semicolons between numbers with decimal commas, quotes around these, or decimal points",
         )
     return replace(notation, decimal_comma=notation.decimal_comma or has_decimal_commas(fields))
 
 
 def first_damaged_line(path: Path) -> UnfitTopography | None:
-    """Return the error for the first line that resembles a row of numbers, but has other fields; None without one."""
+    """Return the error for the first line that resembles a row of numbers but has other fields, too, or None."""
     texts = map(strip_remark, _first_lines(path))
     damages = (_find_damage(text, number, Notation.of_line(text)) for number, text in enumerate(texts, 1))
     return next(filter(None, damages), None)
+
+
+# Rows and columns of coordinates or of numbers of points. Heights of a rough surface do not rise in equal steps along a
+# row or column. If they do so in all rows, the surface is a plane.
+
+
+def drop_coordinates(values: np.ndarray) -> tuple[np.ndarray, tuple[float, float] | None, str]:
+    """Remove a first row and a first column that contain coordinates or numbers of points.
+
+    Returns
+    -------
+    heights, steps of the coordinates along x and y (None unless both are given), and a remark on the removed parts.
+
+    Raises UnfitTopography if the first row or column seems to contain coordinates in unequal steps, or the last one
+    coordinates in equal steps.
+    """
+    heights, steps = values, {}
+    for name in ("row", "column"):
+        table = heights if name == "row" else heights.T
+        first, last = _coordinate_step(table), _coordinate_step(table[::-1])
+        uneven = first is not None and np.isnan(first)
+        if uneven or (last is not None and not np.isnan(last)):
+            raise UnfitTopography(
+                "path",
+                f"has a {'first' if uneven else 'last'} {name} of numbers that rise or fall as coordinates do; "
+                f"expected heights in equal distances. Remove the {name}, or interpolate the heights. If all numbers "
+                "are heights, give them as .npy",
+            )
+        if first is not None:
+            steps[name] = first
+            heights = table[1:] if name == "row" else table[1:].T
+    remark = f"first {' and '.join(steps)} left out: numbers in equal steps, not heights" if steps else ""
+    return heights, (steps["row"], steps["column"]) if len(steps) == 2 else None, remark
+
+
+def _coordinate_step(table):
+    """Return the step of coordinates in the first line of a table: nan if it varies, None if the line has heights."""
+    line, others = table[0], table[1:3]
+    if len(table) < 3 or len(line) < _FEWEST_COORDINATES or any(_equal_step(each) is not None for each in others):
+        return None
+    step = _equal_step(line, rounded=False)
+    if step is None and not _resembles(line[1:], others[:, 1:]):
+        step = _equal_step(line)
+        differences = np.diff(line[1:])
+        if step is None and (np.all(differences > 0) or np.all(differences < 0)):
+            step = np.nan
+    return None if step is None else abs(step)
+
+
+def _resembles(line, others):
+    """Return whether the heights in a line resemble those of the next two lines."""
+    known = np.isfinite(line) & np.all(np.isfinite(others), axis=0)
+    if np.count_nonzero(known) < 3:
+        return False
+    line, others = line[known], others[:, known]
+    same = np.mean(np.sign(np.diff(line)) == np.sign(np.diff(others[0])))
+    usual = np.std(others[0] - others[1])
+    smooth = usual <= _SMOOTH * np.std(others[0])
+    return (same >= _SAME_SIGN or smooth) and np.std(line - others[0]) <= _DIFFERENCE * usual
+
+
+def _equal_step(line: np.ndarray, *, rounded: bool = True) -> float | None:
+    """Return the step from number to number in a line; None if the steps are not equal. The first number may be any.
+
+    rounded : whether steps may differ because the file has few digits.
+    """
+    for numbers in (line, line[1:]):
+        steps = np.diff(numbers)
+        if not len(steps) or not np.all(np.isfinite(steps)):
+            continue
+        mean = float(numbers[-1] - numbers[0]) / len(steps)
+        if mean and np.ptp(steps) <= _EQUAL_STEPS * abs(mean):
+            return mean
+        if not rounded:
+            continue
+        # Rounding shifts every number by up to half a unit of the last digit.
+        unit = _last_digit(numbers)
+        error = np.max(np.abs(numbers - numbers[0] - mean * np.arange(len(numbers))))
+        if np.all(steps * mean >= 0) and error <= 1.001 * unit and np.ptp(numbers) >= _FEWEST_UNITS * unit:
+            return mean
+    return None
+
+
+def _last_digit(numbers):
+    """Return the unit of the last digit with which the largest number was probably written."""
+    largest = np.max(np.abs(numbers))
+    digits = max(len(f"{abs(number):.14e}".partition("e")[0].replace(".", "").rstrip("0")) for number in numbers)
+    return 10.0 ** (np.floor(np.log10(largest)) + 1 - digits) if largest else 0.0

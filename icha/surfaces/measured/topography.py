@@ -1,39 +1,49 @@
 """Measured topographies: from a file to a surface.
 
 A measurement becomes a surface in this order: read heights and lengths in metres (`scan`), turn the side that touches
-first upwards, then apply the steps of `steps`: cut out a square, remove the trend, fill missing points, make pixels
-square, filter short waves, treat the edges as the boundary requires, change the grid.
+first upwards, cut out a square, remove the trend, fill missing points, make pixels square, filter short waves, treat
+the edges as the boundary requires, change the grid.
 
 SurfaceTopography reads the files of instruments. It could also remove trends and fill holes, but its import takes
 seconds, which every command with a measured surface would need.
 """
 
+import math
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import scipy.fft
+import scipy.sparse
+import scipy.sparse.linalg
 
+from icha.support import formatting
 from icha.support.checksums import sha256_of
-from icha.support.input_files import problem_with_path
-from icha.surfaces.measured.scan import load_scan
-from icha.surfaces.measured.settings import Preparation, UnfitTopography
-from icha.surfaces.measured.steps import (
-    crop_square,
-    fill_missing_points,
-    filter_short_waves,
-    refuse_flat,
-    remove_trend,
-    resample_to_square_pixels,
-    treat_edges,
-)
-from icha.surfaces.surface import Surface
+from icha.support.input_files import TooLarge, require_room
+from icha.surfaces.measured.scan import Scan, load_scan
+from icha.surfaces.measured.settings import MIRROR, WINDOW, Preparation, UnfitTopography
+from icha.surfaces.square import problem_with_heights
+from icha.surfaces.surface import FREE, PERIODIC, Surface
+
+# Relative rounding of the quotient of two lengths.
+_ROUNDING = 1e-9
+# Range of heights without their trend, relative to the largest height, below which the heights are rounding.
+_FLAT = 1e-13
+# Largest relative difference of the two sides of a square pixel.
+SQUARE = 1e-3
+# Standard deviation of the weights over the nesting index: alpha/sqrt(2 pi), alpha = sqrt(ln 2/pi) (ISO 16610-61).
+DEVIATION = math.sqrt(math.log(2) / 2) / math.pi
+# Smallest nesting index, in pixels, at which the filter has the transmission of the standard.
+LEAST_PIXELS = 4
+# Standard deviations at which the weights end; this omits 2e-9 of them.
+_REACH = 6
 
 
 @dataclass(frozen=True, eq=False)
 class PreparedTopography:
-    """A surface at its own heights, and how it was made from a file.
+    """A surface at its own heights, and the record of its preparation from a file.
 
     Attributes
     ----------
@@ -41,7 +51,7 @@ class PreparedTopography:
     description : all steps from the file to the surface, for readers.
     format : format as which the file was read.
     data : name of the array or channel that was read; empty if the file has only one.
-    reading : points, pixels and units of the file and what was left out of it, for readers.
+    reading : points, pixels and units of the file, and parts of the file that were left out, for readers.
     filled : number of points that had no height.
     points : number of points that were used.
     """
@@ -56,14 +66,9 @@ class PreparedTopography:
     filled: int
     points: int
 
-    @property
-    def rms_slope(self) -> float:
-        """Root mean square slope of the surface as prepared."""
-        return self.surface.rms_slope
-
 
 def prepared_topography(path: str | os.PathLike, preparation: Mapping) -> PreparedTopography:
-    """Read a topography and make the surface that the settings describe.
+    """Read a topography and prepare the surface that the settings describe.
 
     Parameters
     ----------
@@ -73,11 +78,9 @@ def prepared_topography(path: str | os.PathLike, preparation: Mapping) -> Prepar
     Raises
     ------
     UnfitTopography
-        A ValueError with the setting (`key`) that does not fit the file, the reason, and what is expected.
+        A ValueError with the setting that does not fit the file (attribute `key`), the reason, and what is expected.
     """
     file, settings = Path(path), Preparation(**preparation)
-    if problem := problem_with_path(file):
-        raise UnfitTopography("path", f"{problem}; expected a file of heights")
     scan = load_scan(file, settings)
     touching = scan.heights if settings.touches_first == "high" else -scan.heights
     square = crop_square(scan.after(touching, f"{settings.touches_first} numbers touch first"), settings)
@@ -97,3 +100,221 @@ def prepared_topography(path: str | os.PathLike, preparation: Mapping) -> Prepar
         filled=int(np.count_nonzero(~np.isfinite(square.heights))),
         points=square.heights.size,
     )
+
+
+def crop_square(scan: Scan, settings: Preparation) -> Scan:
+    """Cut out a square of whole pixels. If pixels are not square, its sides may differ by less than a pixel."""
+    rows, columns = scan.heights.shape
+    dx, dy = scan.pixel
+    width, height = map(formatting.length, scan.size)
+    if settings.crop is None:
+        side = min(scan.size)
+        nx, ny = (int(side / each * (1 + _ROUNDING)) for each in (dx, dy))
+        if abs(dx / dy - 1) <= SQUARE:
+            nx = ny = min(nx, ny)
+        first_x, first_y = (columns - nx) // 2, (rows - ny) // 2
+    else:
+        x, y, side = (settings.crop[name] for name in ("x", "y", "side"))
+        first_x, first_y = round(x / dx), round(y / dy)
+        nx, ny = round(side / dx), round(side / dy)
+        if first_x + nx > columns or first_y + ny > rows:
+            raise UnfitTopography(
+                "crop",
+                f"ends at x = {formatting.length(x + side)}, y = {formatting.length(y + side)}, outside of the scan"
+                f"{scan.remark_on_unit}; expected at most x = {width}, y = {height}",
+            )
+    if nx < 8 or ny < 8:
+        raise UnfitTopography(
+            "crop" if settings.crop else "path",
+            f"leaves {nx} x {ny} points{scan.remark_on_unit}; expected at least 8 x 8",
+        )
+    if settings.boundary == PERIODIC and ((nx, ny) != (columns, rows) or abs(nx * dx / (ny * dy) - 1) > SQUARE):
+        raise UnfitTopography(
+            "boundary",
+            f"needs the whole scan to be a square, and it is {width} x {height}; expected another boundary, or no crop",
+        )
+    square = scan.heights[first_y : first_y + ny, first_x : first_x + nx]
+    step = [] if square.shape == scan.heights.shape else [f"cut to {nx} x {ny} points from ({first_x}, {first_y})"]
+    return scan.after(square, *step, size=(nx * dx, ny * dy))
+
+
+def remove_trend(scan: Scan, settings: Preparation) -> Scan:
+    """Remove the plane or the paraboloid that fits the known heights best."""
+    known = np.isfinite(scan.heights)
+    if not known.any():
+        raise UnfitTopography("path", "holds no height within the square that is used; expected another crop or file")
+    degree = {"none": 0, "tilt": 1, "curvature": 2}[settings.detrend]
+    if degree == 0:
+        return scan
+    rows, columns = scan.heights.shape
+    powers = [(i, j) for i in range(degree + 1) for j in range(degree + 1 - i)]
+    y, x = (np.vander(np.linspace(-1, 1, n), 2 * degree + 1, increasing=True) for n in (rows, columns))
+    # Sum all products of powers over the known points, without a table of all points.
+    moments = y.T @ known.astype(float) @ x
+    weighted = y.T @ np.where(known, scan.heights, 0.0) @ x
+    matrix = np.array([[moments[i + k, j + m] for k, m in powers] for i, j in powers])
+    right = np.array([weighted[i, j] for i, j in powers])
+    coefficients = np.zeros((degree + 1, degree + 1))
+    coefficients[tuple(np.transpose(powers))] = np.linalg.lstsq(matrix, right, rcond=None)[0]
+    trend = y[:, : degree + 1] @ coefficients @ x[:, : degree + 1].T
+    return scan.after(scan.heights - trend, f"{settings.detrend} removed")
+
+
+def refuse_flat(prepared: Scan, square: Scan, settings: Preparation) -> None:
+    """Raise UnfitTopography if the prepared heights are only rounding errors of the original heights."""
+    known = np.isfinite(square.heights)
+    if np.ptp(prepared.heights) <= _FLAT * np.nanmax(np.abs(square.heights), where=known, initial=0.0):
+        apart = "" if settings.detrend == "none" else ", apart from the trend that is removed"
+        raise UnfitTopography("path", f"holds heights that are all the same{apart}; expected a rough surface")
+
+
+def fill_missing_points(scan: Scan, settings: Preparation) -> Scan:
+    """Fill missing points with the solution of Laplace's equation, if the settings allow this."""
+    missing = ~np.isfinite(scan.heights)
+    count = int(np.count_nonzero(missing))
+    if not count:
+        return scan
+    if settings.missing == "refuse":
+        raise UnfitTopography(
+            "missing",
+            f"does not allow {count} of {missing.size} points without a height; expected fill, or a crop without them",
+        )
+    if 2 * count > missing.size:
+        raise UnfitTopography("missing", f"cannot fill {count} of {missing.size} points; expected at most half")
+    heights = scan.heights.copy()
+    heights[missing] = _harmonic(heights, missing, periodic=settings.boundary == PERIODIC)
+    return scan.after(heights, f"{count} missing points filled, {formatting.share(count, missing.size)} of the points")
+
+
+def _harmonic(heights, missing, *, periodic):
+    """Solve Laplace's equation: each missing height (count,) is the mean of its neighbours, four or at edges fewer."""
+    row, column = np.nonzero(missing)
+    count, pairs = len(row), []
+    index = np.full(missing.shape, -1)
+    index[missing] = np.arange(count)
+    neighbours, right = np.zeros(count), np.zeros(count)
+    for down, across in ((1, 0), (-1, 0), (0, 1), (0, -1)):
+        y, x = row + down, column + across
+        if periodic:
+            y, x = y % missing.shape[0], x % missing.shape[1]
+        inside = np.flatnonzero((y >= 0) & (y < missing.shape[0]) & (x >= 0) & (x < missing.shape[1]))
+        neighbours[inside] += 1
+        other = index[y[inside], x[inside]]
+        known = inside[other < 0]
+        right[known] += heights[y[known], x[known]]
+        pairs.append((inside[other >= 0], other[other >= 0]))
+    first, second = (np.concatenate(each) for each in zip(*pairs, strict=True))
+    coupling = scipy.sparse.csc_matrix((np.full(len(first), -1.0), (first, second)), shape=(count, count))
+    return scipy.sparse.linalg.spsolve(coupling + scipy.sparse.diags(neighbours, format="csc"), right)
+
+
+def resample_to_square_pixels(scan: Scan, settings: Preparation) -> Scan:
+    """Resample to square cells as large as the shorter side of a pixel.
+
+    Heights along the longer side of the pixels are interpolated by their cosine series. This series is band-limited: it
+    keeps all measured waves and their rms slope, and adds no wave shorter than two pixels. Periodic scans are resampled
+    by their Fourier series in `treat_edges`.
+    """
+    dx, dy = scan.pixel
+    if settings.boundary == PERIODIC or abs(dx / dy - 1) <= SQUARE:
+        return scan
+    across, cell = (0, dx) if dx < dy else (1, dy)
+    grid = int(min(scan.size) / cell * (1 + 1e-9))
+    lines = np.take(scan.heights, range(grid), axis=1 - across)
+    heights = _by_cosine_series(lines, across, cell / max(dx, dy), grid)
+    pixel = " x ".join(map(formatting.length, (dx, dy)))
+    step = f"pixels of {pixel} resampled to {grid} x {grid} square ones, by the cosine series along {'yx'[across]}"
+    return scan.after(heights, step, size=(grid * cell, grid * cell))
+
+
+def _by_cosine_series(heights, axis, step, count):
+    """Evaluate the cosine series along an axis, in the middle of `count` new cells that are `step` old cells wide."""
+    # Slow to import, and rarely needed.
+    from scipy.signal import czt
+
+    n = heights.shape[axis]
+    series = np.moveaxis(scipy.fft.dct(heights, axis=axis, norm="forward", workers=1), axis, 0)
+    series[1:] *= 2
+    # sum_k series_k cos(pi k y/n) at y = step (j + 1/2): a chirp z-transform.
+    turn = 1j * np.pi * step / n
+    return np.moveaxis(czt(series, count, w=np.exp(turn), a=np.exp(-turn / 2), axis=0).real, 0, axis)
+
+
+def filter_short_waves(scan: Scan, settings: Preparation) -> Scan:
+    """Apply the areal Gaussian filter of ISO 16610-61, whose nesting index is the cut-off.
+
+    The filter multiplies a wave of length l by 2^-(cutoff/l)^2. Beyond the edges heights continue by reflection (ISO
+    16610-28), or periodically if the scan is periodic.
+    """
+    if settings.cutoff is None:
+        return scan
+    # Slow to import, and rarely needed.
+    from scipy.ndimage import gaussian_filter
+
+    least, most = LEAST_PIXELS * max(scan.pixel), min(scan.size)
+    if not least * (1 - 1e-9) <= settings.cutoff <= most:
+        raise UnfitTopography(
+            "cutoff",
+            f"is {settings.cutoff / max(scan.pixel):.3g} pixels{scan.remark_on_unit}; expected from {LEAST_PIXELS} "
+            f"pixels, {formatting.length(least)}, to the side of the square, {formatting.length(most)}",
+        )
+    dx, dy = scan.pixel
+    sigma = DEVIATION * settings.cutoff
+    mode = "wrap" if settings.boundary == PERIODIC else "reflect"
+    heights = gaussian_filter(scan.heights, (sigma / dy, sigma / dx), mode=mode, truncate=_REACH)
+    return scan.after(heights, f"Gaussian S-filter (ISO 16610-61) with a nesting index of {settings.cutoff:.6g} m")
+
+
+def treat_edges(scan: Scan, settings: Preparation) -> tuple[Surface, list[str]]:
+    """Treat the edges as the boundary requires, and change the grid; return the surface and all steps."""
+    nodes = settings.grid or (2 if settings.boundary == MIRROR else 1) * max(scan.heights.shape)
+    try:
+        # Resampling copies the heights.
+        require_room(3 * 8 * nodes**2)
+    except TooLarge as error:
+        raise UnfitTopography("grid", f"gives a surface of {nodes} x {nodes} points, which {error}") from None
+    heights, side, free = scan.heights - np.mean(scan.heights), scan.size[0], settings.boundary == FREE
+    steps = list(scan.steps)
+    if settings.boundary == WINDOW:
+        # Tukey's window, cell by cell: half a cosine wave at either edge and one in between.
+        centres = [(np.arange(n) + 0.5) / n for n in heights.shape]
+        edges = [np.minimum(np.minimum(x, 1 - x) / settings.taper, 1.0) for x in centres]
+        across, along = (np.sin(0.5 * np.pi * edge) ** 2 for edge in edges)
+        heights = heights * across[:, None] * along
+        steps.append(f"heights fall to their mean on {settings.taper:g} of the side at every edge")
+    if settings.boundary == MIRROR:
+        heights, side = np.pad(heights, [(0, n) for n in heights.shape], mode="symmetric"), 2 * side
+        steps.append("joined by its mirror images")
+    # Pixels of periodic scans may still not be square.
+    grid = settings.grid or max(heights.shape)
+    if heights.shape != (grid, grid):
+        heights = _resampled(heights, grid, free=free)
+        steps.append(f"resampled to {grid} x {grid} points")
+    if problem := problem_with_heights(heights):
+        raise UnfitTopography("path", f"holds {problem}")
+    steps.append("one square on a free half-space" if free else f"repeats after {side:.6g} m")
+    try:
+        return Surface(heights, side, FREE if free else PERIODIC), steps
+    except ValueError as error:  # the range of heights over the side is out of bounds
+        raise UnfitTopography(
+            "height_unit", f"gives a surface that cannot be pressed ({error}); expected another unit"
+        ) from None
+
+
+def _resampled(heights, grid, *, free):
+    """Resample to grid x grid points by the Fourier series, or a free square by the cosine series."""
+    # Slow to import, and rarely needed.
+    from scipy.signal import resample
+
+    for axis in (0, 1):
+        n = heights.shape[axis]
+        if n == grid:
+            continue
+        if not free:
+            heights = resample(heights, grid, axis=axis)
+            continue
+        series = np.moveaxis(scipy.fft.dct(heights, axis=axis, norm="forward", workers=1), axis, 0)[:grid]
+        padded = np.zeros((grid, series.shape[1]))
+        padded[: len(series)] = series
+        heights = np.moveaxis(scipy.fft.idct(padded, axis=0, norm="forward", workers=1), 0, axis)
+    return heights

@@ -1,9 +1,10 @@
-"""Executor of Snakemake whose jobs are forks of one process that has imported what they need.
+"""Executor of Snakemake. Its jobs are forks of one process that has already imported the libraries.
 
-Importing NumPy, SciPy, xarray and the package takes seconds, often longer than the work of a job. So the first job
-starts the fork server of `multiprocessing`, a process that has imported them, and every job of one thread is a fork of
-it. Other jobs run in their own process, as with Snakemake's executor `local`. So do all jobs if the fork server cannot
-be started, or if libraries do not survive a fork (on other systems than Linux).
+Importing NumPy, SciPy, xarray and the package takes seconds, often longer than the work of a job. Therefore the first
+job starts the fork server of `multiprocessing`, a process that imports these libraries. Every job of one thread is a
+fork of this process. Other jobs run in their own process, as with Snakemake's executor `local`. All jobs run in their
+own process if the fork server cannot be started, and on other systems than Linux, where libraries may not survive a
+fork.
 
 When one of these processes ends, the processes that it started end, too: Snakemake, the fork server, its forks.
 """
