@@ -65,7 +65,7 @@ class FullContactProblem(MaterialUnits):
     @property
     def opening_pressure(self) -> float:
         """Nominal pressure of full contact at which it opens on unloading, Pa."""
-        return self.closing_pressure - self.interface_strength
+        return -float(self.full_contact_pressure.min()) - self.interface_strength
 
     def full_contact(self, pressure: float) -> CellState:
         """Full contact under a nominal pressure, Pa: closed form."""
@@ -78,9 +78,9 @@ class FullContactProblem(MaterialUnits):
         return state.separation == 0 and len(state.cells) == self.heights.size
 
     @property
-    def closing_pressure(self) -> float:
-        """Nominal pressure that closes the last gap without adhesion, Pa."""
-        return -float(self.full_contact_pressure.min())
+    def closing_pressure(self):
+        """Nominal pressure of full contact under control of the separation, Pa: above all targets, otherwise free."""
+        return 10 * max(float(np.abs(self.full_contact_pressure).max()), self.interface_strength)
 
     def open_weakest(self, separation):
         """Full contact after the cells of least pressure opened, so many that they hold the mean gap (m)."""
