@@ -314,14 +314,12 @@ def _write_ragged(
     return count
 
 
-def _put_shared(
-    name: str, column: Column, stored: np.ndarray, index: tuple, values: np.ndarray, run: RunLabels
-) -> None:
+def _put_shared(name: str, column: Column, known: np.ndarray, index: tuple, values: np.ndarray, run: RunLabels) -> None:
     """Store a run's values of a variable that several runs share; values of earlier runs stay, and must be the same."""
-    present = stored[index]
+    present = known[index]
     unknown = present == column.fill
     equal = present == values if values.dtype.kind == "S" else abs(present - values) <= _SAME * abs(values)
     if not np.all(unknown | equal):
         shared = ", ".join(column.along) or "the study"
         raise ValueError(f"{run}: {name} differs between runs that share {shared}")
-    stored[index] = np.where(unknown, values, present)
+    known[index] = np.where(unknown, values, present)
