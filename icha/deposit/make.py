@@ -160,10 +160,7 @@ def _write(path: Path, text: str) -> None:
 
 
 def _write_zip(path: Path, folder: Path, name: str) -> None:
-    """Write a folder to a zip, in which the folder has the given name.
-
-    The zip is not compressed, because versions of zlib differ.
-    """
+    """Write a folder under a name to a zip; it is not compressed, because versions of zlib differ."""
     with zipfile.ZipFile(path, "w", zipfile.ZIP_STORED) as archive:
         for file in files_of(folder):
             status = (folder / file).stat()

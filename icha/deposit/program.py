@@ -180,10 +180,8 @@ def note_versions(results: Path) -> None:
 
 
 def _noted(results: Path) -> set[str]:
-    try:
-        return set((results / MADE_WITH).read_text(encoding="utf-8").split())
-    except OSError:
-        return set()
+    file = results / MADE_WITH
+    return set(file.read_text(encoding="utf-8").split()) if file.is_file() else set()
 
 
 def refuse_other_environment(project: Path, results: Path) -> None:
