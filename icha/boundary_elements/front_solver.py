@@ -69,6 +69,9 @@ class FrontTolerances:
 TOLERANCES = FrontTolerances()
 # Largest numbers of steps, of Krylov vectors, of local relaxations between steps; largest damping.
 _MAX_STEPS, _MAX_KRYLOV, _MAX_LOCAL_RELAXATIONS, _LARGEST_DAMPING = 400, 60, 5, 1e8
+# Largest error of displacements in units of the critical opening, divided by the residual of the front that depends on
+# these displacements.
+_ACCURACY = 1e-3
 # Relative rounding error of the energy, and relative rounding error of the work of a step.
 _ENERGY_ROUNDING, _WORK_ROUNDING = 1e-12, 1e-11
 
@@ -163,9 +166,9 @@ class FrontProblem:
         tolerance = accuracy * self.front.critical_opening
         return solve_bonded_contact(self.space, self.topography, self.separation, contact, tolerance, self.background)
 
-    def accuracy(self, state: AdhesiveContact) -> float:
-        """Accuracy of the displacement of a state, in units of the critical opening."""
-        return state.tolerance / self.front.critical_opening
+    def is_accurate(self, state: AdhesiveContact, accuracy: float) -> bool:
+        """Return whether the displacement errors of a state are at most `accuracy` times the critical opening."""
+        return state.tolerance <= (1 + _WORK_ROUNDING) * accuracy * self.front.critical_opening
 
     def energy(self, state: AdhesiveContact) -> float:
         """Return the elastic energy minus the work of adhesion, in E* times cell size^3."""
@@ -215,16 +218,15 @@ def relax_front(
         active = find_active_cells(problem.front, relaxation.state)
         try:
             if active.residual <= tolerance:
-                if relaxation.is_accurate:
+                if not relaxation.refine(_ACCURACY * tolerance):
                     return relaxation.state
-                relaxation.refine()
             elif not relaxation.relax_locally(active, relax_locally):
                 relaxation.step(active)
         except Stagnation as failure:
-            if relaxation.is_accurate and active.residual <= TOLERANCES.stagnation:
+            if active.residual > TOLERANCES.stagnation:
+                raise NotConverged(f"{failure} (residual of sqrt(G/dgamma): {active.residual:.1e})") from None
+            if not relaxation.refine(TOLERANCES.displacement):
                 return relaxation.state
-            message = f"{failure} (residual of sqrt(G/dgamma): {active.residual:.1e})"
-            raise NotConverged(message) from None
     if max_steps or active.residual <= TOLERANCES.stagnation:
         return relaxation.state
     raise NotConverged(f"the front did not converge (residual of sqrt(G/dgamma): {active.residual:.1e})")
@@ -254,15 +256,16 @@ class FrontRelaxation:
             contact = problem.solve_elastic(contact, self.start)
         self.state = contact
 
-    @property
-    def is_accurate(self) -> bool:
-        """Whether the displacement of the state is that of a converged contact."""
-        return self.problem.accuracy(self.state) <= TOLERANCES.displacement
+    def refine(self, accuracy: float) -> bool:
+        """Solve the pressures again unless displacement errors are at most `accuracy`; return whether it did so.
 
-    def refine(self, accuracy: float = TOLERANCES.displacement) -> None:
-        """Solve for the pressures again, to an accuracy in units of the critical opening."""
+        accuracy : in units of the critical opening; at least TOLERANCES.displacement is used.
+        """
         accuracy = max(accuracy, TOLERANCES.displacement)
+        if self.problem.is_accurate(self.state, accuracy):
+            return False
         self.state = self.problem.solve_elastic(self.state, accuracy)
+        return True
 
     def relax_locally(self, active: ActiveCells, relax: Callable) -> bool:
         """Relax the front around cells far from equilibrium, if that lowers the energy; return whether it did."""
@@ -297,7 +300,7 @@ class FrontRelaxation:
         self.steps += 1
         change, pressure_change = newton_step(problem, active, self.damping)
         if np.sum((active.intensity**2 - 1) * change) > _WORK_ROUNDING * np.abs(change).sum():
-            self._damp(2)
+            self._damp(2, active.residual)
             return
         accuracy = max(TOLERANCES.displacement, min(self.coarsest, self._moving_accuracy(active)))
         # A short step costs as much as a long one. After two lengths, more damping gives a better direction.
@@ -312,14 +315,15 @@ class FrontRelaxation:
                     self.damping = self.damping / 4 if self.damping > 0.01 else 0.0
                 self.state, self.coarsest, self.local_relaxations = new, self.start, 0
                 return
-        self._damp(8)
+        self._damp(8, active.residual)
 
-    def _damp(self, factor: float) -> None:
-        """Solve the pressures more accurately and raise the damping, both at once."""
-        if self.coarsest > TOLERANCES.certain_displacement:
-            self.coarsest = TOLERANCES.certain_displacement
-        if self.problem.accuracy(self.state) > TOLERANCES.displacement:
-            self.refine(min(self.coarsest, 0.03 * self.problem.accuracy(self.state)))
+    def _damp(self, factor: float, residual: float) -> None:
+        """Raise the damping by a factor after a failed step, and solve the pressures more accurately.
+
+        Raise `Stagnation` if the damping is too large.
+        """
+        self.coarsest = min(self.coarsest, TOLERANCES.certain_displacement)
+        self.refine(min(self.coarsest, _ACCURACY * residual))
         self.damping = max(factor * self.damping, TOLERANCES.damping)
         if self.damping > _LARGEST_DAMPING:
             raise Stagnation("no step of the front lowers the energy")

@@ -80,7 +80,10 @@ class FullContactProblem(MaterialUnits):
 
     @property
     def closing_pressure(self):
-        """Nominal pressure, Pa, that stands for any that closes the contact: the mean gap alone does not decide it."""
+        """Nominal pressure, Pa, given to full contact at an imposed separation, which does not determine it.
+
+        The value only has to be larger than all targets.
+        """
         return 10 * max(float(np.abs(self.full_contact_pressure).max()), self.interface_strength)
 
     def open_weakest(self, separation):
