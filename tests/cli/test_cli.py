@@ -173,7 +173,7 @@ def test_a_measured_file_fills_in_what_it_contains(project):
 
 def test_scans_that_cannot_be_used_get_no_campaign(project):
     for name, heights, reason in (
-        ("small", rough_heights()[:6], "leaves 6 x 6 points"),
+        ("small", rough_heights()[:6], "a square of 6 x 6 points"),
         ("flat", np.ones((20, 20)), "heights that are all the same"),
         ("profile", rough_heights()[:1].T, "is a line scan, one profile of 64 points"),
     ):
