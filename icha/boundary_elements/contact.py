@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import pathlib
 from dataclasses import dataclass, replace
+from functools import cached_property
 from importlib.metadata import version
 
 import numpy as np
@@ -38,6 +39,8 @@ from icha.surfaces.surface import Surface
 _SMALLEST_OPENING = 1e-4
 # Largest change of a fraction of contact for which rates predict the next state.
 _LARGEST_PREDICTION = 0.25
+# Smallest work whose error a path bounds, divided by the surface energy: that of 0.1 % of the nominal area.
+_SMALLEST_WORK = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,10 +57,11 @@ class BoundaryElements(FullContactProblem):
         """Return 1: the model covers full contact."""
         return 1.0
 
-    @property
+    @cached_property
     def path_accuracy(self) -> PathAccuracy:
-        """Accuracy to which a path resolves its events."""
-        return MODELS[REFERENCE_MODEL].accuracy
+        """Accuracy to which a path resolves its events. Without adhesion nothing jumps, and nothing is lost."""
+        least_work = _SMALLEST_WORK * self.law.material.surface_energy
+        return replace(MODELS[REFERENCE_MODEL].accuracy, least_work=least_work, predicts_steps=self.adhesive)
 
     def untouched(self) -> CellState:
         """State in which the first summit, or a plateau without one, is about to make contact."""
@@ -77,12 +81,13 @@ class BoundaryElements(FullContactProblem):
         """
         if let_go:
             raise NotConverged("boundary elements cannot let go of single patches")
-        if self.is_full(state):
-            new = self._leave_full_contact(state, separation, control)
-        else:
-            new = self._next_equilibrium(state, separation, control)
-        events = self._events(state, new)
-        return replace(new, history=(*state.history, events) if len(events) else state.history)
+        find = self._leave_full_contact if self.is_full(state) else self._next_equilibrium
+        return self.continue_from(find(state, separation, control), state)
+
+    def continue_from(self, state: CellState, before: CellState) -> CellState:
+        """Return a state with the history of another one and the events since then."""
+        events = self._events(before, state)
+        return replace(state, history=(*before.history, events) if len(events) else before.history)
 
     def _next_equilibrium(self, state, separation, control):
         """Equilibrium from a state that is not full contact; arguments as of `equilibrium`."""
@@ -99,12 +104,12 @@ class BoundaryElements(FullContactProblem):
         """Equilibrium from full contact, which opens at the weakest place; arguments as of `equilibrium`."""
         if control is None and separation <= 0:
             return self.full_contact(self.closing_pressure)
-        if control is not None and control.quantity == PRESSURE and control.target >= self.opening_pressure:
-            return self.full_contact(control.target)
-        if control is not None and control.quantity == AREA_FRACTION and control.target >= 1:
-            return state
         if control is None and self.pressure(state) > self.opening_pressure + ROUNDING * self.contact_modulus:
             return self.full_contact(self.opening_pressure)
+        if control and control.quantity == PRESSURE and control.target >= self.opening_pressure:
+            return self.full_contact(control.target)
+        if control and control.quantity == AREA_FRACTION and control.target >= 1:
+            return state
         separation = max(separation, self.smallest_gap)
         return self._next_equilibrium(self.open_weakest(separation), separation, control)
 
@@ -114,8 +119,7 @@ class BoundaryElements(FullContactProblem):
 
     def relax_region(self, region: np.ndarray, separation: float) -> CellState:
         """Relax a contact of a given region, (n, n) of bool, to equilibrium at a separation (m)."""
-        cells = np.flatnonzero(region)
-        nothing = np.zeros(len(cells))
+        cells, nothing = np.flatnonzero(region), np.zeros(np.count_nonzero(region))
         return self.equilibrium(CellState(separation, cells, nothing + 1, nothing, nothing), separation)
 
     def pressure(self, state: CellState) -> float:

@@ -67,6 +67,8 @@ class FrontTolerances:
 TOLERANCES = FrontTolerances()
 # Limits of the iteration.
 _MAX_STEPS, _MAX_KRYLOV, _MAX_LOCAL_RELAXATIONS, _LARGEST_DAMPING = 400, 60, 5, 1e8
+# Error of displacements in units of the critical opening, over the residual of the front that they decide.
+_ACCURACY = 1e-3
 # Relative rounding error of an energy, and of the work of a step.
 _ENERGY_ROUNDING, _WORK_ROUNDING = 1e-12, 1e-11
 
@@ -161,9 +163,9 @@ class FrontProblem:
         tolerance = accuracy * self.front.critical_opening
         return solve_bonded_contact(self.space, self.topography, self.separation, contact, tolerance, self.background)
 
-    def accuracy(self, state: AdhesiveContact) -> float:
-        """Accuracy of the displacement of a state, in units of the critical opening."""
-        return state.tolerance / self.front.critical_opening
+    def is_accurate(self, state: AdhesiveContact, accuracy: float) -> bool:
+        """Whether the displacement of a state has an accuracy, in units of the critical opening."""
+        return state.tolerance <= (1 + _WORK_ROUNDING) * accuracy * self.front.critical_opening
 
     def energy(self, state: AdhesiveContact) -> float:
         """Elastic energy less the work of adhesion, in E* cells^3."""
@@ -212,16 +214,15 @@ def relax_front(
         active = find_active_cells(problem.front, relaxation.state)
         try:
             if active.residual <= tolerance:
-                if relaxation.is_accurate:
+                if not relaxation.refine(_ACCURACY * tolerance):
                     return relaxation.state
-                relaxation.refine()
             elif not relaxation.relax_locally(active, relax_locally):
                 relaxation.step(active)
         except Stagnation as failure:
-            if relaxation.is_accurate and active.residual <= TOLERANCES.stagnation:
+            if active.residual > TOLERANCES.stagnation:
+                raise NotConverged(f"{failure} (residual of sqrt(G/dgamma): {active.residual:.1e})") from None
+            if not relaxation.refine(TOLERANCES.displacement):
                 return relaxation.state
-            message = f"{failure} (residual of sqrt(G/dgamma): {active.residual:.1e})"
-            raise NotConverged(message) from None
     if max_steps or active.residual <= TOLERANCES.stagnation:
         return relaxation.state
     raise NotConverged(f"the front did not converge (residual of sqrt(G/dgamma): {active.residual:.1e})")
@@ -251,15 +252,13 @@ class FrontRelaxation:
             contact = problem.solve_elastic(contact, self.start)
         self.state = contact
 
-    @property
-    def is_accurate(self) -> bool:
-        """Whether the displacement of the state is that of a converged contact."""
-        return self.problem.accuracy(self.state) <= TOLERANCES.displacement
-
-    def refine(self, accuracy: float = TOLERANCES.displacement) -> None:
-        """Solve for the pressures again, to an accuracy in units of the critical opening."""
+    def refine(self, accuracy: float) -> bool:
+        """Solve for the pressures again, unless they have an accuracy, in units of the critical opening, already."""
         accuracy = max(accuracy, TOLERANCES.displacement)
+        if self.problem.is_accurate(self.state, accuracy):
+            return False
         self.state = self.problem.solve_elastic(self.state, accuracy)
+        return True
 
     def relax_locally(self, active: ActiveCells, relax: Callable) -> bool:
         """Relax the front around cells far from equilibrium; return whether this lowered the energy."""
@@ -294,7 +293,7 @@ class FrontRelaxation:
         self.steps += 1
         change, pressure_change = newton_step(problem, active, self.damping)
         if np.sum((active.intensity**2 - 1) * change) > _WORK_ROUNDING * np.abs(change).sum():
-            self._damp(2)
+            self._damp(2, active.residual)
             return
         accuracy = max(TOLERANCES.displacement, min(self.coarsest, self._moving_accuracy(active)))
         # Short steps cost as much as long ones: after two lengths, more damping finds a better direction.
@@ -309,14 +308,12 @@ class FrontRelaxation:
                     self.damping = self.damping / 4 if self.damping > 0.01 else 0.0
                 self.state, self.coarsest, self.local_relaxations = new, self.start, 0
                 return
-        self._damp(8)
+        self._damp(8, active.residual)
 
-    def _damp(self, factor: float) -> None:
+    def _damp(self, factor: float, residual: float) -> None:
         """Solve the pressures more accurately and raise the damping, both at once."""
-        if self.coarsest > TOLERANCES.certain_displacement:
-            self.coarsest = TOLERANCES.certain_displacement
-        if self.problem.accuracy(self.state) > TOLERANCES.displacement:
-            self.refine(min(self.coarsest, 0.03 * self.problem.accuracy(self.state)))
+        self.coarsest = min(self.coarsest, TOLERANCES.certain_displacement)
+        self.refine(min(self.coarsest, _ACCURACY * residual))
         self.damping = max(factor * self.damping, TOLERANCES.damping)
         if self.damping > _LARGEST_DAMPING:
             raise Stagnation("no step of the front lowers the energy")

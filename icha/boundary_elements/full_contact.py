@@ -79,7 +79,7 @@ class FullContactProblem(MaterialUnits):
 
     @property
     def closing_pressure(self):
-        """Nominal pressure, Pa, that stands for any that closes the contact: the mean gap alone does not decide it."""
+        """Nominal pressure of full contact under control of the separation, Pa: above all targets, otherwise free."""
         return 10 * max(float(np.abs(self.full_contact_pressure).max()), self.interface_strength)
 
     def open_weakest(self, separation):

@@ -136,6 +136,7 @@ def solve_at_control(problem: ControlProblem, state: CellState, separation: floa
     whole = bracket = Bracket(np.sign(-problem.error(state)) or 1.0, same, state)
     if separation <= 0:
         separation = 0.5 * state.separation
+    reason = ""
     try:
         for _ in range(_MAX_ATTEMPTS):
             trial, bracket = bracket_loosely(problem, bracket, separation, scale)
@@ -153,8 +154,6 @@ def solve_at_control(problem: ControlProblem, state: CellState, separation: floa
         reason = ": the contact closes over the whole surface"
     except NotConverged as failure:
         reason = f": {failure}"
-    else:
-        reason = ""
     raise NotConverged(f"a {control.quantity.replace('_', ' ')} of {control.target:g} is not met from here{reason}")
 
 
@@ -168,7 +167,7 @@ def bracket_loosely(
     contact, start, residual = problem.contact, bracket.before, _FIRST_RESIDUAL
     control_is_load = problem.control.quantity == PRESSURE
     close = _CLOSE * scale if contact.adhesive else problem.tolerance(scale)
-    trials = _MAX_TRIALS if contact.adhesive else 2 * _MAX_TRIALS
+    trials = _MAX_TRIALS // 2 if contact.adhesive else 2 * _MAX_TRIALS
     for _ in range(trials):
         trial, residual = problem.solve(start, separation, residual), _RESIDUAL
         error = problem.error(trial)

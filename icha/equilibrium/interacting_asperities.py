@@ -50,6 +50,10 @@ class InteractingAsperities(AsperityContact):
         """Find the equilibrium at another mean separation (m), load or area; see `ContactModel`."""
         return find_equilibrium(self, state, separation, control, let_go=let_go)
 
+    def continue_from(self, state: ContactState, before: ContactState) -> ContactState:
+        """Refuse: paths do not ask this of a model that does not predict steps."""
+        raise NotImplementedError
+
     def pressure(self, state: ContactState) -> float:
         """Return the force over the nominal area, Pa."""
         return nominal_value(self, PRESSURE, state.spots.contact_radius, state.spots.radius_of_curvature)

@@ -61,7 +61,7 @@ class Step:
     separation_change : change of the mean separation, m.
     work : work done on the contact, -(integral of p du), J/m^2.
     stored : change of the stored energy, J/m^2.
-    pressure_jump : change of the pressure by events, Pa.
+    pressure_jump : change of the pressure that the stiffnesses at both ends do not explain, Pa.
     integration_error : estimated error of the work without events, J/m^2.
     has_jump : whether there are events that may change the pressure.
     events : events of the step.
@@ -95,7 +95,7 @@ class Step:
             separation_change=du,
             work=-(0.5 * du * (p + q) + du**2 * (slope - end_slope) / 12),
             stored=contact.stored_energy(after) - contact.stored_energy(before),
-            pressure_jump=pressure_jump(du, q - p, slope, end_slope) if jumps else 0.0,
+            pressure_jump=pressure_jump(du, q - p, slope, end_slope),
             integration_error=error,
             has_jump=bool(jumps),
             events=events,
@@ -114,7 +114,16 @@ class Step:
     @property
     def unresolved(self) -> float:
         """Largest error of the work because events may happen anywhere in the step, J/m^2."""
-        return unresolved_work(self.separation_change, self.pressure_jump)
+        return unresolved_work(self.separation_change, self.pressure_jump) if self.has_jump else 0.0
+
+    @property
+    def unknown_work(self) -> float:
+        """Largest error of the work if the pressure may also jump anywhere without an event, J/m^2.
+
+        If nothing is lost, the work is the change of the stored energy, which is exact.
+        """
+        jump = unresolved_work(self.separation_change, self.pressure_jump)
+        return min(max(jump, self.integration_error), abs(self.loss))
 
     def jump_energy(self, contact: ContactModel) -> float:
         """Return the energy that the jumps of the step would release if every spot were alone, J/m^2."""

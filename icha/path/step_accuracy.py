@@ -57,7 +57,7 @@ class StepAccuracy:
 
     def allows_twice_the_length(self, step: Step) -> bool:
         """Return whether a step of twice the length would be accurate: its error would be eight times as large."""
-        return 8 * step.integration_error <= _CURVED_WORK * self.total_work_after(step)
+        return 8 * step.unknown_work <= self.allowed_unknown_work(step)
 
     def is_work_known(self, state, step):
         """Return whether the work of a step that ends in a state is known well enough.
@@ -67,6 +67,8 @@ class StepAccuracy:
         and differs from the change of the stored energy. Steps up to 1/256 of the longest step are not examined for
         this last case.
         """
+        if self.contact.path_accuracy.predicts_steps:
+            return step.unknown_work <= self.allowed_unknown_work(step)
         length = abs(step.separation_change)
         if step.unresolved > self.allowed_unknown_work(step):
             return False
@@ -84,9 +86,11 @@ class StepAccuracy:
 
     def allowed_unknown_work(self, step):
         """Return the largest uncertainty that the events of a step may give its work, J/m^2."""
-        total_work = self.total_work_after(step)
+        total_work, accuracy = self.total_work_after(step), self.contact.path_accuracy
+        if accuracy.predicts_steps:
+            return accuracy.loss * max(total_work, accuracy.least_work)
         released = UNRESOLVED_LOSS * (self.jump_energy + step.jump_energy(self.contact))
-        return max(released, self.contact.path_accuracy.loss * total_work) if released else UNRESOLVED_WORK * total_work
+        return max(released, accuracy.loss * total_work) if released else UNRESOLVED_WORK * total_work
 
     def is_tension_known(self, start, state, step):
         """Return whether the largest tension of a step between two states is known well enough.
@@ -94,7 +98,7 @@ class StepAccuracy:
         It is not if the tension may have been larger just before an event.
         """
         contact = self.contact
-        if step.separation_change < 0 or not step.pressure_jump:
+        if step.separation_change < 0 or not step.has_jump:
             return True
         if contact.adhesive and contact.spot_count(start) and not contact.spot_count(state):
             return False  # the last contact breaks, and this event must be found as exactly as possible
@@ -112,7 +116,7 @@ class StepAccuracy:
         contact = self.contact
         slope, end_slope = (-contact.stiffness(each) for each in (start, state))
         # Full contact is infinitely stiff, and its largest tension, at which it opens, is a state of the path.
-        if step.separation_change < 0 or step.pressure_jump or not -np.inf < slope < 0 < end_slope:
+        if step.separation_change < 0 or step.has_jump or not -np.inf < slope < 0 < end_slope:
             return None
         p, q = (contact.pressure(each) for each in (start, state))
         # The tangents meet below the curve.

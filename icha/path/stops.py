@@ -20,6 +20,8 @@ _MAX_HALVINGS = 80
 # The solver tries to meet the target before each of the first nine halvings, then only before the 17th, 33rd and 65th,
 # because a target that was missed so often usually lies inside a jump.
 _TRIALS = 8
+# Largest change of load or area between two states without a jump, over that by the slope at one of them.
+_LARGEST_BEND = 4.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,9 +114,10 @@ def find_target_state(target: TargetFunction, before: State, after: State) -> St
     sign = 1.0 if after.separation < before.separation else -1.0
     for halvings in range(_MAX_HALVINGS):
         width = sign * (before.separation - after.separation)
-        if width <= SAME_SEPARATION * contact.rms_height:
+        if width <= max(SAME_SEPARATION, contact.path_accuracy.event) * contact.rms_height:
             return _solve_after_jump(target, before, after)
-        if halvings < _TRIALS or halvings & (halvings - 1) == 0:
+        reached = not contact.path_accuracy.predicts_steps or _is_near(target, before, after)
+        if reached and (halvings < _TRIALS or halvings & (halvings - 1) == 0):
             with suppress(NotConverged):
                 found = target.solve(before, _guess_separation(target, before, after))
                 if 0 < sign * (before.separation - found.separation) <= width:
@@ -133,6 +136,16 @@ def find_target_state(target: TargetFunction, before: State, after: State) -> St
         else:
             before = middle
     raise NotConverged(f"{target.target.describe()} was not met after {_MAX_HALVINGS} halvings of the step")
+
+
+def _is_near(target, before, after):
+    """Return whether the slope of load or area at one of two states leads to the target between them, or nearly so."""
+    control, contact, width = target.control, target.contact, abs(after.separation - before.separation)
+    value = contact.pressure if control.quantity == PRESSURE else contact.area_fraction
+    return any(
+        abs(value(state) - control.target) <= _LARGEST_BEND * abs(contact.slope(control.quantity, state)) * width
+        for state in (before, after)
+    )
 
 
 def _solve_after_jump(target, before, after):
