@@ -52,7 +52,7 @@ def figure(campaign: xr.DataTree, *, study: str, kind: str | None = None, target
         elif group.applicable:
             bare.setdefault(contact, []).append(group)
     if not curves:
-        raise NothingToDraw(f"study {study}: no run with adhesion is complete; runs without have no Tabor parameter")
+        raise NothingToDraw(f"study {study}: no complete run with adhesion, without which no Tabor parameter exists")
 
     dataset = campaign[study].to_dataset()
     contacts = [contact for contact, _ in curves]
