@@ -107,7 +107,8 @@ def write_crate(
 def _steps(jobs: Sequence[Job]) -> list[Job]:
     """Return the first job of every rule, in an order in which the rules can run."""
     maker = {path: job for job in jobs for path in job.outputs}
-    before = {job.outputs: {maker[path].outputs for path in job.inputs if path in maker} for job in jobs}
+    # Lists and not sets, because the order must be the same in every process.
+    before = {job.outputs: [maker[path].outputs for path in job.inputs if path in maker] for job in jobs}
     # Place of the last job of each rule, if every job follows the jobs that made its inputs.
     latest = {maker[outputs[0]].rule: k for k, outputs in enumerate(TopologicalSorter(before).static_order())}
     first = {job.rule: job for job in reversed(jobs)}
