@@ -41,6 +41,7 @@ from icha.path.targets import (
     LEAST_PRESSURE,
     MAX_AREA_FRACTION,
     MAX_REDUCED_PRESSURE,
+    MEAN_SEPARATION,
     RELATIVE_LOAD,
     Path,
     Target,
@@ -52,6 +53,8 @@ from icha.surfaces.surface import Surface
 
 # Largest relative excess of a contact area over its limit that is within the tolerance of the equilibria.
 _AREA_TOLERANCE = 1e-6
+# Largest mean separation of a snapshot, in h_rms; contact is far below it.
+_HIGHEST_SNAPSHOT = 20.0
 # Kind of the snapshot of the largest tension on unloading.
 PULL_OFF = "pull_off"
 _STICKINESS_PAPER = "L. Pastewka and M. O. Robbins, PNAS 111 (2014) 3298-3303, doi:10.1073/pnas.1320846111 (stickiness)"
@@ -255,6 +258,11 @@ def _check_arguments(surface, material, path, by_summits):
                     f"{load} is beyond the range of the asperity model; expected a reduced pressure of at most "
                     f"{MAX_REDUCED_PRESSURE}"
                 )
+        if target.snapshot and target.kind == MEAN_SEPARATION and target.value > _HIGHEST_SNAPSHOT * surface.rms_height:
+            raise ValueError(
+                f"path: a snapshot at a mean separation of {target.value!r} m is far above any contact; expected at "
+                f"most {_HIGHEST_SNAPSHOT:g} rms heights ({_HIGHEST_SNAPSHOT * surface.rms_height:.4g} m)"
+            )
 
 
 @dataclass

@@ -128,15 +128,16 @@ def loop(surface: Surface, largest_pressure: float, step: float, material: Mater
     for waypoint in follow(contact, path):
         balance, steps = waypoint.balance, steps + 1
         largest_work = max(largest_work, balance.work)
-    losses = ("jump_in", "jump_off", "coalescence", "load_jump", "unattributed")
+    names = ("jump_in", "jump_off", "coalescence", "load_jump", "unattributed")
+    losses = {name: getattr(balance, name) for name in names}
     return {
         "grid": surface.grid,
         "step": step,
         "steps": steps,
         "largest_work": largest_work / unit,
         "work": balance.work / unit,
-        "not_closed": (balance.work - balance.loss - contact.stored_energy(waypoint.state)) / unit,
-        **{name: getattr(balance, name) / unit for name in losses},
+        "not_closed": (balance.work - sum(losses.values()) - contact.stored_energy(waypoint.state)) / unit,
+        **{name: loss / unit for name, loss in losses.items()},
     }
 
 

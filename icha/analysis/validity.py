@@ -35,9 +35,11 @@ _VALIDATED = "on seven self-affine surfaces, p* from 0.001 to 0.1 (page on valid
 
 _RATIO = "full_contact_energy_ratio"
 # Facts that are not known of every case: pressure for complete contact, strength of the interface with and without its
-# flaw, largest tension that the grid resolves, Pa; size of the grid cells, m.
+# flaw, largest tension that the grid resolves, Pa; size of the grid cells, rms height, and rms height below which the
+# surface sticks by the bearing area model, m.
 COMPLETE, STRENGTH, THEORETICAL = "complete_contact_pressure", "interface_strength", "theoretical_strength"
 RESOLVED, SPACING = "resolved_tension", "spacing"
+RMS_HEIGHT, STICKY_HEIGHT = "rms_height", "sticky_rms_height"
 _OF_FULL_CONTACT = (COMPLETE, STRENGTH, THEORETICAL, RESOLVED)
 
 # Share of single spots outside the range of Wu's formula, above which a case is named. Every surface has some.
@@ -174,6 +176,9 @@ def _full_contact(cases):
             f"; full contact is complete at about {complete} without adhesion and opens at {opening} (strength of the "
             f"interface: {strength}){_unresolved_strength(lowest.facts)}"
         )
+    if STICKY_HEIGHT in lowest.facts:
+        heights = (format_quantity(lowest.facts[name], "m") for name in (STICKY_HEIGHT, RMS_HEIGHT))
+        text += "; by the bearing area model the surface sticks below an rms height of {}, it has {}".format(*heights)
     if any(MODELS[case.model].by_summits and case.ratio < FULL_CONTACT_BELOW for case in cases):
         text += f"; the asperity model is not applicable below {FULL_CONTACT_BELOW:g}"
     yield Statement("adhesion", text, lowest.ratio >= HIGH_PULL_OFF_BELOW)

@@ -29,3 +29,22 @@ def stickiness(moments: SpectralMoments, material: Material) -> float:
     slope, reach = moments.rms_slope, material.interaction_range
     attractive_area = np.pi * np.cbrt(3 * moments.rms_laplacian * reach / (16 * slope**2)) ** 2
     return float(REPULSIVE_AREA_SLOPE * material.adhesion_length / (slope * reach) * attractive_area)
+
+
+def sticky_rms_height(longest_wavelength: float, material: Material) -> float:
+    r"""Return the rms height below which a random surface sticks by the bearing area model (BAM), m.
+
+    M. Ciavarella, Meccanica 53 (2018) 241-250, doi:10.1007/s11012-017-0701-6. At the mean separation u the area whose
+    gap is less than the range of attraction pulls with p_a = dgamma/(sqrt(2 pi) h) exp(-u^2/(2 h^2)), and the contact
+    repels with Persson's p_r = (3/(8 beta)) q_L h E* exp(-u/(beta h)), where beta = 1/2 and q_L = 2 pi/lambda_L. Here
+    h is the rms height. The ratio p_a/p_r is largest at u = h/beta. It exceeds 1 if
+
+        h^2 < e^2/(sqrt(2 pi) 3 pi/2) lambda_L dgamma/E* = 0.63 lambda_L dgamma/E*.
+
+    Parameters
+    ----------
+    longest_wavelength : lambda_L, m: the roll-off wavelength of a self-affine surface.
+    material : contact modulus and surface energy.
+    """
+    factor = np.exp(2) / (np.sqrt(2 * np.pi) * 1.5 * np.pi)
+    return float(np.sqrt(factor * longest_wavelength * material.adhesion_length))

@@ -142,6 +142,12 @@ class ContactModel(Protocol):
         let_go : number of spots, those closest to jump-off, whose contact is broken before the search.
         """
 
+    def continue_from(self, state: State, before: State) -> State:
+        """Return a state with its events since another one than that from which it was found.
+
+        Only for models that predict steps.
+        """
+
     def pressure(self, state: State) -> float:
         """Return the force over the nominal area, Pa; negative in tension."""
 

@@ -59,13 +59,16 @@ class PathAccuracy:
     balance : largest difference between work and change of energy in a long step without events, relative to the work
         so far.
     tension : largest error of the largest tension between two equilibria without an event, relative to it.
-    predicts_steps : whether the length of a step follows from the errors of the one before; otherwise it doubles.
+    least_work : works below it are as uncertain as this one, J/m^2.
+    predicts_steps : whether the length of a step follows from the error of its work, which then counts in every step:
+        the pressure may jump without an event. Otherwise the length doubles.
     """
 
     event: float = 1e-12
     loss: float = 1e-10
     balance: float = 3e-6
     tension: float = 1e-8
+    least_work: float = 0.0
     predicts_steps: bool = False
 
 
@@ -160,7 +163,7 @@ MODELS = {
         periodic_only=True,
         least_cells=4,
         # Fronts that hop from cell to cell lose energy that only a finer grid would resolve.
-        accuracy=PathAccuracy(event=1e-5, loss=1e-5, tension=1e-5, predicts_steps=True),
+        accuracy=PathAccuracy(event=1e-5, loss=1e-4, tension=1e-5, predicts_steps=True),
         resumable=True,
     ),
 }

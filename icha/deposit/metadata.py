@@ -269,15 +269,21 @@ def datacite_metadata(publication: Publication) -> dict[str, Any]:
 
 def _datacite_creator(author: Author) -> dict[str, Any]:
     identifier, scheme = (author.orcid_address, "ORCID") if author.is_person else (author.ror, "ROR")
-    named = {"nameIdentifier": identifier, "nameIdentifierScheme": scheme}
-    place = {"affiliationIdentifier": author.ror, "affiliationIdentifierScheme": author.ror and "ROR"}
+    named = {"nameIdentifier": identifier, "nameIdentifierScheme": scheme, "schemeUri": f"https://{scheme.lower()}.org"}
+    place = {"name": author.affiliation}
+    if author.ror:
+        place |= {
+            "affiliationIdentifier": author.ror,
+            "affiliationIdentifierScheme": "ROR",
+            "schemeUri": "https://ror.org",
+        }
     return {
         "name": author.sorted_name,
         "nameType": "Personal" if author.is_person else "Organizational",
         "givenName": author.given_names,
         "familyName": author.family_names,
         "nameIdentifiers": [named] if identifier else [],
-        "affiliation": [{"name": author.affiliation} | place] if author.affiliation else [],
+        "affiliation": [place] if author.affiliation else [],
     }
 
 

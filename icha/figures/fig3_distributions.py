@@ -42,6 +42,7 @@ def figure(campaign: xr.DataTree, *, study: str, kind: str | None = None, target
     each_look, looks = snapshot_looks(campaign, study, lines)
     fig, [(left, right)] = new_panels(3.1)
     lowest, highest, top, floor = -0.3, 0.3, 0.0, 1.0
+    tails = []
     for line, look in zip(lines, each_look, strict=True):
         u, densities = gap_densities(line.members)
         drawn = {"positive": True, "asked": line.runs.asked}
@@ -60,9 +61,13 @@ def figure(campaign: xr.DataTree, *, study: str, kind: str | None = None, target
             dashed = TRUTH_LINE | {"color": look["color"], "marker": MODEL_MARKERS[SHORT_RANGE]}
             ax.plot(at, densities.mean(axis=0), markevery=1 + len(at) // _BESIDE_MARKERS, **dashed)
             top = densities.mean(axis=0).max(initial=top) if ax is right else top
+        tails.append((line.truths, look["color"]))
     logarithmic_axes(left)
     logarithmic_axes(right, "y")
     left.set_ylim(floor / 2)
+    for truths, colour in tails:
+        p, density = singular_tail(truths, 1.05 * lowest)
+        right.semilogy(p, density, ls=":", lw=1.1, color=colour, zorder=3)
     load = np.mean([float(state_of(run, at)["reduced_pressure"]) for run, at in lines[-1].members])
     _finish(left, right, (lowest, highest), top, load)
     add_snapshot_legend(fig, [left, right], campaign[study].to_dataset(), lines, looks)
@@ -83,6 +88,24 @@ def _finish(left, right, pressures, highest, load):
     unit = r"E^{\ast}h_{\mathrm{rms}}^{\prime}"
     left.set(xlabel=r"gap  $u/h_{\mathrm{rms}}$", ylabel=r"$P(u)\; h_{\mathrm{rms}}$")
     right.set(xlabel=f"contact pressure  $p/({unit})$", ylabel=rf"$P(p)\; {unit}$")
+
+
+def singular_tail(members: Sequence[tuple[xr.Dataset, int]], lowest: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return p/(E* h'_rms) and P(p) E* h'_rms beyond the tension that the grid resolves, as the mean over snapshots.
+
+    At a distance x from the edge of contact the tension is K_c/sqrt(2 pi x), with K_c^2 = 2 E* dgamma. Along the length
+    L of the edge this gives the density P(p) = L K_c^2/(pi |p|^3 A0). The tail reaches from the resolved tension to
+    the pressure `lowest`; it is empty without adhesion.
+    """
+    (run, _), *_ = members
+    unit = float(run["contact_modulus"]) * float(run["rms_slope"])
+    first = -float(run["resolved_tension"]) / unit
+    if not lowest < first < 0:
+        return np.empty(0), np.empty(0)
+    edge = np.mean([float(run["spot_perimeter"][run["spot_snapshot"] == at].sum()) for run, at in members])
+    intensity = 2 * float(run["contact_modulus"]) * float(run["surface_energy"]) / (np.pi * float(run["period"]) ** 2)
+    p = np.linspace(first, lowest, 100)
+    return p, edge * intensity / (np.abs(p) ** 3 * unit**2)
 
 
 def gap_densities(members: Sequence[tuple[xr.Dataset, int]]) -> tuple[np.ndarray, np.ndarray]:

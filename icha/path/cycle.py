@@ -1,8 +1,9 @@
 """Cycles of loading and unloading: all equilibria of a path that continues after the first loading.
 
 On unloading every spot follows its stable branch until it jumps off. Unloading ends at complete separation or at a
-turning point. It visits the separations of the first loading again, which are called stations, so that both curves can
-be compared. Where an event changes the pressure, steps become so short that the work lost in the event is known.
+turning point. Unloading visits the separations of the loading again, so that both curves can be compared. These
+separations are called stations. Close to an event that changes the pressure, the steps become so short that the energy
+lost in the event is known accurately.
 """
 
 from __future__ import annotations
@@ -30,21 +31,22 @@ from icha.path.stops import (
 )
 from icha.path.targets import LOADS, MEAN_SEPARATION, Path
 
-# Distance of the last station above first contact, in h_rms, without adhesion. At first contact itself the error of an
-# equilibrium may leave a spot in contact.
+# Distance of the last station above first contact, in h_rms, without adhesion. Exactly at first contact, a spot may
+# remain in contact because of the error of the equilibrium.
 _ABOVE_CONTACT = 1e-8
 
 
 def follow_cycle(
     contact: ContactModel, path: Path, longest: float, progress: PathProgress
 ) -> Generator[Waypoint, TargetFunction | None, None]:
-    """Yield all equilibria of a path that continues after the first loading; errors as of `icha.path.follow.follow`.
+    """Follow a path that continues after the first loading, and yield a waypoint for each equilibrium.
 
-    After a waypoint the caller may send one more target (`generator.send`). If this target comes before the others, the
-    path meets it too and yields its waypoint. The waypoints have no energy balances.
+    After each waypoint the caller may send one additional target for the next step (`generator.send`). If the step
+    meets this target first, the generator yields the waypoint at this target. The waypoints have no energy balances.
+    Raise the errors of `icha.path.follow.follow`.
 
     longest : longest step of the separation, m.
-    progress : record of the path.
+    progress : record of the path's progress, which counts and reports the targets.
     """
     start, targets = contact.untouched(), [TargetFunction(target, contact) for target in path.targets]
     # Targets at separations above first contact, where nothing touches.
@@ -67,7 +69,7 @@ def follow_cycle(
         target = TargetFunction(turn, contact)
         if (target.excess(cycle.state) > 0) != (leg % 2 == 1):
             cycle.leg, name = leg, "unloading" if leg % 2 else "loading"
-            reason = f"leg {leg} ({name}) starts already beyond the turning point {turn.describe()}"
+            reason = f"leg {leg} ({name}) already starts beyond its turning point {turn.describe()}"
             raise cycle.make_path_error(NotConverged(reason))
         yield from cycle.follow_leg(leg, [target])
         progress.report_position(f"turning point {turn.describe()}", cycle.state)
@@ -81,7 +83,7 @@ def follow_cycle(
 
 @dataclass(eq=False)
 class _Cycle:
-    """Contact on a cyclic path: its state, and what decides the length of its next step.
+    """State of a contact on a cyclic path, and the values that determine the length of the next step.
 
     Attributes
     ----------
@@ -91,10 +93,11 @@ class _Cycle:
     state : last equilibrium.
     leg : number of the leg, even on loading and odd on unloading.
     step_length : length of the next step, m.
-    event_at : end of the shortest step found so far that contains the next event, as direction times separation, m; inf
-        if no event is known.
-    resolving_length : length of a step in which the work of this event is known well enough, m.
-    smooth_length : length that steps have where there are no events, m.
+    event_at : end of the shortest trial step so far that contains the next event, as direction times separation, m; inf
+        if no event is known. Always inf for models that predict steps.
+    ahead : equilibria at the ends of trial steps that were too long, the next equilibrium last. Always empty for models
+        that do not predict steps.
+    longest_part : longest step so far of those into which the last trial step is divided, m.
     accuracy : sums over all steps so far, and the accuracy that further steps need.
     stations : separations visited on loading, which unloading will visit again, ascending, m.
     """
@@ -106,13 +109,13 @@ class _Cycle:
     leg: int = 0
     step_length: float = np.nan
     event_at: float = np.inf
-    resolving_length: float = 0.0
-    smooth_length: float = 0.0
+    ahead: list[State] = field(default_factory=list)
+    longest_part: float = 0.0
     accuracy: StepAccuracy = field(init=False)
     stations: list[float] = field(default_factory=list)
 
     def __post_init__(self):
-        """Set the longest step as the default, and the sums to zero."""
+        """Start with the longest step, and with sums of zero."""
         self.step_length, self.accuracy = self.longest, StepAccuracy(self.contact, self.longest)
 
     @property
@@ -122,7 +125,7 @@ class _Cycle:
 
     @property
     def event_length(self) -> float:
-        """Length of a step at which an event counts as resolved, m."""
+        """Step length, m, up to which an event in the step counts as located."""
         return self.contact.path_accuracy.event * self.contact.rms_height
 
     @property
@@ -137,8 +140,9 @@ class _Cycle:
     def follow_leg(
         self, leg: int, targets: list[TargetFunction], until_apart: bool = False
     ) -> Generator[Waypoint, TargetFunction | None, None]:
-        """Yield the equilibria of a leg until all targets are met or, with `until_apart`, until nothing touches."""
-        self.leg, self.event_at, self.smooth_length = leg, np.inf, 0.0
+        """Follow one leg to all its targets or, with `until_apart`, to complete separation; yield all waypoints."""
+        self.leg, self.event_at, self.longest_part = leg, np.inf, 0.0
+        self.ahead.clear()
         pending, sent = sort_targets(targets, self.direction), None
         visited, length_limit = [self.state.separation], np.inf
         while pending or until_apart:
@@ -153,54 +157,80 @@ class _Cycle:
             except InsideJump as jump:
                 if jump.target is sent:
                     sent = None
+                    self._keep(state)
                     continue
                 pending.remove(jump.target)
                 if not until_apart:
                     self.progress.skipped.append(jump)
                     if leg:
                         raise self.make_path_error() from None
+                self._keep(state)
                 continue
             except NotConverged as failure:
                 length_limit = self._halve_step(abs(step.separation_change), failure)
+                self._keep(state)
                 continue
             if met is not state:
+                if target and self.contact.path_accuracy.predicts_steps and self._is_behind(met):
+                    # The branch after a jump leads back to the target.
+                    yield self._advance(step, state)
+                else:
+                    self._keep(state)
                 step = Step.between(self.contact, self.state, met)
             listed = None if target is sent else target
             self.progress.require_valid_state(self.state, met, listed, pending, self.loading)
             # The first contact forms in a step of `event_length`; the next step is the longest one.
             first = leg == 0 and len(visited) == 1
-            self.step_length = self.longest if first else self._choose_next_length(step, met)
-            self.accuracy.add(step, met)
-            self.progress.record_equilibrium(met, self.loading)
-            self.state, length_limit = met, np.inf
+            self.step_length = self.longest if first else self._choose_next_length(step)
+            between, length_limit = self._advance(step, met), np.inf
             if self._is_new_station(met.separation, visited[-1]):
                 visited.append(met.separation)
             if listed is not None:
                 pending.remove(listed)
                 if leg == 0:
                     self.progress.record_target(listed.target, met)
-            waypoint = (
-                waypoint_without_target(met, leg, step) if target is None else Waypoint(target.target, met, leg, step)
-            )
-            sent = yield waypoint
+            sent = yield between if target is None else Waypoint(target.target, met, leg, step)
         if self.loading:
             # A reloading adds only separations below all earlier stations.
             lowest = min(self.stations, default=np.inf)
             new = (separation for separation in [*visited, self.state.separation] if separation < lowest)
             self.stations = sorted({*self.stations, *new})
 
-    def find_next_equilibrium(self, length: float) -> tuple[State, Step]:
-        """Find the next equilibrium by a step that is so short that its work is known; return it and the step.
+    def _advance(self, step, state):
+        """Make the end of a step the present state, and return its waypoint without a target."""
+        self.accuracy.add(step, state)
+        self.progress.record_equilibrium(state, self.loading)
+        self.state = state
+        self.ahead = [each for each in self.ahead if self.direction * (each.separation - state.separation) > 0]
+        return waypoint_without_target(state, self.leg, step)
 
-        The step is halved until an equilibrium is found, and until its work is known or its length is at most
-        `event_length`. If the tension has a new maximum within the step, the step ends at the maximum.
+    def _keep(self, state):
+        """If the model predicts steps, keep an equilibrium in `ahead`, because it may be the end of a later step."""
+        if self.contact.path_accuracy.predicts_steps:
+            self.ahead.append(state)
+
+    def _is_behind(self, state):
+        """Return whether a state lies behind the present state in the direction of the leg."""
+        return self.direction * (state.separation - self.state.separation) < 0
+
+    def find_next_equilibrium(self, length: float) -> tuple[State, Step]:
+        """Find the next equilibrium by a step so short that its work is known; return the equilibrium and the step.
+
+        The step is halved until the solver finds an equilibrium. Then the step is halved until its work and its largest
+        tension are known accurately enough, or until its length is at most `event_length`. If the tension has a new
+        maximum within the step, the step ends at the maximum. If the model predicts steps, the ends of steps that were
+        too long are tried again as ends of later steps.
 
         length : length of the first trial step, m.
         """
-        start, accuracy = self.state, self.accuracy
+        start, accuracy, keeps = self.state, self.accuracy, self.contact.path_accuracy.predicts_steps
+        ahead = None
+        if self.ahead and abs(self.ahead[-1].separation - start.separation) < (1 + SAME_EXCESS) * length:
+            ahead = self.ahead.pop()
+            length = abs(ahead.separation - start.separation)
         while True:
             try:
-                state = self._find_equilibrium(start.separation + self.direction * length, length)
+                state = self._find_equilibrium(start.separation + self.direction * length, length, ahead)
             except NotConverged as failure:
                 length = self._halve_step(length, failure)
                 continue
@@ -209,30 +239,35 @@ class _Cycle:
             passed = step.has_jump and self.direction * start.separation + self.event_length >= self.event_at
             sharp = length <= self.event_length or passed
             if sharp or (accuracy.is_work_known(state, step) and accuracy.is_tension_known(start, state, step)):
+                if ahead is not None and abs(step.loss) > accuracy.allowed_unknown_work(step):
+                    ahead = None  # after a loss of energy, the equilibrium is found from the present state
+                    continue
                 if step.has_jump:
                     self.event_at = np.inf
                 tension_peak = None if sharp else accuracy.locate_largest_tension(start, state, step)
                 if tension_peak is None:
                     return state, step
-                length = tension_peak - start.separation
+                shorter = tension_peak - start.separation
             else:
-                if step.has_jump:
+                if step.has_jump and not keeps:
                     self.event_at = min(self.event_at, self.direction * state.separation)
-                    allowed = accuracy.allowed_unknown_work(step)
-                    self.resolving_length = 0.5 * length * min(1.0, allowed / (step.unresolved or np.inf))
-                else:
-                    self.smooth_length = min(self.smooth_length, 0.5 * length)
-                length *= 0.5
+                shorter = 0.5 * length
+            self._keep(state)
+            length, ahead = shorter, None
             self.step_length = min(self.step_length, length)
 
-    def _find_equilibrium(self, separation, length):
-        """Find the equilibrium at the separation at the end of a step of this length, both m.
+    def _find_equilibrium(self, separation, length, ahead=None):
+        """Find the equilibrium at a separation, m, at the end of a step of a given length, m.
 
-        On unloading all spots may lose their equilibrium together before any of them has reached its own jump-off. Then
-        the spot closest to jump-off breaks contact. If there is still no equilibrium, the closest two, four, … spots
-        break contact.
+        If the state `ahead` is given, it is this equilibrium, and only its events are found.
+
+        On unloading the spots together may lose their equilibrium before any single spot has reached its own jump-off.
+        Then, if the step is very short, the spot closest to jump-off breaks contact. If there is still no equilibrium,
+        the two, four, … spots closest to jump-off break contact.
         """
         contact, start = self.contact, self.state
+        if ahead is not None:
+            return contact.continue_from(ahead, start)
         try:
             state = contact.equilibrium(start, separation)
             if separation > start.separation and contact.is_unstable(state):
@@ -248,48 +283,50 @@ class _Cycle:
         raise first
 
     def _halve_step(self, length, failure):
-        """Return half the length of a step whose solve failed, m; the next step is not longer either."""
+        """Return half the length, m, of a step without an equilibrium, and limit the next step to this length."""
         length = self.progress.halve_step(length, failure, self.state, self.loading)
         self.step_length = min(self.step_length, length)
         return length
 
-    def _choose_next_length(self, step, state):
-        """Return the length of the next step after a step to a state, m.
+    def _choose_next_length(self, step):
+        """Return the length of the next step after a step, m.
 
-        If the model does not predict steps, a step is twice as long as the last one. After an event a step has at least
-        the length of steps without events. Before a known event it covers half the distance to the event, or the whole
-        distance if this is short enough to resolve the event. Otherwise it is twice as long as the last one, or as long
-        if the error of a longer step would be too large.
+        If the model does not predict steps, the next step is twice as long as the last step. Otherwise the next step is
+        twice as long as the longest of the steps into which the last trial step was divided. If the last trial step was
+        not divided, the next step is equally long, or twice as long if the error would be small enough.
         """
         longer = min(self.longest, 2 * self.step_length)
         if not self.contact.path_accuracy.predicts_steps:
             return longer
-        if step.has_jump:
-            return max(longer, self.smooth_length)
-        distance = self.event_at - self.direction * state.separation
-        if 0 < distance < np.inf:
-            return distance if distance <= self.resolving_length else 0.5 * distance
-        self.smooth_length = max(self.smooth_length, abs(step.separation_change))
-        return longer if self.accuracy.allows_twice_the_length(step) else self.step_length
+        self.longest_part = max(self.longest_part, abs(step.separation_change))
+        if self.ahead or not step.separation_change:
+            return self.step_length
+        single, part = self.longest_part == abs(step.separation_change), self.longest_part
+        self.longest_part = 0.0
+        if single and not self.accuracy.allows_twice_the_length(step):
+            return part
+        return min(self.longest, 2 * part)
 
     def _is_apart(self):
-        """Return whether there are no spots and the separation is at least that of first contact."""
+        """Return whether there are no spots and the separation is at least the separation of first contact."""
         if self.contact.spot_count(self.state):
             return False
         highest = self.contact.untouched().separation - SAME_SEPARATION * self.contact.rms_height
         return self.state.separation >= highest
 
     def _is_new_station(self, separation, last):
-        """Return whether a separation is so far from the last station that it is a new one.
+        """Return whether a separation, m, is far enough from the last station to be a new station.
 
-        So not all of the short steps around an event become stations.
+        Without this minimum distance, all the short steps around an event would become stations.
         """
         contact = self.contact
         between = self.longest / 64 if contact.adhesive else SAME_SEPARATION * contact.rms_height
         return abs(separation - last) > between
 
     def _distance_to_station(self):
-        """Return the distance to the next station, m, or `step_length` if there is no station ahead."""
+        """Return the distance to the next equilibrium ahead or station, m, or `step_length` if there is neither."""
+        if self.ahead:
+            return abs(self.ahead[-1].separation - self.state.separation)
         at, same, stations = self.state.separation, SAME_SEPARATION * self.contact.rms_height, self.stations
         k = bisect_left(stations, at - same) - 1 if self.loading else bisect_right(stations, at + same)
         return abs(stations[k] - at) if 0 <= k < len(stations) else self.step_length

@@ -6,7 +6,9 @@ from functools import cache
 from icha.analysis.validity import (
     COMPLETE,
     RESOLVED,
+    RMS_HEIGHT,
     SPACING,
+    STICKY_HEIGHT,
     STRENGTH,
     THEORETICAL,
     Case,
@@ -17,7 +19,7 @@ from icha.analysis.validity import (
 )
 from icha.asperity.full_contact import gaussian_complete_pressure
 from icha.asperity.material import WU_HOLDS_FROM, Material
-from icha.asperity.stickiness import stickiness
+from icha.asperity.stickiness import stickiness, sticky_rms_height
 from icha.boundary_elements.front import Front
 from icha.configuration.campaign import Campaign
 from icha.configuration.cases import run_cases
@@ -109,6 +111,11 @@ def expected_validity(campaign: Campaign) -> list[Statement]:
             STRENGTH: material.interface_strength,
             THEORETICAL: material.theoretical_strength,
         }
+        section = campaign.surfaces[case.surface]
+        if isinstance(section, SelfAffineSurface):
+            moments = self_affine_moments(*section.lengths_and_hurst)
+            known[RMS_HEIGHT] = case.rms_slope * math.sqrt(moments.m0 / (2 * moments.m2))
+            known[STICKY_HEIGHT] = sticky_rms_height(section.rolloff_wavelength, material)
         if MODELS[case.model].by_cells:
             spacing = campaign.period(case.surface) / campaign.grid(case.surface)
             tension = Front(material.adhesion_length / spacing).strength * material.contact_modulus

@@ -61,12 +61,11 @@ def test_loop_without_adhesion_gives_all_work_back():
 
 
 @pytest.mark.slow
-def test_loop_with_adhesion_loses_what_its_events_lose_whatever_the_step():
+def test_loss_of_a_loop_with_adhesion_hardly_depends_on_the_step():
     coarse, fine = (loop(rough(96, 12), 1e-2, step) for step in (0.2, 0.1))
     for row in (coarse, fine):
-        assert row["work"] > 0
         assert abs(row["not_closed"]) <= 1e-6 * row["largest_work"]
-    assert coarse["work"] == pytest.approx(fine["work"], rel=0.01)
+    assert coarse["work"] == pytest.approx(fine["work"], abs=1e-4 * fine["largest_work"])
 
 
 def test_load_and_area_hardly_depend_on_the_grid():

@@ -22,6 +22,12 @@ def surface():
     return SelfAffineSpectrum(PERIOD, 0.2 * PERIOD, PERIOD / 16, 0.8).realise(64, 1)
 
 
+@pytest.fixture(scope="module")
+def large():
+    """Enough summits that one event is not a per cent of the area."""
+    return SelfAffineSpectrum(PERIOD, 0.2 * PERIOD, PERIOD / 32, 0.8).realise(128, 1)
+
+
 BOTH = pytest.mark.parametrize("material", [ADHESIVE, BARE], ids=["adhesive", "bare"])
 
 
@@ -74,6 +80,14 @@ def test_a_state_does_not_depend_on_the_kind_of_its_target(surface, material):
         other = simulate(surface, material, path)
         for name in ("contact_area_fraction", "nominal_pressure", "mean_separation", "contact_stiffness"):
             assert float(other[name][0]) == pytest.approx(float(one[name][0]), rel=1e-7), name
+
+
+@BOTH
+def test_steps_of_half_the_length_and_more_targets_change_the_area_by_less_than_a_per_cent(large, material):
+    few = simulate(large, material, Path([1e-3, 1e-2], max_step=0.1))
+    many = simulate(large, material, Path([3e-4, 1e-3, 2e-3, 5e-3, 1e-2], max_step=0.05))
+    for name in ("contact_area_fraction", "mean_separation"):
+        np.testing.assert_allclose(many[name][[1, -1]], few[name], rtol=0.01)
 
 
 def test_a_target_inside_a_jump_is_met_on_the_branch_after_it_as_far_as_that_reaches_back(surface):
@@ -203,6 +217,8 @@ def test_a_snapshot_before_first_contact_is_all_gap(surface):
     assert float(run.contact_area_fraction[0]) == 0 and run.sizes["spot"] == 0
     assert float((run.gap_density * np.diff(run.gap_bin_edges)).sum()) == pytest.approx(1, abs=1e-12)
     assert all(check.passed for check in check_run(run))
+    with pytest.raises(ValueError, match=r"path: a snapshot at a mean separation of 1\.0 m"):
+        simulate(surface, ADHESIVE, Path(reduced_pressures=[1e-3], snapshots=[("mean_separation", 1.0)]))
 
 
 def egg_box(waves=4, grid=64):
