@@ -1,7 +1,7 @@
-"""The deposit as a Workflow Run RO-Crate: what every file is, and which job made it from which files.
+"""The deposit as a Provenance Run RO-Crate: what every file is, and which job made it from which files.
 
-Profiles: RO-Crate 1.1 (https://w3id.org/ro/crate/1.1) and Workflow Run Crate 0.5
-(https://w3id.org/ro/wfrun/workflow/0.5), with the profiles on which they build.
+Profiles: RO-Crate 1.1 (https://w3id.org/ro/crate/1.1) and Provenance Run Crate 0.5
+(https://w3id.org/ro/wfrun/provenance/0.5), with the profiles on which they build.
 
 The crate contains neither the times of jobs nor the person who ran them. So the same data always have the same crate.
 """
@@ -9,6 +9,7 @@ The crate contains neither the times of jobs nor the person who ran them. So the
 import hashlib
 import json
 from collections.abc import Iterable, Mapping, Sequence
+from graphlib import TopologicalSorter
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -103,6 +104,17 @@ def write_crate(
     (folder / CRATE).chmod(0o644)
 
 
+def _steps(jobs: Sequence[Job]) -> list[Job]:
+    """Return the first job of every rule, in an order in which the rules can run."""
+    maker = {path: job for job in jobs for path in job.outputs}
+    # Lists and not sets, because the order must be the same in every process.
+    before = {job.outputs: [maker[path].outputs for path in job.inputs if path in maker] for job in jobs}
+    # Place of the last job of each rule, if every job follows the jobs that made its inputs.
+    latest = {maker[outputs[0]].rule: k for k, outputs in enumerate(TopologicalSorter(before).static_order())}
+    first = {job.rule: job for job in reversed(jobs)}
+    return [first[rule] for rule in sorted(latest, key=latest.get)]
+
+
 def _describe(crate: ROCrate, publication: Publication, campaign: str) -> None:
     """Describe the deposit as a whole."""
     licence = find_licence(publication.license)
@@ -141,28 +153,33 @@ def _add_organisation(crate: ROCrate, name: str, address: str | None) -> Entity:
 
 
 def _describe_workflow(crate: ROCrate, files: Mapping[str, File], revision: str, jobs: Sequence[Job]) -> None:
-    """Describe the workflow and its scripts, which are programs as well as files."""
+    """Describe the workflow, its steps (one for each rule), and its scripts, which are programs as well as files."""
     configuration = crate.dereference("#configuration")
     _set(files[CONFIGURATION], exampleOfWork=configuration)
-    tools = {job.script: job for job in jobs}
-    for script, job in tools.items():
+    tools, steps = {}, []
+    for position, job in enumerate(_steps(jobs), 1):
+        tools[job.script] = files[job.script]
         facts = {"version": revision, "programmingLanguage": crate.dereference("#python")}
-        _set(files[script], ["File", "SoftwareSourceCode"], name=job.rule, description=job.description, **facts)
+        _set(files[job.script], ["File", "SoftwareSourceCode"], name=job.rule, description=job.description, **facts)
+        facts = {"position": str(position), "workExample": files[job.script]}
+        steps.append(_add(crate, f"{_WORKFLOW}#{job.rule}", "HowToStep", name=job.rule, **facts))
     _set(
         files[_WORKFLOW],
-        ["File", "SoftwareSourceCode", "ComputationalWorkflow"],
+        ["File", "SoftwareSourceCode", "ComputationalWorkflow", "HowTo"],
         name="ICHA: adhesive rough contact by interacting and coalescing asperities",
         version=revision,
         conformsTo={"@id": "https://bioschemas.org/profiles/ComputationalWorkflow/1.0-RELEASE"},
         license=files[_LICENCE],
         programmingLanguage=crate.dereference("#snakemake"),
-        hasPart=[files[script] for script in tools],
+        hasPart=list(tools.values()),
+        step=steps,
         input=[configuration],
     )
 
 
 def _add_jobs(crate: ROCrate, jobs: Sequence[Job], files: Mapping[str, File], campaign: str, description: str) -> None:
-    """Add the run of the workflow, and every job in it."""
+    """Add the run of the workflow, every job in it, and for each job the control of the step that started it."""
+    engine = crate.dereference("#snakemake")
     made = {path for job in jobs for path in job.outputs}
     given = {path for job in jobs for path in job.inputs} - made | {CONFIGURATION}
     run = _add_action(
@@ -174,23 +191,28 @@ def _add_jobs(crate: ROCrate, jobs: Sequence[Job], files: Mapping[str, File], ca
         object=[files[path] for path in sorted(given)],
         result=[files[path] for path in sorted(made)],
     )
-    actions = [
-        _add_action(
+    actions, controls = [], []
+    for job in jobs:
+        key, name = quote(job.outputs[0]), f"{job.rule}: {job.outputs[0]}"
+        action = _add_action(
             crate,
-            f"#job/{quote(job.outputs[0])}",
-            name=f"{job.rule}: {job.outputs[0]}",
+            f"#job/{key}",
+            name=name,
             description=job.description,
             instrument=files[job.script],
             object=[*(files[path] for path in job.inputs), *(_add_value(crate, job, *each) for each in job.parameters)],
             result=[files[path] for path in job.outputs],
         )
-        for job in jobs
-    ]
+        actions.append(action)
+        facts = {"instrument": {"@id": f"{_WORKFLOW}#{job.rule}"}, "object": action}
+        controls.append(_add_action(crate, f"#control/{key}", "ControlAction", name=f"step {name}", **facts))
+    name = f"{campaign}, organised by {engine['name']}"
+    _add_action(crate, "#organised", "OrganizeAction", name=name, instrument=engine, object=controls, result=run)
     crate.root_dataset.append_to("mentions", [run, *actions])
 
 
-def _add_action(crate: ROCrate, key: str, **properties: Any) -> Entity:
-    return _add(crate, key, "CreateAction", **properties, actionStatus="http://schema.org/CompletedActionStatus")
+def _add_action(crate: ROCrate, key: str, kind: str = "CreateAction", **properties: Any) -> Entity:
+    return _add(crate, key, kind, **properties, actionStatus="http://schema.org/CompletedActionStatus")
 
 
 def _add_value(crate: ROCrate, job: Job, name: str, value: str) -> Entity:

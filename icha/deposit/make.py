@@ -18,7 +18,8 @@ from icha.configuration.campaign import Campaign
 from icha.configuration.cases import campaign_sha256, run_sha256
 from icha.datasets.files import read_campaign
 from icha.deposit.crate import Job, write_crate
-from icha.deposit.metadata import citation_cff, find_licence, zenodo_metadata
+from icha.deposit.dictionary import data_dictionary
+from icha.deposit.metadata import citation_cff, datacite_metadata, find_licence, zenodo_metadata
 from icha.deposit.program import Source
 from icha.deposit.readme import readme
 from icha.deposit.verify import CHECKSUMS, CRATE, README, SOURCE, ZENODO, files_of, problem_with_name
@@ -85,7 +86,7 @@ def make_deposit(
         if wrong := [f"  {file!r} {why}" for file in files_of(staging) if (why := problem_with_name(file))]:
             listed = "\n".join(wrong)
             raise ValueError(f"not published, because some systems refuse these names. Rename the files:\n{listed}")
-        _describe(staging, campaign, source.revision, cost)
+        _describe(staging, files, campaign, source.revision, cost)
         checksums = {path: sha256_of(staging / path) for path in files_of(staging)}
         write_crate(staging, publication, jobs, campaign=campaign.name, revision=source.revision, checksums=checksums)
         checksums[CRATE] = sha256_of(staging / CRATE)
@@ -133,12 +134,14 @@ def refuse_mixed(results: Path, campaign: Campaign, recorded: Mapping[str, str])
         )
 
 
-def _describe(staging: Path, campaign: Campaign, revision: str, cost: Cost) -> None:
-    """Write licence, citation, metadata and page of the deposit."""
+def _describe(staging: Path, files: Sequence[str], campaign: Campaign, revision: str, cost: Cost) -> None:
+    """Write licence, citation, metadata, data dictionary and page of the deposit."""
     publication = campaign.deposit_metadata()
     _write(staging / "LICENSE.txt", find_licence(publication.license).page())
     _write(staging / "CITATION.cff", citation_cff(publication, revision))
-    _write(staging / ZENODO, json.dumps(zenodo_metadata(publication), indent=1, ensure_ascii=False) + "\n")
+    for name, metadata in ((ZENODO, zenodo_metadata(publication)), ("datacite.json", datacite_metadata(publication))):
+        _write(staging / name, json.dumps(metadata, indent=1, ensure_ascii=False) + "\n")
+    _write(staging / "data_dictionary.csv", data_dictionary(staging, files))
     error = staging / "aggregated/model_error.nc"
     # Opened and not loaded, because the dataset may be large and the page shows little of it.
     with xr.open_datatree(staging / f"dataset/{campaign.name}.nc", engine="netcdf4") as dataset:

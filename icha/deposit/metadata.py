@@ -1,4 +1,4 @@
-"""Metadata of a deposit: licence, citation (CITATION.cff), Zenodo, and attributes of the campaign dataset."""
+"""Metadata of a deposit: licence, citation (CITATION.cff), Zenodo, DataCite, and attributes of the campaign dataset."""
 
 import json
 import re
@@ -10,7 +10,7 @@ import yaml
 from packaging.licenses import InvalidLicenseExpression, canonicalize_license_expression
 
 from icha.configuration.campaign import Campaign
-from icha.configuration.publication import Author, Funding, Publication
+from icha.configuration.publication import Author, Funding, Publication, RelatedIdentifier
 from icha.contact.models import MODEL_PAPER
 from icha.deposit.verify import SOURCE, ZENODO, read_text
 
@@ -222,6 +222,86 @@ def summary_of(metadata: dict[str, Any]) -> dict[str, str]:
     texts = {name: str(metadata.get(name, "")) for name in ("title", "version", "license")}
     communities = join(metadata.get("communities"), "identifier")
     return texts | {"authors": join(metadata.get("creators"), "name"), "community": communities}
+
+
+def datacite_metadata(publication: Publication) -> dict[str, Any]:
+    """Return the metadata of `datacite.json` after DataCite's schema 4.5 (https://doi.org/10.14454/g8e5-6293).
+
+    The publisher is known only from a DOI of Zenodo. Otherwise it is `:tba`, DataCite's code for "to be announced".
+    """
+    licence = find_licence(publication.license)
+    paper = RelatedIdentifier(identifier=f"arXiv:{MODEL_PAPER.arxiv}", relation="Cites", resource="Preprint")
+    rights = {
+        "rights": licence.name,
+        "rightsUri": licence.address,
+        "rightsIdentifier": licence.identifier,
+        "rightsIdentifierScheme": "SPDX",
+        "schemeUri": "https://spdx.org/licenses/",
+    }
+    related = [
+        {
+            "relatedIdentifier": each.identifier,
+            "relatedIdentifierType": _datacite_type(each.identifier),
+            "relationType": each.relation,
+            "resourceTypeGeneral": each.resource,
+        }
+        for each in (*publication.related_identifiers, paper)
+    ]
+    content = {
+        "schemaVersion": "http://datacite.org/schema/kernel-4",
+        "doi": publication.doi,
+        "types": {"resourceTypeGeneral": "Dataset", "resourceType": "Simulation results"},
+        "creators": [_datacite_creator(author) for author in publication.authors],
+        "titles": [{"title": publication.title}],
+        "publisher": {"name": "Zenodo" if (publication.doi or "").startswith("10.5281/zenodo.") else ":tba"},
+        "publicationYear": publication.date[:4],
+        "dates": [{"date": publication.date, "dateType": "Issued"}],
+        "version": publication.version,
+        "language": "en",
+        "descriptions": [{"description": publication.summary, "descriptionType": "Abstract"}],
+        "subjects": [{"subject": keyword} for keyword in publication.keywords],
+        "rightsList": [rights],
+        "relatedIdentifiers": related,
+        "fundingReferences": [_datacite_funding(funding) for funding in publication.funding],
+    }
+    return _without_empty(content)
+
+
+def _datacite_creator(author: Author) -> dict[str, Any]:
+    identifier, scheme = (author.orcid_address, "ORCID") if author.is_person else (author.ror, "ROR")
+    named = {"nameIdentifier": identifier, "nameIdentifierScheme": scheme, "schemeUri": f"https://{scheme.lower()}.org"}
+    place = {"name": author.affiliation}
+    if author.ror:
+        place |= {
+            "affiliationIdentifier": author.ror,
+            "affiliationIdentifierScheme": "ROR",
+            "schemeUri": "https://ror.org",
+        }
+    return {
+        "name": author.sorted_name,
+        "nameType": "Personal" if author.is_person else "Organizational",
+        "givenName": author.given_names,
+        "familyName": author.family_names,
+        "nameIdentifiers": [named] if identifier else [],
+        "affiliation": [place] if author.affiliation else [],
+    }
+
+
+def _datacite_type(identifier: str) -> str:
+    return "DOI" if identifier.startswith("10.") else "arXiv" if identifier.startswith("arXiv:") else "URL"
+
+
+def _datacite_funding(funding: Funding) -> dict[str, Any]:
+    identifier = funding.funder_id or ""
+    registry = "ROR" if "ror.org" in identifier else "Crossref Funder ID" if "10.13039/" in identifier else "Other"
+    return {
+        "funderName": funding.funder,
+        "funderIdentifier": web_address(identifier),
+        "funderIdentifierType": identifier and registry,
+        "awardNumber": funding.award_number,
+        "awardTitle": funding.award_title,
+        "awardUri": funding.award_url and web_address(funding.award_url),
+    }
 
 
 def paragraphs(text: str) -> list[str]:

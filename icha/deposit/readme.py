@@ -180,7 +180,7 @@ def _parts(sizes: Mapping[str, int]) -> list[dict]:
     rows = [(part if part in sizes else f"{part}/", part, content) for part, content in TABLES["contents"].items()]
     return [
         {"path": path, "content": content, "files": len(grouped[part]), "size": sum(grouped[part])}
-        for path, part, content in [*rows, (others, "", "citation, licence and metadata for Zenodo")]
+        for path, part, content in [*rows, (others, "", "citation, licence, and metadata for Zenodo and DataCite")]
         if part in grouped
     ]
 
