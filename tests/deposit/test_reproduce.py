@@ -175,8 +175,8 @@ def test_a_folder_continues_its_own_rerun_only(deposit, reproduce, computed, tmp
     (tmp_path / "other/file").write_text("mine")
     for folder, message in (
         (tmp_path / "again", "belongs to another deposit"),
-        (tmp_path / "other", "has other files in it"),
-        (packed / "again", "is in the deposit"),
+        (tmp_path / "other", "contains other files"),
+        (packed / "again", "is inside the deposit"),
     ):
         status, output = reproduce(packed, "--folder", folder)
         assert status == 2 and message in output, output
@@ -222,7 +222,11 @@ def test_what_is_called_a_run_and_is_none_is_not_followed(content, deposit, repr
             file["step"] = h5py.ExternalLink(str(tmp_path / "other.nc"), "/step")
         content = (tmp_path / "run.nc").read_bytes()
     status, output = reproduce(deposit(**dict.fromkeys(RUNS, content)), "--only=smallest")
-    assert status == 2 and re.search("soft.nc: is not a run|hard.nc: is not a run", output) and not computed, output
+    assert (
+        status == 2
+        and re.search("soft.nc: is not the file of a run|hard.nc: is not the file of a run", output)
+        and not computed
+    ), output
 
 
 def test_a_deposit_that_does_not_fit_leaves_nothing_behind(deposit, reproduce, monkeypatch, tmp_path):
