@@ -258,9 +258,7 @@ def format_comparison(comparison: Comparison) -> str:
         if len(found) > _MOST_LINES:
             text.append(f"… and {len(found) - _MOST_LINES} more")
     if any(file.is_remark for file in comparison.files):
-        text.append(
-            "Figures, pages and checks are made from the data. If the data are the same, the results are correct."
-        )
+        text.append("Figures, pages and checks are made from the data; if only these files differ, nothing is wrong.")
     return "\n".join(text)
 
 

@@ -113,7 +113,7 @@ def test_a_project_may_be_a_folder_of_a_shallow_clone(repository, tmp_path, monk
 def test_folders_without_a_commit_and_links_are_refused(repository, tmp_path, monkeypatch):
     plain = shutil.copytree(repository, tmp_path / "plain", ignore=shutil.ignore_patterns(".git"))
     for _ in range(2):
-        with pytest.raises(ValueError, match=r"not under git, or nothing is committed yet(.|\n)*git init"):
+        with pytest.raises(ValueError, match=r"not a git repository or has no commit(.|\n)*git init"):
             program_source(plain)
         git(plain, "init", "--quiet")
     (repository / "link").symlink_to("Snakefile")
