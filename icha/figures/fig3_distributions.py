@@ -25,9 +25,9 @@ DECLARATION = Declaration(
     options=SnapshotFigure,
 )
 
-# Least number of grid cells in a point of P(u). Bins with fewer cells are joined with their neighbours.
+# Smallest number of grid cells in a bin of P(u). Bins with fewer cells are joined with their neighbours.
 _LEAST_CELLS = 100
-# The same for P(p) of boundary elements, which have few nodes in contact.
+# Smallest number of nodes in a bin of P(p) of boundary elements, which have few nodes in contact.
 _LEAST_NODES = 25
 # Largest number of markers of boundary elements.
 _BESIDE_MARKERS = 14
@@ -35,7 +35,7 @@ _BESIDE_MARKERS = 14
 
 @in_style
 def figure(campaign: xr.DataTree, *, study: str, kind: str | None = None, target: float | None = None) -> Figure:
-    """Draw the distributions of every material on the first surface and slope of a study, means over the seeds."""
+    """Draw mean distributions over the seeds, for every material on the first surface and slope of a study."""
     from icha.analysis.model_error import state_of
 
     lines = select_snapshots(campaign, study, kind, target)
@@ -75,7 +75,7 @@ def figure(campaign: xr.DataTree, *, study: str, kind: str | None = None, target
 
 
 def _finish(left, right, pressures, highest, load):
-    """Label both panels, draw Persson's theory for a reduced pressure, and set the limits of the panel of pressures."""
+    """Label both panels, draw Persson's theory at the reduced pressure `load`, and set the limits of the axes."""
     from icha.references.persson import persson_pressure_density
 
     if load > 0:
@@ -109,7 +109,7 @@ def singular_tail(members: Sequence[tuple[xr.Dataset, int]], lowest: float) -> t
 
 
 def gap_densities(members: Sequence[tuple[xr.Dataset, int]]) -> tuple[np.ndarray, np.ndarray]:
-    """Return u/h_rms (k,) and P(u) h_rms (members, k) of snapshots; bins with few cells are joined."""
+    """Return gaps u/h_rms (k,) and densities P(u) h_rms (members, k) of snapshots; bins with few cells are joined."""
     (first, _), *_ = members
     edges = first["gap_bin_edges"].values / float(first["rms_height"])
     contents = np.array([run["gap_density"].values[at] * float(run["rms_height"]) for run, at in members])
@@ -122,9 +122,9 @@ def gap_densities(members: Sequence[tuple[xr.Dataset, int]]) -> tuple[np.ndarray
 def pressure_densities(
     members: Sequence[tuple[xr.Dataset, int]], *, joined: bool = False
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return p/(E* h'_rms) (k,) and P(p) E* h'_rms (members, k) of the bins of snapshots that are not empty.
+    """Return pressures p/(E* h'_rms) (k,) and densities P(p) E* h'_rms (members, k) of bins that are not empty.
 
-    `joined` joins bins with few nodes, for boundary elements, which have few nodes in contact.
+    With `joined`, bins with few nodes are joined. Boundary elements have few nodes in contact.
     """
     (first, _), *_ = members
     unit = float(first["contact_modulus"]) * float(first["rms_slope"])

@@ -387,7 +387,7 @@ def test_errors_of_runs_that_all_failed_are_nothing_to_draw():
         f"/{name}": (node.to_dataset().drop_vars("applicability") * np.nan).assign_attrs(node.attrs)
         for name, node in compared.errors().children.items()
     }
-    with pytest.raises(NothingToDraw, match="study one: no run beside boundary elements is complete"):
+    with pytest.raises(NothingToDraw, match="study one: no run that was compared with boundary elements is complete"):
         fig11_distribution_error.figure(compared.tree(), xr.DataTree.from_dict(empty), study="one")
 
 
