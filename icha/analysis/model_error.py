@@ -102,10 +102,7 @@ def model_error(
 
 
 def _short_range_entries(select, runs, origins):
-    """Compare every study with boundary-element runs in the limit of a short range.
-
-    The attributes of these runs are appended to `origins`.
-    """
+    """Compare studies with boundary-element runs in the limit of a short range; collect run attributes in `origins`."""
     entries: dict[str, dict[SolutionLabels, dict | None]] = {}
     for labels, truth in runs:
         labels = RunLabels(*labels)
@@ -124,10 +121,7 @@ def _short_range_entries(select, runs, origins):
 
 
 def _finite_range_entries(select, solutions, origins):
-    """Compare every entry with boundary-element solutions at finite ranges.
-
-    The attributes of these solutions are appended to `origins`.
-    """
+    """Compare entries with boundary-element solutions at finite ranges; collect run attributes in `origins`."""
     entries: dict[str, dict[SolutionLabels, dict | None]] = {}
     for labels, solution in solutions:
         labels = SolutionLabels(*labels)

@@ -214,10 +214,7 @@ def _resolution(cases):
 def _accuracy(cases, measured):
     """Return the statement on the error of the asperity model, which is known only in the range of the validation.
 
-    Parameters
-    ----------
-    cases : runs of the asperity model.
-    measured : True if the campaign also has runs with boundary elements.
+    `cases` are runs of the asperity model. `measured` is True if the campaign also has runs with boundary elements.
     """
     unknown, adhesive = {}, set()
     for case in cases:

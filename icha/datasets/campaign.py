@@ -1,7 +1,4 @@
-"""Build the campaign dataset, and select runs, snapshots and spots from it.
-
-The campaign dataset has the runs of every study as arrays along model, surface, seed, rms slope and material.
-"""
+"""Build the campaign dataset, which arranges the runs of every study along labels, and select runs and snapshots."""
 
 import tempfile
 from collections.abc import Collection, Iterable, Mapping

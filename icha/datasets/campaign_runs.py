@@ -122,7 +122,7 @@ def spool_runs(
         if attrs.get("config_sha256") != settings.get(labels, attrs.get("config_sha256")):
             file = labels if isinstance(source, xr.Dataset) else source
             raise ValueError(
-                f"{file}: this run was computed with settings other than those of the configuration. Remove the file "
+                f"{file}: this run was computed with other settings than those of the configuration. Remove the file "
                 "and repeat the command, which computes the run again"
             )
         names, snapshots = frozenset(values), _snapshots_of(values)

@@ -143,10 +143,7 @@ def _problems_with_surface(surface: xr.Dataset) -> Iterator[str]:
 
 
 def _problems_with_variables(data: xr.Dataset, table: Table, *further: Table) -> Iterator[str]:
-    """Yield differences between variables and their descriptions in `table`.
-
-    A `further` table applies if the file has at least one variable of this table.
-    """
+    """Yield differences of variables from `table`; a `further` table applies if the file has one of its variables."""
     for each in further:
         if each.keys() & data.variables.keys():
             table = table | each

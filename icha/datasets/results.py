@@ -36,13 +36,7 @@ LEFT_IN_FILE = 2**26
 
 @dataclass(frozen=True)
 class ResultFiles:
-    """Paths of the results of a campaign.
-
-    Attributes
-    ----------
-    campaign : name of the campaign.
-    folder : folder of the results, with which the paths begin; "" for paths relative to this folder.
-    """
+    """Paths of the results of the campaign `campaign`; paths begin with `folder`, unless `folder` is empty."""
 
     campaign: str
     folder: str = ""

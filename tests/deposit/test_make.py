@@ -339,7 +339,7 @@ def test_failures_are_published_only_with_a_reason(campaign, tmp_path):
 def test_names_that_verify_would_refuse_are_not_published(name, campaign, tmp_path):
     (campaign[1] / "inputs").mkdir()
     (campaign[1] / "inputs" / name).touch()
-    with pytest.raises(ValueError, match="not published, because some systems refuse these names"):
+    with pytest.raises(ValueError, match="not published, because some systems refuse these file names"):
         published_as(tmp_path / "out/small-1.0.0", *campaign)
     assert files_of(tmp_path / "out") == {}
 
@@ -349,7 +349,7 @@ def test_results_that_do_not_belong_together_are_refused(campaign):
     files = campaign_files(campaign)
     recorded = dict.fromkeys([*files.runs, files.dataset], ASKED)
     refuse_mixed(results, campaign, recorded)
-    with pytest.raises(ValueError, match=r"dataset/tiny.nc: the workflow has recorded another job for this file"):
+    with pytest.raises(ValueError, match=r"dataset/tiny.nc: was made by another job than the workflow has recorded"):
         refuse_mixed(results, campaign, recorded | {files.dataset: hash_parameters(["1"])})
     # A run of an older program, with the right settings.
     path, case = next(iter(files.runs.items()))
@@ -358,7 +358,7 @@ def test_results_that_do_not_belong_together_are_refused(campaign):
     with pytest.raises(ValueError, match=f"dataset/tiny.nc: it was made from another version of {path}"):
         refuse_mixed(results, campaign, recorded)
     write(results, path, run.assign_attrs(config_sha256="a" * 64))
-    with pytest.raises(ValueError, match=f"{path}: this file was not computed with the settings of the campaign"):
+    with pytest.raises(ValueError, match=f"{path}: was not computed with the settings of the campaign"):
         refuse_mixed(results, campaign, recorded)
 
 
