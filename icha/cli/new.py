@@ -41,7 +41,7 @@ def new(
 
     file = project() / CAMPAIGNS / f"{name}.yaml"
     if not re.fullmatch(NAME_PATTERN, name) or name.startswith("-"):
-        raise UserError(f"{name!r} is not a name; expected lower-case letters, digits, '_' and '-'")
+        raise UserError(f"{name!r} is not a valid name; expected lower-case letters, digits, '_' and '-'")
     if file.exists():
         raise UserError(f"{shorten_path(file)} exists already; choose another name, or remove it")
     if name in list_campaigns():

@@ -307,7 +307,7 @@ def test_a_licence_that_no_deposit_can_have_is_reported_before_anything_is_compu
     Path("tiny.yaml").write_text(TINY.replace("CC0-1.0", licence))
     described = printed("describe", "tiny.yaml")
     assert ("published" not in described) == accepted
-    assert accepted or f"cannot be published: tiny.yaml: license: '{licence}' is " in described
+    assert accepted or f"cannot be published: tiny.yaml: license: '{licence}' " in described
 
 
 def test_outside_a_clone_the_installed_workflow_is_used(empty_folder):
