@@ -76,7 +76,7 @@ def solve_adhesive_contact(
 ) -> tuple[AdhesiveContact, int]:
     """Solve the adhesive contact at a separation: relax the fronts and close cells within reach of the attraction.
 
-    A summit or cell that loses its new contact again stays open.
+    A summit or cell that closes and then loses contact again stays open.
 
     Parameters
     ----------
@@ -130,7 +130,7 @@ def solve_adhesive_contact(
 
 
 def _form_contact(problem, contact, formed):
-    """Close cells `formed`, (m,); if windows save time, also relax the fronts around them and solve the contact."""
+    """Close the cells `formed`, (m,); if windows save time, also relax fronts near these cells, solve the contact."""
     closed = contact.close_cells(formed)
     relaxed = relax_in_windows(problem.space, problem.front, problem.separation, closed, contact.gap, formed)
     if relaxed is None:

@@ -4,7 +4,7 @@ Every step lowers the energy U(f) - dgamma A(f), the elastic energy minus the wo
 minimum of the energy. An unstable front runs until it is in equilibrium. A step solves three linearised equations: the
 gap of closed cells is zero, the tension at the front is fraction times strength, and the strength depends on the
 fractions of neighbours. A step that raises the energy is repeated with more damping, that is with softer bonds, which
-makes the step shorter (Levenberg-Marquardt method).
+shortens the step (Levenberg-Marquardt method).
 """
 
 from __future__ import annotations
@@ -48,8 +48,8 @@ class FrontTolerances:
     certain_displacement : error of displacements at which the energies of two similar states can be compared.
     linear : smallest and largest relative error of the linearised equations; between them the error is the residual.
     local : residual above which cells are relaxed locally and damped.
-    few : part of the cells at the front. If fewer cells have residuals above `local_few`, only these are relaxed.
-    local_few : residual above which cells are relaxed locally if they are few.
+    few : part of the front, 0 to 1. If a smaller part has residuals above `local_few`, its cells are relaxed locally.
+    local_few : residual above which cells are relaxed locally if they are a smaller part of the front than `few`.
     damping : damping of the bonds after the first step that raises the energy; twice as large if most of the front
         is far from equilibrium at the start.
     """
@@ -201,8 +201,8 @@ def relax_front(
     tolerance : largest allowed residual of the front.
     close : whether the initial contact is close to equilibrium.
     max_steps : number of steps after which the contact is returned, even if it has not converged.
-    relax_locally : function that relaxes the front of a state around given cells, (m,). It returns None where local
-        relaxation would not save time.
+    relax_locally : function that relaxes the front of a state around given cells, (m,). The function returns None if
+        local relaxation would not save time.
 
     Raises
     ------
@@ -247,7 +247,7 @@ class FrontRelaxation:
     """
 
     def __init__(self, problem: FrontProblem, contact: Contact, close: bool):
-        """Solve the elastic contact of the initial contact; `close` means that it is close to equilibrium."""
+        """Solve the elastic contact of the initial contact; `close`: whether this contact is close to equilibrium."""
         self.problem, self.damping, self.local_relaxations, self.steps = problem, 0.0, 0, 0
         self.start = TOLERANCES.certain_displacement if close else TOLERANCES.moving_displacement
         self.coarsest = self.start
@@ -267,7 +267,7 @@ class FrontRelaxation:
         return True
 
     def relax_locally(self, active: ActiveCells, relax: Callable) -> bool:
-        """Relax the front around cells far from equilibrium, if that lowers the energy; return whether it did."""
+        """Relax the front around cells far from equilibrium; keep the result and return True if the energy is lower."""
         far, few = active.cells_to_relax()
         if not far.any() or self.local_relaxations >= (_MAX_LOCAL_RELAXATIONS if few else 1):
             return False
