@@ -63,8 +63,7 @@ _STICKINESS_PAPER = "L. Pastewka and M. O. Robbins, PNAS 111 (2014) 3298-3303, d
 class ConvergenceError(RuntimeError):
     """Error: the path could not be followed to its end, or it leaves the range of the model.
 
-    `dataset` contains the targets that were reached. The attribute `incomplete` or `beyond_model` contains the reason
-    for the error.
+    `dataset` contains the targets that were reached, and the reason as attribute `incomplete` or `beyond_model`.
     """
 
     def __init__(self, message: str, dataset: xr.Dataset):

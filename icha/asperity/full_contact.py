@@ -28,10 +28,8 @@ def gaussian_complete_pressure(waves: float) -> float:
     """Estimate the pressure over E* h'_rms at which contact with a Gaussian surface is complete without adhesion.
 
     This pressure compensates the largest tension of full contact at zero load. That tension is the largest of about
-    2 pi waves^2 independent values with the standard deviation E* h'_rms/2. For five spectra, the mean of five surfaces
-    differed from this estimate by 0 to 9 %.
-
-    waves : side of the surface over the shortest wavelength.
+    2 pi waves^2 independent values with the standard deviation E* h'_rms/2. `waves` is the side of the surface over the
+    shortest wavelength. For five spectra, the mean of five surfaces differed from this estimate by 0 to 9 %.
     """
     return math.sqrt(2 * math.log(2 * math.pi * waves**2)) / 2
 
