@@ -66,7 +66,7 @@ def find_among(places: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, np.nd
 
 
 def blocks_around(grid: int, reach: int, cells: np.ndarray) -> np.ndarray:
-    """Mark with 1 the blocks of BLOCK x BLOCK cells near given cells: all within `reach` cells, or slightly farther."""
+    """Return a field of blocks (BLOCK x BLOCK cells), 1 within at least `reach` cells of given cells, 0 elsewhere."""
     occupied = np.zeros(2 * [-(-grid // BLOCK)], np.uint8)
     row, column = np.divmod(cells, grid)
     occupied[row // BLOCK, column // BLOCK] = 1

@@ -22,8 +22,7 @@ from icha.support.parallel import blocks, on_cores
 ROUNDING, NO_CONTACT = 5e-7, 1e-9
 # Largest error after a correction, divided by the error before it; above, the iteration has stagnated.
 LARGEST_REMAINDER = 0.5
-# Error after one correction, divided by the error before it: while the active set changes, and the smallest possible in
-# single precision.
+# Error after one correction divided by the error before: while the active set changes; smallest in single precision.
 _COARSE_PART, _FINE_PART = 0.1, 1e-4
 # Smallest compliance of the half-space, 2/q at the shortest wave, in h/E*.
 _SMALLEST_COMPLIANCE = np.sqrt(2) / np.pi
@@ -135,6 +134,7 @@ def solve_active_set(
 
     Parameters
     ----------
+    contact : initial contact; its cells and pressures are the start of the iteration.
     tolerance : largest allowed error of displacements in contact, in cell sizes. With a tolerance above the rounding
         error of single precision, all fields are computed in single precision.
     separation : mean separation, in cell sizes; ignored if `load` is given.

@@ -42,7 +42,7 @@ class FrontTolerances:
     front : largest residual of a converged front. For comparison, the grid causes relative errors of areas and loads
         of about 1e-3.
     stagnation : largest residual at which a front is accepted although no step lowers its energy.
-    displacement : largest error of displacements in a converged contact.
+    displacement : error of displacements in a converged contact; pressures are never solved more accurately.
     moving_displacement : largest error of displacements in the first steps. After a step, the allowed error is
         residual * min(moving_displacement, max(residual, linear[0])).
     certain_displacement : error of displacements at which the energies of two similar states can be compared.
@@ -69,8 +69,7 @@ class FrontTolerances:
 TOLERANCES = FrontTolerances()
 # Largest numbers of steps, of Krylov vectors, of local relaxations between steps; largest damping.
 _MAX_STEPS, _MAX_KRYLOV, _MAX_LOCAL_RELAXATIONS, _LARGEST_DAMPING = 400, 60, 5, 1e8
-# Largest error of displacements in units of the critical opening, divided by the residual of the front that depends on
-# these displacements.
+# Allowed error of displacements in units of the critical opening, divided by the allowed residual of the front.
 _ACCURACY = 1e-3
 # Relative rounding error of the energy, and relative rounding error of the work of a step.
 _ENERGY_ROUNDING, _WORK_ROUNDING = 1e-12, 1e-11
@@ -257,9 +256,9 @@ class FrontRelaxation:
         self.state = contact
 
     def refine(self, accuracy: float) -> bool:
-        """Solve the pressures again unless displacement errors are at most `accuracy`; return whether it did so.
+        """Solve the pressures again unless displacement errors are at most `accuracy` (in critical openings).
 
-        accuracy : in units of the critical opening; at least TOLERANCES.displacement is used.
+        Return whether the pressures were solved again.
         """
         accuracy = max(accuracy, TOLERANCES.displacement)
         if self.problem.is_accurate(self.state, accuracy):
@@ -318,10 +317,7 @@ class FrontRelaxation:
         self._damp(8, active.residual)
 
     def _damp(self, factor: float, residual: float) -> None:
-        """Raise the damping by a factor after a failed step, and solve the pressures more accurately.
-
-        Raise `Stagnation` if the damping is too large.
-        """
+        """Raise the damping and solve the pressures more accurately after a failed step, or raise `Stagnation`."""
         self.coarsest = min(self.coarsest, TOLERANCES.certain_displacement)
         self.refine(min(self.coarsest, _ACCURACY * residual))
         self.damping = max(factor * self.damping, TOLERANCES.damping)
@@ -379,9 +375,7 @@ class LinearisedFront:
         self.unit = np.float32(front.strength or 1.0)
 
     def solve(self, right: np.ndarray, accuracy: float) -> tuple[np.ndarray, np.ndarray]:
-        """Solve for the changes of fraction and pressure, (k,) each, to a relative error of at most `accuracy`.
-
-        right : (k,), right-hand side of the equations, in cell sizes.
+        """Solve for the changes of fraction and pressure, (k,) each, with a right-hand side, to a relative accuracy.
 
         Raises
         ------
@@ -435,10 +429,7 @@ class LinearisedFront:
 
 
 def gmres(matrix: Callable, preconditioner: Callable, right: np.ndarray, accuracy: float) -> np.ndarray:
-    """Solve linear equations by right-preconditioned GMRES without restart, in at most _MAX_KRYLOV steps.
-
-    matrix, preconditioner : functions that return the product with a vector. accuracy : relative residual to reach.
-    """
+    """Solve linear equations by right-preconditioned GMRES to a relative accuracy, or until _MAX_KRYLOV steps."""
     norm = float(np.linalg.norm(right))
     if norm == 0:
         return np.zeros_like(right)

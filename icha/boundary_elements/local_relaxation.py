@@ -160,7 +160,7 @@ class Places(NamedTuple):
 
 
 def _boxes(labels):
-    """Return the bounding box of each label: rows and columns, in blocks; from negative numbers across the period."""
+    """Return the box (rows, columns) around each label, in blocks; a box across the period has negative numbers."""
     half = len(labels) // 2
     boxes = []
     rolled = np.roll(labels, (half, half), (0, 1))
