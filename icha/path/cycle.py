@@ -1,7 +1,7 @@
 """Cycles of loading and unloading: all equilibria of a path that continues after the first loading.
 
 On unloading every spot follows its stable branch until it jumps off. Unloading ends at complete separation or at a
-turning point. Unloading visits the separations of the loading again, so that both curves can be compared. These
+turning point. Unloading visits the separations of the loading again, so that both curves can be compared. The visited
 separations are called stations. Close to an event that changes the pressure, the steps become so short that the energy
 lost in the event is known accurately.
 """
@@ -259,9 +259,9 @@ class _Cycle:
         """Find the equilibrium at a separation, m, at the end of a step of a given length, m.
 
         If the state `ahead` is given, this state is the equilibrium, and only its events are found. On unloading the
-        spots together may lose their equilibrium before any single spot has reached its own jump-off. Then, if the step
-        is very short, the spot closest to jump-off breaks contact. If there is still no equilibrium, the two, four, …
-        spots closest to jump-off break contact.
+        spots together may lose their equilibrium before any single spot has reached its own jump-off. If this
+        happens in a very short step, the spot closest to jump-off breaks contact. If there is still no equilibrium, the
+        two, four, … spots closest to jump-off break contact.
         """
         contact, start = self.contact, self.state
         if ahead is not None:
