@@ -126,7 +126,7 @@ class Campaign(Section):
         return list(self._contacts[study])
 
     def with_contacts(self, contacts: Mapping[str, Iterable[Contact]]) -> Campaign:
-        """Return the campaign with the given contacts; each list of a study is replaced by the values in them."""
+        """Return the campaign with the given contacts; lists of studies are replaced by the values in the contacts."""
         contacts = {study: tuple(dict.fromkeys(runs)) for study, runs in contacts.items()}
         studies = {}
         for label, study in self.studies.items():
