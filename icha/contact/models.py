@@ -60,8 +60,8 @@ class PathAccuracy:
         so far.
     tension : largest relative error of the largest tension between two equilibria without an event.
     least_work : smallest work to which `loss` is relative, J/m^2.
-    predicts_steps : whether the error of the work decides the length of every step, because the pressure may jump
-        without an event. If False, the length of steps without events doubles.
+    error_controlled_steps : if True, the error of the work of each step decides the length of the next step, because
+        the pressure may jump without an event. If False, each step may be twice as long as the last one.
     """
 
     event: float = 1e-12
@@ -69,7 +69,7 @@ class PathAccuracy:
     balance: float = 3e-6
     tension: float = 1e-8
     least_work: float = 0.0
-    predicts_steps: bool = False
+    error_controlled_steps: bool = False
 
 
 @dataclass(frozen=True)
@@ -163,7 +163,7 @@ MODELS = {
         periodic_only=True,
         least_cells=4,
         # Fronts that hop from cell to cell lose energy that only a finer grid would resolve.
-        accuracy=PathAccuracy(event=1e-5, loss=1e-4, tension=1e-5, predicts_steps=True),
+        accuracy=PathAccuracy(event=1e-5, loss=1e-4, tension=1e-5, error_controlled_steps=True),
         resumable=True,
     ),
 }
