@@ -99,11 +99,11 @@ class Campaign(Section):
     """Loops of loading and unloading with boundary elements at a finite range of attraction, by name, to compare with
     the runs of a study that unloads."""
     measurements: Annotated[dict[Name, Measurement], _FEW] = {}
-    """Your own measurements by name. Figure 5 shows them with the runs."""
+    """Your own measurements by name. Figure 5 shows the measurements with the runs."""
     figures: Figures = Figures()
     """Figures to draw, with options."""
     publication: Publication = Publication()
-    """Metadata of a deposit. These values do not change any result."""
+    """Metadata of a deposit. Metadata do not change any result."""
 
     _contacts: dict[str, tuple[Contact, ...]] = PrivateAttr(default={})
     _topographies: dict[str, Topography] = PrivateAttr(default={})
