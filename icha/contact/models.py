@@ -55,11 +55,11 @@ class PathAccuracy:
     Attributes
     ----------
     event : step length, in h_rms, up to which an event in the step counts as located.
-    loss : largest uncertainty of the work of one step with events, relative to the work so far.
-    balance : largest difference between work and change of energy in a long step without events, relative to the work
-        so far.
+    loss : largest error of the work of one step with events, relative to `StepAccuracy.energy_scale`.
+    balance : largest difference between work and change of energy in a long step without events, relative to the same
+        scale.
     tension : largest relative error of the largest tension between two equilibria without an event.
-    least_work : smallest work to which `loss` is relative, J/m^2.
+    least_work : smallest energy to which `loss` is relative, J/m^2.
     error_controlled_steps : if True, the error of the work of each step decides the length of the next step, because
         the pressure may jump without an event. If False, each step may be twice as long as the last one.
     """

@@ -290,9 +290,9 @@ class _Cycle:
     def _choose_next_length(self, step):
         """Return the value of `step_length` after a step, m; at most `longest`.
 
-        It is twice `step_length`. With error-controlled steps, it does not change while equilibria lie ahead. Then it
-        is twice the longest of the steps into which the last trial step was divided. If the last of these steps is the
-        longest one, as in a trial step that was not divided, it is doubled only if the error would be small enough.
+        Without error-controlled steps it doubles. With them it does not change while equilibria lie ahead. After the
+        last one of these, it is twice the longest of the steps into which the last trial step was divided. If the last
+        of these steps is the longest, as in a trial step that was not divided, it doubles only if the error allows it.
         """
         if not self.contact.path_accuracy.error_controlled_steps:
             return min(self.longest, 2 * self.step_length)

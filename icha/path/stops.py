@@ -32,7 +32,7 @@ class TargetFunction:
     contact: ContactModel
 
     def excess(self, state: State) -> float:
-        """Return by how much a state exceeds the target, relative to the target value; the excess rises on loading.
+        """Return by how much a state exceeds the target, relative to its absolute value; the excess rises on loading.
 
         The excess over a mean separation is relative to h_rms, and over a load of zero to LEAST_PRESSURE.
         """
@@ -80,7 +80,7 @@ def next_of_each_kind(pending: Iterable[TargetFunction]) -> list[TargetFunction]
 
 
 class InsideJump(NotConverged):
-    """Error: the path jumps over the target, and no equilibrium has the value of the target."""
+    """Error: the path jumps over the target, and no equilibrium at the target is found after the jump."""
 
     def __init__(self, target: TargetFunction, before: State, after: State):
         """Write the message about a target that lies between the states before and after a jump."""
