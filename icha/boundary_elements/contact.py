@@ -38,7 +38,7 @@ from icha.surfaces.surface import Surface
 # Smallest critical opening divided by the largest height; below, rounding of the heights hides it.
 _SMALLEST_OPENING = 1e-4
 # Largest change of a fraction of contact for which rates predict the next state.
-_LARGEST_PREDICTION = 0.25
+_LARGEST_PREDICTION = 1.0
 # Smallest work whose error a path bounds, divided by the surface energy: that of 0.1 % of the nominal area.
 _SMALLEST_WORK = 1e-3
 

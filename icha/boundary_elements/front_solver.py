@@ -68,7 +68,7 @@ TOLERANCES = FrontTolerances()
 # Limits of the iteration.
 _MAX_STEPS, _MAX_KRYLOV, _MAX_LOCAL_RELAXATIONS, _LARGEST_DAMPING = 400, 60, 5, 1e8
 # Error of displacements in units of the critical opening, over the residual of the front that they decide.
-_ACCURACY = 1e-3
+_ACCURACY = 1e-2
 # Relative rounding error of an energy, and of the work of a step.
 _ENERGY_ROUNDING, _WORK_ROUNDING = 1e-12, 1e-11
 

@@ -195,8 +195,8 @@ def iterate_secant(problem: ControlProblem, bracket: Bracket, trial: CellState, 
         separation = bracket.limit(problem.newton_separation(trial, before))
         if separation < problem.contact.smallest_gap:
             raise FullContact("the mean gap vanishes")
-        same = before is not None and abs(error) < _SAME_SLOPES * scale
         start, before = trial, trial if before is not None or trial.front_residual <= TOLERANCES.front else None
+        same = before is not None and abs(error) < _SAME_SLOPES * scale
         trial = problem.solve(start, separation, TOLERANCES.front, close=True, same_slopes=same)
         error = problem.error(trial)
         if abs(error) <= problem.tolerance(scale):
