@@ -8,15 +8,10 @@ import numpy as np
 
 from icha.boundary_elements.cells import mask_of
 from icha.boundary_elements.elastic_contact import AdhesiveContact, Contact
-from icha.boundary_elements.front_solver import FrontProblem, relax_front
+from icha.boundary_elements.front_solver import TOLERANCES, FrontProblem, relax_front
 from icha.boundary_elements.local_relaxation import relax_in_windows
 from icha.contact.model import NotConverged
 
-# Residual of the front at which we look for new contact, and how far below the reach of the attraction the gap must be,
-# in units of the critical opening: where new contact is clear. Then the residual at which it is certain.
-_CLEAR_RESIDUAL, _CLEAR_DISTANCE, _CERTAIN_RESIDUAL = 3e-2, 0.02, 1e-3
-# Accuracy of displacements, in units of the critical opening, in rounds of new contact.
-_ROUND_ACCURACY = 1e-2
 # Safety limit of the rounds of new contact; in theory there can be one round per cell.
 _MAX_ROUNDS = 1000
 
@@ -96,13 +91,13 @@ def solve_adhesive_contact(
     NotConverged
         If the equilibrium is not found.
     """
-    margin = _CLEAR_DISTANCE * problem.front.critical_opening
+    margin = TOLERANCES.coarse * problem.front.critical_opening
 
     def relax_locally(state, far):
         return relax_in_windows(problem.space, problem.front, problem.separation, state, state.gap, far)
 
-    stages = [(_CLEAR_RESIDUAL, margin), (_CERTAIN_RESIDUAL, 0.0), (tolerance, 0.0)]
-    if tolerance > _CERTAIN_RESIDUAL:
+    stages = [(TOLERANCES.coarse, margin), (TOLERANCES.fine, 0.0), (tolerance, 0.0)]
+    if tolerance > TOLERANCES.fine:
         stages[1:] = [(tolerance, margin)]
     first = len(stages) - 1 if close else 0
     tried, rounds, stage = np.zeros(problem.space.size, dtype=bool), 0, first
@@ -136,4 +131,4 @@ def _form_contact(problem, contact, formed):
     relaxed = relax_in_windows(problem.space, problem.front, problem.separation, closed, contact.gap, formed)
     if relaxed is None:
         return closed
-    return problem.solve_elastic(relaxed, _ROUND_ACCURACY)
+    return problem.solve_elastic(relaxed, TOLERANCES.displacement)

@@ -31,7 +31,7 @@ from icha.contact.models import MODELS, REFERENCE_MODEL
 
 @dataclass(frozen=True)
 class FrontTolerances:
-    """Tolerances of the front.
+    """All tolerances of the solver; `docs/short_range.md` has the measurements behind their values.
 
     The residual of a cell is |K/K_c - 1| with K/K_c = sqrt(G/dgamma). Errors of displacements are in units of the
     critical opening.
@@ -40,35 +40,36 @@ class FrontTolerances:
     ----------
     front : residual of a converged front; the grid's own error of areas and loads is some 1e-3.
     stagnation : largest residual at which a front that cannot move on is accepted; above, it has not converged.
-    displacement : error of a converged contact.
-    moving_displacement : largest error of the first steps. After a step, the allowed error is
-        residual * min(moving_displacement, max(residual, linear[0])).
+    coarse : residual above which cells are relaxed locally and damped, and below which contact forms that is within
+        reach by more than the same part of the critical opening; first trials for a load end here.
+    fine : residual below which all contact within reach forms, and above which few cells are relaxed locally on their
+        own; later trials for a load end here, and are close to it if the relative error is no larger.
+    few : part of the front that counts as few cells.
+    displacement : error of a displacement, divided by the residual that it decides.
+    moving_displacement : the same, at most, after a step.
     certain_displacement : error at which energies of states that differ little can be compared.
     linear : error of the linearised equations: the front's residual, but between these two.
-    local : residual above which cells are relaxed locally and damped.
-    few : part of the front; fewer cells above `local_few` are relaxed locally on their own.
-    local_few : residual above which so few cells are relaxed locally.
-    damping : first damping of bonds where a step leads up in energy; twice if most of the front is
-        far from equilibrium at the start.
+    damping : first damping of bonds where a step leads up in energy; twice if most of the front is far from
+        equilibrium at the start.
     """
 
     front: float = 1e-6
     stagnation: float = 1e-3
-    displacement: float = 1e-9
+    coarse: float = 3e-2
+    fine: float = 1e-3
+    few: float = 0.01
+    displacement: float = 1e-2
     moving_displacement: float = 0.1
     certain_displacement: float = 1e-5
     linear: tuple[float, float] = (MODELS[REFERENCE_MODEL].stiffness_error, 0.1)
-    local: float = 0.03
-    few: float = 0.01
-    local_few: float = 1e-3
     damping: float = 0.1
 
 
 TOLERANCES = FrontTolerances()
+# Smallest error of displacements, in units of the critical opening.
+_SMALLEST_ERROR = 1e-3 * TOLERANCES.front
 # Limits of the iteration.
 _MAX_STEPS, _MAX_KRYLOV, _MAX_LOCAL_RELAXATIONS, _LARGEST_DAMPING = 400, 60, 5, 1e8
-# Error of displacements in units of the critical opening, over the residual of the front that they decide.
-_ACCURACY = 1e-2
 # Relative rounding error of an energy, and of the work of a step.
 _ENERGY_ROUNDING, _WORK_ROUNDING = 1e-12, 1e-11
 
@@ -108,10 +109,10 @@ class ActiveCells(Contact):
     def cells_to_relax(self) -> tuple[np.ndarray, bool]:
         """Cells far from equilibrium, (k,) bool, and whether they are only few of the front's."""
         few = TOLERANCES.few * np.count_nonzero(self.at_front)
-        uneasy = self.residuals > TOLERANCES.local_few
+        uneasy = self.residuals > TOLERANCES.fine
         if np.count_nonzero(uneasy) <= few:
             return uneasy, True
-        far = self.residuals > TOLERANCES.local
+        far = self.residuals > TOLERANCES.coarse
         return far, bool(np.count_nonzero(far) <= few)
 
 
@@ -214,14 +215,14 @@ def relax_front(
         active = find_active_cells(problem.front, relaxation.state)
         try:
             if active.residual <= tolerance:
-                if not relaxation.refine(_ACCURACY * tolerance):
+                if not relaxation.refine(TOLERANCES.displacement * tolerance):
                     return relaxation.state
             elif not relaxation.relax_locally(active, relax_locally):
                 relaxation.step(active)
         except Stagnation as failure:
             if active.residual > TOLERANCES.stagnation:
                 raise NotConverged(f"{failure} (residual of sqrt(G/dgamma): {active.residual:.1e})") from None
-            if not relaxation.refine(TOLERANCES.displacement):
+            if not relaxation.refine(_SMALLEST_ERROR):
                 return relaxation.state
     if max_steps or active.residual <= TOLERANCES.stagnation:
         return relaxation.state
@@ -254,7 +255,7 @@ class FrontRelaxation:
 
     def refine(self, accuracy: float) -> bool:
         """Solve for the pressures again, unless they have an accuracy, in units of the critical opening, already."""
-        accuracy = max(accuracy, TOLERANCES.displacement)
+        accuracy = max(accuracy, _SMALLEST_ERROR)
         if self.problem.is_accurate(self.state, accuracy):
             return False
         self.state = self.problem.solve_elastic(self.state, accuracy)
@@ -270,7 +271,7 @@ class FrontRelaxation:
         if contact is not None:
             accuracy = min(self.start, 0.1 * TOLERANCES.moving_displacement, self._moving_accuracy(active))
             try:
-                new = self.problem.solve_elastic(contact, max(TOLERANCES.displacement, accuracy))
+                new = self.problem.solve_elastic(contact, max(_SMALLEST_ERROR, accuracy))
             except FullContact:
                 # With fixed pressures around it, a last gap may close that would otherwise stay open.
                 contact = None
@@ -295,25 +296,21 @@ class FrontRelaxation:
         if np.sum((active.intensity**2 - 1) * change) > _WORK_ROUNDING * np.abs(change).sum():
             self._damp(2, active.residual)
             return
-        accuracy = max(TOLERANCES.displacement, min(self.coarsest, self._moving_accuracy(active)))
-        # Short steps cost as much as long ones: after two lengths, more damping finds a better direction.
-        for length in (1.0, 0.5) if self.coarsest <= TOLERANCES.certain_displacement else (1.0,):
-            try:
-                new = problem.solve_elastic(active.apply_step(length * change, length * pressure_change), accuracy)
-            except FullContact:
-                # The gap has a given volume: it does not close.
-                continue
-            if problem.is_lower(new, self.state):
-                if length == 1.0:
-                    self.damping = self.damping / 4 if self.damping > 0.01 else 0.0
-                self.state, self.coarsest, self.local_relaxations = new, self.start, 0
-                return
-        self._damp(8, active.residual)
+        accuracy = max(_SMALLEST_ERROR, min(self.coarsest, self._moving_accuracy(active)))
+        try:
+            new = problem.solve_elastic(active.apply_step(change, pressure_change), accuracy)
+        except FullContact:
+            new = None  # the gap has a given volume: it does not close
+        if new is None or not problem.is_lower(new, self.state):
+            self._damp(8, active.residual)
+            return
+        self.damping = self.damping / 4 if self.damping > 0.01 else 0.0
+        self.state, self.coarsest, self.local_relaxations = new, self.start, 0
 
     def _damp(self, factor: float, residual: float) -> None:
         """Solve the pressures more accurately and raise the damping, both at once."""
         self.coarsest = min(self.coarsest, TOLERANCES.certain_displacement)
-        self.refine(min(self.coarsest, _ACCURACY * residual))
+        self.refine(min(self.coarsest, TOLERANCES.displacement * residual))
         self.damping = max(factor * self.damping, TOLERANCES.damping)
         if self.damping > _LARGEST_DAMPING:
             raise Stagnation("no step of the front lowers the energy")
@@ -323,7 +320,7 @@ def newton_step(problem: FrontProblem, active: ActiveCells, damping: float) -> t
     """Solve the linearised equations: changes of fraction and pressure, (k,)."""
     front, at_front = problem.front, active.at_front
     # A running front needs shorter steps.
-    local = np.where(np.abs(active.intensity - 1) > TOLERANCES.local, max(damping, 2 * TOLERANCES.damping), damping)
+    local = np.where(np.abs(active.intensity - 1) > TOLERANCES.coarse, max(damping, 2 * TOLERANCES.damping), damping)
     linear = LinearisedFront(problem.space, front, active, active.mean_fraction, at_front, local)
     # Go to the tension that the law wants at the present fraction, and from there along the law.
     strengths = front.strengths(active.mean_fraction)

@@ -18,10 +18,6 @@ if TYPE_CHECKING:
 
 # Relative error of a load or area that is met: below that at which a path recognises a stop, 1e-9.
 _MET = 5e-10
-# Relative errors below which trials are solved to the tolerances of an equilibrium, and below which slopes are reused.
-_CLOSE, _SAME_SLOPES = 1e-3, 1e-4
-# Residuals of the front in the first coarse trial, and in those after it.
-_FIRST_RESIDUAL, _RESIDUAL = 3e-2, 1e-3
 # Separations that differ by less, in h_rms, are the same.
 _SAME_SEPARATION = 1e-13
 # Unit of the error of a load of zero, divided by stiffness times h_rms: attraction and repulsion of about this size
@@ -164,12 +160,12 @@ def bracket_loosely(
 
     Where events may happen on the path, none is skipped: a trial that goes too far starts from before it.
     """
-    contact, start, residual = problem.contact, bracket.before, _FIRST_RESIDUAL
+    contact, start, residual = problem.contact, bracket.before, TOLERANCES.coarse
     control_is_load = problem.control.quantity == PRESSURE
-    close = _CLOSE * scale if contact.adhesive else problem.tolerance(scale)
+    close = TOLERANCES.fine * scale if contact.adhesive else problem.tolerance(scale)
     trials = _MAX_TRIALS // 2 if contact.adhesive else 2 * _MAX_TRIALS
     for _ in range(trials):
-        trial, residual = problem.solve(start, separation, residual), _RESIDUAL
+        trial, residual = problem.solve(start, separation, residual), TOLERANCES.fine
         error = problem.error(trial)
         if abs(error) <= close:
             return trial, bracket
@@ -196,12 +192,12 @@ def iterate_secant(problem: ControlProblem, bracket: Bracket, trial: CellState, 
         if separation < problem.contact.smallest_gap:
             raise FullContact("the mean gap vanishes")
         start, before = trial, trial if before is not None or trial.front_residual <= TOLERANCES.front else None
-        same = before is not None and abs(error) < _SAME_SLOPES * scale
+        same = before is not None and abs(error) < TOLERANCES.linear[0] * scale
         trial = problem.solve(start, separation, TOLERANCES.front, close=True, same_slopes=same)
         error = problem.error(trial)
         if abs(error) <= problem.tolerance(scale):
             return trial, True
-        if abs(error) > _CLOSE * scale:
+        if abs(error) > TOLERANCES.fine * scale:
             return trial, False
         bracket = bracket.with_state(trial, error)
     raise NotConverged(f"{_MAX_TRIALS} secants do not meet it")
