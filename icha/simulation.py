@@ -51,9 +51,9 @@ from icha.surfaces.moments import height_statistics, slope_anisotropy, spectral_
 from icha.surfaces.summits import SummitCoverage, locate_summits
 from icha.surfaces.surface import Surface
 
-# Largest relative excess of a contact area over its limit that is within the tolerance of the equilibria.
+# Largest relative excess of a contact area over its limit that errors of the equilibria can cause.
 _AREA_TOLERANCE = 1e-6
-# Largest mean separation of a snapshot, in h_rms; contact is far below it.
+# Largest mean separation of a snapshot, in h_rms. Contact forms at much smaller separations.
 _HIGHEST_SNAPSHOT = 20.0
 # Kind of the snapshot of the largest tension on unloading.
 PULL_OFF = "pull_off"
@@ -61,18 +61,18 @@ _STICKINESS_PAPER = "L. Pastewka and M. O. Robbins, PNAS 111 (2014) 3298-3303, d
 
 
 class ConvergenceError(RuntimeError):
-    """Error: the path could not be followed to its end, or leaves the range of the model.
+    """Error: the path could not be followed to its end, or it leaves the range of the model.
 
-    `dataset` contains the targets that were reached. Its attribute `incomplete` or `beyond_model` is the reason.
+    `dataset` contains the targets that were reached, and the reason as attribute `incomplete` or `beyond_model`.
     """
 
     def __init__(self, message: str, dataset: xr.Dataset):
-        """Store the dataset of the targets that were reached."""
+        """Store the message, and the dataset of the targets that were reached."""
         super().__init__(message)
         self.dataset = dataset
 
     def __reduce__(self):
-        """Pickle the error together with its dataset."""
+        """Return the class and the arguments from which pickle restores the error with its dataset."""
         return type(self), (self.args[0], self.dataset)
 
 
@@ -86,48 +86,48 @@ def simulate(
     progress: Callable[[str], None] | None = None,
     kept: pathlib.Path | None = None,
 ) -> xr.Dataset:
-    """Press a surface against an elastic half-space along a path of loading and unloading; return all states.
+    """Simulate the contact of a surface and an elastic half-space along a path; return a dataset of all states.
 
     Parameters
     ----------
-    surface : topography with its final rms slope.
+    surface : rough surface, scaled to its final rms slope.
     material : contact modulus, work of adhesion, range of attraction and flaws of the contact.
     path : loads, areas or separations to reach, and the snapshots, whose distributions and spots are stored.
-    model : "asperities", or "boundary_elements" in the limit of a short range of attraction, which is slower and needs
-        a periodic surface.
+    model : "asperities" or "boundary_elements". Boundary elements are slower, use the limit of a short range of
+        attraction, and need a periodic surface.
     seed : number that is recorded in the dataset; -1 for a surface without a seed.
     progress : function that is called with a line of text at every target.
-    kept : folder of checkpoints (`icha.contact.checkpoints`), with boundary elements only. An interrupted call with the
-        same arguments resumes from them.
+    kept : folder of checkpoints (`icha.contact.checkpoints`), only with boundary elements. If a call was interrupted, a
+        call with the same arguments resumes from the checkpoints.
 
     Returns
     -------
     xarray.Dataset with dimensions step, snapshot, gap_bin, pressure_bin and spot; every variable has units and a long
     name. On a path that continues after the first loading, all equilibria are steps, and there is a dimension event.
     Boundary elements also have dimensions row and column. The attribute `contact_model` names the model.
-    `applicability` gives the reasons why the model is not applicable to this contact, and is empty without a reason.
-    `failed_checks` lists the checks that the run fails (`icha.checks.run.check_run`); without any it does not exist.
+    `applicability` gives the reasons why the model is not applicable to this contact, or is empty.
+    `failed_checks` lists the checks that the run fails (`icha.checks.run.check_run`); it is absent if all checks pass.
 
     Warns
     -----
     UserWarning
-        If the run fails checks; its numbers must not be used then.
+        If the run fails checks. The numbers of this run must not be used.
 
     Raises
     ------
     ValueError
         If an argument has the wrong type, the model is unknown, a target is out of range on this surface, the surface
-        has no summits, or the model does not cover it.
+        has no summits, or the model is not available for the surface.
     ConvergenceError
-        If an equilibrium is not found, a target cannot be reached, or the path leaves the range of the model; its
-        `dataset` has the targets reached before.
+        If an equilibrium is not found, a target cannot be reached, or the path leaves the range of the model. The
+        attribute `dataset` of the error contains the targets reached before.
     """
     if model not in tuple(MODELS):
         raise ValueError(f"model: {model!r} must be one of {', '.join(MODELS)}")
     _check_arguments(surface, material, path, MODELS[model].by_summits)
     if kept is not None and not MODELS[model].resumable:
         raise ValueError(f"kept: the model {model} has no checkpoints; expected None")
-    # Only this model is imported, because the fingerprint of a run must not depend on other models.
+    # Only the chosen model is imported, because the fingerprint of a run must not depend on other models.
     solver = importlib.import_module(MODELS[model].module)
     seed = IntegerRange(-1).validate("seed", seed)
     dataset = _compute(solver, surface, material, path, model, seed, progress, kept)
@@ -158,7 +158,7 @@ def _compute(solver, surface, material, path, model, seed, progress, kept):
         raise ConvergenceError(record.failure, dataset) from None
     if path.unload:
         pull_off = record.snapshots[-1]["snapshot_step"]
-        # Tension if all summits pulled with their pull-off force at once, Pa.
+        # Nominal tension if all summits had their pull-off force at the same time, Pa.
         radii = float(np.sum(contact.asperities.radius_of_curvature))
         summits_pull = 1.5 * np.pi * material.surface_energy * radii / contact.area
         loop = summarise_loop(record.steps, pull_off, material, summits_pull, record.unattributed)
@@ -170,9 +170,9 @@ def _compute(solver, surface, material, path, model, seed, progress, kept):
 def empty_run(
     surface: Surface, material: Material, path: Path, reason: str, *, model: str = DEFAULT_MODEL, seed: int = -1
 ) -> xr.Dataset:
-    """Return the dataset of a run that could not be computed: without steps, with the reason as attribute `incomplete`.
+    """Return the dataset of a run that could not be computed: no steps, and the reason as attribute `incomplete`.
 
-    All other arguments are those of `simulate`.
+    The arguments other than `reason` are those of `simulate`.
     """
     record, summits = _PathRecord(reason), locate_summits(surface)
     coverage = SummitCoverage.of(surface, summits)
@@ -213,13 +213,13 @@ def _dataset(surface, material, path, name, seed, record, summits, reasons, of_c
 def asperity_applicability(
     full_contact_energy_ratio: float, summit_reasons: Sequence[str] = (), contact_area_fraction: float = 0.0
 ) -> str:
-    """Return a text with the reasons why the asperity model is not applicable; it is empty if there are none.
+    """Return a text with the reasons why the asperity model is not applicable, or an empty text if it is applicable.
 
     Parameters
     ----------
     full_contact_energy_ratio : elastic energy of full contact over the work of adhesion; infinite without adhesion.
-    summit_reasons : reasons that follow from the summits of the surface.
-    contact_area_fraction : largest A/A0 of the run.
+    summit_reasons : reasons why the summits do not represent the surface.
+    contact_area_fraction : largest contact area fraction A/A0 of the run.
     """
     reasons = []
     if full_contact_energy_ratio < FULL_CONTACT_BELOW:
@@ -240,8 +240,8 @@ def _check_arguments(surface, material, path, by_summits):
     """
     for name, value, kind in (("surface", surface, Surface), ("material", material, Material), ("path", path, Path)):
         if not isinstance(value, kind):
-            raise ValueError(f"{name}: a {type(value).__name__} is not an icha.{kind.__name__}")
-    # Loading ends at the limit of the asperity model, but it must begin within it.
+            raise ValueError(f"{name}: expected an icha.{kind.__name__}, got a {type(value).__name__}")
+    # Loading may end at the limit of the asperity model, but the first target must be within the limit.
     limited = (path.targets[0], *path.turning_points) if by_summits else ()
     for target in (*path.targets, *path.turning_points):
         if target in limited and target.kind in ASPERITY_RANGES and target.value > 0:
@@ -272,10 +272,10 @@ class _PathRecord:
     Attributes
     ----------
     failure : reason why the path ends early; empty for a complete path.
-    beyond_model : whether it ends early because it leaves the range of the model.
-    steps, snapshots : one row of values, by the names of the variables, for every step and snapshot.
+    beyond_model : whether the path ends early because it leaves the range of the model.
+    steps, snapshots : for every step and snapshot, a dictionary of values by variable name.
     events : events of every step.
-    unattributed : loss that belongs to no kind of event, J/m^2.
+    unattributed : loss that is not attributed to any kind of event, J/m^2.
     pressed : state of the first loading with the largest contact area.
     """
 
@@ -289,7 +289,7 @@ class _PathRecord:
 
 
 def _count_uphill_jumps_in(record: _PathRecord) -> int:
-    """Return the number of jumps into contact that cost energy, by the law of a single spot or the energy balance."""
+    """Return the number of jumps into contact that cost energy, by the law of a spot or by the energy balance."""
     gained = np.diff([step["dissipated_by_jump_in"] for step in record.steps], prepend=0.0) < 0
     return sum(
         int(np.count_nonzero((events.kind == JUMP_IN) & ((events.energy < 0) | uphill)))
@@ -300,7 +300,7 @@ def _count_uphill_jumps_in(record: _PathRecord) -> int:
 def _record_path(contact, observables, path, reachable, progress) -> _PathRecord:
     """Follow a path and return the record of its steps, snapshots and events.
 
-    reachable : the path without targets above the range of the model; if there are any, the path ends before them.
+    reachable : path without targets above the range of the model. The record ends before the first missing target.
     """
     left_out = [target for target in path.targets if target not in reachable.targets]
     remaining = len(reachable.targets)
@@ -308,7 +308,7 @@ def _record_path(contact, observables, path, reachable, progress) -> _PathRecord
     counts = np.zeros(len(EVENT_KINDS), int)
 
     def record_snapshot(target, state, step):
-        """Add a snapshot of a state to the record; `step` is the index of its step."""
+        """Add a snapshot of a state to the record; `step` is the index of the step of this state."""
         row = {"snapshot_step": step, "snapshot_kind": target.kind, "snapshot_target": target.value}
         record.snapshots.append(_require_finite(row | observables.of_snapshot(state)))
 
@@ -342,7 +342,7 @@ def _record_path(contact, observables, path, reachable, progress) -> _PathRecord
 
 
 def _require_finite(values: dict) -> dict:
-    """Return the values; raise `NotConverged` if one is not finite. The stiffness of full contact may be infinite."""
+    """Return the values; raise `NotConverged` if a value is not finite, except the stiffness of full contact."""
     for name, value in values.items():
         numbers = np.asarray(value)
         if name == "contact_stiffness" and np.isposinf(numbers).all():
@@ -353,7 +353,7 @@ def _require_finite(values: dict) -> dict:
 
 
 def _step_values(contact: ContactModel, waypoint: Waypoint) -> dict:
-    """Return the values of an equilibrium that every contact model has, by the names of the variables."""
+    """Return the values of an equilibrium that all contact models have, by variable name."""
     state, target, balance = waypoint.state, waypoint.target, waypoint.balance
     pressure = contact.pressure(state)
     row = {
@@ -379,7 +379,7 @@ def _step_values(contact: ContactModel, waypoint: Waypoint) -> dict:
 
 
 def _path_values(table: Table, path: Path, record: _PathRecord, grid: int) -> dict:
-    """Return the values of all steps, snapshots, spots and events as arrays, by the names of the variables."""
+    """Return the values of all steps, snapshots, spots and events as arrays, by variable name."""
     sizes = {"gap_bin": len(GAP_BINS) - 1, "pressure_bin": len(PRESSURE_BINS) - 1, "row": grid, "column": grid}
     values = {"control": path.control}
     values |= stack_rows(table, record.steps, "step") | stack_rows(table, record.snapshots, "snapshot", sizes)
@@ -399,7 +399,7 @@ def _path_values(table: Table, path: Path, record: _PathRecord, grid: int) -> di
 
 
 def _describe_targets(table: Table, path: Path) -> Table:
-    """Return the descriptions of the variables `step_target` and `snapshot_target` with their units on this path."""
+    """Return the descriptions of `step_target` and `snapshot_target`, whose units depend on the targets of the path."""
     steps = {target.kind for target in (*path.targets, *path.turning_points)} | ({BETWEEN} if path.cyclic else set())
     snapshots = {target.kind for target in path.targets if target.snapshot} | ({PULL_OFF} if path.unload else set())
     return {
@@ -409,7 +409,7 @@ def _describe_targets(table: Table, path: Path) -> Table:
 
 
 def _target_unit(kinds: set[str], named_by: str) -> dict:
-    """Return the unit of targets of these kinds; for two units also a comment that states which kinds are in m."""
+    """Return the unit of targets of given kinds, and a comment which kinds are in m if units differ."""
     metres = kinds.intersection(IN_METRES)
     if not metres or metres == kinds:
         return {"units": "m" if metres else "1"}
@@ -417,7 +417,7 @@ def _target_unit(kinds: set[str], named_by: str) -> dict:
 
 
 def _surface_values(surface: Surface, material: Material, seed: int) -> dict:
-    """Return the values of the surface and the material, by the names of the variables."""
+    """Return the values of the surface and the material, by variable name."""
     moments, (skewness, kurtosis) = spectral_moments(surface), height_statistics(surface)
     complete = surface.complete_contact_pressure * material.contact_modulus
     return {
@@ -454,5 +454,5 @@ def _attributes(surface, material, path, name):
         COMPUTED,
         references=f"{model.references}; {_STICKINESS_PAPER}",
     )
-    # A campaign fills in the empty attributes.
+    # A campaign sets the attributes that are empty here.
     return attributes | {"contact_model": name} | dict.fromkeys(("campaign", "study", "config_sha256", "license"), "")

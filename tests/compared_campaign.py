@@ -69,6 +69,7 @@ def own_patches(run, *, area=1.0, separation=1.0):
     maps = [contact_of_spots(run, k, GRID) for k in range(run.sizes["snapshot"])]
     step = xr.zeros_like(run["reduced_pressure"])
     return run.assign(
+        resolved_tension=0.1 * run["contact_modulus"],
         contact_area_fraction=run["contact_area_fraction"] * area,
         reduced_separation=run["reduced_separation"] * separation,
         front_residual=step + 1e-4,

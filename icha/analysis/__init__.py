@@ -1,1 +1,1 @@
-"""Analysis of finished runs: comparison at common loads, error of the asperity model, checks, validity."""
+"""Analysis of finished runs: comparison at common loads, errors of the asperity model, checks, range of validity."""

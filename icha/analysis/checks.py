@@ -1,4 +1,4 @@
-"""Checks of campaigns and of boundary-element solutions: identities and bounds, computed from the datasets alone."""
+"""Check campaigns and boundary-element solutions by identities and bounds that are computed from the datasets."""
 
 import json
 import os
@@ -17,21 +17,21 @@ from icha.datasets.labels import RunLabels
 from icha.datasets.variables.campaign import MISSING
 from icha.support.atomic_files import whole_file
 
-# Largest relative error of a load; the search for its mean gap stops at 2e-4.
+# Largest relative error of a load. The search for the mean gap stops at an error of 2e-4.
 LOAD_LIMIT = 1e-3
-# Name of the check that a run reached its end and passed its checks.
+# Name of the check that a run reached the end of its path and passed all other checks.
 COMPLETED = "completed"
 
 
 def check_campaign(tree: xr.DataTree, expected: Iterable[RunLabels | tuple] | None = None) -> tuple[Check, ...]:
     """Check that a campaign dataset has all runs and describes all variables, and check every run (`check_run`).
 
-    An incomplete run, or one that failed its own checks, has a single check. It fails; its description is the reason.
+    A run that is incomplete, or that failed the checks of its job, has a single failed check, described by the reason.
 
     Parameters
     ----------
     tree : the campaign dataset.
-    expected : labels of the runs of the campaign. Default: those that the dataset itself lists.
+    expected : labels of the runs of the campaign. Default: the labels in the dataset.
     """
     checks = []
     present = run_labels(tree)
@@ -49,7 +49,7 @@ def check_campaign(tree: xr.DataTree, expected: Iterable[RunLabels | tuple] | No
         checks.append(compare_with_limit("described", bare, 0, description, study))
     for labels in present:
         variables, attrs = variables_of_run(tree, labels)
-        # Nothing uses the values of a failed run, so they are not checked.
+        # No result uses the values of a failed run, so these values are not checked.
         if reason := attrs.get("incomplete") or attrs.get("failed_checks"):
             checks.append(Check(COMPLETED, 1.0, 0.0, False, reason, str(labels)))
             continue
@@ -60,19 +60,19 @@ def check_campaign(tree: xr.DataTree, expected: Iterable[RunLabels | tuple] | No
 
 
 def check_solution(solution: xr.Dataset, subject: str = "") -> tuple[Check, ...]:
-    """Check that a boundary-element solution is finite, converged, resolved, at its load, and consistent in itself.
+    """Check that a boundary-element solution is finite, converged, resolved by the grid, at its load, and consistent.
 
     Parameters
     ----------
-    solution : a dataset as `icha.references.finite_range.finite_range_solution` returns it.
-    subject : name of the solution in the findings.
+    solution : dataset from `icha.references.finite_range.finite_range_solution`.
+    subject : name of the solution in the checks.
     """
     found = _findings(solution)
     return tuple(compare_with_limit(f"boundary elements: {name}", *rest, subject) for name, *rest in found)
 
 
 def _findings(solution) -> Iterator[Finding]:
-    """Yield findings on the solver, and on the identities between distributions, area and load."""
+    """Yield name, value, limit and description of each check of a boundary-element solution."""
     values = (variable.values for variable in solution.variables.values())
     yield "finite", count_not_finite(values), 0, "number of values that are not finite"
     converged = float(solution["residual"]) / float(solution["tolerance"])
@@ -81,23 +81,25 @@ def _findings(solution) -> Iterator[Finding]:
     target, nominal = float(solution["target_reduced_pressure"]) * unit, float(solution["nominal_pressure"])
     yield "load", abs(nominal / target - 1), LOAD_LIMIT, "relative error of the load"
     strength = float(solution["strength_number"])
-    words = "sqrt(dgamma dx/E*) over the range of attraction, with the grid spacing dx; 0 without adhesion"
+    words = "sqrt(dgamma dx/E*) over the range of attraction, where dx is the grid spacing; 0 without adhesion"
     yield "resolved", strength, MAX_STRENGTH_NUMBER, words
 
     gaps = solution["gap_density"].values * np.diff(solution["gap_bin_edges"].values)
     pressures = solution["pressure_density"].values * np.diff(solution["pressure_bin_edges"].values)
     loads, area = pressures * solution["pressure_bin_mean"].values, float(solution["contact_area_fraction_raw"])
     complete = abs(gaps.sum() + area - 1)
-    yield "P(u) complete", complete, IDENTITY_LIMIT, "integral of P(u) over u, plus the nodes in contact, against 1"
+    words = "integral of P(u) over u, plus the fraction of nodes in contact, minus 1"
+    yield "P(u) complete", complete, IDENTITY_LIMIT, words
     from_pressures = abs(pressures.sum() - area) / max(area, np.finfo(float).tiny)
-    yield "area from P(p)", from_pressures, IDENTITY_LIMIT, "integral of P(p) over p against the nodes in contact"
+    words = "integral of P(p) over p, relative to the fraction of nodes in contact, minus 1"
+    yield "area from P(p)", from_pressures, IDENTITY_LIMIT, words
     load = abs(loads.sum() + float(solution["outside_pressure"]) - nominal) / max(np.abs(loads).sum(), target)
-    words = "integral of p P(p) over p, plus the traction outside contact, against F/A0, over the sum of both signs"
+    words = "difference of F/A0 from the integral of p P(p) over p and the traction outside contact, over mean |p|"
     yield "load from P(p)", load, IDENTITY_LIMIT, words
 
 
 def worst(checks: Iterable[Check]) -> tuple[Check, ...]:
-    """Return for each name the check with the largest value; a failed check comes before all that passed."""
+    """Return the worst check of each name: the one with the largest value, where failed checks precede passed ones."""
     found: dict[str, Check] = {}
     for check in checks:
         best = found.get(check.name)
@@ -107,19 +109,19 @@ def worst(checks: Iterable[Check]) -> tuple[Check, ...]:
 
 
 def describe_failure(check: Check) -> str:
-    """Describe a failed check in one line."""
+    """Describe a failed check in one line, with its value and its limit."""
     if check.name == COMPLETED:
         return f"{check.subject}: the run failed: {check.description}"
     return f"{check.subject}: {check.name}: {check.value:.3g} ({check.description}); expected at most {check.limit:g}"
 
 
 def refuse_unknown_failures(checks: Iterable[Check], known: Iterable[str]) -> None:
-    """Raise ValueError if subjects other than the known ones failed, or if a known one passed; list them."""
+    """Raise ValueError if the failed checks are not exactly the known failures; the message lists the differences."""
     failed = [check for check in checks if not check.passed]
     known = list(known)
     passing = sorted(set(known) - {check.subject for check in failed})
     lines = [describe_failure(check) for check in failed if check.subject not in known]
-    lines += [f"{subject}: is listed as a known failure, but all its checks passed" for subject in passing]
+    lines += [f"{subject}: is listed as a known failure, but all checks of this run passed" for subject in passing]
     if lines:
         raise ValueError("\n".join(lines))
 

@@ -1,4 +1,4 @@
-"""Comparison of the runs of a study: areas and separations at common loads, and their spread."""
+"""Compare the runs of a study: contact areas and mean separations at common loads, their means and their scatter."""
 
 import warnings
 from collections.abc import Mapping, Sequence
@@ -17,12 +17,12 @@ from icha.support.statistics import ensemble
 
 # Number of loads per decade at which curves are compared.
 _POINTS_PER_DECADE = 8
-# Relative difference below which the loads of two seeds count as the same.
+# Largest relative difference between loads of two seeds that count as equal.
 _SAME_LOAD = 1e-6
 
 _WITHOUT_SEED = tuple(label for label in LABELS if label != "seed")
-_SEED_COUNT = Variable(_WITHOUT_SEED, "1", "number of seeds that means and deviations are over", np.int32)
-_ASKED_SEED_COUNT = Variable(_WITHOUT_SEED, "1", "number of seeds asked for", np.int32)
+_SEED_COUNT = Variable(_WITHOUT_SEED, "1", "number of seeds in the mean and the standard deviation", np.int32)
+_ASKED_SEED_COUNT = Variable(_WITHOUT_SEED, "1", "number of requested seeds", np.int32)
 _AVERAGED = (
     ("contact_area_fraction", "area", "A/A0"),
     ("reduced_separation", "separation", "the mean separation, of a free square the mean gap, over the rms height"),
@@ -35,13 +35,13 @@ _STATISTICS = {
 
 
 def interpolate(load, values, at, *, logarithmic: bool) -> np.ndarray:
-    """Interpolate a monotone curve at given loads, by monotone cubic polynomials of the logarithm of the load.
+    """Interpolate a monotone curve at given loads, with monotone cubic polynomials of the logarithm of the load.
 
     Parameters
     ----------
-    load, values : the curve, in any order; loads are positive. The first of equal loads is used.
+    load, values : points of the curve, in any order; loads are positive. The first of several equal loads is used.
     at : loads within the range of the curve.
-    logarithmic : whether to interpolate the logarithm of the values, which must then be positive.
+    logarithmic : True to interpolate the logarithm of the values, which must then be positive.
 
     Raises
     ------
@@ -49,8 +49,8 @@ def interpolate(load, values, at, *, logarithmic: bool) -> np.ndarray:
         If a load lies outside the range of the curve.
     """
     load, first = np.unique(np.asarray(load, float), return_index=True)
-    # Two targets of different kinds may be the same state. The slope between loads that differ only by rounding is
-    # meaningless.
+    # Two targets of different kinds may have the same state. Between loads that differ only by rounding, the slope of
+    # the curve is meaningless.
     distinct = np.concatenate([[True], np.diff(load) > 1e-9 * load[1:]])
     load, values = load[distinct], np.asarray(values, float)[first][distinct]
     at = np.asarray(at, float)
@@ -74,19 +74,19 @@ def compare_runs(study: xr.Dataset) -> xr.Dataset:
 
     Returns
     -------
-    Dataset on two grids of loads, `reduced_pressure` and `relative_load`. A grid spans the loads that the targets of
-    the first loading cover in all runs. It is empty if there are no such loads. Variables on the second grid have the
-    suffix `_at_load`. On each grid the dataset has
+    Dataset on two grids of loads, `reduced_pressure` and `relative_load`. Each grid spans the range of loads that the
+    targets of the first loading cover in all runs. A grid is empty if there is no such range. Variables on the second
+    grid have the suffix `_at_load`. On each grid the dataset has
 
     - `contact_area_fraction` and `reduced_separation` along the labels of the runs;
-    - the mean of both over the seeds, the standard deviation, and half the width of the 95 % confidence interval
-      (`area_mean`, `area_deviation`, `area_confidence`, `separation_mean`, …; `icha.support.statistics`);
-    - `material_spread` and `slope_spread`: the largest over the smallest area of all materials (slopes), minus one.
+    - the mean of both variables over the seeds, the standard deviation, and half the width of the 95 % confidence
+      interval (`area_mean`, `area_deviation`, `area_confidence`, `separation_mean`, …; `icha.support.statistics`);
+    - `material_spread` and `slope_spread`: the largest area of all materials (slopes) over the smallest, minus one.
 
-    Incomplete runs (`status`) have no values and are in no mean. Runs beyond the range of their model have values up to
-    its limit. Runs for which the asperity model is not applicable have values, but are in no mean. `seed_count` is the
-    number of seeds in the means, `asked_seed_count` the number of requested seeds. A single seed has no deviation and
-    no confidence interval.
+    Incomplete runs (`status`) have no values and are in no mean. Runs that left the range of the model have values up
+    to the limit of the model. Runs for which the asperity model is not applicable have values, but are in no mean.
+    `seed_count` is the number of seeds in the means, `asked_seed_count` the number of requested seeds. For a single
+    seed, standard deviation and confidence interval are missing.
     """
     status = study["status"].transpose(*LABELS).values
     loaded, asked = np.isin(status, LOADED_RUNS), np.isin(status, (*COMPUTED_RUNS, MISSING))
@@ -110,7 +110,7 @@ def compare_runs(study: xr.Dataset) -> xr.Dataset:
             variables[name + suffix] = make_variable(along, values)
     described = combine_attributes(
         f"Comparison of the runs of study {study.attrs.get('study', '')}".rstrip(),
-        "Contact area and mean separation at loads common to all runs, by monotone interpolation.",
+        "Contact area and mean separation of all runs at common loads, by monotone interpolation.",
         DERIVED,
         [study.attrs],
     )
@@ -119,7 +119,7 @@ def compare_runs(study: xr.Dataset) -> xr.Dataset:
 
 
 def _loads(study):
-    """Return the loads of all steps for both axes; NaN except at compressive targets of the first loading."""
+    """Return the loads of all steps on both load axes; NaN except at compressive targets of the first loading."""
     pressure = study["reduced_pressure"].transpose(*LABELS, "step").values
     slope = study["rms_slope"].broadcast_like(study["status"]).transpose(*LABELS).values[..., None]
     shown = loading_stops(study).transpose(*LABELS, "step").values & (pressure > 0)
@@ -128,7 +128,7 @@ def _loads(study):
 
 
 def _on_common_grid(study, load, loaded):
-    """Return loads that all loaded runs cover, and by name the values of all runs at these loads."""
+    """Return loads that all runs in `loaded` cover, and the values of all runs at these loads by name of variable."""
     curves = {
         "contact_area_fraction": study["contact_area_fraction"].transpose(*LABELS, "step").values,
         "reduced_separation": reduced_gap(study).transpose(*LABELS, "step").values,
@@ -146,17 +146,19 @@ def _on_common_grid(study, load, loaded):
 
 
 def _spreads(on_grid, averaged):
-    """Return descriptions and values of statistics over the seeds, and of the spread over materials and slopes."""
+    """Return statistics over the seeds and ratios between materials and slopes: descriptions and values by name."""
     found = {}
     for name, short, symbol in _AVERAGED:
         over_seeds = ensemble(np.where(averaged[..., None], on_grid[name], np.nan), LABELS.index("seed"))
         for part, words in _STATISTICS.items():
-            missing = "where no run counts" if part == "mean" else "where there is a single seed"
+            missing = "where no run is in the mean" if part == "mean" else "where the mean has a single seed"
             description = Variable(_WITHOUT_SEED, "1", words.format(symbol), further={"missing": missing})
             found[f"{short}_{part}"] = description, getattr(over_seeds, part)
     for label, many in (("material", "materials"), ("rms_slope", "rms slopes")):
         description = Variable(
-            tuple(each for each in LABELS if each != label), "1", f"largest over smallest A/A0 of all {many}, less 1"
+            tuple(each for each in LABELS if each != label),
+            "1",
+            f"largest over smallest A/A0 of all {many}, minus 1",
         )
         spread = _spread(on_grid["contact_area_fraction"], LABELS.index(label))
         found[f"{label.removeprefix('rms_')}_spread"] = description, spread
@@ -170,14 +172,14 @@ def at_common_loads(
 
     Parameters
     ----------
-    curves : load and values of every member.
-    logarithmic : whether to interpolate the logarithm of the values, which must then be positive.
+    curves : loads and values of every member.
+    logarithmic : True to interpolate the logarithm of the values, which must then be positive.
 
     Returns
     -------
-    loads : (loads,), those of the members if they are the same; otherwise evenly spaced by their logarithm over the
-        range that all members cover, empty if there is no such range.
-    values : (members, loads).
+    loads : (loads,) float, the loads of the members if these are equal; otherwise loads with equal steps of the
+        logarithm in the range that all members cover. Empty if there is no such range.
+    values : (members, loads) float, values of every member at these loads.
     """
     curves = [(load[load > 0], values[load > 0]) for load, values in curves]
     loads = [np.sort(load) for load, _ in curves]
@@ -190,14 +192,14 @@ def at_common_loads(
 
 
 def _spread(area, axis):
-    """Return the largest over the smallest area along an axis, minus 1; NaN without a complete run."""
+    """Return the ratio of the largest to the smallest area along an axis, minus 1; NaN without a complete run."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)
         return np.nanmax(area, axis) / np.nanmin(area, axis) - 1
 
 
 def _common_grid(loads):
-    """Return loads with equal steps of the logarithm, within the range that the positive loads of every run cover."""
+    """Return loads with equal steps of the logarithm, in the range that the positive loads of every run cover."""
     if not loads or not all(map(len, loads)):
         return np.empty(0)
     lowest = max(float(load.min()) for load in loads)
@@ -213,7 +215,7 @@ def compare_campaign(tree: xr.DataTree, *, attrs: Mapping[str, str] = {}) -> xr.
     groups = {f"/{name}": compare_runs(node.to_dataset()) for name, node in tree.children.items()}
     root = combine_attributes(
         "Comparison of the runs of every study",
-        "Contact area and mean separation of all runs of a study at common loads, a group for each study.",
+        "Contact area and mean separation of all runs of a study at common loads, with one group for each study.",
         DERIVED,
         [group.attrs for group in groups.values()],
     )

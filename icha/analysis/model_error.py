@@ -1,7 +1,7 @@
-"""Error of the asperity model, compared with boundary elements on the same topography at the same load.
+"""Compute errors of the asperity model with respect to boundary elements on the same topography at the same load.
 
 In the limit of a short range of attraction, the reference is a run of the same study with boundary elements. At finite
-ranges, the reference is a solution of the code Tamaas.
+ranges of attraction, the reference is a solution of the code Tamaas.
 """
 
 import contextlib
@@ -27,16 +27,16 @@ from icha.path.targets import REDUCED_PRESSURE
 from icha.support.statistics import ensemble
 
 _TITLE = "Error of the model against boundary elements"
-_SUMMARY = "The same topographies, loads and materials by the model and by boundary elements."
+_SUMMARY = "Results of the model and of boundary elements for the same topographies, loads and materials."
 
 # Labels of the runs except the model.
 _LABELS = tuple(label for label in LABELS if label != "model")
 AXES = (*_LABELS, "reduced_pressure")
 
-# Variables that a run and its reference must share, and the relative accuracy to which they must.
+# Variables that must be equal in a run and its reference, and the largest relative difference of equal values.
 SHARED = ("period", "rms_height", "rms_slope", "contact_modulus", "surface_energy", "interaction_range")
 _ROUNDING = 1e-6
-# Smallest contact fraction with which a cell of a contact map counts as in contact.
+# Smallest fraction of a cell of a contact map that must be in contact for the cell to count as in contact.
 _HALF = 0.5
 
 # Variables with a mean and a standard deviation over the seeds.
@@ -57,35 +57,35 @@ def model_error(
     runs: Iterable[tuple[RunLabels | tuple, xr.Dataset]] = (),
     attrs: Mapping[str, str] = {},
 ) -> xr.DataTree:
-    """Compare the runs of the asperity model with boundary elements, load by load.
+    """Compare the runs of the asperity model with boundary elements at each load.
 
     Parameters
     ----------
     campaign : the campaign dataset. Its runs have a snapshot of kind `reduced_pressure` at the load of every solution.
-    solutions : pairs of labels and dataset (`icha.references.finite_range`), at finite ranges of attraction.
-    runs : pairs of labels and dataset of runs with boundary elements, in the limit of a short range. They have their
-        contact maps. Areas and separations are compared at the targets of kind `reduced_pressure` of the first
-        loading; distributions and maps are compared where both models have a snapshot.
+    solutions : labels and dataset of each solution at a finite range of attraction (`icha.references.finite_range`).
+    runs : labels and dataset of each run with boundary elements in the limit of a short range, with contact maps. Areas
+        and separations are compared at the targets of kind `reduced_pressure` of the first loading. Distributions and
+        contact maps are compared where both models have a snapshot.
     attrs : further global attributes.
 
     Returns
     -------
-    DataTree with a group for every study of `runs`, which has the name of the study, and for every entry of
-    `solutions`. The attribute `truth` of a group names its reference (`SHORT_RANGE` or `FINITE_RANGE`). Variables are
-    along surface, seed, rms_slope, material and the target of the reduced pressure:
+    DataTree with one group for every study in `runs`, named after the study, and one group for every entry in
+    `solutions`. The attribute `truth` of a group names the reference (`SHORT_RANGE` or `FINITE_RANGE`). The dimensions
+    of variables are surface, seed, rms_slope, material and the target of the reduced pressure:
 
     - the variables of `icha.datasets.variables.model_error`;
     - for each name in `SUMMARISED`, the mean over the seeds `<name>_mean`, and for two seeds or more the standard
       deviation `<name>_deviation`;
-    - modulus, surface energy, range and Tabor parameter of the runs;
-    - `status(surface, seed, rms_slope, material)`: whether a run and its reference are complete. If they are not, the
-      values are missing.
+    - modulus, surface energy, range of attraction and Tabor parameter of the runs;
+    - `status(surface, seed, rms_slope, material)`: whether a run and its reference are complete. If one of them is not
+      complete, the values are missing.
 
     Raises
     ------
     ValueError
-        If a solution has no run, or its run has no snapshot at the load, or run and reference differ in topography or
-        material. The message names entry, run and load.
+        If a solution has no asperity run, if this run has no snapshot at the load, or if run and reference differ in
+        topography or material. The message names entry, run and load.
     """
     origins: dict[str, list[dict[str, str]]] = {}
     select = cache(lambda labels: select_run(campaign, labels))
@@ -102,7 +102,7 @@ def model_error(
 
 
 def _short_range_entries(select, runs, origins):
-    """Compare every study with runs in the limit of a short range; append attributes of the runs to `origins`."""
+    """Compare studies with boundary-element runs in the limit of a short range; collect run attributes in `origins`."""
     entries: dict[str, dict[SolutionLabels, dict | None]] = {}
     for labels, truth in runs:
         labels = RunLabels(*labels)
@@ -113,7 +113,7 @@ def _short_range_entries(select, runs, origins):
             raise ValueError(f"{labels}: {error}") from None
         origins.setdefault(labels.study, []).extend((run.attrs, truth.attrs))
     for states in entries.values():
-        # None for loads at which a run has no state, and other runs of the study have one.
+        # A run has None at loads at which only other runs of the study have a state.
         loads = {labels.reduced_pressure for labels in states}
         for place in [labels._replace(reduced_pressure=load) for labels in states for load in loads]:
             states.setdefault(place, None)
@@ -121,7 +121,7 @@ def _short_range_entries(select, runs, origins):
 
 
 def _finite_range_entries(select, solutions, origins):
-    """Compare every entry with solutions at finite ranges; append attributes of the runs to `origins`."""
+    """Compare entries with boundary-element solutions at finite ranges; collect run attributes in `origins`."""
     entries: dict[str, dict[SolutionLabels, dict | None]] = {}
     for labels, solution in solutions:
         labels = SolutionLabels(*labels)
@@ -134,7 +134,9 @@ def _finite_range_entries(select, solutions, origins):
             snapshot = find_snapshot(run, REDUCED_PRESSURE, labels.reduced_pressure)
             target = float(solution["target_reduced_pressure"])
             if not np.isclose(target, labels.reduced_pressure, rtol=1e-9):
-                raise ValueError(f"the solution is for reduced pressure {target:g}")
+                raise ValueError(
+                    f"the solution is for reduced pressure {target:g}; expected {labels.reduced_pressure:g}"
+                )
             states[labels] = compare_state(run, snapshot, solution)
         except ValueError as error:
             name = f"entry {labels.entry}, run {labels.run}, reduced pressure {labels.reduced_pressure:g}"
@@ -144,7 +146,7 @@ def _finite_range_entries(select, solutions, origins):
 
 
 def compare_state(run: xr.Dataset, snapshot: int, solution: xr.Dataset) -> dict[str, float | np.ndarray]:
-    """Return the variables of `MODEL_ERROR` for one snapshot of a run and the solution for the same state.
+    """Return the variables of `MODEL_ERROR` for one snapshot of an asperity run and the solution at the same load.
 
     Raises
     ------
@@ -158,7 +160,7 @@ def compare_state(run: xr.Dataset, snapshot: int, solution: xr.Dataset) -> dict[
 
 
 def _compare_stops(labels, run, truth):
-    """Compare both models at each load; None where one of the runs has no state, or contact is full."""
+    """Compare a run of each model at each load; the result is None if one run has no state, or if contact is full."""
     if difference := difference_of_contacts(run, truth):
         raise ValueError(difference)
     failed = why_no_result(run.attrs) or why_no_result(truth.attrs)
@@ -167,7 +169,7 @@ def _compare_stops(labels, run, truth):
     for load in dict.fromkeys((*stops, *true_stops)):
         state = None
         in_both = not failed and load in stops and load in true_stops
-        # The mean separation of full contact is zero, so that it has no relative error.
+        # The mean separation of full contact is zero, so its relative error is undefined.
         if in_both and truth["mean_separation"].values[true_stops[load]] > 0:
             solution = _as_solution(truth, true_stops[load], load)
             state = _amounts(run.isel(step=stops[load]), solution)
@@ -178,7 +180,7 @@ def _compare_stops(labels, run, truth):
 
 
 def _stops(run):
-    """Return the steps of the first loading at targets of kind `reduced_pressure`, by the value of the target."""
+    """Return the positions of the steps of the first loading whose target is a reduced pressure, by the target."""
     targets = loading_stops(run) & (run["step_kind"] == REDUCED_PRESSURE)
     return {float(run["step_target"].values[step]): step for step in np.flatnonzero(targets.values).tolist()}
 
@@ -192,10 +194,10 @@ def snapshot_if_any(run: xr.Dataset, kind: str, target: float) -> int | None:
 
 
 def _as_solution(run, step, load):
-    """Return a step of a run with boundary elements in the form of a solution at a finite range.
+    """Return a step of a run with boundary elements, with the variables of a solution at a finite range.
 
-    If the step has a snapshot, the distributions and the contact map are included. In the limit of a short range no
-    stress acts outside contact, so that the contact areas by all definitions are equal.
+    If the step has a snapshot, the distributions and the contact map are included. In the limit of a short range, no
+    stress acts outside contact, so the contact areas by all definitions are equal.
     """
     state = run.drop_dims([*RAGGED, "snapshot"], errors="ignore").isel(step=step)
     snapshot = snapshot_if_any(run, REDUCED_PRESSURE, load)
@@ -212,14 +214,14 @@ def _as_solution(run, step, load):
 
 
 def _amounts(state, solution):
-    """Compare the areas and separations of a state and a solution; add residual and grid of the solution."""
+    """Return areas, separations and errors of a state and a solution, and residual and grid of the solution."""
     area, truth = (float(each["contact_area_fraction"]) for each in (state, solution))
     separation, true_separation = (float(each["reduced_separation"]) for each in (state, solution))
     for name, value in (("contact area", truth), ("mean separation", true_separation)):
         if not value > 0:
             raise ValueError(f"the {name} of boundary elements is {value:g}; expected a positive value")
-    # At a finite range, attraction also acts outside the area of zero gap. As the range decreases, the energetic area
-    # approaches the area of JKR theory faster than the area of zero gap does.
+    # At a finite range, attraction also acts outside the area of zero gap. As the range decreases, both the energetic
+    # area and the area of zero gap approach the area of JKR theory. The energetic area does so faster.
     adhesive = float(solution["surface_energy"]) > 0
     raw, energetic = float(solution["contact_area_fraction_raw"]), float(solution["energetic_area_fraction"])
     return {
@@ -240,13 +242,13 @@ def _amounts(state, solution):
 
 
 def _shapes(run, snapshot, solution):
-    """Compare the distributions and contact maps of a snapshot and a solution; add the densities of the solution."""
+    """Return differences of distributions and contact maps between a snapshot and a solution, and its densities."""
     state, spots = state_of(run, snapshot), contact_of_spots(run, snapshot, solution.sizes["x"])
     contact = solution["contact"].transpose("y", "x").values == 1
     height, nominal = float(solution["rms_height"]), float(state["nominal_pressure"])
     pressure = float(solution["contact_modulus"]) * float(solution["rms_slope"])
     gaps = solution["gap_density"].values * height
-    # On a deep surface, the last bin of the solution is wider than the last bin of the model error.
+    # The last bin of gaps contains all larger gaps. In the solution for a deep surface, this bin is wider.
     gaps[-1] *= np.diff(solution["gap_bin_edges"].values)[-1] / np.diff(GAP_BINS * height)[-1]
     return {
         "gap_distribution_distance": distribution_distance("gap", state, solution) / height,
@@ -283,22 +285,23 @@ def contact_of_spots(run: xr.Dataset, snapshot: int, grid: int) -> np.ndarray:
 
 
 def jaccard(one: np.ndarray, other: np.ndarray) -> float:
-    """Return the Jaccard index: nodes in both maps over nodes in at least one; 1 if both maps are empty."""
+    """Return the Jaccard index of two contact maps: number of nodes in both over number in at least one, 1 if empty."""
     return shared(one | other, one & other)
 
 
 def shared(one: np.ndarray, other: np.ndarray) -> float:
-    """Return the nodes in both maps over the nodes in the first; 1 if the first map is empty."""
+    """Return the number of nodes in both contact maps over the number in the first; 1 if the first map is empty."""
     count = np.count_nonzero(one)
     return np.count_nonzero(one & other) / count if count else 1.0
 
 
 def distribution_distance(quantity: str, one: xr.Dataset, other: xr.Dataset) -> float:
-    """Return the first Wasserstein distance between two distributions P(u), m, or P(p), Pa, over the nominal area.
+    """Return the first Wasserstein distance between two distributions of the gap (m) or of the pressure (Pa).
 
-    The distance is the area between the cumulative distributions. The gap counts as zero in contact, and where surfaces
-    overlap outside contact. The pressure counts as zero outside contact, also where attraction acts. A bin of gaps has
-    the geometric mean of its edges as its value, and a bin of pressures has its mean pressure.
+    The distributions are over the nominal area. The distance is the area between the cumulative distributions. The gap
+    counts as zero in contact, and where surfaces overlap outside contact. The pressure counts as zero outside contact,
+    also where attraction acts. All gaps in a bin count as the geometric mean of the edges of the bin. All pressures in
+    a bin count as the mean pressure of the bin.
 
     Parameters
     ----------
@@ -310,7 +313,7 @@ def distribution_distance(quantity: str, one: xr.Dataset, other: xr.Dataset) -> 
 
 
 def _values_and_weights(quantity, state):
-    """Return values and shares of the nominal area of all bins; the rest of the area has the value zero."""
+    """Return the value and the fraction of the nominal area of each bin; the rest of the area has the value zero."""
     edges = state[f"{quantity}_bin_edges"].values
     content = state[f"{quantity}_density"].values * np.diff(edges)
     values = np.sqrt(edges[1:] * edges[:-1]) if quantity == "gap" else state["pressure_bin_mean"].values
@@ -319,7 +322,7 @@ def _values_and_weights(quantity, state):
 
 
 def _entry_dataset(campaign, entry, states):
-    """Arrange the states of one entry as a dataset along `AXES`; a failed state is None."""
+    """Arrange the compared states of one entry as a dataset along `AXES`; a missing state is None."""
     name = next(labels.study for labels in states)
     study = campaign[name].to_dataset()
     axes = _axes(study, states)
@@ -336,7 +339,7 @@ def _entry_dataset(campaign, entry, states):
     labelled = xr.Dataset(coords=coords)
     shape = tuple(labelled.sizes[axis] for axis in AXES)
     grid = [SolutionLabels(entry, name, *labels_at(labelled, place, AXES)) for place in np.ndindex(shape)]
-    # A contact is complete if it is complete at one load.
+    # A comparison is complete if a state was compared at one load at least.
     statuses = [
         NOT_IN_DESIGN if labels not in states else INCOMPLETE if states[labels] is None else COMPLETE for labels in grid
     ]
@@ -354,7 +357,7 @@ def _entry_dataset(campaign, entry, states):
 
 
 def _of_asperities(quantity, labelled):
-    """Return a quantity of the asperity runs along the labels of a dataset; missing where there is no run."""
+    """Return a quantity of the asperity runs along the labels of the dataset `labelled`; NaN where there is no run."""
     none = "" if quantity.dtype.kind in "OSU" else np.nan
     values = np.full([labelled.sizes[label] for label in _LABELS], none, object if none == "" else float)
     for place in np.ndindex(values.shape):
@@ -365,7 +368,7 @@ def _of_asperities(quantity, labelled):
 
 
 def _axes(study, states):
-    """Return the values of `AXES` in the states of an entry; `arrange_slopes` arranges the rms slopes."""
+    """Return the values along each of `AXES` in the states of an entry; `arrange_slopes` gives the rms slopes."""
     asked = {axis: {getattr(labels, axis) for labels in states} for axis in AXES}
     axes = {
         label: [value for value in study[label].values.tolist() if value in asked[label]]
@@ -378,14 +381,14 @@ def _axes(study, states):
 
 
 def _arrange(shape, states):
-    """Return the variables of all states as arrays of a shape along `AXES`; missing where a state is None."""
+    """Return the variables of all states as arrays along `AXES` with the given shape; NaN where a state is None."""
     bins = {"gap_bin": len(GAP_BINS) - 1, "pressure_bin": len(PRESSURE_BINS) - 1}
     variables = {}
     for name, description in MODEL_ERROR.items():
         unknown = np.full([bins[dim] for dim in description.dims], np.nan)
         values = np.array([unknown if state is None else state.get(name, unknown) for state in states])
         values = values.reshape(shape + values.shape[1:])
-        missing = {"missing": "where a run lacks the state"} if None in states else {}
+        missing = {"missing": "where a run does not have the state"} if None in states else {}
         variables[name] = xr.Variable(AXES + description.dims, values, description.attributes | missing)
         if description.dtype is int and values.dtype.kind == "f":
             variables[name].encoding["dtype"] = np.dtype("int32")
@@ -400,7 +403,7 @@ def _summarise_over_seeds(variables, applicable):
     for name in SUMMARISED:
         values, long_name = np.where(applicable, variables[name].values, np.nan), MODEL_ERROR[name].long_name
         over_seeds = ensemble(values, seeds)
-        further = {"missing": "where no run counts"} | MODEL_ERROR[name].further
+        further = {"missing": "where no run is in the mean"} | MODEL_ERROR[name].further
         mean = Variable(others, "1", f"mean over the seeds: {long_name}", further=further)
         found[f"{name}_mean"] = make_variable(mean, over_seeds.mean)
         if values.shape[seeds] > 1:

@@ -1,7 +1,7 @@
-"""Validity of the models for a campaign: where the models were verified, and how large their errors are.
+"""State the validity of the models for a campaign: the verified range of each model, and the size of its errors.
 
-Checks verify that equations were solved. The statements of this module describe how accurate the solutions are. They
-are short lines, which are printed before and after a campaign runs, and at the top of its report.
+Checks verify that equations were solved. Statements of validity describe how accurate the models are. ICHA prints these
+short statements before and after a campaign runs, and at the top of the report of the campaign.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ from icha.surfaces.moments import RESOLVED_CELLS, cells_per_short_wave, error_of
 if TYPE_CHECKING:
     import xarray as xr
 
-# Errors of the asperity model in per cent with adhesion (True) and without (False): lowest and highest mean over the
-# seeds. Campaign `validation` computes them for docs/validation.md; a test compares the two.
+# Relative errors of the asperity model in per cent, with adhesion (True) and without (False): lowest and highest mean
+# over the seeds. Campaign `validation` computes these errors for docs/validation.md. A test compares both.
 VALIDATION = {
     True: {"contact area": (-25.3, -8.1), "mean separation": (-36.1, -0.8)},
     False: {"contact area": (-21.4, -4.9), "mean separation": (-36.4, -0.8)},
@@ -34,20 +34,22 @@ VALIDATION = {
 _VALIDATED = "on seven self-affine surfaces, p* from 0.001 to 0.1 (page on validation)"
 
 _RATIO = "full_contact_energy_ratio"
-# Facts that are not known of every case: pressure for complete contact, strength of the interface with and without its
-# flaw, largest tension that the grid resolves, Pa; size of the grid cells, m.
+# Keys of facts that some cases lack: pressure for complete contact (Pa), strength of the interface with and without a
+# flaw (Pa), largest tension that the grid resolves (Pa), size of the grid cells (m), rms height (m), and largest rms
+# height at which the surface sticks according to the bearing area model (m).
 COMPLETE, STRENGTH, THEORETICAL = "complete_contact_pressure", "interface_strength", "theoretical_strength"
 RESOLVED, SPACING = "resolved_tension", "spacing"
+RMS_HEIGHT, STICKY_HEIGHT = "rms_height", "sticky_rms_height"
 _OF_FULL_CONTACT = (COMPLETE, STRENGTH, THEORETICAL, RESOLVED)
 
-# Share of single spots outside the range of Wu's formula, above which a case is named. Every surface has some.
+# Largest fraction of single spots outside the range of Wu's formula without a warning. Every surface has some.
 _FEW = 0.05
 # Largest number of cases that a statement names.
 _MOST_NAMES = 4
 
 
 class Range(NamedTuple):
-    """Range of a quantity in the validation.
+    """Range of a quantity that the validation covers.
 
     Attributes
     ----------
@@ -60,19 +62,19 @@ class Range(NamedTuple):
     most: float
 
 
-# Ranges of the surfaces and materials in study `short_range` of campaign `validation`, rounded outwards. A test
-# compares them with the campaign.
+# Ranges of quantities in study `short_range` of campaign `validation`, rounded outwards. A test compares these ranges
+# with the campaign.
 VALIDATED = {
-    # 1 in the validation, because its spectra have fixed amplitudes. Random amplitudes give up to 1.2.
+    # Surfaces in the validation have 1, because their spectra have fixed amplitudes. Random amplitudes give up to 1.2.
     "slope_anisotropy": Range("anisotropy of slopes", 1.0, 1.2),
     "height_skewness": Range("skewness of heights", -0.2, 0.2),
     "height_kurtosis": Range("kurtosis of heights", 2.3, 3.5),
     # The validation begins at 3.3. Smaller values are included, because narrow spectra have fewer unions of spots.
     # Isotropic surfaces have 1.5 or more.
     "nayak_parameter": Range("Nayak's parameter", 1.5, 47.0),
-    # At most 0.005 in the validation.
+    # Surfaces in the validation have at most 0.005.
     "unsupported_summits": Range("share of unsupported summits", 0.0, 0.01),
-    # There is no upper limit, because a finer grid or less adhesion does not increase the error.
+    # The upper limit is infinite, because a finer grid does not increase the error.
     "nodes_per_short_wave": Range("nodes per shortest wave", 5.8, math.inf),
     "full_contact_energy_ratio": Range("U_full/dgamma", 76.0, math.inf),
     # 1 for a single square, 0 for a periodic surface.
@@ -81,7 +83,7 @@ VALIDATED = {
 
 
 def outside_validation(facts: Mapping[str, float]) -> list[str]:
-    """List the facts outside the range of the validation, with value and range; keys are those of `VALIDATED`."""
+    """Describe each fact outside the range of the validation, with value and range; `facts` has keys of `VALIDATED`."""
     return [
         f"{words} {facts[name]:.2g}, validated: {least:g} {'and more' if most == math.inf else f'to {most:g}'}"
         for name, (words, least, most) in VALIDATED.items()
@@ -96,7 +98,7 @@ class Statement(NamedTuple):
     ----------
     about : subject of the line.
     text : the statement.
-    good : whether the campaign is within the verified range; if not, the line is a warning.
+    good : True if the campaign is within the verified range; False makes the line a warning.
     """
 
     about: str
@@ -105,12 +107,12 @@ class Statement(NamedTuple):
 
 
 class Case(NamedTuple):
-    """A run, and the facts on which the validity of its model depends.
+    """Quantities of a run on which the validity of the model depends.
 
     Attributes
     ----------
     model, surface, material : names.
-    facts : values for the keys of `VALIDATED`; also values of full contact and the spacing of the grid, if known.
+    facts : values for the keys of `VALIDATED`; also quantities of full contact and of the grid, if known.
     """
 
     model: str
@@ -120,7 +122,7 @@ class Case(NamedTuple):
 
     @property
     def ratio(self) -> float:
-        """Elastic energy of full contact over the adhesion energy; infinite without adhesion."""
+        """Elastic energy of full contact divided by the work of adhesion; infinite without adhesion."""
         return self.facts[_RATIO]
 
 
@@ -130,21 +132,21 @@ def statements(
     outside: str | None = None,
     sticky: Collection[str] = (),
 ) -> list[Statement]:
-    """State the validity of the models of a campaign, one line for each subject.
+    """Return statements on the validity of the models of a campaign, one line for each subject.
 
     Parameters
     ----------
     models : names of the models of each study.
     cases : the runs.
-    outside : text that names the cases whose jumps into contact are outside the verified range, "" if none is; None
-        without adhesion.
-    sticky : result of `describe_sticky`.
+    outside : text that names the cases whose jumps into contact are outside the verified range; "" if there are none,
+        None without adhesion.
+    sticky : surfaces and materials whose attraction outweighs repulsion, from `describe_sticky`.
     """
     cases = list(cases)
     found = [Statement("models", _used(models)), *_full_contact(cases)]
     if outside is not None:
         verified = f"Wu's distance is verified for Tabor parameters of {WU_HOLDS_FROM:g} and more"
-        found.append(Statement("jump-in", f"{verified}; {outside or 'all cases inside'}", not outside))
+        found.append(Statement("jump-in", f"{verified}; {outside or 'all runs are in this range'}", not outside))
     if sticky:
         text = f"attraction outweighs repulsion: {join_first(sticky)}; errors can be many times those of the validation"
         found.append(Statement("sticky", text, False))
@@ -156,7 +158,7 @@ def statements(
 
 
 def _full_contact(cases):
-    """Yield the statement on full contact if a case has adhesion; it describes the case with the strongest adhesion."""
+    """Yield the statement on full contact for the case with the strongest adhesion, if any case has adhesion."""
     adhesive = [case for case in cases if case.ratio < math.inf]
     if not adhesive:
         return
@@ -174,13 +176,16 @@ def _full_contact(cases):
             f"; full contact is complete at about {complete} without adhesion and opens at {opening} (strength of the "
             f"interface: {strength}){_unresolved_strength(lowest.facts)}"
         )
+    if STICKY_HEIGHT in lowest.facts:
+        heights = (format_quantity(lowest.facts[name], "m") for name in (STICKY_HEIGHT, RMS_HEIGHT))
+        text += "; by the bearing area model the surface sticks below an rms height of {}, it has {}".format(*heights)
     if any(MODELS[case.model].by_summits and case.ratio < FULL_CONTACT_BELOW for case in cases):
         text += f"; the asperity model is not applicable below {FULL_CONTACT_BELOW:g}"
     yield Statement("adhesion", text, lowest.ratio >= HIGH_PULL_OFF_BELOW)
 
 
 def _unresolved_strength(facts):
-    """Describe the tension that the grid resolves, if it is less than the strength of the interface; else return ""."""
+    """Describe the largest tension that the grid resolves if the strength of the interface is higher; "" otherwise."""
     if not 0 < facts.get(RESOLVED, math.inf) < facts[STRENGTH]:
         return ""
     needed = facts[SPACING] * (facts[RESOLVED] / facts[STRENGTH]) ** 2
@@ -207,9 +212,9 @@ def _resolution(cases):
 
 
 def _accuracy(cases, measured):
-    """State the error of the asperity model, which is known only within the range of the validation.
+    """Return the statement on the error of the asperity model, which is known only in the range of the validation.
 
-    cases : runs of the asperity model; measured : whether the campaign also has runs with boundary elements.
+    `cases` are runs of the asperity model. `measured` is True if the campaign also has runs with boundary elements.
     """
     unknown, adhesive = {}, set()
     for case in cases:
@@ -224,24 +229,24 @@ def _accuracy(cases, measured):
     if not unknown:
         return Statement("accuracy", known)
     reasons = join_first((f"{name}: {'; '.join(found)}" for name, found in unknown.items()), ". ")
-    advice = "`models: [asperities, boundary_elements]` measures it"
+    advice = "a study with `models: [asperities, boundary_elements]` measures the error"
     if measured:
-        advice = "its runs with boundary elements show it"
+        advice = "the runs with boundary elements show the error"
     text = f"the accuracy {'of the others' if adhesive else 'of this campaign'} is unknown ({reasons}); {advice}"
     return Statement("accuracy", f"{known}; {text}" if known else text, False)
 
 
 def join_first(cases: Iterable[str], between: str = ", ") -> str:
-    """Join the first cases to one text, and append the number of the others."""
+    """Join the first texts of a list to one text, and append the number of the others."""
     cases = list(cases)
     more = len(cases) - _MOST_NAMES
     return between.join(cases[:_MOST_NAMES]) + (f" and {more} more" if more > 0 else "")
 
 
 def statements_on_dataset(campaign: xr.DataTree) -> list[Statement]:
-    """State the validity of the models for a campaign dataset; incomplete runs count up to where they ended.
+    """Return statements on the validity of the models for a campaign dataset, including runs that ended early.
 
-    Of a dataset that is open in its file, only a few variables are read.
+    If the dataset is open and not loaded, only a few variables are read from the file.
     """
     models, cases, shares, sticky = {}, [], {}, {}
     for name, node in campaign.children.items():
@@ -289,7 +294,7 @@ def _cases(study):
 
 
 def describe_sticky(stickiness: Mapping[tuple[str, str], float]) -> list[str]:
-    """Describe the surfaces and materials (the keys) whose stickiness (`icha.asperity.stickiness`) exceeds 1."""
+    """Describe surfaces and materials (the keys) whose stickiness (`icha.asperity.stickiness`) is larger than 1."""
     return [
         f"{material} on {surface} (stickiness {value:.2g})"
         for (surface, material), value in stickiness.items()
@@ -298,7 +303,7 @@ def describe_sticky(stickiness: Mapping[tuple[str, str], float]) -> list[str]:
 
 
 def _describe_shares(shares):
-    """Describe the cases with many single spots outside the range of Wu's formula, those with most spots first."""
+    """Describe surfaces and materials with many single spots outside the range of Wu's formula, most spots first."""
     cases = [
         f"{material} on {surface} ({100 * share:.0f} % of single spots)"
         for (surface, material), share in sorted(shares.items(), key=lambda item: -item[1])
@@ -308,10 +313,10 @@ def _describe_shares(shares):
 
 
 def _shares_outside(study):
-    """Return the largest share of single spots outside the range of Wu's formula, by surface and material.
+    """Return the fraction of single spots outside the range of Wu's formula, by surface and material.
 
-    The share is taken at the end of the first loading; the largest value is over seeds and slopes. Materials without
-    adhesion are left out, because their spots do not jump.
+    The fraction is that at the end of the first loading, the largest over all seeds and slopes. Materials without
+    adhesion are left out, because their spots do not jump into contact.
     """
     runs = study[["status", "leg", "outside_wu_fraction", "surface_energy"]].sel(model=DEFAULT_MODEL).load()
     end = (runs["leg"] == 0).sum("step") - 1
@@ -322,7 +327,7 @@ def _shares_outside(study):
 
 
 def _used(models):
-    """List the studies that each model computes."""
+    """Return a text that lists, for each model, the studies with this model."""
     studies: dict[str, list[str]] = {}
     for study, names in models.items():
         for model in names:
@@ -331,7 +336,7 @@ def _used(models):
 
 
 def _error(adhesive):
-    """Describe the errors of runs with adhesion, if `adhesive` contains True, and without, if it contains False."""
+    """Describe the errors in the validation, with adhesion (True in `adhesive`) and without (False in `adhesive`)."""
     found = []
     for quantity in VALIDATION[True]:
         ranges = (VALIDATION[each][quantity] for each in sorted(adhesive, reverse=True))

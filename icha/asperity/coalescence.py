@@ -13,15 +13,15 @@ from icha.surfaces.square import periodic_difference
 def overlapping_pairs(position, a, first, second, r):
     """Return the pairs (k, 2) of spots that overlap, r_ij < a_i + a_j, sorted by the depth of their overlap.
 
-    The deepest overlap a_i + a_j - r_ij is the first one. Pairs of equal depth are sorted by their positions, so that
-    the result does not depend on the order of the input.
+    The pair with the deepest overlap a_i + a_j - r_ij comes first. Pairs of equal depth are sorted by their positions,
+    so that the result does not depend on the order of the input.
 
     Parameters
     ----------
-    position : (n, 2) float, centres, m.
-    a : (n,) float, contact radii, m.
-    first, second : (p,) int, indices of the spots of pairs; a pair counts only with the larger spot first.
-    r : (p,) float, distances of the pairs, m.
+    position : (n, 2) float, centres of the spots, m.
+    a : (n,) float, contact radii of the spots, m.
+    first, second : (p,) int, indices of the two spots of p pairs; pairs with the smaller spot first are ignored.
+    r : (p,) float, distances between the two spots of the pairs, m.
     """
     depth = a[first] + a[second] - r
     larger = (a[second] < a[first]) | ((a[second] == a[first]) & (second > first))
@@ -36,7 +36,7 @@ def overlapping_pairs(position, a, first, second, r):
 
 
 def disjoint_pairs(pairs):
-    """Select from pairs (k, 2) of spots, the first ones first, so that every spot is in one pair at most."""
+    """Return those of k pairs (k, 2) of spots that share no spot with an earlier selected pair."""
     taken, chosen = set(), []
     for i, j in pairs.tolist():
         if i not in taken and j not in taken:
@@ -55,14 +55,14 @@ def equivalent_spots(law: JKR, position_i, a_i, R_i, position_j, a_j, R_j, perio
 
 
 def covering_spot(points, position, a, period, larger_than=None):
-    """Return the index of the spot that covers each point deepest, (k,) int; -1 where no spot covers it.
+    """Return for each of k points the index of the spot that covers the point deepest, (k,) int; -1 if none covers it.
 
     Parameters
     ----------
-    points : (k, 2) float, m.
+    points : (k, 2) float, positions of the points, m.
     position, a : (m, 2) and (m,) float, centres and contact radii of the spots, m.
-    larger_than : (k,) float, contact radii of the points if they are the spots themselves, m. Then only larger spots
-        cover a point, and of two equal spots the first one.
+    larger_than : (k,) float, contact radii of the points, m, if the points are the spots themselves. Then only a larger
+        spot covers a point; if two spots are equal, the first spot covers the second.
     """
     covering = np.full(len(points), -1)
     if not len(points) or not len(position):

@@ -1,8 +1,9 @@
-"""Resolution of a range of attraction on a grid: the cohesive zone around an adhesive contact must span its cells.
+"""Resolution of the attraction on a grid: the cohesive zone around an adhesive contact must not be shorter than a cell.
 
-The traction at a gap u is (dgamma/rho) exp(-u/rho). Two dimensionless numbers decide: the spacing over the length of
-the cohesive zone; and the distance over which a single node jumps into contact, relative to the range rho (A. Wang,
-Y. Zhou and M. H. Müser, Lubricants 9 (2021) 17, doi:10.3390/lubricants9020017).
+The traction at a gap u is (dgamma/rho) exp(-u/rho). Two dimensionless numbers show whether a grid resolves this
+traction: the grid spacing over the length of the cohesive zone; and the distance over which a single node jumps into
+contact, relative to the range rho (A. Wang, Y. Zhou and M. H. Müser, Lubricants 9 (2021) 17,
+doi:10.3390/lubricants9020017).
 """
 
 import math
@@ -21,7 +22,7 @@ def longest_spacing(material: Material) -> float:
 
 
 def strength_number(material: Material, spacing: float) -> float:
-    """Return sqrt(dgamma dx/E*)/rho of a grid of spacing dx, m."""
+    """Return sqrt(dgamma dx/E*)/rho for a grid of spacing dx, m: the jump of a single node over the range rho."""
     return math.sqrt(material.adhesion_length * spacing) / material.interaction_range
 
 

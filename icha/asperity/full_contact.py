@@ -1,12 +1,13 @@
-"""Full contact: its energy, and the pressure at which contact is complete. They show whether a surface is sticky.
+"""Energy of full contact, and pressure at which contact is complete. Energy and pressure indicate stickiness.
 
-In full contact the pressure p(q) = q E* h(q)/2 flattens the wave h(q) of wave number q. Energy: B. N. J. Persson and
+In full contact the pressure p(q) = q E* h(q)/2 flattens the wave h(q) of wave number q. Source: B. N. J. Persson and
 E. Tosatti, J. Chem. Phys. 115 (2001) 5597-5610, doi:10.1063/1.1398300.
 """
 
 import math
 
-# Values of U_full/dgamma below which full contact has a lower energy than no contact, and high pull-off is expected.
+# Values of U_full/dgamma below which full contact has a lower energy than no contact, and below which a high pull-off
+# tension is expected.
 FULL_CONTACT_BELOW, HIGH_PULL_OFF_BELOW = 1.0, 2.0
 MEANING = (
     f"below {FULL_CONTACT_BELOW:g} full contact has the lower energy; below about {HIGH_PULL_OFF_BELOW:g} high "
@@ -26,9 +27,9 @@ def full_contact_energy_ratio(full_contact_energy: float, contact_modulus: float
 def gaussian_complete_pressure(waves: float) -> float:
     """Estimate the pressure over E* h'_rms at which contact with a Gaussian surface is complete without adhesion.
 
-    It compensates the largest tension of full contact at zero load. This tension is the largest of about 2 pi waves^2
-    independent values with the standard deviation E* h'_rms/2; `waves` is the number of the shortest waves along a
-    side. For five spectra the mean of five realisations differed by 0 to 9 %.
+    The estimated pressure compensates the largest tension of full contact at zero load, which is the largest of about
+    2 pi waves^2 independent values with the standard deviation E* h'_rms/2. `waves` is the side of the surface over the
+    shortest wavelength. For five spectra, the mean of five surfaces differed from this estimate by 0 to 9 %.
     """
     return math.sqrt(2 * math.log(2 * math.pi * waves**2)) / 2
 

@@ -55,7 +55,7 @@ class JKR:
         return slope
 
     def radius_derivative(self, a, R):
-        """Return da/d(delta) for a > 0, limited near jump-off, where it is infinite."""
+        """Return da/d(delta) for a > 0; the value is limited near jump-off, where the derivative is infinite."""
         return 1 / np.maximum(self.approach_derivative(a, R), 1e-3 * (a / R))
 
     def contact_radius(self, approach, R):
@@ -103,7 +103,8 @@ class JKR:
         """Return the approach at which contact forms, (1 - 2.641 mu^(3/7)) epsilon, eq. (3), m; negative for a gap.
 
         For mu below about 1.06 the formula gives less than the jump-off approach, where no JKR state exists. For very
-        small mu it gives more than zero. The result is limited to this interval. It is zero without adhesion.
+        small mu the formula gives more than zero. The result is limited to the interval from the jump-off approach to
+        zero. Without adhesion the result is zero.
         """
         if self.material.surface_energy == 0:
             return np.zeros(np.shape(R))
@@ -111,7 +112,7 @@ class JKR:
         return np.clip(wu, self.jump_off_approach(R), 0.0)
 
     def is_jump_in_verified(self, R):
-        """Return whether Wu's formula is accurate for these radii: whether the Tabor parameter is 1 or more."""
+        """Return whether Wu's formula is accurate for radii of curvature R: the Tabor parameter must be 1 or more."""
         return self.material.tabor_parameter(R) >= WU_HOLDS_FROM
 
     def displacement(self, r, a, R):
@@ -137,8 +138,8 @@ class JKR:
     def displacement_derivative(self, r, a, R):
         """Return the derivative of `displacement` with respect to a, for a > 0.
 
-        The adhesive part, sqrt(a)/sqrt(r^2 - a^2), is singular at the edge. Within 2.5 % of the radius from the edge it
-        is kept constant. In equilibrium no centre of another spot is so close to the edge.
+        The adhesive part, sqrt(a)/sqrt(r^2 - a^2), is singular at the edge. Within 2.5 % of the radius from the edge,
+        this part is kept constant. In equilibrium no centre of another spot is so close to the edge.
         """
         outside = r > a
         arc = np.arcsin(np.where(outside, a / np.maximum(r, a), 1.0))
@@ -198,7 +199,7 @@ class JKR:
         """
         peak, neck = self.pressure_amplitudes(a, R)
         root = np.sqrt(p**2 + 4 * peak * neck)
-        # Both are the positive root of P s^2 - p s - B = 0, without a difference of nearly equal numbers.
+        # Both formulas give the positive root of P s^2 - p s - B = 0 without a difference of nearly equal numbers.
         with np.errstate(divide="ignore", invalid="ignore"):
             s = np.where(p >= 0, (p + root) / (2 * peak), np.where(root > p, 2 * neck / (root - p), 0.0))
         s = np.minimum(s, 1.0)
@@ -207,8 +208,8 @@ class JKR:
     def union(self, a_i, R_i, a_j, R_j):
         """Return contact radius and radius of curvature of the union of two spots, m, and the position of its centre.
 
-        a^2 = a_i^2 + a_j^2 and R^2 = R_i^2 + R_j^2. The centre is the centroid of the cap volumes pi a^4/(4R). Its
-        position is a fraction of the distance from the first spot to the second.
+        a^2 = a_i^2 + a_j^2 and R^2 = R_i^2 + R_j^2. The centre is the centroid of the cap volumes pi a^4/(4R). The
+        position of the centre is a fraction of the distance from the first spot to the second.
         """
         volume_i, volume_j = a_i**4 / R_i, a_j**4 / R_j
         return np.hypot(a_i, a_j), np.hypot(R_i, R_j), volume_j / (volume_i + volume_j)
@@ -220,7 +221,7 @@ def wu_gap(tabor_parameter: np.ndarray | float) -> np.ndarray | float:
 
 
 class MaterialUnits:
-    """Base class with the properties of a contact that follow from its law and the rms slope of the surface."""
+    """Base class of a contact: properties that depend only on the law of a spot and the rms slope of the surface."""
 
     law: JKR
     rms_slope: float
@@ -232,10 +233,10 @@ class MaterialUnits:
 
     @property
     def contact_modulus(self) -> float:
-        """E*, Pa."""
+        """Contact modulus E*, Pa."""
         return self.law.material.contact_modulus
 
     @property
     def pressure_unit(self) -> float:
-        """E* h'_rms, Pa."""
+        """Unit of reduced pressures, E* h'_rms, Pa."""
         return self.contact_modulus * self.rms_slope

@@ -56,7 +56,7 @@ class Material:
 
     @property
     def interface_strength(self) -> float:
-        """Tension at which closed contact opens, Pa: the theoretical strength, or that of the flaw if it is lower.
+        """Tension at which closed contact opens, Pa: the theoretical strength, or the strength with the flaw if lower.
 
         A penny-shaped crack of radius a grows at the tension sigma = sqrt(pi E* dgamma/(2 a)). Its stress intensity
         K = 2 sigma sqrt(a/pi) then has the energy release rate K^2/(2 E*) = dgamma, because one of the two bodies is

@@ -1,4 +1,4 @@
-"""Stickiness of rough surfaces: ratio of the attractive to the repulsive force where they touch."""
+"""Stickiness of rough surfaces: two criteria for whether adhesion overcomes the roughness."""
 
 import numpy as np
 
@@ -12,20 +12,40 @@ REPULSIVE_AREA_SLOPE = 2.0
 def stickiness(moments: SpectralMoments, material: Material) -> float:
     r"""Return the ratio of the attractive to the repulsive force in contact; above 1 the surface is sticky.
 
-    L. Pastewka and M. O. Robbins, PNAS 111 (2014) 3298-3303, doi:10.1073/pnas.1320846111. On the contact area A acts
-    the mean repulsive pressure h' E*/kappa with kappa = 2. Around the contact, where the gap is less than the range r
-    of attraction of the material, acts the stress dgamma/r. By Hertz's gap beside a contact of mean diameter
-    d = 4 h'/h'' the attractive area is
+    L. Pastewka and M. O. Robbins, PNAS 111 (2014) 3298-3303, doi:10.1073/pnas.1320846111. The mean repulsive
+    pressure on the contact area A is h' E*/kappa with kappa = 2. Around the contact, the attractive stress is dgamma/r
+    where the gap is less than the range r of attraction. Hertz's gap beside a contact of mean diameter d = 4 h'/h''
+    gives the attractive area
 
         A_att/A = pi [3 h'' r/(16 h'^2)]^(2/3).
 
-    Here h' is the rms slope and h'' the rms Laplacian. The ratio is kappa/kappa_att in their notation. It exceeds 1
-    where their criterion for sticking holds, (h' r E*/(kappa dgamma)) [h' d/(4 r)]^(2/3) < pi (3/16)^(2/3) = 1.03. The
-    criterion needs an attraction of so short a range that A_att is small compared with A: J. M. Monti, A. Sanner and
-    L. Pastewka, Tribol. Lett. 69 (2021), doi:10.1007/s11249-021-01454-6. Without adhesion the ratio is 0.
+    Here h' is the rms slope and h'' the rms Laplacian. In the paper the ratio is called
+    kappa/kappa_att. The ratio exceeds 1 if the criterion for sticking in the paper is met,
+    (h' r E*/(kappa dgamma)) [h' d/(4 r)]^(2/3) < pi (3/16)^(2/3) = 1.03. The criterion is valid for an attraction of so
+    short a range that A_att is small compared with A: J. M. Monti, A. Sanner and L. Pastewka, Tribol. Lett. 69 (2021),
+    doi:10.1007/s11249-021-01454-6. Without adhesion the ratio is 0.
 
-    moments : spectral moments of the surface at its own rms slope.
+    moments : spectral moments of the surface at its actual rms slope.
     """
     slope, reach = moments.rms_slope, material.interaction_range
     attractive_area = np.pi * np.cbrt(3 * moments.rms_laplacian * reach / (16 * slope**2)) ** 2
     return float(REPULSIVE_AREA_SLOPE * material.adhesion_length / (slope * reach) * attractive_area)
+
+
+def sticky_rms_height(longest_wavelength: float, material: Material) -> float:
+    r"""Return the rms height, m, below which a random surface is sticky according to the bearing area model (BAM).
+
+    M. Ciavarella, Meccanica 53 (2018) 241-250, doi:10.1007/s11012-017-0701-6. At the mean separation u the area whose
+    gap is less than the range of attraction pulls with p_a = dgamma/(sqrt(2 pi) h) exp(-u^2/(2 h^2)), and the contact
+    repels with Persson's p_r = (3/(8 beta)) q_L h E* exp(-u/(beta h)), where beta = 1/2 and q_L = 2 pi/lambda_L. Here
+    h is the rms height. The ratio p_a/p_r is largest at u = h/beta. At u = h/beta, p_a exceeds p_r if
+
+        h^2 < e^2/(sqrt(2 pi) 3 pi/2) lambda_L dgamma/E* = 0.63 lambda_L dgamma/E*.
+
+    Parameters
+    ----------
+    longest_wavelength : lambda_L, m: the roll-off wavelength of a self-affine surface.
+    material : contact modulus and surface energy.
+    """
+    factor = np.exp(2) / (np.sqrt(2 * np.pi) * 1.5 * np.pi)
+    return float(np.sqrt(factor * longest_wavelength * material.adhesion_length))

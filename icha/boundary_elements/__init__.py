@@ -1,23 +1,24 @@
-"""Boundary elements in the limit of a short range of adhesion: it resolves contact patches, not the range of adhesion.
+"""Boundary elements in the limit of short-ranged adhesion: the grid resolves contact patches, not the adhesion range.
 
-The model minimises, at a given mean separation, the elastic energy of the half-space less the work of adhesion, under
-gap >= 0. Contact is a set of grid cells. A closed cell has gap 0 and bears pressure or tension. A cell at the edge of
-contact carries a tension that falls linearly with its gap g, t = s (1 - g/g_c), and is open at g_c; its fraction of
-contact is f = t/s = 1 - g/g_c. The work of t is the work of adhesion of the cell (`front`). Elsewhere there is neither
-pressure nor attraction: new contact forms at summits within reach of the attraction, or where surfaces would overlap.
+At a given mean separation the model minimises the elastic energy of the half-space minus the work of adhesion, with
+gap >= 0. The contact is a set of grid cells. A closed cell has zero gap and carries pressure or tension. A cell at the
+edge of contact carries a tension that falls linearly with its gap g, t = s (1 - g/g_c), and is open at g_c. The
+fraction of contact of this cell is f = t/s = 1 - g/g_c. The tension t does the work of adhesion of the cell (`front`).
+Open cells carry neither pressure nor tension. New contact forms at summits within reach of the attraction, and where
+the surfaces would overlap.
 
-There are many minima. The model takes the one that the path reaches from its last state with falling energy: fronts
-advance, recede and run until the energy release rate is the work of adhesion along all edges.
+The energy has many local minima. The model finds the minimum to which the energy falls from the previous state of the
+path: fronts advance or recede until the energy release rate equals the work of adhesion along all edges.
 
 Read the modules in this order:
 
-`front`             the law of a cell at the edge of contact.
-`half_space`        displacement under pressures, on the full grid; `tiles` and `transforms` make it fast on large ones.
-`elastic_contact`   the elastic contact of bonded cells: an active set, solved by conjugate gradients.
-`front_solver`      the front at a given separation: Newton steps, each of which lowers the energy.
-`local_relaxation`  the same in small windows, where few places of a large contact are far from equilibrium.
-`adhesive`          elastic contact and front together, with new contact at summits.
-`load_control`      the separation at which a contact has a given load or area.
-`full_contact`      contact without gaps: a closed form, and where it opens.
-`contact`           all of this as a contact model; `patches` and `observables` for its results.
+`front`             law of a cell at the edge of contact: its tension, gap and fraction of contact.
+`half_space`        displacements under pressures, by transforms of the grid; `tiles` and `transforms` for large grids.
+`elastic_contact`   elastic contact of bonded cells, solved with an active set and conjugate gradients.
+`front_solver`      equilibrium of the front at a given separation, by Newton steps that lower the energy.
+`local_relaxation`  equilibrium of parts of the front in small windows, where only these parts are far from equilibrium.
+`adhesive`          adhesive contact at a given separation: elastic contact, front, and new contact at summits.
+`load_control`      the mean separation at which the contact has a given load or area.
+`full_contact`      contact without gaps: its pressure in closed form, and its opening.
+`contact`           the contact model that a path follows; `patches` and `observables` evaluate its states.
 """

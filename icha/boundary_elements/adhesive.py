@@ -1,4 +1,4 @@
-"""Contact with adhesion at a given separation: fronts relax, and contact forms within reach of the attraction."""
+"""Adhesive contact at a given separation: fronts move to equilibrium, and new contact forms by attraction."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ from icha.boundary_elements.front_solver import TOLERANCES, FrontProblem, relax_
 from icha.boundary_elements.local_relaxation import relax_in_windows
 from icha.contact.model import NotConverged
 
-# Safety limit of the rounds of new contact; in theory there can be one round per cell.
+# Largest number of rounds of new contact, for safety; in theory there can be one round per cell.
 _MAX_ROUNDS = 1000
 
 
 @dataclass(frozen=True, eq=False)
 class Summits:
-    """Summits at which contact may form. Lengths in cells.
+    """Summits at which new contact may form; lengths in cell sizes.
 
     Parameters
     ----------
-    cell : (k,) int, of the grid.
-    above : (k,), height of the summit above the node of its cell.
-    reach : (k,), range of the attraction at the summit.
-    radius : (k,), of the contact that a lone summit makes there; from a smaller one it could not grow.
+    cell : (k,) int, grid cell of each summit.
+    above : (k,), height of the summit above the grid node of its cell.
+    reach : (k,), largest gap at which the summit jumps into contact.
+    radius : (k,), radius of the contact after the jump of a single summit. A smaller contact might not grow.
     """
 
     cell: np.ndarray
@@ -34,7 +34,7 @@ class Summits:
     radius: np.ndarray
 
     def contacts(self, chosen: np.ndarray, grid: int) -> np.ndarray:
-        """Cells, ascending, that chosen summits (k,) touch with when they jump into contact."""
+        """Return the cells, ascending, that close when the chosen summits, (k,) bool, jump in: discs around them."""
         touched = np.zeros((grid, grid), bool)
         # A larger disc would cover the surface with its periodic images.
         for cell, radius in zip(self.cell[chosen], np.minimum(self.radius[chosen], 0.75 * grid), strict=True):
@@ -45,20 +45,19 @@ class Summits:
         return np.flatnonzero(touched)
 
     def find_within_reach(self, state: AdhesiveContact, margin: float) -> tuple[np.ndarray, np.ndarray]:
-        """Find summits out of contact that are in reach by more than a margin, (k,) bool; and cells that overlap so."""
+        """Find open summits with gap < reach - margin, (k,) bool, and cells away from contact with gap < -margin."""
         gap, touched = state.gap.ravel(), mask_of(state.cells, state.gap.shape).ravel()
         within = (gap[self.cell] - self.above - self.reach < -margin) & ~touched[self.cell]
-        # Surfaces also touch where they overlap without a summit.
-        # Neighbours of the contact are left to the front solver.
+        # The surfaces also touch where they overlap without a summit. Neighbours of contact belong to the front solver.
         touched[state.rim] = True
         return within, np.flatnonzero((gap < -margin) & ~touched)
 
     def new_contact(
         self, state: AdhesiveContact, margin: float, tried: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, int]:
-        """Find new contact at places not tried before: its cells, the places, and a number.
+        """Find new contact at summits and overlapping cells within reach by more than a margin, if not `tried` before.
 
-        The number is that of all places within reach (summits and overlapping cells), tried ones included.
+        Return the cells to close, the cells newly tried, and the number of all cells within reach (also tried ones).
         """
         within, overlapping = self.find_within_reach(state, margin)
         places = np.union1d(self.cell[within], overlapping)
@@ -70,26 +69,26 @@ class Summits:
 def solve_adhesive_contact(
     problem: FrontProblem, summits: Summits, contact: Contact, tolerance: float, *, close: bool = False
 ) -> tuple[AdhesiveContact, int]:
-    """Solve the contact at a separation: relax the fronts, and form contact at all places within reach.
+    """Solve the adhesive contact at a separation: relax the fronts and close cells within reach of the attraction.
 
-    A place that loses its new contact again stays open.
+    A summit or cell that closes and then loses contact again stays open.
 
     Parameters
     ----------
-    problem : the surface at a separation.
-    summits : where contact may form.
-    contact : to start from.
-    tolerance : residual of the fronts.
-    close : whether the contact is so close to equilibrium that it is clear where contact forms.
+    problem : the surface, the law of its front, and the separation.
+    summits : summits at which contact may form.
+    contact : initial contact.
+    tolerance : largest allowed residual of the fronts.
+    close : whether the initial contact is close to equilibrium.
 
     Returns
     -------
-    The contact, and the number of places within reach (summits and overlapping cells) that stayed open.
+    The contact, and the number of summits and overlapping cells within reach that stay open.
 
     Raises
     ------
     NotConverged
-        If the equilibrium is not found.
+        If no equilibrium is found.
     """
     margin = TOLERANCES.coarse * problem.front.critical_opening
 
@@ -112,7 +111,7 @@ def solve_adhesive_contact(
             contact = solved
             continue
         stage = first
-        # Contact that is clearly within reach of new contact forms before the whole front is relaxed.
+        # New contact can bring further summits clearly within reach. They touch before the whole front is relaxed.
         while len(new):
             rounds += 1
             if rounds > _MAX_ROUNDS:
@@ -126,7 +125,7 @@ def solve_adhesive_contact(
 
 
 def _form_contact(problem, contact, formed):
-    """Close cells (m,); relax the fronts around them in windows and solve the elastic contact if windows pay."""
+    """Close the cells `formed`, (m,); if windows save time, also relax fronts near these cells, solve the contact."""
     closed = contact.close_cells(formed)
     relaxed = relax_in_windows(problem.space, problem.front, problem.separation, closed, contact.gap, formed)
     if relaxed is None:

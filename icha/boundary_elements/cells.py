@@ -1,23 +1,23 @@
-"""Sets of cells: ascending lists of flat indices on a periodic grid, or on several independent ones."""
+"""Sets of grid cells, as ascending flat indices on one periodic grid or on several independent grids."""
 
 from __future__ import annotations
 
 import numpy as np
 from scipy.ndimage import maximum_filter
 
-# Cells along a side of the blocks by which neighbourhoods are found.
+# Cells along a side of the blocks in which `blocks_around` divides a grid.
 BLOCK = 4
 
 
 def mask_of(cells: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
-    """Field of bool that is true on the cells."""
+    """Return a bool field of a given shape that is True at the given cells and False elsewhere."""
     mask = np.zeros(shape, dtype=bool)
     mask.ravel()[cells] = True
     return mask
 
 
 def rim_of(cells: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
-    """Cells that share an edge with given ones and are not among them, (m,), ascending."""
+    """Find the rim of a set of cells: cells outside the set, (m,), ascending, that share an edge with one inside."""
     inside = mask_of(cells, shape)
     rim = inside.copy()
     for target, source in ((slice(1, None), slice(-1)), (slice(1), slice(-1, None))):
@@ -29,7 +29,7 @@ def rim_of(cells: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
 
 
 def adjacent(cells: np.ndarray, grid: int) -> np.ndarray:
-    """Four cells that share an edge with each, (4, k)."""
+    """Return the four neighbours that share an edge with each cell, (4, k)."""
     within = cells % grid**2
     first, (row, column) = cells - within, np.divmod(within, grid)
     above, below, left, right = (row - 1) % grid, (row + 1) % grid, (column - 1) % grid, (column + 1) % grid
@@ -39,16 +39,16 @@ def adjacent(cells: np.ndarray, grid: int) -> np.ndarray:
 def merge_cells(
     cells: np.ndarray, others: np.ndarray, *values: tuple[np.ndarray, np.ndarray | float]
 ) -> tuple[np.ndarray, ...]:
-    """Merge two disjoint lists of cells.
+    """Merge two disjoint lists of cells, and values that are given for both lists.
 
     Parameters
     ----------
-    cells, others : (k,) and (m,) int.
-    values : pairs of values on `cells`, (k,), and on `others`, (m,) or one for all.
+    cells, others : (k,) and (m,) int, flat indices.
+    values : pairs of values: those of `cells`, (k,), and those of `others`, (m,) or one number for all of them.
 
     Returns
     -------
-    The merged list, ascending, and each pair in its order.
+    The merged cells, ascending, and the merged values of each pair in the same order.
     """
     merged = np.concatenate([cells, others])
     order = np.argsort(merged, kind="stable")
@@ -58,7 +58,7 @@ def merge_cells(
 
 
 def find_among(places: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Find places (m,) among ascending cells (k,): which of them are present, (m,), and the index of each of these."""
+    """Find which `places`, (m,), are in ascending `cells`: (m,) bool, and the indices in `cells` of those found."""
     index = np.searchsorted(cells, places)
     # No cell has the number -1.
     present = np.append(cells, -1)[index] == places
@@ -66,7 +66,7 @@ def find_among(places: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, np.nd
 
 
 def blocks_around(grid: int, reach: int, cells: np.ndarray) -> np.ndarray:
-    """Blocks of a grid with cells that are within `reach` of given ones, or slightly more: field of 0 and 1."""
+    """Return a field of blocks (BLOCK x BLOCK cells), 1 within at least `reach` cells of given cells, 0 elsewhere."""
     occupied = np.zeros(2 * [-(-grid // BLOCK)], np.uint8)
     row, column = np.divmod(cells, grid)
     occupied[row // BLOCK, column // BLOCK] = 1

@@ -1,4 +1,4 @@
-"""Boundary elements in the limit of a short range of adhesion: a contact model that a path can follow."""
+"""Contact model by boundary elements with short-ranged adhesion, for loading and unloading paths."""
 
 from __future__ import annotations
 
@@ -35,17 +35,18 @@ from icha.contact.models import MODELS, REFERENCE_MODEL, PathAccuracy
 from icha.surfaces.summits import locate_summits
 from icha.surfaces.surface import Surface
 
-# Smallest critical opening divided by the largest height; below, rounding of the heights hides it.
+# Smallest critical opening divided by the largest height. Rounding of the heights would hide a smaller opening.
 _SMALLEST_OPENING = 1e-4
-# Largest change of a fraction of contact for which rates predict the next state.
+# Largest change of a fraction of contact up to which the rates of a state predict the next state.
 _LARGEST_PREDICTION = 1.0
-# Smallest work whose error a path bounds, divided by the surface energy: that of 0.1 % of the nominal area.
+# Smallest work to which errors of a loop are compared, divided by the surface energy times the nominal area A0. The
+# value is the work of adhesion of 0.1 % of A0.
 _SMALLEST_WORK = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
 class BoundaryElements(FullContactProblem):
-    """`icha.contact.model.ContactModel` of a periodic rough surface against a half-space, cell by cell."""
+    """Contact model of a periodic rough surface against a half-space, by boundary elements on grid cells."""
 
     @property
     def area(self) -> float:
@@ -59,12 +60,12 @@ class BoundaryElements(FullContactProblem):
 
     @cached_property
     def path_accuracy(self) -> PathAccuracy:
-        """Accuracy to which a path resolves its events. Without adhesion nothing jumps, and nothing is lost."""
+        """Accuracy to which a path resolves its events; without adhesion there are no jumps and no losses."""
         least_work = _SMALLEST_WORK * self.law.material.surface_energy
         return replace(MODELS[REFERENCE_MODEL].accuracy, least_work=least_work, predicts_steps=self.adhesive)
 
     def untouched(self) -> CellState:
-        """State in which the first summit, or a plateau without one, is about to make contact."""
+        """Return the state without contact at the separation at which the first summit or plateau starts to touch."""
         separation = float(self.heights.max())
         if self.adhesive:
             first = self.asperities.height + self.summits.reach * self.spacing
@@ -75,9 +76,9 @@ class BoundaryElements(FullContactProblem):
     def equilibrium(
         self, state: CellState, separation: float, control: Control | None = None, *, let_go: int = 0
     ) -> CellState:
-        """Bring the contact to another mean separation (m), load or area; as of `ContactModel`.
+        """Find the next equilibrium from a state: at a mean separation (m), or at the load or area of `control`.
 
-        Unstable fronts run by themselves: no patch can be `let_go`.
+        With `control`, `separation` is the first guess. Fronts move until they are stable, so `let_go` must be 0.
         """
         if let_go:
             raise NotConverged("boundary elements cannot let go of single patches")
@@ -85,12 +86,12 @@ class BoundaryElements(FullContactProblem):
         return self.continue_from(find(state, separation, control), state)
 
     def continue_from(self, state: CellState, before: CellState) -> CellState:
-        """Return a state with the history of another one and the events since then."""
+        """Return a state with its history: the history of the state `before`, and the events since that state."""
         events = self._events(before, state)
         return replace(state, history=(*before.history, events) if len(events) else before.history)
 
     def _next_equilibrium(self, state, separation, control):
-        """Equilibrium from a state that is not full contact; arguments as of `equilibrium`."""
+        """Find the next equilibrium from a state that is not full contact; arguments as in `equilibrium`."""
         if control is None:
             closed = separation < self.smallest_gap
             return self.full_contact(self.closing_pressure) if closed else self._solve(state, separation)
@@ -101,7 +102,7 @@ class BoundaryElements(FullContactProblem):
         return solve_at_control(ControlProblem(self, control, self._solve, self._events), state, separation)
 
     def _leave_full_contact(self, state, separation, control):
-        """Equilibrium from full contact, which opens at the weakest place; arguments as of `equilibrium`."""
+        """Find the next equilibrium from full contact, which opens where tension is largest; see `equilibrium`."""
         if control is None and separation <= 0:
             return self.full_contact(self.closing_pressure)
         if control is None and self.pressure(state) > self.opening_pressure + ROUNDING * self.contact_modulus:
@@ -114,55 +115,55 @@ class BoundaryElements(FullContactProblem):
         return self._next_equilibrium(self.open_weakest(separation), separation, control)
 
     def observables(self, surface: Surface) -> PatchObservables:
-        """Observables of the states on a surface."""
+        """Return the object that computes recorded values of states from this contact and its surface."""
         return PatchObservables(self, surface)
 
     def relax_region(self, region: np.ndarray, separation: float) -> CellState:
-        """Relax a contact of a given region, (n, n) of bool, to equilibrium at a separation (m)."""
+        """Find the equilibrium at a separation (m), starting from contact in a given region, (n, n) bool."""
         cells, nothing = np.flatnonzero(region), np.zeros(np.count_nonzero(region))
         return self.equilibrium(CellState(separation, cells, nothing + 1, nothing, nothing), separation)
 
     def pressure(self, state: CellState) -> float:
-        """Force divided by the nominal area, Pa; negative in tension."""
+        """Return the nominal pressure of a state: force divided by nominal area, Pa; negative in tension."""
         return float(np.sum(state.pressure)) / self.heights.size
 
     def area_fraction(self, state: CellState) -> float:
-        """Contact area divided by the nominal area."""
+        """Return the contact area of a state divided by the nominal area."""
         return float(np.sum(self.area_of_cells(state))) / self.heights.size
 
     def area_of_cells(self, state: CellState) -> np.ndarray:
-        """Contact area of each cell in contact, (k,), in cells; less than its fraction along the perimeter."""
+        """Return the contact area of each cell, (k,), divided by the cell area, corrected along the perimeter."""
         if self.adhesive:
             return reported_areas(state.fraction, state.mean_fraction)
         return 1 - BEYOND_EDGES * free_edges(state.cells, self.space.grid)
 
     def gap(self, state: CellState) -> np.ndarray:
-        """Gap at the nodes, (n, n), m; zero in contact, but for the extension of bonds."""
+        """Return the gap at the grid nodes, (n, n), m; in partial cells it is the extension of the bond."""
         displaced = self.space.displacement(state.cells, state.pressure / self.contact_modulus)
         return displaced * self.spacing + state.separation - self.heights
 
     def fractions(self, state: CellState) -> np.ndarray:
-        """Fraction of contact of each cell, (n, n)."""
+        """Return the fraction of contact of all cells of the grid, (n, n)."""
         return self.space.field(state.cells, state.fraction)
 
     def mean_gap(self, state: CellState) -> float:
-        """Mean gap, m: the mean separation, since the mean plane is not displaced."""
+        """Return the mean gap, m; it equals the mean separation because the mean displacement is zero."""
         return state.separation
 
     def spot_count(self, state: CellState) -> int:
-        """Count the contact patches, the spots of this model."""
+        """Return the number of contact patches of a state."""
         return label_patches(state.cells, self.space.grid)[1]
 
     def stiffness(self, state: CellState) -> float:
-        """Contact stiffness -dp/du with moving fronts, Pa/m."""
+        """Return the contact stiffness -dp/du with moving fronts, Pa/m; p nominal pressure, u mean separation."""
         return 0.0 - self.slope(PRESSURE, state)
 
     def slope(self, quantity: str, state: CellState) -> float:
-        """Return derivative of a load or area with respect to the mean separation, with moving fronts."""
+        """Return the derivative of nominal pressure or area fraction with respect to the separation; fronts move."""
         return state.pressure_slope if quantity == PRESSURE else state.area_slope
 
     def stored_energy(self, state: CellState) -> float:
-        """Elastic energy less that of adhesion, divided by the nominal area, J/m^2; zero out of contact."""
+        """Return the elastic energy minus the work of adhesion, divided by the nominal area, J/m^2."""
         return float(np.sum(self._energy_of_cells(state))) / self.heights.size
 
     def is_unstable(self, state: CellState) -> bool:
@@ -170,7 +171,7 @@ class BoundaryElements(FullContactProblem):
         return False
 
     def _predict(self, state, separation):
-        """Contact of a state, moved along its rates to a separation (m) if that is close."""
+        """Predict the contact at a separation (m) from the rates of a state; if that is too far, do not change it."""
         contact = Contact(state.cells, state.fraction, state.pressure / self.contact_modulus)
         if state.rates is None:
             return contact
@@ -181,7 +182,7 @@ class BoundaryElements(FullContactProblem):
         return contact.apply_step(change, state.rates[1] * distance)
 
     def _solve(self, state, separation, residual=TOLERANCES.front, *, close=False, same_slopes=False):
-        """Equilibrium at a separation (m), to a residual of the front; arguments as of `ControlProblem.solve`."""
+        """Solve the equilibrium at a separation (m), to a residual of the front; options as for `ControlProblem`."""
         if not self.adhesive:
             return self._solve_nonadhesive(state, separation=separation / self.spacing)
         problem = FrontProblem(self.space, self.front, self.topography, separation / self.spacing)
@@ -202,7 +203,7 @@ class BoundaryElements(FullContactProblem):
         return self._with_slopes(new, float(np.clip(residual, *TOLERANCES.linear)))
 
     def _solve_nonadhesive(self, state, **given):
-        """Equilibrium without adhesion at a separation (cells) or under a load (E*)."""
+        """Solve the equilibrium without adhesion at a given separation (cell sizes) or load (nominal pressure, E*)."""
         contact = Contact(state.cells, state.fraction, state.pressure / self.contact_modulus)
         solved = solve_nonadhesive_contact(self.space, self.topography, contact, **given)
         new = CellState(
@@ -216,16 +217,16 @@ class BoundaryElements(FullContactProblem):
         return self._with_slopes(new, TOLERANCES.linear[0])
 
     def _gap_residual(self, solved):
-        """Largest gap of closed cells, or overlap anywhere, m."""
+        """Return the largest gap of a closed cell, or the largest overlap of the surfaces if that is larger, m."""
         closed = solved.gap.ravel()[solved.cells[solved.fraction >= 1]]
         return float(max(np.abs(closed).max(initial=0.0), -solved.gap.min())) * self.spacing
 
     def _events(self, before, after):
-        """Events between two consecutive states."""
+        """Find the jumps, coalescences and splits of patches between two consecutive states."""
         return patch_events(before, after, self._jump_energy, self.summits.cell, self.space.grid, self.spacing)
 
     def _with_slopes(self, state, accuracy):
-        """State with the derivatives of pressure and area."""
+        """Return the state with its rates, and with the derivatives of nominal pressure and area fraction."""
         if not len(state.cells):
             return state
         contact = Contact(state.cells, state.fraction, state.pressure / self.contact_modulus)
@@ -236,27 +237,27 @@ class BoundaryElements(FullContactProblem):
             gradient = reported_area_gradient(state.fraction, state.mean_fraction)
             area_slope = float(np.sum(gradient * fraction)) / scale
         else:
-            # Whole cells come and go; on average the area grows about in proportion to the load.
+            # The area changes by whole cells. On average it is nearly proportional to the load.
             area_slope = self.area_fraction(state) * pressure_slope / self.pressure(state)
         return replace(state, pressure_slope=pressure_slope, area_slope=area_slope, rates=(fraction, pressure))
 
     def _energy_of_cells(self, state):
-        """Elastic energy less that of adhesion of each cell in contact, (k,), J/m^2."""
+        """Return the elastic energy minus the work of adhesion of each cell in contact, (k,), J/m^2."""
         elastic = 0.5 * state.pressure * (self.heights.ravel()[state.cells] - state.separation)
         return elastic - self.law.material.surface_energy * adhesive_areas(state.fraction, state.mean_fraction)
 
     def _jump_energy(self, state):
-        """Energy of each cell, J/m^2; `patch_events` applies the sign. Zero without adhesion: nothing jumps."""
+        """Return the energy of each cell, (k,), that a jump of its patch can release, J/m^2; zero without adhesion."""
         return self._energy_of_cells(state) if self.adhesive else np.zeros(len(state.cells))
 
 
 def contact_of(surface: Surface, material: Material) -> BoundaryElements:
-    """Contact of a surface and a material.
+    """Build the boundary elements for a surface and a material.
 
     Raises
     ------
     ValueError
-        If the surface is a free square, or rounding of its heights hides the adhesion.
+        If the surface is not periodic, or if adhesion is so weak that rounding of the heights would hide it.
     """
     surface.require_periodic("a model of boundary elements")
     law, asperities, h = JKR(material), locate_summits(surface), surface.spacing
@@ -284,7 +285,7 @@ def contact_of(surface: Surface, material: Material) -> BoundaryElements:
 
 
 def resumable(contact: BoundaryElements, folder: pathlib.Path) -> CheckpointedContact:
-    """Contact whose equilibria are saved in a folder, so that an interrupted path can resume."""
+    """Return the contact with checkpoints: equilibria are saved in a folder, so that an interrupted path can resume."""
     programs = [(name, version(name)) for name in ("icha", "numpy", "scipy")]
     others = repr((contact.spacing, contact.law.material, programs, CellState.__match_args__)).encode()
     of = hashlib.sha256(contact.heights.tobytes() + others).hexdigest()

@@ -1,8 +1,9 @@
-"""Elastic contact of bonded cells: an active set, whose pressures conjugate gradients find.
+"""Elastic contact of bonded cells, solved with an active set of cells and conjugate gradients for their pressures.
 
-Given cells stay in contact, under pressure or tension. Other cells join where the surfaces would overlap, and leave
-again in tension: a Newton method for the complementarity of pressure and gap (Hintermueller, Ito & Kunisch, SIAM
-J. Optim. 13 (2003) 865). Bonds only pull: a partial cell closes under pressure.
+The cells of the initial contact stay in contact, under pressure or tension. Other cells join the active set where the
+surfaces overlap, and leave the set when they are in tension. The iteration is a Newton method for the complementarity
+of pressure and gap (Hintermueller, Ito & Kunisch, SIAM J. Optim. 13 (2003) 865). A bond transmits only tension, so that
+a partial cell under pressure closes.
 """
 
 from __future__ import annotations
@@ -17,30 +18,30 @@ from icha.boundary_elements.half_space import HalfSpace, Operator
 from icha.contact.model import FullContact, NotConverged
 from icha.support.parallel import blocks, on_cores
 
-# Relative error of displacements in single precision; fraction of a cell that counts as none, for the same reason.
+# Relative error of displacements in single precision; smallest fraction of contact of a cell, below which it is open.
 ROUNDING, NO_CONTACT = 5e-7, 1e-9
-# A correction must reduce the error at least to this part; otherwise the iteration has stagnated.
+# Largest error after a correction, divided by the error before it; above, the iteration has stagnated.
 LARGEST_REMAINDER = 0.5
-# Part of the error that one correction leaves: while the active set changes, and the smallest in single precision.
+# Error after one correction divided by the error before: while the active set changes; smallest in single precision.
 _COARSE_PART, _FINE_PART = 0.1, 1e-4
 # Smallest compliance of the half-space, 2/q at the shortest wave, in h/E*.
 _SMALLEST_COMPLIANCE = np.sqrt(2) / np.pi
 # Typical compliance of the half-space per cell, in h/E*, to scale the preconditioner at soft bonds.
 _TYPICAL_COMPLIANCE = 2.5
 _MAX_CHANGES, _MAX_ITERATIONS = 200, 300
-# Rows of a field that one core works on.
+# Rows of a field that one core processes at a time.
 _ROWS = 1024
 
 
 @dataclass(frozen=True, eq=False)
 class Contact:
-    """Cells in contact. Lengths in cells, pressures in E*.
+    """Cells in contact, with their fractions of contact and their pressures.
 
     Parameters
     ----------
-    cells : (k,) int, ascending.
-    fraction : (k,), share of the cell's area that is in contact, 0 < f <= 1.
-    pressure : (k,), mean of each cell; negative in tension.
+    cells : (k,) int, flat indices of the cells in contact, ascending.
+    fraction : (k,), part f of the area of each cell that is in contact, 0 < f <= 1.
+    pressure : (k,), force on each cell divided by the area of the whole cell, in E*; negative in tension.
     """
 
     cells: np.ndarray
@@ -48,27 +49,27 @@ class Contact:
     pressure: np.ndarray
 
     def close_cells(self, cells: np.ndarray) -> Contact:
-        """Return the contact with these cells, (m,), ascending, fully in contact."""
+        """Return the contact after the given cells, (m,), ascending, closed fully; new cells get zero pressure."""
         present, index = find_among(cells, self.cells)
         fraction = self.fraction.copy()
         fraction[index] = 1.0
         return Contact(*merge_cells(self.cells, cells[~present], (fraction, 1.0), (self.pressure, 0.0)))
 
     def apply_step(self, fraction_change: np.ndarray, pressure_change: np.ndarray) -> Contact:
-        """Return the contact after changes (k,), without cells that lose contact."""
+        """Return the contact after changes (k,) of fraction and pressure, without cells whose fraction falls to 0."""
         fraction = np.clip(self.fraction + fraction_change, 0.0, 1.0)
         touching = fraction > NO_CONTACT
         return Contact(self.cells[touching], fraction[touching], (self.pressure + pressure_change)[touching])
 
     @property
     def bond_compliance(self) -> np.ndarray:
-        """Compliance of the bond of each cell, (k,)."""
+        """Compliance of the bond of each cell, (k,), in cell sizes per E*."""
         return bond_compliance(self.fraction)
 
 
 @dataclass(frozen=True, eq=False)
 class Topography:
-    """Heights of a surface in cells, (n, n) or (t, n, n), in double and single precision; largest absolute height."""
+    """Heights of a surface in cell sizes, (n, n) or (t, n, n), in two precisions; `largest` is the largest |height|."""
 
     double: np.ndarray
     single: np.ndarray
@@ -76,18 +77,18 @@ class Topography:
 
     @classmethod
     def of(cls, heights: np.ndarray) -> Topography:
-        """Topography of heights in double precision."""
+        """Return the topography of given heights (in double precision, in cell sizes)."""
         return cls(heights, heights.astype(np.float32), float(max(heights.max(), -heights.min())))
 
     @property
     def rounding(self) -> float:
-        """Error of displacements in single precision, in cells."""
+        """Rounding error of displacements in single precision, in cell sizes."""
         return ROUNDING * self.largest
 
     def gap(self, displacement: np.ndarray, separation: float, contact: Contact) -> np.ndarray:
-        """Turn a field of displacements into the gap, in place.
+        """Convert a field of displacements to the gap, displacement + separation - height, in place.
 
-        In contact, heights are subtracted in double precision. The result keeps the precision of the field.
+        At cells in contact the gap is computed from heights in double precision. The field keeps its precision.
         """
         heights = self.single if displacement.dtype == np.float32 else self.double
         inside = displacement.ravel()[contact.cells] - (self.double.ravel()[contact.cells] - separation)
@@ -103,14 +104,14 @@ class Topography:
 
 @dataclass(frozen=True, eq=False)
 class ElasticContact(Contact):
-    """Contact in elastic equilibrium at a separation.
+    """Contact in elastic equilibrium at one separation; lengths in cell sizes.
 
     Parameters
     ----------
-    gap : (n, n), at the nodes.
+    gap : (n, n), gap at the grid nodes.
     separation : mean separation.
-    misfit : (k,), error of the displacement in contact, not larger than the tolerance.
-    tolerance : of the displacement in contact.
+    misfit : (k,), error of the displacement of each cell in contact; at most `tolerance`.
+    tolerance : largest allowed error of the displacements of cells in contact.
     """
 
     gap: np.ndarray = field(repr=False)
@@ -129,20 +130,21 @@ def solve_active_set(
     load: float | None = None,
     sticky: bool = True,
 ) -> ElasticContact:
-    """Solve the elastic contact at a separation, or under a load, from the pressures of a given contact.
+    """Find the cells in contact and their pressures at a separation or under a load, starting from a given contact.
 
     Parameters
     ----------
-    tolerance : largest error of the displacement in contact, in cells. If it is larger than the rounding of single
-        precision, everything is computed in single precision.
-    separation : mean separation, in cells; not used under a load.
-    load : mean pressure in E*; needs at least one cell in contact.
-    sticky : whether cells of the given contact stay in contact under tension.
+    contact : initial contact; its cells and pressures are the start of the iteration.
+    tolerance : largest allowed error of displacements in contact, in cell sizes. With a tolerance above the rounding
+        error of single precision, all fields are computed in single precision.
+    separation : mean separation, in cell sizes; ignored if `load` is given.
+    load : nominal pressure, in E*; `contact` must then have at least one cell.
+    sticky : whether the cells of the initial contact stay in contact under tension.
 
     Raises
     ------
     FullContact
-        If the contact covers the surface at a given separation, which is the mean gap.
+        If all cells close at a given separation, which is impossible because the separation is the mean gap.
     """
     dtype = np.float32 if tolerance > topography.rounding else float
     keep, gap, before, changing = np.full(len(contact.cells), sticky), None, np.inf, not sticky
@@ -181,7 +183,7 @@ def solve_active_set(
 
 
 def _scale_to_load(space, contact, load):
-    """Scale the pressures to the load, if there is one; without a load the contact must not cover the surface."""
+    """Scale the pressures to a given load; without a load, raise `FullContact` if the contact covers the surface."""
     if load is None and len(contact.cells) == space.size and (contact.fraction >= 1).all():
         raise FullContact("the contact covers the whole surface")
     if load is None or not len(contact.cells):
@@ -191,10 +193,10 @@ def _scale_to_load(space, contact, load):
 
 
 def _next_active_set(contact, keep, joining, smallest):
-    """Contact after partial cells under pressure closed, cells in tension left, and others (m,) joined.
+    """Close partial cells under pressure, remove cells in tension, add cells `joining`, (m,).
 
-    keep : (k,) bool, cells that do not leave. smallest : smallest pressure at which a cell that is not kept may stay.
-    None if nothing changes.
+    keep : (k,) bool, cells that stay in any case. smallest : pressure below which other cells leave contact.
+    Return the new contact and its `keep`; None if nothing changes.
     """
     closing = (contact.pressure > 0) & (contact.fraction < 1)
     staying = keep | (contact.pressure >= smallest)
@@ -212,7 +214,7 @@ def _next_active_set(contact, keep, joining, smallest):
 
 
 def _compute_gap(space, topography, contact, separation, load, dtype, out=None):
-    """Compute the gap everywhere, the misfit in contact, and the separation, which follows from a load."""
+    """Compute the gap field, the misfit of cells in contact, and the separation (unknown only if a load is given)."""
     cells = contact.cells
     displacement = space.displacement(cells, contact.pressure.astype(dtype), out=out)
     if load is not None:
@@ -222,7 +224,7 @@ def _compute_gap(space, topography, contact, separation, load, dtype, out=None):
 
 
 def _correct_pressures(space, contact, misfit, part, zero_sum):
-    """Correct the pressures so that a part of the misfit is left; zero_sum: as of `solve_pressures`."""
+    """Correct the pressures to reduce the largest misfit by the factor `part`; zero_sum as in `solve_pressures`."""
     operator = space.restrict_to(contact.cells)
     error = np.abs(misfit).max()
     change, _ = solve_pressures(operator, contact.bond_compliance, misfit / error, max(part, operator.error), zero_sum)
@@ -230,7 +232,7 @@ def _correct_pressures(space, contact, misfit, part, zero_sum):
 
 
 def _overlapping_cells(gap, cells, tolerance):
-    """Cells, ascending, out of contact at which the surfaces overlap by more than a tolerance."""
+    """Find the cells out of contact, ascending, at which the surfaces overlap by more than a tolerance."""
 
     def find(rows):
         return rows.start * gap[0].size + np.flatnonzero(gap[rows] < -tolerance)
@@ -242,19 +244,19 @@ def _overlapping_cells(gap, cells, tolerance):
 def solve_pressures(
     operator: Operator, bonds: np.ndarray, wanted: np.ndarray, accuracy: float, zero_sum: bool = False
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Solve (K + bonds) p = wanted by preconditioned conjugate gradients, in single precision.
+    """Solve (K + bonds) p = wanted for the pressures p by preconditioned conjugate gradients, in single precision.
 
     Parameters
     ----------
-    operator : the half-space K of k cells.
-    bonds : (k,), compliance of the bonds.
-    wanted : (k,), displacements in cells.
-    accuracy : largest error of a displacement, in cells.
-    zero_sum : whether the pressures sum up to zero, and `wanted` is met up to a constant.
+    operator : compliance K of the half-space between k cells.
+    bonds : (k,), compliance of the bond of each cell.
+    wanted : (k,), prescribed displacement of each cell, in cell sizes.
+    accuracy : largest allowed error of a displacement, in cell sizes.
+    zero_sum : if True, the pressures sum to zero, and the displacements may differ from `wanted` by a constant.
 
     Returns
     -------
-    Pressures (k,) and the error that is left, (k,).
+    Pressures (k,) in E*, and remaining errors of the displacements (k,).
     """
     scale = np.sqrt(_TYPICAL_COMPLIANCE / (_TYPICAL_COMPLIANCE + bonds)).astype(np.float32)
     bonds, residual = bonds.astype(np.float32), wanted.astype(np.float32)
@@ -285,9 +287,9 @@ def solve_nonadhesive_contact(
     separation: float = 0.0,
     load: float | None = None,
 ) -> ElasticContact:
-    """Solve the contact without adhesion at a separation (cells) or under a mean pressure (E*).
+    """Solve the contact without adhesion at a separation (in cell sizes) or under a nominal pressure (in E*).
 
-    contact : contact close to the solution; a load needs at least one cell in contact. Raises as `solve_active_set`.
+    contact : start of the iteration; an empty contact is replaced by the cells that are higher than the separation.
     """
     if not len(contact.cells):
         cells = np.flatnonzero(topography.double > separation)
@@ -301,15 +303,15 @@ def solve_nonadhesive_contact(
 
 @dataclass(frozen=True, eq=False)
 class AdhesiveContact(ElasticContact):
-    """Elastic contact of bonded cells, with what its front depends on.
+    """Elastic contact of bonded cells, with the quantities that decide how its front moves.
 
     Parameters
     ----------
-    energy : elastic, of half-space and bonds, in E* cells^3.
-    energy_error : largest amount by which the energy may be underestimated.
-    mean_fraction : (k,), Gaussian mean of the fractions, the cell itself included (`average_fractions`).
-    rim : (m,) int, cells next to contact, ascending.
-    mean_fraction_rim : (m,), the same on the rim.
+    energy : elastic energy of half-space and bonds, in E* times cell size^3.
+    energy_error : largest amount by which `energy` may be too small.
+    mean_fraction : (k,), Gaussian average of the fractions around each cell (`average_fractions`).
+    rim : (m,) int, open cells that share an edge with a cell in contact, ascending.
+    mean_fraction_rim : (m,), Gaussian average of the fractions around each cell of the rim.
     """
 
     energy: float
@@ -327,15 +329,15 @@ def solve_bonded_contact(
     tolerance: float,
     background: np.ndarray | None = None,
 ) -> AdhesiveContact:
-    """Solve the pressures at a separation; parameters as of `solve_active_set`.
+    """Solve the elastic contact at a separation; all cells of `contact` stay bonded. Add energy and mean fractions.
 
-    Given cells stay in contact. A partial cell under pressure closes. Overlapping cells join.
+    Partial cells under pressure close, and overlapping cells join the contact. Parameters as in `solve_active_set`.
 
-    background : part of the mean fraction that is due to contact outside of a window, (t, n, n).
+    background : in windows, part of the mean fraction due to contact outside the window, (t, n, n); otherwise None.
     """
     state = solve_active_set(space, topography, contact, tolerance, separation=separation)
     overlap = topography.double.ravel()[state.cells] - separation
-    # The energy is the maximum of this functional of the pressures: their error enters squared.
+    # The energy is the maximum of a functional of the pressures, so that errors of the pressures enter squared.
     energy = 0.5 * float(np.sum(state.pressure * (overlap + state.misfit)))
     error = 0.5 * float(np.sum(state.misfit**2 / (_SMALLEST_COMPLIANCE + state.bond_compliance)))
     if state.gap.dtype == np.float32:

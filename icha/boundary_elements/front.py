@@ -1,20 +1,20 @@
-"""Law of a cell at the edge of contact: tension against gap, area, and the energy release rate.
+"""Law of a cell at the edge of contact: its tension, gap and contact area, and the energy release rate.
 
-A cell has a fraction of contact f. Its bond to the half-space has the compliance c(f) = C (1/f - 1): closed for f = 1,
-none for f = 0. At a given work of adhesion dgamma the energy of bonds, half-space and adhesion is stationary in f where
-the tension of the cell is f s, with the strength s = sqrt(2 dgamma/C) (A. A. Griffith, Phil. Trans. A 221 (1921) 163).
-With f eliminated this is a cohesive law: the tension falls linearly with the gap g, t = s (1 - g/g_c), to zero at
-g_c = C s, and does the work dgamma. Its range follows the grid. C is that of the rows of cells at a straight front,
-times a factor: then a front moves through its cells without being trapped, and is about two cells wide.
+Each cell has a fraction of contact f and a bond to the half-space with the compliance c(f) = C (1/f - 1). The bond is
+rigid at f = 1 and broken at f = 0. The sum of elastic energy and adhesion energy is stationary in f if the tension of
+the cell is f s. The strength s = sqrt(2 dgamma/C) contains the work of adhesion dgamma (A. A. Griffith, Phil. Trans.
+A 221 (1921) 163). With f eliminated, bonds obey a cohesive law: the tension falls linearly with the gap g to zero at
+g_c, t = s (1 - g/g_c) with g_c = C s, and does the work dgamma. The range g_c depends on the cell size. C is the
+compliance of a row of cells at a straight front, times a factor. The factor lets the front move across cells without
+being trapped, and makes the front about two cells wide.
 
-The sum of fractions overestimates the contact radius by a constant part of a cell. An area that counts cells by their
-neighbours,
+The sum of the fractions overestimates the contact radius by a constant part of a cell. So the area
 
     A = sum f - b sum f (1 - w*f),   w a Gaussian stencil,
 
-takes a perimeter off the sum: off the area and, through its derivative, off the work of adhesion at curved fronts.
+subtracts a term in proportion to the perimeter. With the area A the work of adhesion is lower at convex fronts.
 
-Units of the grid: lengths in cells, pressures in E*.
+Lengths are in units of the cell size, pressures in E*.
 """
 
 from __future__ import annotations
@@ -29,26 +29,26 @@ import numpy as np
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
-# Compliance of the last row of a straight contact, with the kernel 2/q, in h/E*; and factor by which that of a bond is
-# larger. With it circular patches follow JKR, wherever they lie on the grid (docs/short_range.md).
+# Compliance of the last row of cells of a straight contact (kernel 2/q, cell size h), in h/E*; compliance of a bond,
+# divided by that of the row. With this factor circular patches follow JKR at any position (docs/short_range.md).
 _ROW_COMPLIANCE, _BOND_FACTOR = 1.7316, 3.5
 COMPLIANCE = _BOND_FACTOR * _ROW_COMPLIANCE
-# Compliance at the front in preconditioners: that of a bond less that of the half-space.
+# Compliance of a cell at the front in preconditioners: compliance of its bond minus that of the half-space.
 NET_COMPLIANCE = 0.6 * COMPLIANCE
-# Width and reach of the stencil in cells, and the weight of the perimeter in the work of adhesion, from JKR patches.
+# Width and reach of the stencil in cells, and weight of the perimeter in the work of adhesion, fitted to JKR patches.
 _WIDTH, _REACH = 1.5, 5
 PERIMETER = 0.7
-# Weights of the perimeter and of the front's width in the reported area, from patches between Hertz's and JKR's; and
-# the smallest area of a cell, divided by its fraction.
+# Weights of the perimeter and of the width of the front in the reported area, fitted to patches between Hertz and JKR;
+# smallest reported area of a cell, divided by its fraction.
 _EDGE, _FRONT_WIDTH, _SMALLEST_SHARE = 0.236, 1.115, 0.02
 _profile = np.exp(-0.5 * (np.arange(-_REACH, _REACH + 1) / _WIDTH) ** 2)
 STENCIL = _profile / _profile.sum()
-# Rows of the matrix of neighbours that are built together.
+# Rows of the matrix of `neighbour_weights` that are built together.
 _BATCH = 4096
 
 
 def average_fractions(fractions: np.ndarray) -> np.ndarray:
-    """Return the Gaussian mean w*f of the fractions of every cell, itself included; fields (..., n, n)."""
+    """Return the Gaussian average w*f of the fractions around every cell of periodic fields (..., n, n)."""
     from scipy.ndimage import correlate1d
 
     along_columns = correlate1d(fractions, STENCIL, axis=-2, mode="wrap")
@@ -56,11 +56,12 @@ def average_fractions(fractions: np.ndarray) -> np.ndarray:
 
 
 def neighbour_weights(cells: np.ndarray, shape: tuple[int, ...]) -> csr_array:
-    """Weights w between given cells, (k, k), in single precision.
+    """Return the sparse matrix (k, k) of the Gaussian weights w between given cells, in single precision.
 
     Parameters
     ----------
-    cells : (k,) int, ascending, of grids of the shape (n, n) or (t, n, n).
+    cells : (k,) int, ascending.
+    shape : shape of the grid, (n, n), or of t independent grids, (t, n, n).
     """
     from scipy.sparse import csr_array
 
@@ -87,29 +88,29 @@ def neighbour_weights(cells: np.ndarray, shape: tuple[int, ...]) -> csr_array:
 
 
 def adhesive_areas(fraction: np.ndarray, mean_fraction: np.ndarray) -> np.ndarray:
-    """Area of each cell that counts in the adhesion energy, in cells: f less its perimeter term."""
+    """Return the adhesive area of each cell, divided by the cell area: its fraction minus its perimeter term."""
     return fraction - PERIMETER * fraction * (1 - mean_fraction)
 
 
 def adhesive_area_gradient(mean_fraction: np.ndarray) -> np.ndarray:
-    """Return derivative of the total of `adhesive_areas` with respect to the fraction of each cell."""
+    """Return the derivative of the sum of `adhesive_areas` with respect to the fraction of each cell."""
     return 1 - PERIMETER + 2 * PERIMETER * mean_fraction
 
 
 def reported_areas(fraction: np.ndarray, mean_fraction: np.ndarray) -> np.ndarray:
-    """Contact area of each cell in results, in cells.
+    """Return the contact area of each cell as reported in results, divided by the cell area.
 
-    The sum of fractions extends beyond the edge of contact by a length that depends on the width of the front, which
-    partial cells indicate. With both terms the radius of patches of 4 to 16 cells is right to some hundredths of a
-    cell, whether adhesion is strong or negligible (docs/short_range.md).
+    The sum of the fractions is larger than the contact area, the more so the wider the front is. One term subtracts the
+    effect of the perimeter, and one the effect of partial cells. The radius of patches of 4 to 16 cells is then exact
+    within some hundredths of a cell, with strong and with negligible adhesion (docs/short_range.md).
     """
     return fraction * np.maximum(1 - _EDGE * (1 - mean_fraction) - _FRONT_WIDTH * (1 - fraction), _SMALLEST_SHARE)
 
 
 def reported_area_gradient(fraction: np.ndarray, mean_fraction: np.ndarray) -> np.ndarray:
-    """Return derivative of the total of `reported_areas` with respect to the fraction of each cell.
+    """Return the derivative of the sum of `reported_areas` with respect to the fraction of each cell.
 
-    Approximate next to cells at the floor `_SMALLEST_SHARE`.
+    The derivative is approximate next to cells with the smallest area, `_SMALLEST_SHARE` of their fraction.
     """
     gradient = 1 - _EDGE - _FRONT_WIDTH + 2 * _EDGE * mean_fraction + 2 * _FRONT_WIDTH * fraction
     share = 1 - _EDGE * (1 - mean_fraction) - _FRONT_WIDTH * (1 - fraction)
@@ -117,20 +118,20 @@ def reported_area_gradient(fraction: np.ndarray, mean_fraction: np.ndarray) -> n
 
 
 def bond_compliance(fraction: np.ndarray) -> np.ndarray:
-    """Compliance of the bond of cells with given fractions, h/E*."""
+    """Return the compliance of the bonds of cells with given fractions, in cell sizes per E*."""
     return COMPLIANCE * (1 / fraction - 1)
 
 
 @dataclass(frozen=True)
 class Front:
-    """Linear cohesive law of a front, which is written out only in this module.
+    """Linear cohesive law of cells at the front; other modules use it only through these methods.
 
     Fraction f, strength s, tension t and opening g of a cell obey t = f s and g = C s (1 - f).
 
     Parameters
     ----------
-    adhesion_length : dgamma/E*, in cells; zero without adhesion.
-    interface_strength : tension, in E*, at which contact opens without a front.
+    adhesion_length : dgamma/E*, in cell sizes; zero without adhesion.
+    interface_strength : tension, in E*, at which closed cells open inside the contact.
     """
 
     adhesion_length: float
@@ -143,43 +144,43 @@ class Front:
 
     @property
     def critical_opening(self) -> float:
-        """Gap at which a cell at a straight front is open, in cells."""
+        """Gap g_c at which the tension of a cell at a straight front falls to zero, in cell sizes."""
         return COMPLIANCE * self.strength
 
     def strengths(self, mean_fraction: np.ndarray) -> np.ndarray:
-        """Tension at which closed cells at the edge start to open, in E*: less where the front is convex."""
+        """Return the tension at which closed cells at the front start to open, in E*; it is lower at convex fronts."""
         return self.strength * np.sqrt(adhesive_area_gradient(mean_fraction))
 
     def strength_change(self, strengths: np.ndarray, mean_fraction_change: np.ndarray) -> np.ndarray:
-        """Change of the strengths with that of the mean fractions."""
+        """Return the first-order change of the strengths for given changes of the mean fractions."""
         return self.strength**2 * PERIMETER / strengths * mean_fraction_change
 
     def tension(self, strengths: np.ndarray, fraction: np.ndarray) -> np.ndarray:
-        """Tension of cells at the front, in E*."""
+        """Return the tension of cells at the front from their strengths and fractions, in E*."""
         return strengths * fraction
 
     def tension_change(
         self, strengths: np.ndarray, fraction: np.ndarray, strengths_change: np.ndarray, fraction_change: np.ndarray
     ) -> np.ndarray:
-        """Change of the tension with those of strength and fraction."""
+        """Return the first-order change of the tension for given changes of strength and fraction."""
         return strengths * fraction_change + fraction * strengths_change
 
     def opening(self, strengths: np.ndarray, fraction: np.ndarray) -> np.ndarray:
-        """Gap of cells at the front, in cells."""
+        """Return the gap of cells at the front from their strengths and fractions, in cell sizes."""
         return COMPLIANCE * strengths * (1 - fraction)
 
     def opening_change(self, strengths_change: np.ndarray, tension_change: np.ndarray) -> np.ndarray:
-        """Change of the gap with those of strength and tension, in single precision."""
+        """Return the change of the gap for given changes of strength and tension, in single precision."""
         return np.float32(COMPLIANCE) * (strengths_change - tension_change)
 
     def intensity(self, fraction: np.ndarray, pressure: np.ndarray, mean_fraction: np.ndarray) -> np.ndarray:
-        """Stress intensity of cells in contact divided by the critical one: tension divided by that of the law."""
+        """Return K/K_c of cells in contact: their tension divided by the tension of the law at the same fraction."""
         return -pressure / self.tension(self.strengths(mean_fraction), fraction)
 
     def relative_gap(self, gap: np.ndarray, mean_fraction: np.ndarray) -> np.ndarray:
-        """Gap of open cells divided by the one at which they are open, g/g_c; below 1 they close."""
+        """Return the gap of open cells divided by the gap at which their tension is zero; below 1 the cells close."""
         return gap / (COMPLIANCE * self.strengths(mean_fraction))
 
     def adhesion_energy(self, fraction: np.ndarray, mean_fraction: np.ndarray) -> float:
-        """Work of adhesion of all cells, in E* cells^3."""
+        """Return the work of adhesion dgamma times the adhesive area of all cells, in E* times cell size^3."""
         return self.adhesion_length * float(np.sum(adhesive_areas(fraction, mean_fraction)))

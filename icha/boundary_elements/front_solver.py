@@ -1,9 +1,10 @@
-"""Equilibrium of the front at a given separation: Newton steps of pressures and fractions, with falling energy.
+"""Equilibrium of the front at a given separation, by Newton steps of pressures and fractions that lower the energy.
 
-The energy U(f) - dgamma A(f) falls with every step, so that the result is a local minimum that the start leads down
-to; where the front is unstable it runs until it rests. A step solves the linearised equations of contact (gap 0 in
-closed cells), of the front (tension = f strength) and of its strength. Where it leads up in energy, it is repeated with
-softer bonds, which shortens it (Levenberg and Marquardt).
+Every step lowers the energy U(f) - dgamma A(f), the elastic energy minus the work of adhesion. So the result is a local
+minimum of the energy. An unstable front runs until it is in equilibrium. A step solves three linearised equations: the
+gap of closed cells is zero, the tension at the front is fraction times strength, and the strength depends on the
+fractions of neighbours. A step that raises the energy is repeated with more damping, that is with softer bonds, which
+shortens the step (Levenberg-Marquardt method).
 """
 
 from __future__ import annotations
@@ -31,26 +32,29 @@ from icha.contact.models import MODELS, REFERENCE_MODEL
 
 @dataclass(frozen=True)
 class FrontTolerances:
-    """All tolerances of the solver; `docs/short_range.md` has the measurements behind their values.
+    """Tolerances of the solver; `docs/short_range.md` justifies them by measurements.
 
-    The residual of a cell is |K/K_c - 1| with K/K_c = sqrt(G/dgamma). Errors of displacements are in units of the
-    critical opening.
+    The residual of a cell is |K/K_c - 1| with the stress intensity K/K_c = sqrt(G/dgamma). Errors of displacements are
+    divided by the critical opening.
 
     Parameters
     ----------
-    front : residual of a converged front; the grid's own error of areas and loads is some 1e-3.
-    stagnation : largest residual at which a front that cannot move on is accepted; above, it has not converged.
-    coarse : residual above which cells are relaxed locally and damped, and below which contact forms that is within
-        reach by more than the same part of the critical opening; first trials for a load end here.
-    fine : residual below which all contact within reach forms, and above which few cells are relaxed locally on their
-        own; later trials for a load end here, and are close to it if the relative error is no larger.
-    few : part of the front that counts as few cells.
-    displacement : error of a displacement, divided by the residual that it decides.
-    moving_displacement : the same, at most, after a step.
-    certain_displacement : error at which energies of states that differ little can be compared.
-    linear : error of the linearised equations: the front's residual, but between these two.
-    damping : first damping of bonds where a step leads up in energy; twice if most of the front is far from
-        equilibrium at the start.
+    front : largest residual of a converged front. For comparison, the grid causes relative errors of areas and loads
+        of about 1e-3.
+    stagnation : largest residual at which a front is accepted although no step lowers its energy.
+    coarse : residual above which cells are relaxed locally and damped. Below it, contact forms where the gap is below
+        the reach of the attraction by at least `coarse` critical openings, and the first trial for a load ends.
+    fine : residual below which contact forms wherever the gap is below the reach, and later trials for a load end.
+        Cells above it are relaxed locally if they are a smaller part of the front than `few`. Also the relative error
+        of a load below which its trials are solved to the final tolerances.
+    few : part of the front, 0 to 1.
+    displacement : largest error of displacements, divided by the allowed residual of the front.
+    moving_displacement : largest error of displacements in the first steps. After a step, the allowed error is
+        residual * min(moving_displacement, max(residual, linear[0])).
+    certain_displacement : error of displacements at which the energies of two similar states can be compared.
+    linear : smallest and largest relative error of the linearised equations; between them the error is the residual.
+    damping : damping of the bonds after the first step that raises the energy; twice as large if most of the front
+        is far from equilibrium at the start.
     """
 
     front: float = 1e-6
@@ -66,24 +70,24 @@ class FrontTolerances:
 
 
 TOLERANCES = FrontTolerances()
-# Smallest error of displacements, in units of the critical opening.
+# Smallest error to which displacements are solved, in units of the critical opening.
 _SMALLEST_ERROR = 1e-3 * TOLERANCES.front
-# Limits of the iteration.
+# Largest numbers of steps, of Krylov vectors, of local relaxations between steps; largest damping.
 _MAX_STEPS, _MAX_KRYLOV, _MAX_LOCAL_RELAXATIONS, _LARGEST_DAMPING = 400, 60, 5, 1e8
-# Relative rounding error of an energy, and of the work of a step.
+# Relative rounding error of the energy, and relative rounding error of the work of a step.
 _ENERGY_ROUNDING, _WORK_ROUNDING = 1e-12, 1e-11
 
 
 @dataclass(frozen=True, eq=False)
 class ActiveCells(Contact):
-    """Cells that take part in a step: those in contact, and cells of the rim that close, with fraction 0.
+    """Cells that take part in a step: cells in contact, and open cells of the rim (fraction 0) that start to close.
 
     Parameters
     ----------
-    gap : (k,), in cells.
-    mean_fraction : (k,), as of `AdhesiveContact`.
-    intensity : (k,), stress intensity at the front divided by the critical one, K/K_c = sqrt(G/dgamma).
-    free : (k,) bool, whether the front may move there.
+    gap : (k,), gap of each cell, in cell sizes.
+    mean_fraction : (k,), Gaussian average of the fractions around each cell.
+    intensity : (k,), stress intensity of each cell divided by the critical stress intensity, K/K_c = sqrt(G/dgamma).
+    free : (k,) bool, whether the fraction of a cell may change.
     """
 
     gap: np.ndarray
@@ -93,21 +97,21 @@ class ActiveCells(Contact):
 
     @property
     def at_front(self) -> np.ndarray:
-        """Whether a cell is free or partly in contact, (k,)."""
+        """Whether each cell belongs to the front, (k,) bool: it is free, or it is partly in contact."""
         return self.free | ((self.fraction > 0) & (self.fraction < 1))
 
     @property
     def residuals(self) -> np.ndarray:
-        """Residual of every cell, (k,)."""
+        """Residual |K/K_c - 1| of each cell, (k,); zero for cells that are not free."""
         return np.where(self.free, np.abs(self.intensity - 1), 0.0)
 
     @property
     def residual(self) -> float:
-        """Largest residual of the front."""
+        """Largest residual of all cells."""
         return float(np.max(self.residuals, initial=0.0))
 
     def cells_to_relax(self) -> tuple[np.ndarray, bool]:
-        """Cells far from equilibrium, (k,) bool, and whether they are only few of the front's."""
+        """Find cells far from equilibrium, (k,) bool; also return whether they are a small part of the front."""
         few = TOLERANCES.few * np.count_nonzero(self.at_front)
         uneasy = self.residuals > TOLERANCES.fine
         if np.count_nonzero(uneasy) <= few:
@@ -117,7 +121,7 @@ class ActiveCells(Contact):
 
 
 def find_active_cells(front: Front, state: AdhesiveContact) -> ActiveCells:
-    """Find the cells of a state that take part in a step.
+    """Find the cells of a state that take part in the next step, with their stress intensities.
 
     A closed cell can start to open only if one of its four neighbours is not closed, or if its tension exceeds the
     strength of the interface.
@@ -144,13 +148,13 @@ def find_active_cells(front: Front, state: AdhesiveContact) -> ActiveCells:
 
 @dataclass(frozen=True, eq=False)
 class FrontProblem:
-    """A surface with a front at one separation.
+    """A rough surface against a half-space at one separation, with the law of its front.
 
     Parameters
     ----------
-    space, front, topography : half-space, law of the front, heights.
-    separation : mean separation, in cells.
-    background : in windows, part of the mean fraction that is due to contact outside; else None.
+    space, front, topography : half-space, law of the front, heights of the surface.
+    separation : mean separation, in cell sizes.
+    background : in windows, part of the mean fraction due to contact outside the window; otherwise None.
     """
 
     space: HalfSpace
@@ -160,24 +164,24 @@ class FrontProblem:
     background: np.ndarray | None = None
 
     def solve_elastic(self, contact: Contact, accuracy: float) -> AdhesiveContact:
-        """Solve the pressures as `solve_bonded_contact`, to an accuracy in units of the critical opening."""
+        """Call `solve_bonded_contact`; displacement errors are at most `accuracy` times the critical opening."""
         tolerance = accuracy * self.front.critical_opening
         return solve_bonded_contact(self.space, self.topography, self.separation, contact, tolerance, self.background)
 
     def is_accurate(self, state: AdhesiveContact, accuracy: float) -> bool:
-        """Whether the displacement of a state has an accuracy, in units of the critical opening."""
+        """Return whether the displacement errors of a state are at most `accuracy` times the critical opening."""
         return state.tolerance <= (1 + _WORK_ROUNDING) * accuracy * self.front.critical_opening
 
     def energy(self, state: AdhesiveContact) -> float:
-        """Elastic energy less the work of adhesion, in E* cells^3."""
-        # Pairs of a window cell and an outside cell count twice in w, so the background is added once more.
+        """Return the elastic energy minus the work of adhesion, in E* times cell size^3."""
+        # A window cell and an outside cell are neighbours of each other, so the background counts twice.
         mean_fraction = state.mean_fraction
         if self.background is not None:
             mean_fraction = mean_fraction + self.background.ravel()[state.cells]
         return state.energy - self.front.adhesion_energy(state.fraction, mean_fraction)
 
     def is_lower(self, new: AdhesiveContact, old: AdhesiveContact) -> bool:
-        """Whether a state is not above another in energy, within the errors of both."""
+        """Return whether the energy of a new state is not higher than that of an old one, within their errors."""
         energy = self.energy(old)
         rounding = _ENERGY_ROUNDING * abs(energy) + NO_CONTACT * self.front.adhesion_length
         return self.energy(new) <= energy + new.energy_error + old.energy_error + rounding
@@ -192,21 +196,22 @@ def relax_front(
     max_steps: int | None = None,
     relax_locally: Callable[[AdhesiveContact, np.ndarray], Contact | None] = lambda state, cells: None,
 ) -> AdhesiveContact:
-    """Relax the front of a contact to the equilibrium to which its energy falls.
+    """Move the front of a contact to equilibrium, in steps that lower the energy.
 
     Parameters
     ----------
-    contact : if it is an `AdhesiveContact`, of this problem.
-    tolerance : largest residual of the front.
-    close : whether the contact is close to equilibrium.
-    max_steps : number of steps after which the front is returned as it is.
-    relax_locally : relaxes the front around given cells, (m,), of a state; None where that does not pay.
+    contact : initial contact; an `AdhesiveContact` must be a solution for the same problem.
+    tolerance : largest allowed residual of the front.
+    close : whether the initial contact is close to equilibrium.
+    max_steps : number of steps after which the contact is returned, even if it has not converged.
+    relax_locally : function that relaxes the front of a state around given cells, (m,). The function returns None if
+        local relaxation would not save time.
 
     Raises
     ------
     NotConverged
-        If the front stagnates at a residual above TOLERANCES.stagnation, or still has one after _MAX_STEPS steps if
-        max_steps is not given.
+        If no step lowers the energy, or if _MAX_STEPS steps were made without `max_steps`, while the residual is above
+        TOLERANCES.stagnation.
     FullContact
         If the contact covers the surface.
     """
@@ -230,22 +235,22 @@ def relax_front(
 
 
 class Stagnation(NotConverged):
-    """No step lowers the energy."""
+    """Error: no step of the front lowers the energy."""
 
 
 class FrontRelaxation:
-    """State of the iteration that relaxes a front.
+    """State of the iteration in which `relax_front` moves a front to equilibrium.
 
     Attributes
     ----------
-    state : the contact of the last step.
-    damping : of the bonds in the next step.
-    coarsest : largest error of the displacement, in units of the critical opening.
-    local_relaxations : number since the last step of the whole front.
+    state : contact after the last step.
+    damping : damping of the bonds in the next step.
+    start, coarsest : largest allowed error of displacements in critical openings: at the start, and in the next step.
+    local_relaxations : number of local relaxations since the last step of the whole front.
     """
 
     def __init__(self, problem: FrontProblem, contact: Contact, close: bool):
-        """Begin with a contact that is close to equilibrium or not."""
+        """Solve the elastic contact of the initial contact; `close`: whether this contact is close to equilibrium."""
         self.problem, self.damping, self.local_relaxations, self.steps = problem, 0.0, 0, 0
         self.start = TOLERANCES.certain_displacement if close else TOLERANCES.moving_displacement
         self.coarsest = self.start
@@ -254,7 +259,10 @@ class FrontRelaxation:
         self.state = contact
 
     def refine(self, accuracy: float) -> bool:
-        """Solve for the pressures again, unless they have an accuracy, in units of the critical opening, already."""
+        """Solve the pressures again unless displacement errors are at most `accuracy` (in critical openings).
+
+        Return whether the pressures were solved again.
+        """
         accuracy = max(accuracy, _SMALLEST_ERROR)
         if self.problem.is_accurate(self.state, accuracy):
             return False
@@ -262,7 +270,7 @@ class FrontRelaxation:
         return True
 
     def relax_locally(self, active: ActiveCells, relax: Callable) -> bool:
-        """Relax the front around cells far from equilibrium; return whether this lowered the energy."""
+        """Relax the front around cells far from equilibrium; keep the result and return True if the energy is lower."""
         far, few = active.cells_to_relax()
         if not far.any() or self.local_relaxations >= (_MAX_LOCAL_RELAXATIONS if few else 1):
             return False
@@ -273,7 +281,7 @@ class FrontRelaxation:
             try:
                 new = self.problem.solve_elastic(contact, max(_SMALLEST_ERROR, accuracy))
             except FullContact:
-                # With fixed pressures around it, a last gap may close that would otherwise stay open.
+                # In a window, pressures outside are fixed. So the last gap can close although it should stay open.
                 contact = None
         if contact is None or not self.problem.is_lower(new, self.state):
             self.local_relaxations = _MAX_LOCAL_RELAXATIONS
@@ -282,12 +290,12 @@ class FrontRelaxation:
         return True
 
     def _moving_accuracy(self, active: ActiveCells) -> float:
-        """Accuracy that the displacement should have after a step."""
+        """Return the allowed error of displacements after a step, in units of the critical opening."""
         residual = active.residual
         return residual * min(TOLERANCES.moving_displacement, max(residual, TOLERANCES.linear[0]))
 
     def step(self, active: ActiveCells) -> None:
-        """Make one Newton step, or raise the damping where it leads up in energy."""
+        """Make one Newton step if it lowers the energy; otherwise raise the damping."""
         problem = self.problem
         if self.steps == 0 and 2 * np.count_nonzero(active.cells_to_relax()[0]) > np.count_nonzero(active.at_front):
             self.damping = 2 * TOLERANCES.damping
@@ -300,7 +308,7 @@ class FrontRelaxation:
         try:
             new = problem.solve_elastic(active.apply_step(change, pressure_change), accuracy)
         except FullContact:
-            new = None  # the gap has a given volume: it does not close
+            new = None  # the separation fixes the volume of the gap, so the gap cannot close
         if new is None or not problem.is_lower(new, self.state):
             self._damp(8, active.residual)
             return
@@ -308,7 +316,7 @@ class FrontRelaxation:
         self.state, self.coarsest, self.local_relaxations = new, self.start, 0
 
     def _damp(self, factor: float, residual: float) -> None:
-        """Solve the pressures more accurately and raise the damping, both at once."""
+        """Raise the damping and solve the pressures more accurately after a failed step, or raise `Stagnation`."""
         self.coarsest = min(self.coarsest, TOLERANCES.certain_displacement)
         self.refine(min(self.coarsest, TOLERANCES.displacement * residual))
         self.damping = max(factor * self.damping, TOLERANCES.damping)
@@ -317,12 +325,12 @@ class FrontRelaxation:
 
 
 def newton_step(problem: FrontProblem, active: ActiveCells, damping: float) -> tuple[np.ndarray, np.ndarray]:
-    """Solve the linearised equations: changes of fraction and pressure, (k,)."""
+    """Solve the linearised equations of the front; return the changes of fraction and pressure, (k,) each."""
     front, at_front = problem.front, active.at_front
     # A running front needs shorter steps.
     local = np.where(np.abs(active.intensity - 1) > TOLERANCES.coarse, max(damping, 2 * TOLERANCES.damping), damping)
     linear = LinearisedFront(problem.space, front, active, active.mean_fraction, at_front, local)
-    # Go to the tension that the law wants at the present fraction, and from there along the law.
+    # First set the tension to that of the law at the present fraction. Then change tension and fraction by the law.
     strengths = front.strengths(active.mean_fraction)
     missing = np.where(at_front, front.tension(strengths, active.fraction) + active.pressure, 0.0)
     moved = linear.operator.displacement(missing.astype(np.float32))
@@ -335,15 +343,15 @@ def newton_step(problem: FrontProblem, active: ActiveCells, damping: float) -> t
 def rates_with_separation(
     space: HalfSpace, front: Front, contact: Contact, mean_fraction: np.ndarray, accuracy: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Rates of fraction and pressure (E*), (k,), per unit of separation (one cell length)."""
+    """Return the derivatives of fraction and pressure (E*), (k,) each, with respect to the separation in cell sizes."""
     linear = LinearisedFront(space, front, contact, mean_fraction, contact.fraction < 1, np.zeros(len(mean_fraction)))
     return linear.solve(np.full(len(mean_fraction), -1.0), accuracy)
 
 
 class LinearisedFront:
-    """Equations of contact and front, linearised at a state; in single precision.
+    """Linearised equations of contact and front, in single precision.
 
-    Unknowns are the pressures of closed cells and, times the strength, the fractions of cells at the front.
+    The unknowns are changes: of the pressure of closed cells, and of strength times fraction of cells at the front.
     """
 
     def __init__(
@@ -355,7 +363,7 @@ class LinearisedFront:
         at_front: np.ndarray,
         damping: np.ndarray,
     ):
-        """Linearise at a contact, with mean fractions, which cells are at the front, and damping, (k,) each."""
+        """Linearise at a contact; mean_fraction, at_front and damping are given for each of its cells, (k,)."""
         self.space, self.front, self.cells = space, front, contact.cells
         self.closed, self.at_front = ~at_front, np.flatnonzero(at_front)
         self.strengths = front.strengths(mean_fraction[self.at_front]).astype(np.float32)
@@ -366,14 +374,14 @@ class LinearisedFront:
         self.unit = np.float32(front.strength or 1.0)
 
     def solve(self, right: np.ndarray, accuracy: float) -> tuple[np.ndarray, np.ndarray]:
-        """Solve for changes of fraction and pressure, (k,), to a relative accuracy.
+        """Solve for the changes of fraction and pressure, (k,) each, with a right-hand side, to a relative accuracy.
 
         Raises
         ------
         NotConverged
             If the solution is not finite.
         """
-        # Scaled to order one: on flat surfaces, squares of residuals would vanish in single precision.
+        # Scale to order one, because squares of small residuals would vanish in single precision on flat surfaces.
         scale = 2.0 ** np.frexp(np.abs(right).max(initial=0.0))[1]
         right = (right / scale).astype(np.float32)
         norm = error = np.linalg.norm(right)
@@ -395,7 +403,7 @@ class LinearisedFront:
         return fraction, scale * pressure.astype(float)
 
     def _pressures(self, unknowns):
-        """Return changes of pressure, (k,), and of the strengths and tensions at the front."""
+        """Convert unknowns to changes of the pressures, (k,), and of the strengths and tensions at the front."""
         fraction = unknowns[self.at_front] / self.unit
         if not len(fraction):
             return unknowns, fraction, fraction
@@ -406,21 +414,21 @@ class LinearisedFront:
         return pressure, stronger, tension
 
     def _left_side(self, unknowns, operator=None):
-        """Displacement less the change of opening by the law."""
+        """Return the left side of the equations: change of displacement minus change of the opening by the law."""
         pressure, stronger, tension = self._pressures(unknowns)
         result = (operator or self.operator).displacement(pressure)
         result[self.at_front] -= self.front.opening_change(stronger, self.damping_factor * tension)
         return result
 
     def _approximate_inverse(self, right):
-        """Preconditioner: half-space at closed cells, a constant at the edge."""
+        """Apply the preconditioner: inverse half-space at closed cells, division by a constant at the front."""
         result = self.operator.approximate_inverse(np.where(self.closed, right, np.float32(0)))
         result[self.at_front] = right[self.at_front] / np.float32(NET_COMPLIANCE)
         return result
 
 
 def gmres(matrix: Callable, preconditioner: Callable, right: np.ndarray, accuracy: float) -> np.ndarray:
-    """Solve linear equations by right-preconditioned GMRES without restart, to a relative accuracy or _MAX_KRYLOV."""
+    """Solve linear equations by right-preconditioned GMRES to a relative accuracy, or until _MAX_KRYLOV steps."""
     norm = float(np.linalg.norm(right))
     if norm == 0:
         return np.zeros_like(right)

@@ -1,4 +1,4 @@
-"""Full contact of a surface on a grid: closed form of its pressure, and where it opens."""
+"""Full contact of a rough surface: its pressure in closed form, and the cells where it opens."""
 
 from __future__ import annotations
 
@@ -16,24 +16,25 @@ from icha.boundary_elements.patches import CellState
 from icha.surfaces.summits import Asperities
 from icha.surfaces.surface import full_contact_pressure
 
-# Mean gap, in h_rms, below which contact is full: the pressures of smaller gaps are lost in rounding.
+# Mean gap below which contact counts as full, divided by h_rms. Rounding would hide the pressures of smaller gaps.
 _SMALLEST_GAP = 1e-4
-# Relative difference of pressures of full contact that is rounding.
+# Relative rounding error of pressures in full contact.
 ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
 class FullContactProblem(MaterialUnits):
-    """A periodic rough surface against a half-space, in full contact or about to leave it.
+    """A periodic rough surface against a half-space: the contact problem, and its states of full contact.
 
     Parameters
     ----------
-    heights : (n, n), m.
+    heights : (n, n), heights of the surface, m.
     spacing : size of a cell, m.
-    law : of one summit, for the reach of its attraction.
-    rms_height, rms_slope : of the surface, m and 1.
-    asperities : its summits.
-    space, topography, front, summits : the same for the solver, in units of cells and E*.
+    law : contact law of a single summit, for the distance of jump into contact.
+    rms_height, rms_slope : root-mean-square height (m) and slope of the surface.
+    asperities : summits of the surface.
+    space, topography, front, summits : half-space, heights, law of the front and summits for the solver, in units of
+        the cell size and of E*.
     """
 
     heights: np.ndarray
@@ -49,47 +50,47 @@ class FullContactProblem(MaterialUnits):
 
     @cached_property
     def full_contact_pressure(self) -> np.ndarray:
-        """Pressure of full contact less its mean, (n, n), Pa."""
+        """Pressure in full contact minus its mean value, (n, n), Pa."""
         return self.contact_modulus * full_contact_pressure(self.heights, len(self.heights) * self.spacing)
 
     @property
     def interface_strength(self) -> float:
-        """Tension at which contact opens without a front: the theoretical strength of the interface, Pa."""
+        """Tension at which closed cells open inside the contact, Pa: the strength of the interface."""
         return self.front.interface_strength * self.contact_modulus
 
     @property
     def smallest_gap(self) -> float:
-        """Mean gap below which contact is full, m."""
+        """Mean gap below which the contact counts as full contact, m."""
         return _SMALLEST_GAP * self.rms_height
 
     @property
     def opening_pressure(self) -> float:
-        """Nominal pressure of full contact at which it opens on unloading, Pa."""
+        """Nominal pressure at which full contact opens on unloading, Pa; negative if this is a tension."""
         return -float(self.full_contact_pressure.min()) - self.interface_strength
 
     def full_contact(self, pressure: float) -> CellState:
-        """Full contact under a nominal pressure, Pa: closed form."""
+        """Return the state of full contact under a nominal pressure (Pa), from the closed form."""
         ones = np.ones(self.heights.size)
         cells = np.arange(self.heights.size)
         return CellState(0.0, cells, ones, self.full_contact_pressure.ravel() + pressure, ones, pressure_slope=-np.inf)
 
     def is_full(self, state: CellState) -> bool:
-        """Whether a state is full contact."""
+        """Return whether a state is full contact: all cells in contact at zero separation."""
         return state.separation == 0 and len(state.cells) == self.heights.size
 
     @property
     def closing_pressure(self):
-        """Nominal pressure of full contact under control of the separation, Pa: above all targets, otherwise free."""
+        """Nominal pressure assigned to full contact at an imposed separation, Pa: a value above all targets."""
         return 10 * max(float(np.abs(self.full_contact_pressure).max()), self.interface_strength)
 
     def open_weakest(self, separation):
-        """Full contact after the cells of least pressure opened, so many that they hold the mean gap (m)."""
+        """Return a start for the solver: full contact without the cells of lowest pressure, for a mean gap (m)."""
         pressure = self.full_contact_pressure.ravel() - self.full_contact_pressure.min()
-        # Around the first gap the pressure is that of a front, not that which opened it.
+        # Around the first gap the tension is the strength of a front, not the tension that opened the gap.
         pressure -= self.front.strength * self.contact_modulus
         opening = max(self.front.critical_opening * self.spacing, separation)
         count = int(min(1 + separation / opening * pressure.size, pressure.size / 2))
-        # Cells of equal pressure open together, as symmetry wants.
+        # Cells of equal pressure open together, so that a symmetric surface opens symmetrically.
         limit = np.partition(pressure, count - 1)[count - 1] + ROUNDING * self.contact_modulus
         closed = np.flatnonzero(pressure > limit)
         ones = np.ones(len(closed))

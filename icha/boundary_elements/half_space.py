@@ -1,8 +1,8 @@
-"""Elastic half-space on a periodic grid: displacement under pressures, and an approximate inverse.
+"""Elastic half-space on a periodic grid: displacements under pressures, and an approximate inverse.
 
-Units of the grid: lengths in cells, pressures in E*. A pressure of wave vector q displaces the surface by 2/q (K. L.
-Johnson, Contact Mechanics, 1985, sec. 13.2). The mean pressure displaces nothing, since separations are those of the
-mean planes.
+Lengths are in units of the cell size, pressures in E*. A unit pressure wave with wave number q displaces the surface by
+2/q (K. L. Johnson, Contact Mechanics, 1985, sec. 13.2). The mean pressure causes no displacement, because separations
+are measured between the mean planes.
 """
 
 from __future__ import annotations
@@ -18,19 +18,19 @@ from numpy.typing import DTypeLike
 from icha.boundary_elements import transforms
 from icha.boundary_elements.tiles import TiledGrid
 
-# Approximate inverse for the mean pressure, divided by that for the longest wave.
+# Stiffness of the approximate inverse for the mean displacement, divided by its stiffness for the longest wave.
 _MEAN_STIFFNESS = 0.3
 
 
 @dataclass(frozen=True, eq=False)
 class HalfSpace:
-    """Half-space under one n x n grid, or under t independent ones.
+    """Elastic half-space under one periodic n x n grid, or under t independent grids.
 
     Parameters
     ----------
-    shape : of fields, (n, n) or (t, n, n).
-    compliance : Fourier kernel, (n, n//2 + 1), by precision.
-    stiffness : its approximate inverse, (n, n//2 + 1), in single precision.
+    shape : shape of all fields, (n, n) or (t, n, n).
+    compliance : displacement by unit pressure for each Fourier mode, (n, n//2 + 1), in double and single precision.
+    stiffness : approximate inverse of the compliance, (n, n//2 + 1), in single precision.
     """
 
     shape: tuple[int, ...]
@@ -39,7 +39,7 @@ class HalfSpace:
 
     @classmethod
     def of(cls, grid: int) -> HalfSpace:
-        """Half-space under a grid of so many cells along a side."""
+        """Return the half-space under one grid with the given number of cells along a side."""
         q = 2 * np.pi * np.hypot(scipy.fft.fftfreq(grid)[:, None], scipy.fft.rfftfreq(grid))
         stiffness = (q / 2).astype(np.float32)
         stiffness[0, 0] = _MEAN_STIFFNESS * np.pi / grid
@@ -50,25 +50,25 @@ class HalfSpace:
 
     @property
     def grid(self) -> int:
-        """Cells along a side."""
+        """Number of cells along a side."""
         return self.shape[-1]
 
     @property
     def size(self) -> int:
-        """Number of cells."""
+        """Number of cells of all grids."""
         return math.prod(self.shape)
 
     def displacement(
         self, cells: np.ndarray, pressure: np.ndarray, at: np.ndarray | None = None, out: np.ndarray | None = None
     ) -> np.ndarray:
-        """Displacement, positive into the half-space, of zero mean.
+        """Compute the displacement under given pressures, positive into the half-space, with zero mean over the grid.
 
         Parameters
         ----------
         cells : (k,) int, loaded cells, ascending.
-        pressure : (k,), in E*; single or double precision.
-        at : (m,) int, cells where the displacement is computed, ascending; None: everywhere.
-        out : a field of the same type that may be overwritten.
+        pressure : (k,), pressure on these cells, in E*; in single or double precision.
+        at : (m,) int, ascending, the cells where the displacement is computed; None for the whole grid.
+        out : array that may be overwritten with the result; None for a new array.
         """
         return self.filter(cells, pressure, self.compliance[pressure.dtype], at, out)
 
@@ -80,7 +80,7 @@ class HalfSpace:
         at: np.ndarray | None = None,
         out: np.ndarray | None = None,
     ) -> np.ndarray:
-        """Multiply the Fourier modes of values on cells by factors; arguments as in `displacement`."""
+        """Multiply the Fourier modes of values on cells by factors and transform back; see `displacement`."""
         if len(self.shape) > 2 or self.size * values.itemsize < transforms.CACHE:
             modes = scipy.fft.rfft2(self.field(cells, values, values.dtype), workers=1)
             modes *= factor
@@ -89,48 +89,48 @@ class HalfSpace:
         return transforms.filter_by_blocks(self.grid, cells, values, factor, at, out)
 
     def field(self, cells: np.ndarray, values: np.ndarray | float, dtype: DTypeLike = float) -> np.ndarray:
-        """Field with given values on cells (k,), and zero elsewhere."""
+        """Return a field with given values on cells (k,), and zero elsewhere."""
         field: np.ndarray = np.zeros(self.shape, dtype)
         field.ravel()[cells] = values
         return field
 
     def restrict_to(self, cells: np.ndarray) -> Operator:
-        """Operator between pressures and displacements of cells (k,), ascending, for iterative solvers."""
+        """Return the map from pressures to displacements of given cells, (k,), ascending; with tiles if faster."""
         large = len(self.shape) == 2 and self.size * np.float32().itemsize >= transforms.CACHE
         return (TiledGrid.of(cells, self.grid) if large else None) or FullGrid(self, cells)
 
 
 class Operator(Protocol):
-    """Half-space between pressures (E*) and displacements (cells) of k of its cells, in single precision."""
+    """Half-space restricted to k cells: linear map from pressures to displacements, in single precision."""
 
     @property
     def error(self) -> float:
         """Largest error of a displacement, divided by the largest displacement."""
 
     def displacement(self, pressure: np.ndarray) -> np.ndarray:
-        """Displacements (k,) under pressures (k,)."""
+        """Return the displacements of the k cells, in cell sizes, under pressures on these cells, in E*."""
 
     def approximate_inverse(self, displacement: np.ndarray) -> np.ndarray:
-        """Pressures (k,) for displacements (k,), approximately: a preconditioner."""
+        """Return approximate pressures of the k cells for given displacements; solvers use it as preconditioner."""
 
 
 @dataclass(frozen=True, eq=False)
 class FullGrid:
-    """`Operator` that transforms the full grid: exact."""
+    """Exact `Operator` of given cells, by Fourier transforms of the full grid."""
 
     space: HalfSpace
     cells: np.ndarray
     error: float = 0.0
 
     def displacement(self, pressure: np.ndarray) -> np.ndarray:
-        """Displacements (k,) under pressures (k,)."""
+        """Return the displacements of the k cells under pressures on these cells."""
         return self.space.displacement(self.cells, pressure, self.cells)
 
     def approximate_inverse(self, displacement: np.ndarray) -> np.ndarray:
-        """Pressures (k,) for displacements (k,), approximately."""
+        """Return approximate pressures of the k cells for given displacements."""
         pressure = self.space.filter(self.cells, displacement, self.space.stiffness, self.cells)
         if len(self.space.shape) == 2:
-            # The smaller the gaps, the stiffer the contact is against its mean pressure.
+            # The contact is stiffer against a mean displacement if a larger share of the grid is in contact.
             share = len(self.cells) / self.space.size
             stiffer = self.space.stiffness[0, 0] * share / max(1 - share, 1 / self.space.size)
             pressure += np.float32(stiffer / self.space.size) * np.sum(displacement)
@@ -138,5 +138,5 @@ class FullGrid:
 
 
 def by_precision(field: np.ndarray) -> dict[np.dtype, np.ndarray]:
-    """Return a field in double and in single precision, by type."""
+    """Return a dictionary with a field in double and in single precision."""
     return {np.dtype(dtype): field.astype(dtype, copy=False) for dtype in (np.float64, np.float32)}

@@ -1,4 +1,4 @@
-"""Loads and areas: the mean separation at which a contact has a given one."""
+"""Control of load or area: find the mean separation at which the contact has a given load or area."""
 
 from __future__ import annotations
 
@@ -16,29 +16,29 @@ from icha.contact.models import AREA_TOLERANCE_CELLS, AREA_TOLERANCE_PART
 if TYPE_CHECKING:
     from icha.boundary_elements.contact import BoundaryElements
 
-# Relative error of a load or area that is met: below that at which a path recognises a stop, 1e-9.
+# Relative error at which a load or area counts as met. A path recognises a stop at a larger error, 1e-9.
 _MET = 5e-10
-# Separations that differ by less, in h_rms, are the same.
+# Smallest difference of two separations, divided by h_rms.
 _SAME_SEPARATION = 1e-13
-# Unit of the error of a load of zero, divided by stiffness times h_rms: attraction and repulsion of about this size
-# cancel.
+# Reference for errors if the target is zero load, divided by stiffness times h_rms. At zero load, attraction and
+# repulsion of about this size cancel.
 _ZERO_LOAD = 1e-2
 _MAX_TRIALS, _MAX_ATTEMPTS = 30, 4
-# Largest change of the mean gap between trials where the target may lie in full contact: as a part of the mean gap,
-# and in h_rms.
+# Largest decrease of the mean gap between trials on the way to full contact: divided by the mean gap, and by h_rms.
 _CLOSING, _LONGEST = 0.5, 0.1
 
 
 @dataclass(frozen=True, eq=False)
 class ControlProblem:
-    """A load or area that a contact has to meet.
+    """A contact model and the load or area that its state must have.
 
     Parameters
     ----------
-    contact, control : the model, and the quantity with its target.
-    solve : solves the equilibrium at a separation (m) from a state, to a residual of the front; close: whether the
-        state is close to it, same_slopes: whether it has its slopes.
-    events : finds the events between two states.
+    contact : the contact model.
+    control : the controlled quantity (nominal pressure or area fraction) and its target.
+    solve : function that solves the equilibrium at a separation (m), from a state, to a residual of the front. Options:
+        close, whether the state is close to equilibrium; same_slopes, whether its slopes are reused.
+    events : function that finds the events between two states.
     """
 
     contact: BoundaryElements
@@ -47,46 +47,47 @@ class ControlProblem:
     events: Callable[[CellState, CellState], Events]
 
     def error(self, state: CellState) -> float:
-        """Value of a state less the target."""
+        """Return the controlled quantity of a state minus the target."""
         return self.value(state) - self.control.target
 
     def value(self, state: CellState) -> float:
-        """Nominal pressure or area fraction of a state."""
+        """Return the controlled quantity of a state: its nominal pressure (Pa) or its area fraction."""
         of = self.contact.pressure if self.control.quantity == PRESSURE else self.contact.area_fraction
         return of(state)
 
     def scale(self, state: CellState) -> float:
-        """Return unit of relative errors, from the state at the start."""
+        """Return the reference of relative errors: |target|, or for zero load a typical load at the first state."""
         if self.control.target:
             return abs(self.control.target)
         unit = abs(self.contact.stiffness(state)) * self.contact.rms_height
         return max(abs(self.contact.pressure(state)), _ZERO_LOAD * unit if np.isfinite(unit) else 0.0)
 
     def tolerance(self, scale: float) -> float:
-        """Largest error of a value that meets the target."""
+        """Return the largest error at which the target counts as met; `scale` is the reference of relative errors."""
         if self.control.quantity == AREA_FRACTION and not self.contact.adhesive:
             cells = AREA_TOLERANCE_CELLS * self.contact.spacing**2 / self.contact.area
             return max(_MET * scale, min(cells, AREA_TOLERANCE_PART * scale))
         return _MET * scale
 
     def newton_separation(self, state: CellState, before: CellState | None = None) -> float:
-        """Separation at which the target is expected, m: by the slope, or by the secant through an earlier state."""
+        """Predict the separation (m) of the target from the slope at a state, or from the secant through `before`."""
         slope = self.contact.slope(self.control.quantity, state)
         if before is not None and before.separation != state.separation:
-            # The slope of an area does not know of cells that begin to open or to close.
+            # The slope of the area neglects cells that start to open or to close.
             slope = (self.value(state) - self.value(before)) / (state.separation - before.separation)
         return state.separation - self.error(state) / slope if slope else np.nan
 
 
 @dataclass(frozen=True, eq=False)
 class Bracket:
-    """Two states on either side of a target.
+    """Two states with the target load or area between them.
 
     Parameters
     ----------
-    sign : of what is missing to the target in `before`.
-    before, beyond : states short of the target, and beyond it once one is known.
-    same : separations that differ by less are the same, m.
+    sign : sign of the target minus the controlled quantity in `before`.
+    same : smallest difference between two separations, m.
+    before : state that has not yet reached the target.
+    beyond : state that has passed the target; None before such a state is found.
     """
 
     sign: float
@@ -95,36 +96,36 @@ class Bracket:
     beyond: CellState | None = None
 
     def with_state(self, state: CellState, error: float) -> Bracket:
-        """Replace one side by a state with an error."""
+        """Return the bracket with a new state in place of `before` or `beyond`; its error (value - target) decides."""
         return replace(self, before=state) if self.sign * error < 0 else replace(self, beyond=state)
 
     def limit(self, separation: float) -> float:
-        """Return a separation (m) if it lies within, else the middle.
+        """Return a predicted separation (m) if it lies inside the bracket, or else the middle of the bracket.
 
         Raises
         ------
         NotConverged
-            If the bracket is closed, or open and the separation not finite.
+            If the separations of both states are equal, or if the prediction is not finite while `beyond` is unknown.
         """
         if self.beyond is None:
             if np.isfinite(separation):
                 return separation
-            raise NotConverged("the target is not met from here")
+            raise NotConverged("the slope predicts no finite separation for the target")
         low, high = sorted((self.before.separation, self.beyond.separation))
         if high - low < self.same:
-            raise NotConverged("the target is not met from here")
+            raise NotConverged("the contact jumps past the target between two equal separations")
         return separation if low < separation < high else 0.5 * (low + high)
 
 
 def solve_at_control(problem: ControlProblem, state: CellState, separation: float) -> CellState:
-    """Solve the equilibrium under a load or of an area, from a state not far away.
+    """Find the equilibrium with the target load or area, starting from a nearby state.
 
-    separation : a first guess, m.
+    separation : first guess of the mean separation, m.
 
     Raises
     ------
     NotConverged
-        If the target is not met.
+        If no equilibrium with the target is found.
     """
     contact, control = problem.contact, problem.control
     scale = problem.scale(state)
@@ -144,7 +145,7 @@ def solve_at_control(problem: ControlProblem, state: CellState, separation: floa
             bracket = whole.with_state(found, problem.error(found))
             separation = bracket.limit(problem.newton_separation(found))
     except FullContact:
-        # The load is larger than that of the smallest gap.
+        # The target load is larger than the load at the smallest mean gap.
         if control.quantity == PRESSURE and whole.sign > 0:
             return contact.full_contact(control.target)
         reason = ": the contact closes over the whole surface"
@@ -156,9 +157,9 @@ def solve_at_control(problem: ControlProblem, state: CellState, separation: floa
 def bracket_loosely(
     problem: ControlProblem, bracket: Bracket, separation: float, scale: float
 ) -> tuple[CellState, Bracket]:
-    """Find a state close to the target by trials with coarse fronts.
+    """Find a state close to the target with coarsely relaxed fronts; return this state and the bracket of the target.
 
-    Where events may happen on the path, none is skipped: a trial that goes too far starts from before it.
+    After a trial that passes the target with an event, the next trial starts again from the state before the target.
     """
     contact, start, residual = problem.contact, bracket.before, TOLERANCES.coarse
     control_is_load = problem.control.quantity == PRESSURE
@@ -174,18 +175,18 @@ def bracket_loosely(
         start = bracket.before if passed else trial
         separation = problem.newton_separation(trial)
         if control_is_load and bracket.sign > 0 and bracket.beyond is None and not separation < trial.separation:
-            # The load falls as the surfaces approach: look for it beyond its minimum.
+            # The load falls as the surfaces approach, so search past the minimum of the load.
             separation = trial.separation - min(_CLOSING * trial.separation, _LONGEST * contact.rms_height)
         separation = bracket.limit(separation)
         if separation < contact.smallest_gap:
             separation = (1 - _CLOSING) * trial.separation
             if separation < contact.smallest_gap:
                 raise FullContact("the mean gap vanishes")
-    raise NotConverged(f"{trials} trials do not bracket it")
+    raise NotConverged(f"{trials} trials found no state close to the target")
 
 
 def iterate_secant(problem: ControlProblem, bracket: Bracket, trial: CellState, scale: float) -> tuple[CellState, bool]:
-    """Meet the target by secants from a state close to it; returns the last state, and whether it meets the target."""
+    """Approach the target by secant steps from a close state; return the last state and whether it meets the target."""
     before, error = None, problem.error(trial)
     for _ in range(_MAX_TRIALS):
         separation = bracket.limit(problem.newton_separation(trial, before))
@@ -200,4 +201,4 @@ def iterate_secant(problem: ControlProblem, bracket: Bracket, trial: CellState, 
         if abs(error) > TOLERANCES.fine * scale:
             return trial, False
         bracket = bracket.with_state(trial, error)
-    raise NotConverged(f"{_MAX_TRIALS} secants do not meet it")
+    raise NotConverged(f"{_MAX_TRIALS} secant steps did not meet the target")

@@ -1,8 +1,9 @@
-"""Local relaxation: fronts far from equilibrium in few places are relaxed in windows around them.
+"""Local relaxation: move parts of the front that are far from equilibrium to equilibrium, in small windows.
 
-After new contact, where two patches meet, or everywhere after a long step, a place hardly affects others before it is
-relaxed. Transforms of a window are so much shorter than those of the whole grid that nearly all of a front is relaxed
-in windows; steps of the whole contact then account for the interaction between places.
+Parts of a front are far from equilibrium after new contact, where two patches meet, or after a long step. These parts
+hardly affect each other before they are relaxed. A Fourier transform of a window takes much less time than a transform
+of the whole grid, so nearly all of the front is relaxed in windows. Steps of the whole contact then account for the
+interaction between the parts.
 """
 
 from __future__ import annotations
@@ -24,22 +25,23 @@ from icha.boundary_elements.patches import label_patches
 from icha.contact.model import FullContact, NotConverged
 from icha.support.parallel import blocks, on_cores
 
-# Sides of windows, in cells, half of which may move. Wider places are cut into pieces of this side.
+# Sides of windows in cells; cells may move in the inner half of this length. Side of the pieces into which wider
+# regions are cut, in cells.
 _SIDES, _PIECE = (64, 128, 256), 64
-# Cells of windows that are solved together, in the cache.
+# Number of cells of the windows that are solved together; they fit in the cache.
 _BATCH = 65_536
-# Residual of the front in windows; the whole front is relaxed afterwards.
+# Largest residual of the front in windows; the whole front is relaxed afterwards.
 _TOLERANCE = 1e-4
 
 
 class _Extent(NamedTuple):
-    """Extent of windows.
+    """Size and effort of the windows.
 
     Parameters
     ----------
-    reach : how far around a cell the front may move, in cells.
-    cover : largest area of all windows, divided by the grid's.
-    max_steps : number of steps.
+    reach : distance from the given cells within which the front may move, in cells.
+    cover : largest total area of the windows, divided by the area of the grid.
+    max_steps : largest number of steps of the front in a window.
     """
 
     reach: int
@@ -47,23 +49,24 @@ class _Extent(NamedTuple):
     max_steps: int
 
 
-# Few places get wider windows and more steps.
+# If the windows cover little of the grid, they are wider and get more steps.
 _EXTENTS = (_Extent(20, 0.05, 60), _Extent(4, 0.5, 20))
 
 
 def relax_in_windows(
     space: HalfSpace, front: Front, separation: float, contact: Contact, gap: np.ndarray, far: np.ndarray
 ) -> Contact | None:
-    """Relax the front of a contact around cells far from equilibrium, in windows.
+    """Relax the front of a contact around cells far from equilibrium, in windows around these cells.
 
     Parameters
     ----------
-    gap : (n, n), of the contact with its pressures.
+    gap : (n, n), gap of the contact, in cell sizes.
     far : (m,) int, cells far from equilibrium, ascending.
 
     Returns
     -------
-    The contact, or None if windows would not pay or no front in them converges.
+    The contact with new fractions and pressures in the windows. None if the windows would cover too much of the grid,
+    or if the front converges in none of them.
     """
     for extent in _EXTENTS:
         places = Places.around(far, space.grid, extent.reach)
@@ -100,13 +103,13 @@ def relax_in_windows(
 
 
 def _relax_window(small, front, separation, contact, gap, mean_fraction, windows, free, max_steps):
-    """Cells of the grid in contact in some windows, with fractions and pressures, relaxed; None if not converged."""
+    """Relax the front in a batch of windows; return the cells in contact, fractions, pressures; None if unconverged."""
     cells = windows[free]
     touching, index = find_among(cells, contact.cells)
     inside = np.flatnonzero(free)[touching]
     start = Contact(inside, contact.fraction[index], contact.pressure[index])
-    # The displacement by fixed pressures outside counts as part of the heights. Frozen cells are lowered so that they
-    # cannot touch.
+    # The heights include the displacement caused by fixed pressures outside the window. Cells that may not move are
+    # lowered so that they cannot touch.
     displacement = small.displacement(inside, start.pressure)
     lowest = separation - 10 * front.critical_opening - 2 * np.abs(displacement).max()
     heights = Topography.of(np.where(free, displacement + separation - gap.ravel()[windows], lowest))
@@ -120,13 +123,13 @@ def _relax_window(small, front, separation, contact, gap, mean_fraction, windows
 
 
 class Places(NamedTuple):
-    """Places far from equilibrium.
+    """Connected regions of the grid in which the front may move, each with a window.
 
     Parameters
     ----------
-    labels : number of its place, from 1, of every block of the grid; 0 where nothing moves.
-    middles : (t, 2), of the boxes around the places, in cells.
-    sides : (t,), of the windows, in cells.
+    labels : number of the region, from 1, of every block of the grid; 0 for blocks in which the front is fixed.
+    middles : (t, 2), row and column of the middle of each region, in cells.
+    sides : (t,), side of the window of each region, in cells; 0 for a region that was cut into pieces.
     """
 
     labels: np.ndarray
@@ -135,19 +138,19 @@ class Places(NamedTuple):
 
     @classmethod
     def around(cls, far: np.ndarray, grid: int, reach: int) -> Places:
-        """Places around cells (m,), including what is within reach of them."""
+        """Find the regions of all blocks within `reach` cells of the cells `far`, (m,)."""
         moving = blocks_around(grid, reach, far)
         labels, numbers = np.zeros(moving.shape, int), np.flatnonzero(moving)
         labels.ravel()[numbers], _ = label_patches(numbers, len(moving))
         boxes = _cut(labels, _boxes(labels))
         ends = np.array([[(side.start, side.stop) for side in box] for box in boxes], int).reshape(-1, 2, 2)
         widths = BLOCK * np.max(ends[:, :, 1] - ends[:, :, 0], axis=1, initial=0)
-        # Boxes cut into pieces get no window of their own (side 0).
+        # Regions that were cut into pieces get no window (side 0).
         sides = np.array([*_SIDES, 0])[np.searchsorted(np.array(_SIDES) // 2, widths)]
         return cls(labels, np.sum(ends, axis=2) * BLOCK // 2, sides)
 
     def windows(self, grid: int) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        """Batches of windows: cells of the grid, (t, w, w), and which of them may move, each in one window only."""
+        """Yield batches of windows: grid cells of each window, (t, w, w), and whether each cell may move there."""
         for side in _SIDES:
             numbers, offset = np.flatnonzero(self.sides == side), np.arange(side) - side // 2
             for batch in blocks(len(numbers), _BATCH // side**2):
@@ -158,7 +161,7 @@ class Places(NamedTuple):
 
 
 def _boxes(labels):
-    """Rows and columns, in blocks, around each label; across the edges of the period they begin below zero."""
+    """Return the box (rows, columns) around each label, in blocks; a box across the period has negative numbers."""
     half = len(labels) // 2
     boxes = []
     rolled = np.roll(labels, (half, half), (0, 1))
@@ -169,7 +172,7 @@ def _boxes(labels):
 
 
 def _cut(labels, boxes):
-    """Boxes, in blocks, after those wider than any window are cut into pieces with labels of their own."""
+    """Cut boxes that no window can hold into pieces with new numbers in `labels`; return all boxes and the pieces."""
     widest, step = _SIDES[-1] // 2 // BLOCK, _PIECE // BLOCK
     pieces = []
     for number, box in enumerate(boxes, 1):
@@ -187,7 +190,7 @@ def _cut(labels, boxes):
 
 @cache
 def window_kernel(grid: int, side: int) -> tuple[dict[np.dtype, np.ndarray], np.ndarray]:
-    """Compliance, by precision, and stiffness of a window: exact between cells less than half of it apart."""
+    """Return compliance (in two precisions) and stiffness of a window, exact for cells closer than half its side."""
     qx, qy = 2 * np.pi * scipy.fft.rfftfreq(grid), 2 * np.pi * scipy.fft.fftfreq(grid)
     q = np.hypot(qy[:, None], qx)
     q[0, 0] = np.inf

@@ -1,4 +1,4 @@
-"""Observables of a contact of cells: residuals, events, distributions, patches and maps."""
+"""Observables of the boundary elements: residuals, contact patches, maps, distributions of gap and pressure."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class PatchObservables:
-    """`icha.contact.model.Observables` of a contact of cells and its surface."""
+    """Values that the results record for a state of the boundary elements (an `icha.contact.model.Observables`)."""
 
     contact: BoundaryElements
     surface: Surface
 
     def of_contact(self) -> dict:
-        """Return the largest tension that the grid resolves at a straight edge of contact."""
+        """Return the largest tension that the grid resolves at a straight edge of contact, Pa."""
         return {"resolved_tension": self.contact.front.strength * self.contact.contact_modulus}
 
     def of_step(self, state: CellState) -> dict:
-        """Residuals of the equilibrium, and the share of summits outside the range of Wu's formula."""
+        """Return the residuals of a state, and the share of touched summits outside the range of Wu's formula."""
         contact = self.contact
         touched = np.isin(contact.summits.cell, state.cells)
         verified = contact.law.is_jump_in_verified(contact.asperities.radius_of_curvature[touched])
@@ -43,7 +43,7 @@ class PatchObservables:
         }
 
     def of_snapshot(self, state: CellState) -> dict:
-        """Distributions of gap and pressure, patches, and maps of contact and pressure."""
+        """Return the distributions of gap and pressure, properties of each patch, and maps of contact and pressure."""
         areas = self.contact.area_of_cells(state)
         gap = self._gap_density(state, areas)
         pressure, mean = self._pressure_density(state, areas)
@@ -60,7 +60,7 @@ class PatchObservables:
         }
 
     def reasons_against(self, separations: Iterable[float], pressed: CellState | None) -> list[str]:
-        """Reason why the grid does not resolve the surface: too few cells for its shortest waves."""
+        """Return a message if the grid has too few cells per shortest wavelength of the surface, or else no message."""
         asperities, grid = self.contact.asperities, self.surface.grid
         cells = cells_per_short_wave(grid, len(asperities) + len(asperities.unsupported_height))
         if cells >= LEAST_CELLS_PER_WAVE:
@@ -68,7 +68,7 @@ class PatchObservables:
         return [f"about {cells:.2g} grid cells for the shortest waves (at least {LEAST_CELLS_PER_WAVE:g} expected)"]
 
     def _gap_density(self, state, areas):
-        """Density of the gap over the nominal area outside contact; with the contact area it sums up to one."""
+        """Return the probability density of the gap outside contact; its integral plus the area fraction is one."""
         edges_of_bins = gap_bins(self.surface)
         gap = np.clip(self.contact.gap(state), 0.0, edges_of_bins[-1])
         outside = 1 - self.contact.space.field(state.cells, areas)
@@ -76,9 +76,9 @@ class PatchObservables:
         return content / gap.size / np.diff(edges_of_bins)
 
     def _pressure_density(self, state, areas):
-        """Density of the pressure over the nominal area, and its mean in each bin."""
+        """Return the probability density of the pressure over the nominal area, and the mean pressure of each bin."""
         edges_of_bins = PRESSURE_BINS * self.contact.pressure_unit
-        # The force of a cell acts on its fraction in contact, scaled by one factor to the contact area.
+        # The force on a cell acts on its fraction in contact. One factor scales all fractions to the contact area.
         weight = state.fraction * (np.sum(areas) / (np.sum(state.fraction) or 1.0))
         pressure = state.pressure / weight
         counted = np.clip(pressure, edges_of_bins[0], edges_of_bins[-1])
@@ -88,7 +88,7 @@ class PatchObservables:
         return content / self.contact.heights.size / np.diff(edges_of_bins), mean
 
     def _patches(self, state, areas):
-        """Patches: centre of area, area, perimeter, force, summits, and the curvature of the highest summit."""
+        """Return position, area, perimeter, force, number of summits, radius of the highest summit of each patch."""
         contact, h = self.contact, self.contact.spacing
         grid = contact.space.grid
         labels, count = label_patches(state.cells, grid)
@@ -99,7 +99,7 @@ class PatchObservables:
         area = sums(areas) * h**2
         of_summit = labels_at(contact.summits.cell, state.cells, labels)
         order = np.argsort(contact.asperities.height, kind="stable")
-        # A patch without a summit counts as a cap of the surface's rms curvature.
+        # A patch without a summit gets the radius of the rms curvature of the surface.
         radius = np.full(count + 1, 1 / self.surface.rms_curvature)
         radius[of_summit[order]] = contact.asperities.radius_of_curvature[order]
         centre = patch_centres(state.cells, grid, labels, count, state.fraction) * h

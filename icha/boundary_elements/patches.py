@@ -1,4 +1,4 @@
-"""States of a contact of cells, the patches that the cells make up, and the events between states."""
+"""Equilibrium states of the boundary elements, their contact patches, and the events between two states."""
 
 from __future__ import annotations
 
@@ -15,22 +15,23 @@ from icha.contact.model import COALESCENCE, JUMP_IN, JUMP_OFF, SPLIT, Events
 
 @dataclass(frozen=True, eq=False)
 class CellState:
-    """Equilibrium of a contact.
+    """Contact in equilibrium at one mean separation, as a list of grid cells.
 
     Parameters
     ----------
     separation : mean separation u, m.
-    cells : (k,) int, cells in contact, ascending.
-    fraction : (k,), share of the cell's area that is in contact, 0 < f <= 1.
-    pressure : (k,), mean of each cell, Pa; negative in tension.
-    mean_fraction : (k,), Gaussian mean of the fractions, the cell itself included.
-    pressure_slope, area_slope : derivatives of nominal pressure (Pa/m) and area fraction (1/m) with the separation,
-        with moving fronts.
-    rates : derivatives of fraction and pressure, (k,) each, per cell and in E* per cell; None if unknown.
-    front_residual : largest deviation of sqrt(G/dgamma) from 1 where a front is free to move.
-    gap_residual : largest gap in contact or overlap outside, m.
-    pending : number of places within reach of the attraction that stay open, since contact there is not stable.
-    history : events of the path so far, for each equilibrium with events.
+    cells : (k,) int, flat indices of the grid cells in contact, ascending.
+    fraction : (k,), part f of the area of each cell that is in contact, 0 < f <= 1.
+    pressure : (k,), force on each cell divided by the area of the whole cell, Pa; negative in tension.
+    mean_fraction : (k,), Gaussian average of the fractions of each cell and its neighbours.
+    pressure_slope, area_slope : derivatives of the nominal pressure (Pa/m) and of the area fraction (1/m) with respect
+        to the separation; the fronts move.
+    rates : changes of the fractions, (k,), and of the pressures in E*, (k,), when the separation increases by one cell
+        size; None if unknown.
+    front_residual : largest |sqrt(G/dgamma) - 1| at the cells where the front can move; G is the energy release rate.
+    gap_residual : largest gap of a closed cell, or largest overlap of the surfaces, m.
+    pending : number of cells within reach of the attraction that stay open because contact there is not stable.
+    history : events of the path up to this state, one `Events` for each equilibrium with events.
     """
 
     separation: float
@@ -48,7 +49,7 @@ class CellState:
 
 
 def pack(state: CellState, before: CellState) -> dict[str, np.ndarray]:
-    """Return the arrays of a state, with the events since the one before."""
+    """Convert a state to named arrays for a checkpoint; of its events, only those since the state `before`."""
     arrays = {each.name: getattr(state, each.name) for each in fields(state) if each.name not in ("rates", "history")}
     arrays |= {f"rates_{k}": rate for k, rate in enumerate(state.rates or ())}
     events = Events.concatenate(state.history[len(before.history) :])
@@ -56,7 +57,7 @@ def pack(state: CellState, before: CellState) -> dict[str, np.ndarray]:
 
 
 def unpack(arrays: dict[str, np.ndarray], before: CellState) -> CellState:
-    """Return the state whose arrays `pack` returned, after the state before it."""
+    """Restore a state from the arrays of `pack`; `before` is the state before it on the path."""
     found = {each.name: arrays[each.name] for each in fields(CellState) if each.name in arrays}
     values: dict[str, Any] = {name: value if value.ndim else value.item() for name, value in found.items()}
     rates = (arrays["rates_0"], arrays["rates_1"]) if "rates_0" in arrays else None
@@ -70,9 +71,9 @@ BEYOND_EDGES = (np.pi - 1 + np.log(2)) / 24
 
 
 def label_patches(cells: np.ndarray, grid: int) -> tuple[np.ndarray, int]:
-    """Label the patches, from 1: that of each cell, (k,), and their count.
+    """Find the contact patches; return the patch number of each cell, (k,), from 1, and the number of patches.
 
-    Cells that share an edge are of one patch, across the edges of the period too.
+    Cells that share an edge belong to the same patch, also across the periodic boundary.
     """
     labels, count = label(mask_of(cells, (grid, grid)))
     pairs = [
@@ -95,7 +96,7 @@ def label_patches(cells: np.ndarray, grid: int) -> tuple[np.ndarray, int]:
 
 
 def labels_at(places: np.ndarray, cells: np.ndarray, labels: np.ndarray) -> np.ndarray:
-    """Return number of the patch at each place, (m,); 0 where there is none."""
+    """Return the patch number at each of the cells `places`, (m,); 0 where there is no contact."""
     result = np.zeros(len(places), dtype=int)
     present, index = find_among(places, cells)
     result[present] = labels[index]
@@ -103,13 +104,13 @@ def labels_at(places: np.ndarray, cells: np.ndarray, labels: np.ndarray) -> np.n
 
 
 def free_edges(cells: np.ndarray, grid: int) -> np.ndarray:
-    """Return number of edges of each cell, (k,), at which it has no neighbour in contact."""
+    """Count for each cell in contact, (k,), its edges (0 to 4) without a neighbour in contact."""
     touching = mask_of(cells, (grid, grid)).ravel()
     return 4.0 - np.count_nonzero(touching[adjacent(cells, grid)], axis=0)
 
 
 def patch_centres(cells: np.ndarray, grid: int, labels: np.ndarray, count: int, weight: np.ndarray) -> np.ndarray:
-    """Centres (count, 2) of the patches, (x, y) in cells, with weights (k,); across the edges of the period too."""
+    """Return the centre (x, y) of each patch, (count, 2), in cell sizes: the weighted mean position of its cells."""
     turn = np.exp(2j * np.pi * np.arange(grid) / grid)
     result = np.empty((count, 2))
     for axis, at in enumerate((cells % grid, cells // grid)):
@@ -129,14 +130,14 @@ def patch_events(
     grid: int,
     spacing: float,
 ) -> Events:
-    """Find the events between two consecutive states.
+    """Find the jumps, coalescences and splits of patches between two consecutive states.
 
     Parameters
     ----------
-    energy_of_cells : energy of each cell, (k,), of a state, J/m^2. A patch that jumps off releases its energy, one that
-        jumps in the negative of it.
-    summits : (m,) int, their cells.
-    grid, spacing : cells along a side, and size of a cell in m.
+    energy_of_cells : function that returns the energy of each cell of a state, (k,), J/m^2. A patch that jumps off
+        releases its energy. A patch that jumps in releases the negative of its energy.
+    summits : (m,) int, cells of the summits.
+    grid, spacing : number of cells along a side, and size of a cell in m.
     """
     (old, old_count), (new, new_count) = label_patches(before.cells, grid), label_patches(after.cells, grid)
     _, in_old, in_new = np.intersect1d(before.cells, after.cells, assume_unique=True, return_indices=True)
@@ -161,7 +162,7 @@ def patch_events(
 
 
 def _events(kind, state, labels, count, energy_of_cells, which, sign, summits, grid, spacing):
-    """Events of one kind of patches `which`, (k,), of a state; a jump sets the energy of its patch free."""
+    """Return one event for each patch in `which`, (k,), from 0; it releases sign * energy of the patch, at least 0."""
     if not len(which):
         return Events.concatenate(())
     energy = np.bincount(labels, energy_of_cells(state), count + 1)[1:]

@@ -1,9 +1,9 @@
-"""Half-space for cells in contact on large grids: tiles for short distances, a coarse grid for long ones.
+"""Displacements of cells in contact on large grids: tiles for short distances, a coarse grid for long distances.
 
-The kernel is split as in `icha.half_space.ewald`: 2/q = (2/q) erf(q/2a) + (2/q) erfc(q/2a). The first term is short in
-range, and is summed tile by tile. The second is smooth, and is computed on a coarser grid, with splines for transfer
-(R. W. Hockney & J. W. Eastwood, Computer Simulation Using Particles, 1988, ch. 8). The inverse of the kernel is short
-in range. Little contact needs few tiles, and no transform is that of the whole grid.
+The kernel is split as in `icha.half_space.ewald`: 2/q = (2/q) erf(q/2a) + (2/q) erfc(q/2a). The first term has a short
+range and is summed tile by tile. The second term is smooth and is computed on a coarser grid; splines transfer values
+between the two grids (R. W. Hockney & J. W. Eastwood, Computer Simulation Using Particles, 1988, ch. 8). The inverse of
+the kernel also has a short range. A small contact area needs few tiles, and no Fourier transform of the whole grid.
 """
 
 from __future__ import annotations
@@ -20,32 +20,33 @@ from icha.boundary_elements.transforms import filter_by_blocks, reusable_field
 from icha.support import parallel
 from icha.support.parallel import blocks, on_cores
 
-# Cells along a side of a tile, and range of the short kernel, which is the margin of a tile.
+# Number of cells along a side of a tile; range of the short kernel in cells, which is also the margin of a tile.
 TILE, REACH = 128, 16
 # Spacing of the coarse grid in cells, and order of its splines; their support is at most REACH.
 COARSENING, _ORDER = 4, 4
 _NODES = TILE // COARSENING
-# Ewald parameter per cell: what is cut off and what the coarse grid misses are then both below `error`.
+# Ewald parameter a, per cell size. With this value the cut-off part of the short kernel and the error of the coarse
+# grid are both below `error`.
 _ALPHA = 2.3 / REACH
-# Largest area of all tiles, divided by the grid's, for which they are faster; the second on grids whose transforms run
-# on several cores.
+# Largest total area of the tiles, divided by the area of the grid, for which tiles are faster than the whole grid; the
+# second value is for grids whose transforms run on several cores.
 _LARGEST_COVER, _LARGEST_COVER_LARGE = 0.6, 1.2
-# Tiles that are transformed together, in the cache.
+# Number of tiles that are transformed together; they fit in the cache.
 _BATCH = 8
 
 
 @dataclass(frozen=True, eq=False)
 class TiledGrid:
-    """`icha.boundary_elements.half_space.Operator` of k cells of a periodic grid, by the square tiles around them.
+    """Fast, approximate `Operator` of `half_space` for k cells of a periodic grid, by square tiles around the cells.
 
     Parameters
     ----------
-    grid : cells along a side.
-    count : number of tiles, t.
-    sources : cells within each tile and its margin.
-    targets : cells within each tile without its margin.
-    nodes : (m,) int, nodes of the coarse grid that tiles cover, ascending.
-    covered : (t, _NODES, _NODES) int, which of these each tile covers.
+    grid : number of cells along a side of the grid.
+    count : number t of tiles.
+    sources : cells inside each tile, including the margin.
+    targets : cells inside each tile, without the margin.
+    nodes : (m,) int, nodes of the coarse grid inside the tiles, ascending.
+    covered : (t, _NODES, _NODES) int, indices in `nodes` of the coarse nodes inside each tile.
     """
 
     grid: int
@@ -83,17 +84,17 @@ class TiledGrid:
         return cls(grid, len(tiles), sources, targets, nodes, number[covered])
 
     def convolve_short(self, values: np.ndarray, modes: np.ndarray) -> np.ndarray:
-        """Convolve values (k,) on the cells with a kernel of range REACH, given by its modes (TILE, TILE//2 + 1)."""
+        """Convolve values (k,) on the cells with a kernel of range REACH; `modes` are its modes on a tile."""
         result = np.empty_like(values)
         self._convolve(modes, values, result)
         return result
 
     def approximate_inverse(self, displacement: np.ndarray) -> np.ndarray:
-        """Pressures (k,) for displacements (k,), approximately."""
+        """Return approximate pressures of the k cells for given displacements."""
         return self.convolve_short(displacement, _inverse_modes())
 
     def displacement(self, pressure: np.ndarray) -> np.ndarray:
-        """Displacements (k,) under pressures (k,), in single precision."""
+        """Return the displacements of the k cells under pressures on these cells, in single precision."""
         near, far = _displacement_modes(self.grid)
         result, shares = np.empty_like(pressure), np.empty((self.count, _NODES, _NODES), np.float32)
 
@@ -107,7 +108,7 @@ class TiledGrid:
         return result
 
     def _convolve(self, modes, values, result, coarse=None):
-        """Write into `result` the convolution with a short kernel, plus the interpolated values of coarse nodes."""
+        """Write to `result` the convolution of values with a short kernel, plus interpolated values of coarse nodes."""
 
         def convolve(batch):
             field = scipy.fft.rfft2(self.sources.field(batch, values), workers=1)
@@ -123,16 +124,16 @@ class TiledGrid:
 
 @dataclass(frozen=True, eq=False)
 class _CellsByTile:
-    """Numbers of cells in their list, and their places in the tiles, by batches of tiles."""
+    """For each batch of tiles: indices of its cells in the list of k cells, and their positions in the tiles."""
 
     batches: tuple[tuple[np.ndarray, np.ndarray], ...]
 
     def of_batch(self, batch):
-        """Numbers and places of the cells in a batch of tiles."""
+        """Return the list indices and the positions of the cells in a batch of tiles."""
         return self.batches[batch.start // _BATCH]
 
     def field(self, batch, values):
-        """Values (k,) of the cells in a batch of tiles, (t, TILE, TILE)."""
+        """Return a batch of tiles, (t, TILE, TILE), filled with the values (k,) of its cells and zeros elsewhere."""
         field = np.zeros((batch.stop - batch.start, TILE, TILE), values.dtype)
         numbers, places = self.of_batch(batch)
         field.ravel()[places] = values[numbers]
@@ -140,9 +141,9 @@ class _CellsByTile:
 
 
 def _cells_by_tile(cells, grid, corner, size):
-    """Assign cells (k,) to tiles with given corners (t, 2): those within the margins, and those without.
+    """Return the cells inside each tile including its margin, and the cells inside each tile without its margin.
 
-    size : (t, 2) int, rows and columns of each tile without its margin.
+    corner : (t, 2) int, first row and column of each tile. size : (t, 2) int, rows and columns without the margin.
     """
     number = reusable_field((grid, grid), np.dtype(np.int32))  # zeros before and after
     number.ravel()[cells] = np.arange(1, len(cells) + 1)
@@ -163,7 +164,7 @@ def _cells_by_tile(cells, grid, corner, size):
 
 
 def _window(field, row, column):
-    """Return the part of a periodic field, (TILE, TILE), whose corner is at a row and column."""
+    """Return the tile, (TILE, TILE), of a periodic field that starts at a given row and column."""
     grid, along = len(field), np.arange(TILE)
     if min(row, column) >= 0 and max(row, column) <= grid - TILE:
         return field[row : row + TILE, column : column + TILE]
@@ -171,12 +172,12 @@ def _window(field, row, column):
 
 
 def _numbers_and_places(windows):
-    """Numbers, less 1, and places of the numbered cells in tiles (t, TILE, TILE)."""
+    """Return list indices and positions of the cells in tiles (t, TILE, TILE), which contain list index + 1 or 0."""
     places = np.flatnonzero(windows)
     return windows.ravel()[places].astype(int) - 1, places
 
 
-# Spline of one node of the coarse grid on the cells around it, and splines of all coarse nodes of a tile on its cells.
+# Spline of one coarse node, evaluated on the cells around it; splines of all coarse nodes of a tile, on its cells.
 _HALF = _ORDER * COARSENING // 2
 _SPLINE = BSpline.basis_element(np.arange(_ORDER + 1) - _ORDER / 2)(np.arange(-_HALF, _HALF) / COARSENING)
 _SPLINES = np.zeros((TILE + 2 * _HALF, _NODES), np.float32)
@@ -185,22 +186,22 @@ for _node in range(_NODES):
 _SPLINES = _SPLINES[_HALF:-_HALF]
 
 
-# The matrices are so small that no library splits their products among threads, which could change bits.
+# These matrices are small, so that no library computes their products on several threads, which could change rounding.
 def _restrict(field):
-    """Transfer values on the cells of tiles, (t, TILE, TILE), to coarse nodes, (t, _NODES, _NODES)."""
+    """Transfer values from the cells of tiles, (t, TILE, TILE), to the coarse nodes, (t, _NODES, _NODES)."""
     rows = (field.reshape(-1, _NODES, TILE) @ _SPLINES).reshape(-1, TILE, _NODES)
     return _SPLINES.T @ rows
 
 
 def _interpolate(coarse):
-    """Interpolate values of coarse nodes, (t, _NODES, _NODES), on the cells of tiles, (t, TILE, TILE)."""
+    """Interpolate values from the coarse nodes, (t, _NODES, _NODES), to the cells of tiles, (t, TILE, TILE)."""
     rows = _SPLINES @ coarse
     return (rows.reshape(-1, _NODES, _NODES) @ _SPLINES.T).reshape(-1, TILE, TILE)
 
 
 @cache
 def _inverse_modes():
-    """Modes of the inverse kernel q/2, cut off at REACH; all of them are larger than 0.03."""
+    """Return the Fourier modes on a tile of the inverse kernel q/2, cut off at distance REACH; all exceed 0.03."""
     along = scipy.fft.fftfreq(TILE) * TILE
     table = scipy.fft.irfft2(_wave_numbers(TILE) / 2)
     return scipy.fft.rfft2(np.where(np.hypot(along[:, None], along) <= REACH, table, 0.0)).real.astype(np.float32)
@@ -208,7 +209,7 @@ def _inverse_modes():
 
 @cache
 def _displacement_modes(grid):
-    """Modes of the short kernel on a tile, and of the smooth one on the coarse grid with its splines."""
+    """Return the modes of the short kernel on a tile, and of the smooth kernel on the coarse grid of splines."""
     many = 8 * TILE
     q = _wave_numbers(many)
     q[0, 0] = 1.0
@@ -233,5 +234,5 @@ def _displacement_modes(grid):
 
 
 def _wave_numbers(grid):
-    """Wave numbers q of a grid, (n, n//2 + 1), per cell."""
+    """Return the wave number q of each Fourier mode of an n x n grid, (n, n//2 + 1), per cell size."""
     return 2 * np.pi * np.hypot(scipy.fft.fftfreq(grid)[:, None], scipy.fft.rfftfreq(grid))

@@ -1,4 +1,4 @@
-"""Fourier filters of large periodic fields, by blocks of rows and columns that fit in the cache."""
+"""Fourier filter for large periodic fields, computed in blocks of rows and columns that fit in the cache."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import scipy.fft
 from icha.support import parallel
 from icha.support.parallel import blocks, on_cores
 
-# Size of a field, in bytes, from which blocks are faster than one transform; columns in a block.
+# Smallest size of a field, in bytes, for which blocks are faster than one transform; number of columns in a block.
 CACHE, _COLUMNS = 2_000_000, 32
 
 
@@ -22,16 +22,16 @@ def filter_by_blocks(
     at: np.ndarray | None = None,
     out: np.ndarray | None = None,
 ) -> np.ndarray:
-    """Multiply the Fourier modes of a field by factors.
+    """Multiply the Fourier modes of a field by factors, and transform the product back.
 
     Parameters
     ----------
-    grid : cells along a side, n.
-    cells : (k,) int, ascending, where the field is not zero.
-    values : (k,), of the field there; the result has their precision.
-    factor : (n, n//2 + 1).
-    at : (m,) int, ascending, cells where the result is computed; None: everywhere.
-    out : a field that may be overwritten.
+    grid : number n of cells along a side.
+    cells : (k,) int, ascending, the cells where the field is not zero.
+    values : (k,), values of the field at these cells; the result has the same precision.
+    factor : (n, n//2 + 1), factor of each mode.
+    at : (m,) int, ascending, the cells where the result is computed; None for the whole grid, (n, n).
+    out : array in which the result is stored; None for a new array.
     """
     each = on_cores if grid >= parallel.LARGE_GRID else _one_by_one
     modes = reusable_field((grid, grid // 2 + 1), np.result_type(values.dtype, np.complex64))
@@ -72,7 +72,7 @@ _fields = threading.local()
 
 
 def reusable_field(shape: tuple[int, int], dtype: np.dtype) -> np.ndarray:
-    """Return a field that a thread reuses, zeros at first: new memory can take longer than the work in it."""
+    """Return the array that this thread reuses for a shape and type; it has zeros at first use, old values later."""
     fields: dict = vars(_fields)
     if (shape, dtype) not in fields:
         fields[shape, dtype] = np.zeros(shape, dtype)

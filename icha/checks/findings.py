@@ -1,4 +1,4 @@
-"""Findings of checks: a value, its limit and its meaning."""
+"""Results of checks: a value, the limit of the value, and its meaning."""
 
 import math
 from collections.abc import Iterable, Mapping
@@ -37,23 +37,23 @@ class Check:
 
 @dataclass(frozen=True)
 class RunArrays:
-    """Arrays of a run by name, without xarray, whose labels take more time than the checks of a small run."""
+    """Arrays of a run by name. Checks of a small run are much faster with these arrays than with xarray."""
 
     values: dict[str, np.ndarray]
     sizes: dict[str, int]
     attrs: Mapping[str, str]
 
     def __contains__(self, name: str) -> bool:
-        """Return whether the run has a variable."""
+        """Return whether the run has a variable of this name."""
         return name in self.values
 
     def __getitem__(self, name: str) -> np.ndarray:
-        """Return the values of a variable."""
+        """Return the values of the variable of this name."""
         return self.values[name]
 
 
 def count_not_finite(arrays: Iterable[np.ndarray]) -> int:
-    """Count the values that are not finite."""
+    """Return the number of values in arrays that are not finite."""
     return sum(int(np.count_nonzero(~np.isfinite(values))) for values in arrays if values.dtype.kind in "fiu")
 
 

@@ -1,4 +1,4 @@
-"""Checks of loops of loading and unloading: their events, their losses, and complete separation at their end."""
+"""Checks of loops of loading and unloading: events, losses, and complete separation at the end of the loop."""
 
 from collections.abc import Iterator
 
@@ -16,10 +16,10 @@ EVENT_COUNTS = ("jump_in_count", "jump_off_count", "coalescence_count", "split_c
 
 # Largest unknown work of a loop, over its largest work, for which a gain of energy may be tolerated.
 LARGEST_UNKNOWN_WORK = 1e-2
-# Largest gain of energy in a loop of boundary elements, over its largest work: the error of its losses, since a path
-# bounds the error of the work in every step (docs/short_range.md).
+# Largest gain of energy in a loop of boundary elements, over the largest work. This value is the error of the losses,
+# because a path limits the error of the work in every step (docs/short_range.md).
 CELL_LOSS_LIMIT = 1e-3
-# Largest loss of such a loop without adhesion, which loses nothing.
+# Largest loss of a loop of boundary elements without adhesion, over the largest work. The exact loss is zero.
 CELL_CLOSURE_LIMIT = 1e-4
 # Largest gain of energy by unions of spots and their splits, over the largest work. The rule of unions does not
 # conserve energy: without adhesion loops close to a few hundredths of a per cent (docs/hysteresis.md).
@@ -27,9 +27,9 @@ UNION_LIMIT = 1e-3
 
 # Meanings of the checks by name. Energies are relative to the largest work of the run.
 LOOP_CHECKS = {
-    "events": "number of events that are only in the counts or only in the log",
-    "loss adds up": "hysteresis loss against its parts, over the largest work",
-    "loss is the work": "hysteresis loss against the work done up to complete separation, over the largest work",
+    "events": "number of events that are only in the counts of events or only in the list of events",
+    "loss adds up": "difference of the hysteresis loss and the sum of its parts, over the largest work",
+    "loss is the work": "difference of the hysteresis loss and the whole work of the loop, over the largest work",
     "loop loses energy": "energy gained in the whole loop, over the largest work",
     "jumps lose energy": "energy gained in jumps into and out of contact together, over the largest work",
     "jumps off lose energy": "energy gained in jumps out of contact, over the largest work",
@@ -37,8 +37,8 @@ LOOP_CHECKS = {
     "load jumps lose energy": "energy gained in jumps at constant load, over the largest work",
     "separated: spots": "number of spots left in contact at the end of unloading",
     "separated: pressure": "nominal pressure left at the end of unloading, in Pa",
-    "pull-off pressure": "pull-off pressure against the largest tension of the last unloading, over the largest "
-    "pressure there",
+    "pull-off pressure": "difference of the pull-off pressure and the largest tension of the last unloading, over the "
+    "largest pressure of this unloading",
     "loop closes": "hysteresis loss without adhesion and coalescence, which must be zero, over the largest work",
 }
 
@@ -51,7 +51,7 @@ def check_events(run) -> Iterator[tuple]:
 
 
 def check_loop(run) -> Iterator[tuple]:
-    """Yield the checks of a run that ends with complete separation: its losses, and that nothing touches at the end."""
+    """Yield name, value and limit of the checks of a loop: losses, pull-off and complete separation at the end."""
     # All energies are differences of works, so that their errors are relative to the largest work.
     scale = float(np.max(np.abs(run["work"]))) or 1.0
     loss = float(run["hysteresis_loss"])
@@ -64,7 +64,7 @@ def check_loop(run) -> Iterator[tuple]:
     back = run["nominal_pressure"][run["leg"] == int(run["leg"][-1])]
     error = abs(float(run["pull_off_pressure"]) + back.min()) / (np.abs(back).max() or 1.0)
     yield "pull-off pressure", error, IDENTITY_LIMIT
-    # Unions of asperities by rule may cost energy; patches of boundary elements merge and split reversibly.
+    # The rule for unions of asperities may cost energy. Patches of boundary elements merge and split reversibly.
     if float(run["surface_energy"]) == 0 and not _has_united(run):
         model = model_of(run.attrs)
         unknown = work_error(run) / scale + 3 * model.accuracy.balance * count_unshared_separations(run)
@@ -77,7 +77,7 @@ def _has_united(run):
 
 
 def _check_losses(run, scale):
-    """Yield the checks of the losses of a loop, which must not return more work than was done on it."""
+    """Yield the checks that a loop and its kinds of events do not gain energy: name, value and limit."""
     unknown = IDENTITY_LIMIT + (_unresolved_work(run) + work_error(run)) / scale
     tolerance = CELL_LOSS_LIMIT if model_of(run.attrs).by_cells else min(unknown, LARGEST_UNKNOWN_WORK)
     with_unions = max(tolerance, UNION_LIMIT) if _has_united(run) else tolerance
@@ -90,8 +90,8 @@ def _check_losses(run, scale):
 
     yield "loop loses energy", gain(float(run["hysteresis_loss"])), with_unions
     yield "jumps lose energy", gain(into + out), tolerance
-    # A jump into contact may cost energy, by the law itself or by the forces of other spots. Then only the sum of its
-    # loss and that of the jump out of contact must be positive.
+    # A jump into contact may cost energy, by the law itself or by the forces of other spots. Then only the sum of the
+    # losses by jumps into and out of contact must be positive.
     if int(run["uphill_jump_in_count"]) == 0:
         yield "jumps off lose energy", gain(out), tolerance
     yield "unions lose energy", gain(unions), with_unions
@@ -101,8 +101,8 @@ def _check_losses(run, scale):
 def count_unshared_separations(run) -> int:
     """Count the separations of later legs that the first loading does not have.
 
-    At such a separation, two steps of the later leg correspond to one step of the first loading. The work of each step
-    has an error.
+    Each of these separations divides one step of the first loading into two steps of the later leg. The work of each
+    step has an error.
     """
     first, later = (np.unique(run["mean_separation"][run["leg"] == 0]), run["mean_separation"][run["leg"] > 0])
     same = 10 * RESIDUAL_TOLERANCE * float(run["rms_height"])
@@ -117,10 +117,10 @@ def finite_stiffness(run) -> np.ndarray:
 
 
 def work_error(run) -> float:
-    """Bound the error of the work of a path by the tolerances of its equilibria, J/m^2.
+    """Return an upper bound, J/m^2, for the error of the work of a path, from the tolerances of the equilibria.
 
     An error of the separation causes an error of the pressure that is larger by the factor of the stiffness. An error
-    of the stiffness changes the cubic through both ends of a step; the work is the integral of this cubic.
+    of the stiffness changes the cubic polynomial between both ends of a step; the work is the integral of this cubic.
     """
     width, stiffness = np.abs(np.diff(run["mean_separation"])), finite_stiffness(run)
     ends = np.abs(stiffness[1:]) + np.abs(stiffness[:-1])
@@ -130,7 +130,7 @@ def work_error(run) -> float:
 
 
 def _unresolved_work(run):
-    """Bound the error of the work of the steps with events, J/m^2; an event may happen anywhere in its step.
+    """Return an upper bound, J/m^2, for the error of the work because events may happen anywhere in their steps.
 
     The bound of a step is the sum of `unresolved_work`, from the jump of the pressure, and `integration_error`, from
     the change of the stiffness (an event may change the stiffness alone). The path limits the unknown work of each
@@ -138,7 +138,7 @@ def _unresolved_work(run):
     of all jumps, and the model's accuracy of a loss times the sum of all changes of work and loss.
     """
     events = sum(np.diff(run[name]) for name in EVENT_COUNTS) > 0
-    events &= np.diff(run["dissipated_by_load_jump"]) == 0  # there the pressure is constant
+    events &= np.diff(run["dissipated_by_load_jump"]) == 0  # in a jump at constant load the pressure is constant
     width, slope = np.diff(run["mean_separation"]), -finite_stiffness(run)
     jumped = pressure_jump(width, np.diff(run["nominal_pressure"]), slope[:-1], slope[1:])
     work = float(np.sum(events * (unresolved_work(width, jumped) + integration_error(width, slope[:-1], slope[1:]))))

@@ -1,4 +1,4 @@
-"""Checks of one run: identities and bounds of the physics that need no more than the dataset of the run."""
+"""Checks of one run: physical identities and limits that are computed from the dataset of the run alone."""
 
 import math
 from collections.abc import Hashable, Iterable, Iterator, Mapping
@@ -13,48 +13,46 @@ from icha.datasets.variables.run import OF_MODELS, RUN
 from icha.datasets.variables.terms import INFINITE
 from icha.path.targets import AREA_FRACTION, BETWEEN
 
-# Largest error of an equilibrium, in h_rms, and of a target, relative to it.
+# Largest error of an equilibrium, in h_rms, and largest relative error of a target.
 RESIDUAL_LIMIT = 1e-8
 TARGET_LIMIT = 1e-8
-# Largest residual of the fronts of boundary elements. They converge to 1e-6 or stagnate below this limit.
+# Largest residual of the fronts of boundary elements. The residual converges to 1e-6 or stagnates below this limit.
 FRONT_LIMIT = 1e-3
-# Largest fall of the contact area of boundary elements, over its maximum. The position of a front within its cell is
-# known less accurately, so that the area may seem to fall a little where a front enters another cell.
+# Largest decrease of the contact area of boundary elements, over the largest area. The position of a front within a
+# cell is known less accurately, so that the area may seem to decrease a little when a front enters another cell.
 CELL_LIMIT = 1e-3
-# Largest rise of the mean separation where spots unite, in h_rms, because the same load may then need a larger one.
+# Largest rise of the mean separation in a step in which spots unite, in h_rms. After a union, the same load may need a
+# larger separation.
 SEPARATION_RISE_LIMIT = 1e-2
 _MAY_BE_INFINITE = {name for name, description in RUN.items() if INFINITE in description.further}
 
 # Meanings of the checks by name.
 _CHECKS = LOOP_CHECKS | {
     "finite": "number of values that are not finite",
-    "steps": "1 if the run has no step at all",
+    "steps": "1 if the run has no steps, otherwise 0",
     "residual": "largest equilibrium error over h_rms",
     "front": OF_MODELS["front_residual"].long_name,
     "gap": OF_MODELS["gap_residual"].long_name,
     "converged": "number of steps that did not converge",
     "targets": "largest relative distance of a step from its target",
-    "area rises": "largest fall of A/A0 within the first loading, between stops or where nothing unites, over its "
-    "maximum",
-    "pressure rises": "largest fall of the nominal pressure within the first loading, between stops or where nothing "
-    "unites, over its maximum",
-    "separation falls": "largest rise of the mean separation within the first loading where no spots unite, over h_rms",
-    "separation falls where spots unite": "largest rise of the mean separation within the first loading where spots "
-    "unite, over h_rms",
+    "area rises": "largest decrease of A/A0 in the first loading, from target to target or in a step without unions, "
+    "over the largest A/A0",
+    "pressure rises": "largest decrease of the nominal pressure in the first loading, from target to target or in a "
+    "step without unions, over the largest pressure",
+    "separation falls": "largest rise of the mean separation in a step of the first loading without unions, over h_rms",
+    "separation falls where spots unite": "largest rise of the mean separation in a step of the first loading with "
+    "unions, over h_rms",
     "stiffness": "number of steps with a negative contact stiffness, without adhesion",
-    "area from P(p)": "integral of P(p) over p against A/A0",
-    "load from P(p)": "integral of p P(p) over p against F/A0, over the sum of compression and tension",
-    "P(u) complete": "integral of P(u) over u, plus A/A0 within the edges, plus overlap, against 1",
-    "area of spots": "sum of the spots' areas against A/A0",
-    "load of spots": "sum of the spots' forces against F/A0, over the sum of compression and tension",
+    "area from P(p)": "relative difference of the integral of P(p) and A/A0",
+    "load from P(p)": "difference of the integral of p P(p) and F/A0, over the sum of compression and tension",
+    "P(u) complete": "integral of P(u), plus A/A0 within the edges, plus overlap, minus 1",
+    "area of spots": "relative difference of the sum of the areas of spots and A/A0",
+    "load of spots": "difference of the sum of the forces of spots and F, over the sum of compression and tension",
 }
 
 
 def check_run(run: xr.Dataset, subject: str = "") -> tuple[Check, ...]:
-    """Check a dataset of `icha.simulate`: finite, converged, on target, monotone, and with consistent distributions.
-
-    subject : name of the run in the checks.
-    """
+    """Return the results of all checks of a dataset of `icha.simulate`; `subject` is the name of the run."""
     return check_variables(run.variables, run.attrs, subject)
 
 
@@ -69,7 +67,7 @@ def check_variables(
 
 
 def _check(run: RunArrays) -> Iterator[tuple]:
-    """Yield name, value and limit of every check."""
+    """Yield name, value and limit of every check of a run."""
     values = (own[~np.isposinf(own)] if name in _MAY_BE_INFINITE else own for name, own in run.values.items())
     yield "finite", count_not_finite(values), 0
     steps = run.sizes["step"]
@@ -93,7 +91,7 @@ def _check(run: RunArrays) -> Iterator[tuple]:
 
 
 def _check_loading(run) -> Iterator[tuple]:
-    """Yield the checks of the first loading; unloading and reloading follow other curves."""
+    """Yield name, value and limit of the checks of the first loading; later legs may follow other curves."""
     first = run["leg"] == 0
     names = ("contact_area_fraction", "nominal_pressure", "mean_separation", "step_kind", "coalescence_count")
     loading = {name: run[name][first] for name in names}
@@ -112,10 +110,10 @@ def _check_loading(run) -> Iterator[tuple]:
 
 
 def _largest_fall_in_loading(loading, name):
-    """Return the largest fall of a variable from target to target and from step to step, over its largest magnitude.
+    """Return the largest decrease of a variable from target to target or step to step, over its largest magnitude.
 
-    A union may carry less load than its two spots at the same separation. Therefore the variable may fall in a step in
-    which spots unite, but not from one target to the next.
+    A union may carry less load than its two spots at the same separation. Therefore the variable may decrease in a step
+    in which spots unite, but not from one target to the next.
     """
     values, at_targets = loading[name], loading["step_kind"] != BETWEEN
     united = np.cumsum(np.diff(loading["coalescence_count"], prepend=0) != 0)
@@ -125,9 +123,9 @@ def _largest_fall_in_loading(loading, name):
 
 
 def _largest_rises_of_separation(loading):
-    """Return the largest rise of the mean separation in a step, m, where no spots unite, and where spots unite.
+    """Return the largest rise of the mean separation, m, in steps without unions, and in steps with unions.
 
-    Steps to targets of the area do not count, because there the separation may rise: if the area jumps past a target,
+    Steps to area targets are ignored, because the separation may rise in these steps: if the area jumps past a target,
     the path meets the target on the branch after the jump.
     """
     rise = np.diff(loading["mean_separation"])
@@ -156,8 +154,8 @@ def _target_error(run):
         error = np.where(of_area, np.maximum(error - cells, 0.0), error)
     # The error of a target of zero load is relative to the largest load of the run.
     largest = np.array([np.max(np.abs(reached[kind])) for kind in kinds])
-    # With adhesion a load may be the small difference of attraction and repulsion, which are about the stiffness times
-    # h_rms. Its error is relative to their size.
+    # With adhesion a load may be a small difference of attraction and repulsion. Both are about as large as the
+    # stiffness times h_rms, and the error of the load is relative to this product.
     gross = np.abs(finite_stiffness(run)) * float(run["rms_height"]) * adhesive
     unit = {"reduced_pressure": scale * float(run["rms_slope"]), "relative_load": scale}
     least = np.array([SMALLEST_LOAD * gross[k] / unit.get(kind, math.inf) for k, kind in enumerate(kinds)])
@@ -165,7 +163,7 @@ def _target_error(run):
 
 
 def _identity_errors(run):
-    """Yield the largest errors of the identities between the distributions, the spots and the step of a snapshot."""
+    """Yield name and largest error of every identity between distributions, spots and step of a snapshot."""
     at = run["snapshot_step"].astype(int)
     area = run["contact_area_fraction"][at]
     pressure = run["nominal_pressure"][at]
@@ -192,7 +190,7 @@ def _identity_errors(run):
 
 
 def reasons_of_failure(checks: Iterable[Check]) -> str:
-    """Join the failed checks in one line; an empty text if all have passed."""
+    """Return the failed checks as one line of text; return an empty text if all checks have passed."""
     return "; ".join(
         f"{check.name}: {check.value:.3g} ({check.description}); expected at most {check.limit:.3g}"
         for check in checks

@@ -1,1 +1,1 @@
-"""Configuration files: their model, how they are read, and the runs that they ask for."""
+"""Configuration files: keys and their meaning, reading and checks, and the runs of a campaign."""

@@ -1,7 +1,7 @@
 """A campaign: surfaces, materials, and studies that press the surfaces into half-spaces of the materials.
 
-Values are in SI units. `icha.configuration.load` makes a campaign from the text of a configuration file,
-`icha.configuration.errors` words the errors, and `icha.configuration.schema` generates the JSON schema of the file.
+Values are in SI units. `icha.configuration.load` reads a campaign from a configuration file,
+`icha.configuration.errors` writes the messages, and `icha.configuration.schema` generates the JSON schema of the file.
 """
 
 from __future__ import annotations
@@ -21,16 +21,17 @@ from icha.contact.models import MODELS
 from icha.support.input_files import read_columns
 from icha.support.values import ROUNDING, Name, Problem, Section, Text, distinct
 
-# Sections with entries that belong to a study.
+# Sections whose entries refer to a study.
 BESIDE_STUDIES = ("finite_range", "boundary_element_loops")
-# Largest number of entries in a section; it is small because the check of an entry goes through all runs of its study.
+# Largest number of entries in a section; a small number, because the check of each entry goes through all runs of a
+# study.
 _FEW = Field(max_length=100)
 # Cells per shortest wavelength: the fewest without a warning, and the recommended number.
 _LEAST_CELLS, _ADVISABLE_CELLS = 4, 8
 
 
 class Contact(NamedTuple):
-    """Surface, seed, slope and material of a run; the slope is `measured` until the file is read."""
+    """Surface, seed, rms slope and material of a run; the slope is `measured` until the surface's file is read."""
 
     surface: str
     seed: int
@@ -39,16 +40,16 @@ class Contact(NamedTuple):
 
 
 class Topography(NamedTuple):
-    """Facts of a topography from a file.
+    """Properties of a topography from a file.
 
     Attributes
     ----------
     grid : nodes along a side.
-    period : side, m.
-    rms_slope : measured slope; None if no study uses it.
-    sha256 : checksum of the file.
-    full_contact_energy : U_full/E* at rms slope 1, m.
-    complete_contact_pressure : pressure over E* at which contact is complete, at rms slope 1.
+    period : side of the square, m.
+    rms_slope : measured rms slope; None if no study uses the measured slope.
+    sha256 : SHA-256 of the file.
+    full_contact_energy : elastic energy of full contact per area, divided by E*, at rms slope 1, m.
+    complete_contact_pressure : pressure of complete contact without adhesion, divided by E*, at rms slope 1.
     """
 
     grid: int
@@ -60,30 +61,30 @@ class Topography(NamedTuple):
 
 
 class Defaults(Section):
-    """Default values for the entries of sections."""
+    """Default values for surfaces, materials and studies."""
 
     surfaces: dict[str, Any] = {}
-    """Default values of keys of surfaces. A surface takes only the keys that its kind has."""
+    """Default values for the keys of surfaces. Each surface takes only the keys of its kind."""
     materials: dict[str, Any] = {}
-    """Default values of keys of materials."""
+    """Default values for the keys of materials."""
     studies: dict[str, Any] = {}
-    """Default values of keys of studies."""
+    """Default values for the keys of studies."""
 
 
 class Campaign(Section):
-    """A campaign, the content of one configuration file."""
+    """A campaign: the content of one configuration file."""
 
     name: Name
-    """Name of the campaign; results go to `results/<name>/`."""
+    """Name of the campaign. ICHA writes results to `results/<name>/`."""
     title: Line
     """Title of the campaign, one line."""
     summary: Prose
-    """A few sentences for readers of datasets and report."""
+    """A few sentences about the campaign. Datasets and report contain this text."""
     license: Line
     """Licence of the data, as an SPDX identifier such as `CC-BY-4.0`."""
     confirmed: Annotated[list[Text], AfterValidator(distinct)] = []
     """Keys of unusual values that you intend, such as `materials.soft.contact_modulus`. For an entry of a list, give
-    the key of the list. Unusual values that you do not confirm are refused."""
+    the key of the list. ICHA refuses unusual values that are not confirmed."""
     defaults: Defaults = Defaults()
     """Default values for all surfaces, materials or studies."""
     surfaces: Annotated[dict[Name, AnySurface], Field(min_length=1)]
@@ -93,39 +94,39 @@ class Campaign(Section):
     studies: Annotated[dict[Name, Study], Field(min_length=1)]
     """Studies by name."""
     finite_range: Annotated[dict[Name, BoundaryElements], _FEW] = {}
-    """Boundary elements at a finite range of attraction, by name, to compare with the runs of a study."""
+    """Solutions of boundary elements at a finite range of attraction, by name, to compare with the runs of a study."""
     boundary_element_loops: Annotated[dict[Name, BoundaryElementLoops], _FEW] = {}
-    """Loading and unloading with boundary elements at a finite range of attraction, by name, to compare with the runs
-    of a study that unloads."""
+    """Loops of loading and unloading with boundary elements at a finite range of attraction, by name, to compare with
+    the runs of a study that unloads."""
     measurements: Annotated[dict[Name, Measurement], _FEW] = {}
-    """Your own measurements by name, to draw over figure 5."""
+    """Your own measurements by name. Figure 5 shows the measurements with the runs."""
     figures: Figures = Figures()
-    """Figures and their options."""
+    """Figures to draw, with options."""
     publication: Publication = Publication()
-    """Metadata of a deposit. They change no result."""
+    """Metadata of a deposit. Metadata do not change any result."""
 
     _contacts: dict[str, tuple[Contact, ...]] = PrivateAttr(default={})
     _topographies: dict[str, Topography] = PrivateAttr(default={})
     _origins: dict[tuple[str, str], str] = PrivateAttr(default={})
 
     def deposit_metadata(self) -> Publication:
-        """Return the metadata of a deposit; title, summary and licence default to those of the campaign."""
+        """Return the metadata of a deposit; missing title, summary or licence are taken from the campaign."""
         given = self.publication
         return given.model_copy(
             update={key: getattr(given, key) or getattr(self, key) for key in ("title", "summary", "license")}
         )
 
     def compares_models(self, study: str) -> bool:
-        """Return whether a study has runs with both models at given loads."""
+        """Return whether a study has runs with both contact models at the same reduced pressures."""
         section = self.studies[study]
         return set(section.models) == set(MODELS) and bool(section.targets.reduced_pressures)
 
     def contacts(self, study: str) -> list[Contact]:
-        """Return the contacts of a study, run by run."""
+        """Return surface, seed, slope and material of each run of a study."""
         return list(self._contacts[study])
 
     def with_contacts(self, contacts: Mapping[str, Iterable[Contact]]) -> Campaign:
-        """Return the campaign with these contacts; the lists of each study become the values in its contacts."""
+        """Return the campaign with the given contacts; lists of studies are replaced by the values in the contacts."""
         contacts = {study: tuple(dict.fromkeys(runs)) for study, runs in contacts.items()}
         studies = {}
         for label, study in self.studies.items():
@@ -137,7 +138,7 @@ class Campaign(Section):
         return campaign
 
     def with_topographies(self, topographies: Mapping[str, Topography]) -> Campaign:
-        """Return the campaign with the facts of its topographies, whose slopes replace `measured`."""
+        """Return the campaign with properties of topographies from files; their slopes replace the text `measured`."""
 
         def with_slope(contact):
             measured = contact.rms_slope == MEASURED
@@ -148,29 +149,29 @@ class Campaign(Section):
         return campaign
 
     def topography(self, surface: str) -> Topography | None:
-        """Return the facts of a topography from a file; None for a random topography."""
+        """Return the properties of a surface from a file; None for a random surface."""
         return self._topographies.get(surface)
 
     def origin(self, section: str, name: str) -> str:
-        """Return the entry of a section (surfaces, materials) of which `name` is a variant; else return `name`."""
+        """Return the original name of a variant of a section (surfaces, materials); other names remain unchanged."""
         return self._origins.get((section, name), name)
 
     def is_free(self, surface: str) -> bool:
-        """Return whether a surface is a square with free edges; all other surfaces are periodic."""
+        """Return whether a surface is a square with free edges; False for periodic surfaces."""
         return getattr(self.surfaces[surface], "boundary", None) == "free"
 
     def grid(self, surface: str) -> int | None:
-        """Return the number of nodes along a side of a surface; None for a file that was not inspected."""
+        """Return the number of nodes along a side of a surface; None if its file has not been read."""
         return getattr(self.topography(surface) or self.surfaces[surface], "grid", None)
 
     def period(self, surface: str) -> float:
-        """Return the side of a surface, m, if its grid is known."""
+        """Return the side of a surface, m; the surface must be random, or its file must have been read."""
         return (self.topography(surface) or self.surfaces[surface]).period
 
     def snapshots_of(self, study: str) -> list[tuple[str, float]] | None:
-        """Return kind and value of all states that the runs of a study save; None if each saves only its last state.
+        """Return kind and value of all states that the runs of a study save; None if runs save only the last state.
 
-        The result includes the loads at which the section `finite_range` solves the surfaces of this study.
+        The result includes the loads at which entries of `finite_range` solve contacts of this study.
         """
         loads = sorted({p for e in self.finite_range.values() if e.study == study for p in e.reduced_pressures})
         if self.studies[study].snapshots is None and not loads:
@@ -180,7 +181,7 @@ class Campaign(Section):
         return snapshots + [state for p in loads if (state := ("reduced_pressure", p)) not in known]
 
     def contacts_beside(self, entry: BesideStudy) -> list[Contact]:
-        """Return the contacts that an entry of `finite_range` or `boundary_element_loops` solves."""
+        """Return the contacts of a study that an entry of `finite_range` or `boundary_element_loops` solves."""
         lists = (entry.surfaces, entry.seeds, entry.rms_slopes, entry.materials)
         asked = [None if values is None else set(values) for values in lists]
 
@@ -195,9 +196,9 @@ class Campaign(Section):
         return list(filter(is_asked_for, self._contacts[entry.study]))
 
     def problems(self) -> Iterator[Problem]:
-        """Yield the reasons why the campaign cannot run, although each single value is valid.
+        """Yield the problems of the campaign whose single values are valid, such as names that are not defined.
 
-        Problems that depend on measured slopes or on the grids of files are left out until these are known.
+        Problems that depend on files (measured slopes, grids) are left out until the files are read.
         """
         unknown_slopes = any(MEASURED in study.rms_slopes for study in self.studies.values())
         for location, value, reason in self._problems():
@@ -217,11 +218,11 @@ class Campaign(Section):
                 yield from _within((section, label), entry.problems(self))
         for label in self.finite_range:
             if label in self.studies and self.compares_models(label):
-                reason = "is the name of a study that has boundary elements itself; expected another name"
+                reason = "is also the name of a study with boundary elements; expected another name"
                 yield ("finite_range", label), label, reason
 
     def measurement_problems(self) -> Iterator[Problem]:
-        """Report tables of measurements that cannot be read."""
+        """Yield a problem for each table of measurements that cannot be read."""
         for label, entry in self.measurements.items():
             try:
                 read_columns(entry.path, entry.columns)
@@ -229,25 +230,25 @@ class Campaign(Section):
                 yield ("measurements", label, "path"), entry.path, str(error)
 
     def _model_problems(self, study: Study) -> Iterator[Problem]:
-        """Report surfaces of a study that its models do not support."""
+        """Yield a problem for each surface of a study that one of its models does not support."""
         for (index, label), name in itertools.product(enumerate(study.models), study.surfaces):
             surface, model = self.surfaces[name], MODELS[label]
             least = model.least_cells
             if model.periodic_only and self.is_free(name):
-                reason = f"need a periodic surface, and {name!r} is a square with free edges; expected asperities, or "
+                reason = f"need a periodic surface, but {name!r} has free edges; expected asperities, or "
                 yield ("models", index), label, f"{reason}another `boundary`, which makes the surface periodic"
             if surface.cells_per_short_wave < least * (1 - ROUNDING):
                 enough, better = surface.grid_of_cells(least), surface.grid_of_cells(_ADVISABLE_CELLS)
                 yield (
                     ("models", index),
                     label,
-                    f"need at least {least} grid cells per shortest wavelength, and {name!r} has "
+                    f"need at least {least} grid cells per shortest wavelength, but {name!r} has "
                     f"{surface.cells_per_short_wave:.3g}; expected asperities, or a `grid` of {enough} or more for "
                     f"{name!r} (better {better})",
                 )
 
     def warnings(self) -> list[str]:
-        """Return warnings about grids of random surfaces that are valid but coarse."""
+        """Return a warning for each random surface whose grid is valid but coarse."""
         expected: dict[str, int] = {}
         for study in self.studies.values():
             least = _ADVISABLE_CELLS if any(MODELS[model].by_cells for model in study.models) else _LEAST_CELLS
@@ -265,7 +266,7 @@ class Campaign(Section):
         return found
 
     def resolve_paths(self, folder: FilePath) -> Campaign:
-        """Return the campaign with the paths of its files relative to `folder`."""
+        """Return the campaign with `folder` before all paths of files."""
 
         def in_folder(section):
             return section.model_copy(update={"path": str(folder / section.path)})

@@ -1,4 +1,4 @@
-"""Runs, solutions and surfaces of a campaign: their labels, the settings of their jobs, and their checksums."""
+"""List the runs, solutions and surfaces of a campaign: labels, settings of the jobs, and checksums."""
 
 import hashlib
 import itertools
@@ -14,7 +14,7 @@ from icha.datasets.labels import ContactLabels, RunLabels, SolutionLabels
 
 
 def run_cases(campaign: Campaign) -> list[RunLabels]:
-    """Return all runs of a campaign, study by study and model by model, in the order of the configuration."""
+    """Return the labels of all runs of a campaign, study by study and model by model, in the order of the file."""
     return [
         RunLabels(label, model, *contact)
         for label, study in campaign.studies.items()
@@ -23,12 +23,12 @@ def run_cases(campaign: Campaign) -> list[RunLabels]:
 
 
 def surface_cases(campaign: Campaign) -> list[tuple[str, int]]:
-    """Return the topographies of a campaign, (surface, seed), each once."""
+    """Return surface and seed of each topography that a campaign uses, without repetition."""
     return list(dict.fromkeys((case.surface, case.seed) for case in run_cases(campaign)))
 
 
 def solution_cases(campaign: Campaign) -> list[SolutionLabels]:
-    """Return all boundary-element solutions of a campaign, entry by entry."""
+    """Return the labels of all solutions in the section `finite_range`, entry by entry."""
     return [
         SolutionLabels(label, entry.study, *contact, pressure)
         for label, entry in campaign.finite_range.items()
@@ -37,7 +37,7 @@ def solution_cases(campaign: Campaign) -> list[SolutionLabels]:
 
 
 def loop_cases(campaign: Campaign) -> list[ContactLabels]:
-    """Return all loops of boundary elements of a campaign, entry by entry."""
+    """Return the labels of all loops in the section `boundary_element_loops`, entry by entry."""
     return [
         ContactLabels(label, *contact)
         for label, entry in campaign.boundary_element_loops.items()
@@ -46,7 +46,7 @@ def loop_cases(campaign: Campaign) -> list[ContactLabels]:
 
 
 def surface_settings(campaign: Campaign, name: str) -> dict:
-    """Return the settings of a topography in SI units, without its seed and file."""
+    """Return the settings of a surface in SI units, without seed and path."""
     surface = campaign.surfaces[name]
     if surface.random:
         return surface.model_dump(exclude_none=True)
@@ -56,7 +56,7 @@ def surface_settings(campaign: Campaign, name: str) -> dict:
 
 
 def run_settings(campaign: Campaign, case: RunLabels) -> dict:
-    """Return the settings that determine the numbers of a run, in SI units."""
+    """Return the settings that determine the results of a run, in SI units."""
     return {
         "material": campaign.materials[case.material].model_dump(exclude_none=True),
         "path": campaign.studies[case.study].path_settings(campaign.snapshots_of(case.study)),
@@ -66,13 +66,13 @@ def run_settings(campaign: Campaign, case: RunLabels) -> dict:
 
 
 def solution_settings(campaign: Campaign, case: SolutionLabels) -> dict:
-    """Return the settings of a boundary-element solution in SI units, without its topography."""
+    """Return the settings of one solution of `finite_range`, in SI units, without the settings of its surface."""
     entry = campaign.finite_range[case.entry]
     return _solver_settings(campaign, entry, case) | {"reduced_pressure": case.reduced_pressure}
 
 
 def loop_settings(campaign: Campaign, case: ContactLabels) -> dict:
-    """Return the settings of a loop of boundary elements in SI units, without its topography."""
+    """Return the settings of one loop of `boundary_element_loops`, in SI units, without the settings of its surface."""
     entry = campaign.boundary_element_loops[case.entry]
     return _solver_settings(campaign, entry, case) | {
         "largest_reduced_pressure": campaign.studies[entry.study].targets.last[1],
@@ -81,7 +81,7 @@ def loop_settings(campaign: Campaign, case: ContactLabels) -> dict:
 
 
 def _solver_settings(campaign: Campaign, entry: BesideStudy, case: SolutionLabels | ContactLabels) -> dict:
-    """Return the settings of boundary elements without their loads."""
+    """Return the settings of the boundary-element solver, without loads."""
     return {
         "material": campaign.materials[case.material].model_dump(exclude_none=True),
         "rms_slope": case.rms_slope,
@@ -92,7 +92,7 @@ def _solver_settings(campaign: Campaign, entry: BesideStudy, case: SolutionLabel
 
 
 def adhesive_contacts(campaign: Campaign, surface: str) -> list[dict]:
-    """Return the slopes and adhesive materials of the runs on a surface, each once."""
+    """Return all pairs of rms slope and adhesive material in the runs on a surface, without repetition."""
     pairs = dict.fromkeys((case.rms_slope, case.material) for case in run_cases(campaign) if case.surface == surface)
     return [
         {"rms_slope": rms_slope, "name": name, "material": campaign.materials[name].model_dump(exclude_none=True)}
@@ -102,21 +102,21 @@ def adhesive_contacts(campaign: Campaign, surface: str) -> list[dict]:
 
 
 def run_sha256(campaign: Campaign, case: RunLabels) -> str:
-    """Compute the checksum of everything that determines a run."""
+    """Compute the SHA-256 of all settings and files that determine the results of a run."""
     topography = campaign.topography(case.surface)
     file = [topography.sha256] if topography else []
     return _sha256([run_settings(campaign, case), surface_settings(campaign, case.surface), *file])
 
 
 def campaign_sha256(campaign: Campaign, of_run: Callable[[RunLabels], str] | None = None) -> str:
-    """Compute the checksum of everything that determines the runs of a campaign, without its figures and title.
+    """Compute the SHA-256 of all settings and files that determine the runs of a campaign, without figures and title.
 
-    `of_run` returns the checksum of a run, if it is known already; by default `run_sha256` computes the checksums.
+    `of_run` returns known checksums of runs; by default `run_sha256` computes these checksums.
     """
     of_run = of_run or partial(run_sha256, campaign)
     return _sha256({case.path: of_run(case) for case in run_cases(campaign)})
 
 
 def _sha256(settings) -> str:
-    """Compute the checksum of settings, which does not depend on the order of their keys."""
+    """Compute the SHA-256 of settings; the order of the keys does not matter."""
     return hashlib.sha256(json.dumps(settings, sort_keys=True).encode()).hexdigest()

@@ -1,8 +1,8 @@
-"""The design of a campaign: the runs of each study, as combinations of surfaces, seeds, slopes and materials.
+"""Expand each study of a campaign into runs: combinations of surfaces, seeds, slopes and materials.
 
-All lists of a study are combined with each other, except for groups that are combined one by one (`zip`); an explicit
-list (`cases`) replaces them. Every varied parameter makes a new surface or material, a variant, with a name such as
-`rough-hurst0.6`.
+A study runs all combinations of the entries of its lists. Lists in a group of `zip` are combined entry by entry. The
+values of `cases` replace lists. Each combination of varied parameters defines a new surface or material, called a
+variant, with a name such as `rough-hurst0.6`.
 """
 
 import hashlib
@@ -26,31 +26,31 @@ from icha.support.values import LONGEST_LABEL, NOTHING, Problem, list_names
 MAX_RUNS = 100_000
 # Largest number of targets of all runs together.
 _MAX_TARGETS = 5_000_000
-# Lists of a study, and the key of one of their entries in a case.
+# Keys of the lists of a study, and the corresponding keys of a case.
 _LISTS = {"surfaces": "surface", "seeds": "seed", "rms_slopes": "rms_slope", "materials": "material"}
-# Order of the lists of a study. From run to run, the last list changes first.
+# Order of the lists of a study. The last list changes fastest from run to run.
 _OF_MATERIAL = MaterialSection.model_fields
 _ORDER = ("surface", *(name for name in SCALARS if name not in _OF_MATERIAL), "seed", "rms_slope", "material")
 _ORDER += tuple(_OF_MATERIAL)
 _SYMBOLS = {"m": "m", "Pa": "Pa", "J/m^2": "J"}
 _PREFIXES = {-15: "f", -12: "p", -9: "n", -6: "u", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 
-# A value in the design, and its location in the configuration.
+# Location of a value in the configuration, and the value.
 _Located = tuple[tuple, Any]
 
 
 def expand_design(campaign: Campaign, content: Mapping) -> tuple[Campaign, list[Problem]]:
-    """Expand the runs of every study.
+    """Return the campaign with all runs of every study.
 
     Parameters
     ----------
-    campaign : as written.
-    content : the configuration as nested mappings, from which varied sections are validated.
+    campaign : the campaign as written in the configuration file.
+    content : the configuration as nested mappings, with which sections with varied values are validated again.
 
     Returns
     -------
     The expanded campaign, and the problems that prevented the expansion. `Campaign.with_topographies` later replaces
-    the slopes that are `measured`.
+    `measured` slopes by numbers.
     """
     problems = itertools.chain.from_iterable(
         _study_problems(campaign, label, study) for label, study in campaign.studies.items()
@@ -71,7 +71,7 @@ def expand_design(campaign: Campaign, content: Mapping) -> tuple[Campaign, list[
 
 
 def _lists(label: str, study: Study) -> dict[str, list[_Located]]:
-    """Return the lists and varied parameters of a study, which are combined; the surfaces come first."""
+    """Return the lists and varied parameters of a study, in the order of the combinations; surfaces come first."""
 
     def located(values, *keys):
         return [(("studies", label, *keys, index), value) for index, value in enumerate(values)]
@@ -83,7 +83,7 @@ def _lists(label: str, study: Study) -> dict[str, list[_Located]]:
 
 
 def _points(label: str, study: Study) -> Iterator[dict[str, _Located]]:
-    """Yield the values of each run, with their locations."""
+    """Yield the parameters of each run of a study, each value with its location in the configuration."""
     lists = _lists(label, study)
     for index, given in enumerate(_cases(study)):
         fixed = {name: (("studies", label, "cases", index, name), value) for name, value in given.items()}
@@ -96,12 +96,12 @@ def _points(label: str, study: Study) -> Iterator[dict[str, _Located]]:
 
 
 def _cases(study: Study) -> list[dict[str, Any]]:
-    """Return the values that each case of a study fixes; a study without `cases` has a single case without values."""
+    """Return the values of each case of a study; a study without `cases` has one case without values."""
     return [{}] if study.cases is None else [case.model_dump(exclude_none=True) for case in study.cases]
 
 
 def _axes(study: Study, lists: Mapping, fixed: Mapping) -> Iterator[list[str]]:
-    """Yield the groups of lists to combine; the lists of a group are combined one by one."""
+    """Yield groups of lists; lists within a group are combined entry by entry, the groups in all combinations."""
     groups = [[_LISTS.get(name, name) for name in group] for group in study.zip]
     done = set(fixed)
     for name in lists:
@@ -113,7 +113,7 @@ def _axes(study: Study, lists: Mapping, fixed: Mapping) -> Iterator[list[str]]:
 
 
 def _too_many_runs(campaign: Campaign) -> Iterator[Problem]:
-    """Report too many runs or targets, before they are expanded."""
+    """Yield a problem if a campaign has too many runs or targets, before the runs are expanded."""
     runs = targets = 0
     for label, study in campaign.studies.items():
         count, states = _run_count(label, study), {*study.targets.states, *(campaign.snapshots_of(label) or ())}
@@ -123,7 +123,7 @@ def _too_many_runs(campaign: Campaign) -> Iterator[Problem]:
 
 
 def _too_many_solutions(campaign: Campaign) -> Iterator[Problem]:
-    """Report too many solutions in the sections beside the studies, after the runs are expanded."""
+    """Yield a problem if `finite_range` or `boundary_element_loops` has too many solutions; runs must be expanded."""
     for section in BESIDE_STUDIES:
         entries = [entry for entry in getattr(campaign, section).values() if entry.study in campaign.studies]
         counts = (len(campaign.contacts_beside(e)) * len(getattr(e, "reduced_pressures", [0])) for e in entries)
@@ -132,11 +132,11 @@ def _too_many_solutions(campaign: Campaign) -> Iterator[Problem]:
 
 def _excess(section: str, count: int, what: str, most: int) -> Iterator[Problem]:
     if count > most:
-        yield (section,), NOTHING, f"asks for {count} {what}; expected at most {most}"
+        yield (section,), NOTHING, f"defines {count} {what}; expected at most {most}"
 
 
 def _run_count(label: str, study: Study) -> int:
-    """Count the runs of a study with all its models, including equal runs."""
+    """Count the runs of a study with all models; equal runs count several times."""
     lists = _lists(label, study)
     counts = (math.prod(len(lists[group[0]]) for group in _axes(study, lists, given)) for given in _cases(study))
     return len(study.models) * sum(counts)
@@ -147,7 +147,7 @@ def _study_problems(campaign: Campaign, label: str, study: Study) -> Iterator[Pr
     lists, cases = _lists(label, study), study.cases or []
 
     def values(one):
-        """Return the values of a list and the values of the cases that replace it, with their locations."""
+        """Return the values of the list for `one`, and the values in `cases` that replace the list, with locations."""
         located = (((*prefix, "cases", index, one), getattr(case, one)) for index, case in enumerate(cases))
         return [*lists[one], *((location, value) for location, value in located if value is not None)]
 
@@ -166,7 +166,7 @@ def _study_problems(campaign: Campaign, label: str, study: Study) -> Iterator[Pr
         surface = cases[location[3]].surface if location[2] == "cases" else None
         for name in [surface] if surface else study.surfaces:
             if name in campaign.surfaces and campaign.surfaces[name].random:
-                yield location, slope, f"surface {name!r} is random and has no measured slope; expected numbers"
+                yield location, slope, f"needs a measured surface, but {name!r} is random; expected numbers"
 
 
 def _zip_problems(prefix, study, lists) -> Iterator[Problem]:
@@ -181,7 +181,7 @@ def _zip_problems(prefix, study, lists) -> Iterator[Problem]:
                 yield location, name, f"is not a list of this study; expected one of {expected}"
                 continue
             if one in seen:
-                yield location, name, "is in two groups; expected every list in one group only"
+                yield location, name, "is in two groups; expected each list in at most one group"
             seen.add(one)
             lengths[name] = len(lists[one])
         if len(set(lengths.values())) > 1:
@@ -190,18 +190,18 @@ def _zip_problems(prefix, study, lists) -> Iterator[Problem]:
 
 
 class _Variants:
-    """The variants: surfaces and materials with varied parameters, one for each combination of values."""
+    """Variants: surfaces and materials with varied parameters, one for each combination of values."""
 
     def __init__(self, campaign: Campaign, content: Mapping):
         self._campaign, self._content = campaign, content
         self._names: dict[tuple, str] = {}
         self.derived: dict[str, dict[str, Any]] = {"surfaces": {}, "materials": {}}
         self.origin: dict[tuple[str, str], str] = {}
-        # By location, so that each wrong value is reported once.
+        # Problems by location, so that each wrong value is reported once.
         self.problems: dict[tuple, Problem] = {}
 
     def contact(self, point: Mapping[str, _Located]) -> Contact:
-        """Return the contact of a run, after making its surface and material."""
+        """Return the labels of a run's contact; create the variants of its surface and material."""
         surface, material = point["surface"][1], point["material"][1]
         fields = type(self._campaign.surfaces[surface]).model_fields
         varied = {name: point[name] for name in point if name in SCALARS}
@@ -211,7 +211,7 @@ class _Variants:
             if name in of_surface or name in of_material:
                 continue
             kinds = ", ".join(k for k, section in SURFACE_KINDS.items() if name in section.model_fields)
-            reason = f"surface {surface!r} is of another kind; expected kind {kinds}, or separate studies"
+            reason = f"is not a key of surface {surface!r}; expected surfaces of kind {kinds} only, or separate studies"
             self.problems[location[:4]] = (location[:4], value, reason)
         return Contact(
             self._variant("surfaces", surface, of_surface),
@@ -221,7 +221,7 @@ class _Variants:
         )
 
     def _variant(self, section: str, base: str, changes: Mapping[str, _Located]) -> str:
-        """Return the name of the variant of a surface or material with changed values; make it if it is new."""
+        """Return the name of the variant of a surface or material with changed values; create new variants."""
         key = (section, base, *((name, repr(value)) for name, (_, value) in changes.items()))
         if changes and key not in self._names:
             self._names[key] = self._make(section, base, changes)
@@ -236,7 +236,7 @@ class _Variants:
             for keys, wrong, reason in map(problem_of, error.errors()):
                 key = str(keys[0]) if keys else ""
                 location, value = changes.get(key) or next(iter(changes.values()))
-                if key not in changes:  # the varied parameter contradicts another parameter of the surface
+                if key not in changes:  # the varied parameter is inconsistent with another parameter of the surface
                     reason = f"{key} of {base!r}: {wrong!r} {reason}" if key else f"{base!r}: {reason}"
                 self.problems.setdefault(location, (location, value, reason))
             return base
@@ -244,7 +244,9 @@ class _Variants:
             variant = variant.model_copy(update={"path": entries[base].path})
         name = "-".join([base, *(f"{key}{value_label(variant, key)}" for key in changes)])
         if name in entries or len(name) > LONGEST_LABEL:
-            reason = f"gives {base!r} a variant with the name {name!r}; expected a name without another entry, and with"
+            reason = (
+                f"defines a variant of {base!r} with the name {name!r}; expected a name without another entry, with"
+            )
             reason += f" at most {LONGEST_LABEL} letters. Rename an entry"
             self.problems[section, name] = (*next(iter(changes.values())), reason)
         self.derived[section][name] = variant
@@ -253,11 +255,12 @@ class _Variants:
 
 
 def value_label(section, name: str) -> str:
-    """Format the value of a parameter for file names, such as 0.6 of `hurst0.6` and 40nm of `interaction_range40nm`."""
+    """Format the value of a parameter for names, such as 0.6 in `hurst0.6` and 40nm in `interaction_range40nm`."""
     value = getattr(section, name)
     if not isinstance(value, float):
         text = str(value)
-        # Some texts, such as names of channels, cannot be part of a file name; their checksum replaces them.
+        # Some texts, such as names of channels, cannot be part of a file name; the name contains their checksum
+        # instead.
         return text if re.fullmatch(r"[A-Za-z0-9_.+-]{1,40}", text) else hashlib.sha256(text.encode()).hexdigest()[:8]
     unit = next((each.unit for each in type(section).model_fields[name].metadata if isinstance(each, FloatRange)), None)
     if unit is None:

@@ -1,4 +1,4 @@
-"""Error messages of a configuration: file, key, value, what is wrong with the value, and what is expected."""
+"""Error messages for configurations: file, key, value, problem and expected value."""
 
 import difflib
 import itertools
@@ -16,14 +16,14 @@ from icha.support.values import NAME_PATTERN, NOTHING, Problem
 
 # Largest number of problems in one message.
 MOST_PROBLEMS = 50
-# Reasons against keys that had another name or were removed, by the model of their section.
+# Messages for keys that were renamed or removed, by section and key.
 _FORMER_KEYS = {
     ("Campaign", "boundary_elements"): "was renamed; expected the same section with the name `finite_range` (`models: "
     "[boundary_elements]` of a study keeps its name)",
-    ("Study", "united_until"): "was removed: united spots split where their two parts would not overlap. Keeping them "
-    "until detachment was farther from boundary elements in 8 of 9 losses. Remove the key",
+    ("Study", "united_until"): "was removed, because coalesced spots now split when their parts would no longer "
+    "overlap. Remove the key",
 }
-# Reasons by the type of pydantic's error, where the words of pydantic are those of programmers.
+# Messages by pydantic's type of error; they replace messages of pydantic that only programmers understand.
 _NOT_A_SECTION = "is not a section; expected a mapping of keys to values"
 _REASONS = {
     "model_type": _NOT_A_SECTION,
@@ -35,14 +35,11 @@ _REASONS = {
 
 
 class ConfigurationError(ValueError):
-    """A configuration that cannot be run; the message has a line for each problem."""
+    """Error: a configuration is not valid. The message has one line for each problem."""
 
 
 def refuse(origin: str, problems: Iterable[Problem], implausible: Iterable[Problem] = ()) -> None:
-    """Raise ConfigurationError if there are problems; the message also lists implausible values, a possible cause.
-
-    `origin` is the name of the file.
-    """
+    """Raise ConfigurationError if there are problems; the message also lists implausible values, a possible cause."""
     found = list(itertools.islice(problems, MOST_PROBLEMS + 1))
     if not found:
         return
@@ -54,7 +51,7 @@ def refuse(origin: str, problems: Iterable[Problem], implausible: Iterable[Probl
 
 
 def format_problem(origin: str, location: tuple, value: Any, reason: str) -> str:
-    """Format a problem as one line that is safe to print, because a stranger may have written the file."""
+    """Format a problem as one line; escape control characters, because the file may come from an unknown source."""
     keys = [f"[{entry}]" if isinstance(entry, int) else f".{_cut(str(entry), 80)}" for entry in location]
     key = "".join(keys).lstrip(".") or "top level"
     shown = "" if value is NOTHING else " (empty)" if value is None else f" {_cut(repr(value), 80)}"
@@ -66,11 +63,11 @@ def _cut(text: str, most: int) -> str:
 
 
 def problem_of(details: Mapping) -> Problem:
-    """Translate the details of a pydantic error into location, value and reason."""
+    """Convert the details of a pydantic error into location (keys), value and reason."""
     location, value, kind = _without_tags(details["loc"]), details["input"], details["type"]
     context = details.get("ctx", {})
     if kind == "value_error":
-        # The error of a whole section contains the keys and values already.
+        # The message for a whole section already contains keys and values.
         return location, NOTHING if isinstance(value, Mapping | BaseModel) else value, str(context["error"])
     if kind in ("extra_forbidden", "missing"):
         return location, NOTHING, _reason_for_key(kind, details["loc"])
@@ -78,14 +75,14 @@ def problem_of(details: Mapping) -> Problem:
         given = value.get("kind", NOTHING) if isinstance(value, Mapping) else value
         return (*location, "kind"), given, f"is not a kind of surface; expected one of {', '.join(SURFACE_KINDS)}"
     if kind == "string_pattern_mismatch" and context.get("pattern") == NAME_PATTERN:
-        return location, value, "is not a name; expected lower-case letters, digits, '_' and, but not first, '-'"
-    # Such as "List should have at least 1 item after validation, not 0".
+        return location, value, "is not a valid name; expected lower-case letters, digits, '_' and (not first) '-'"
+    # Example of a message of pydantic: "List should have at least 1 item after validation, not 0".
     expected = re.sub(r"^\w+ should (be|have) | after validation.*", "", details["msg"])
     return location, value, _REASONS.get(kind, f"is not valid; expected {expected}")
 
 
 def _reason_for_key(kind: str, location: tuple) -> str:
-    """Return the reason against a key that is unknown or missing in a section."""
+    """Return the message for an unknown or missing key of a section."""
     section, name = _section_at(location[:-1]), location[-1]
     if kind == "missing":
         return f"the key is missing; expected: {' '.join(str(section.model_fields[name].description).split())}"
@@ -97,14 +94,14 @@ def _reason_for_key(kind: str, location: tuple) -> str:
 
 
 def _without_tags(location: tuple) -> tuple:
-    """Remove the parts that pydantic adds to a location: the kind of a surface, and the mark of a key."""
+    """Remove the parts that pydantic adds to a location: the kind of a surface, and the marker `[key]`."""
     if len(location) > 2 and location[0] == "surfaces" and location[2] in SURFACE_KINDS:
         location = (*location[:2], *location[3:])
     return location[:-1] if location[-1:] == ("[key]",) else location
 
 
 def _section_at(location: tuple) -> type[BaseModel]:
-    """Return the model of the section at a location of pydantic; such a location contains the kind of a surface."""
+    """Return the class of the section at a location; pydantic adds the kind of a surface to the location."""
     model: Any = Campaign
     for key in location:
         if model in SURFACE_KINDS.values() and key in SURFACE_KINDS:

@@ -1,4 +1,4 @@
-"""Section `figures`, with one key for every figure, and `measurements`, measured contact areas for figure 5."""
+"""Sections `figures` (one key for every figure) and `measurements` (measured contact areas for figure 5)."""
 
 from collections.abc import Iterator
 from typing import Annotated, Any
@@ -11,7 +11,7 @@ from icha.support.values import File, Name, Positive, Problem, Section, Text, co
 
 
 def _factor(unit: str, si_unit: str) -> float | None:
-    """Return the factor from a unit to an SI unit; None if the unit is of another quantity."""
+    """Return the factor from a unit to an SI unit; None if the units are of different quantities."""
     try:
         return float(conversion_factor(unit, si_unit))
     except ValueError:
@@ -24,25 +24,26 @@ class Column(Section):
     column: Text
     """Heading of the column."""
     unit: Annotated[str, Field(strict=True)]
-    """Unit of the numbers: `1` or `percent` for ratios, a unit of pressure for nominal pressures."""
+    """Unit of the numbers in the column: `1` or `percent` for ratios, a unit of pressure for nominal pressures."""
 
 
 class Measurement(Section):
-    """Measured contact areas, drawn over the figure of a study."""
+    """A table of measured contact areas, which figure 5 shows with the runs of a study."""
 
     path: File
-    """CSV file with a line of headings, relative to the configuration file."""
+    """CSV file whose first line contains the headings of the columns. The path is relative to the configuration
+    file."""
     label: Text
-    """Name in the legend; formulas stand between two `$`."""
+    """Name in the legend of the figure. Write formulas between two `$`."""
     citation: Text
-    """Source of the numbers; the report prints it."""
+    """Source of the numbers, which the report prints."""
     study: Name
-    """Name of the study to compare with."""
+    """Name of the study that is compared with the measurement."""
     load: Column
-    """Load: reduced pressures p/(E* h'rms) (unit `1`), or nominal pressures (unit `kPa`, …), for which `material` and
-    `rms_slope` are required."""
+    """Column of the loads: reduced pressures p/(E* h'rms) (unit `1`), or nominal pressures (unit `kPa`, …). Nominal
+    pressures need the keys `material` and `rms_slope`."""
     area: Column
-    """Contact area fraction A/A0 (unit `1` or `percent`)."""
+    """Column of the contact area fractions A/A0 (unit `1` or `percent`)."""
     material: Name | None = None
     """Material of the measurement. Required if the loads are nominal pressures."""
     rms_slope: Positive | None = None
@@ -55,7 +56,7 @@ class Measurement(Section):
 
     @property
     def columns(self) -> dict[str, float]:
-        """Headings of the columns of load and area, and the factors that turn them into SI units."""
+        """Headings of the columns of load and area, with the factors that convert the numbers to SI units."""
         load = _factor(self.load.unit, "Pa" if self.load_is_pressure else "1")
         return {self.load.column: load, self.area.column: _factor(self.area.unit, "1")}
 
@@ -63,15 +64,15 @@ class Measurement(Section):
     def _check_units(self):
         load, area = self.load.unit, self.area.unit
         if self.load_is_pressure and _factor(load, "Pa") is None:
-            raise ValueError(f"load: unit {load!r}; expected '1' or a unit of pressure, such as 'kPa'")
+            raise ValueError(f"load: the unit is {load!r}; expected '1' or a unit of pressure, such as 'kPa'")
         if _factor(area, "1") is None:
-            raise ValueError(f"area: unit {area!r}; expected '1' or 'percent'")
+            raise ValueError(f"area: the unit is {area!r}; expected '1' or 'percent'")
         if self.load_is_pressure and (self.material is None or self.rms_slope is None):
             raise ValueError(f"load in {load!r} without material and rms_slope; expected both, or loads of unit '1'")
         return self
 
     def problems(self, campaign: Any) -> Iterator[Problem]:
-        """Report names that the `icha.configuration.campaign.Campaign` does not define."""
+        """Yield a problem for each name in this entry that the campaign does not define."""
         yield from unknown(("study",), self.study, campaign.studies)
         if self.material is not None:
             yield from unknown(("material",), self.material, campaign.materials)
@@ -79,14 +80,14 @@ class Measurement(Section):
 
 class _Drawn(Section):
     def by_name(self) -> dict[str, FigureOptions]:
-        """Return the options of the figures to draw, by name."""
+        """Return the options of each figure to draw, by the name of the figure."""
         return {name: getattr(self, name) for name in type(self).model_fields if getattr(self, name) is not None}
 
 
 Figures = create_model(
     "Figures",
     __base__=_Drawn,
-    __doc__="The figures of the campaign; a figure without its key is not drawn.",
+    __doc__="Figures of the campaign. ICHA draws only figures whose key is given.",
     __module__=__name__,
     **{
         name: (declaration.options | None, Field(default=None, description=declaration.description))

@@ -1,4 +1,4 @@
-"""Load a configuration file: turn its text into a campaign, or report all problems."""
+"""Load a configuration file: convert its text into a campaign, or report all problems."""
 
 import itertools
 import os
@@ -34,13 +34,13 @@ from icha.support.values import Problem
 
 @dataclass(frozen=True)
 class Configuration:
-    """A valid campaign and its source.
+    """A valid campaign and the text from which it was loaded.
 
     Parameters
     ----------
-    campaign : in SI units, with the resolved paths of its files.
-    text : the configuration with its overrides, as its author wrote it, with units.
-    origin : path of its file.
+    campaign : the campaign in SI units, with complete paths of files.
+    text : the configuration as written, with units and overrides.
+    origin : path of the configuration file.
     warnings : warnings about coarse grids and unusual values.
     """
 
@@ -53,20 +53,20 @@ class Configuration:
 def load_configuration(
     path: str | os.PathLike, overrides: Mapping[str, Any] | None = None, *, within: str | os.PathLike | None = None
 ) -> Configuration:
-    """Read and check a configuration file and the files that it names.
+    """Read and check a configuration file, and all surfaces and measurements in other files.
 
-    The text is checked before the files, because this finds most errors at once.
+    The text is checked before the other files, because this order finds most errors quickly.
 
     Parameters
     ----------
-    path : YAML file.
-    overrides : values that replace those of the file, key by key, as `snakemake --config` gives them.
-    within : folder that must contain all files that the configuration names; None for any folder.
+    path : path of the configuration file (YAML).
+    overrides : nested mapping of values that replace values in the file, as from `snakemake --config`.
+    within : folder that must contain all files of surfaces and measurements; None to allow any folder.
 
     Raises
     ------
     ConfigurationError
-        If any key or file is wrong; the message has a line for each.
+        If a key or file is wrong; the message has a line for each problem.
     """
     path = Path(path)
     written = merge(read_yaml(path), overrides or {})
@@ -81,7 +81,7 @@ def load_configuration(
         location = "surfaces", campaign.origin("surfaces", name)
         unusual += unusual_topography(location, campaign.surfaces[name], each.period, each.rms_slope)
     sticky = list(sticky_runs(campaign))
-    # A contact may be sticky because of another unusual value.
+    # A low U_full/dgamma may be due to another unusual value.
     implausible = list(plausibility_problems(unusual, confirmed)) or plausibility_problems(sticky, confirmed)
     unusual += sticky
     refuse(origin, itertools.chain(campaign.problems(), implausible))
@@ -93,7 +93,7 @@ def load_configuration(
 
 
 def _check_text(path: Path, origin: str, written: Mapping) -> Campaign:
-    """Return the campaign in the text of a file, after checking the text but not the files that it names."""
+    """Check the text of a configuration file and return the campaign; surfaces from files are not read."""
 
     def implausible():
         return plausibility_problems(unusual_values(written), written.get(CONFIRMED))
@@ -115,34 +115,38 @@ def _check_text(path: Path, origin: str, written: Mapping) -> Campaign:
 
 
 def _named_files(campaign: Campaign) -> dict[tuple[str, str], str]:
-    """Return the files that a campaign names, by section and entry."""
+    """Return the paths of the files of surfaces and measurements, by section and entry."""
     files = {("surfaces", name): each.path for name, each in campaign.surfaces.items() if not each.random}
     return files | {("measurements", name): each.path for name, each in campaign.measurements.items()}
 
 
 def _files_outside(campaign: Campaign, folder: str | os.PathLike) -> list[Problem]:
-    """Report files of a campaign that are outside of a folder, after resolving links."""
+    """Return a problem for each file of a campaign that is outside a folder; links are resolved first."""
     return [
-        ((section, campaign.origin(section, name), "path"), path, "is in another folder; expected files beside it")
+        (
+            (section, campaign.origin(section, name), "path"),
+            path,
+            "is outside the folder of the configuration; expected files in this folder",
+        )
         for (section, name), path in _named_files(campaign).items()
         if not Path(path).resolve().is_relative_to(Path(folder).resolve())
     ]
 
 
-# Folder for the files that a configuration names, beside the copy of the configuration in the results.
+# Folder for copies of the files of surfaces and measurements, beside the copy of the configuration in the results.
 INPUTS = "inputs"
 
 
 def collect_inputs(configuration: Configuration) -> tuple[str, dict[str, str]]:
-    """Return the text of a configuration as ICHA used it, and the files to store beside it.
+    """Return the text of a configuration with paths in the folder `inputs`, and the files to copy to this folder.
 
     Returns
     -------
-    text : the configuration with the paths `inputs/<section>/<entry>/<name>` of its files.
-    files : present paths of these files, by their paths in the text. Surfaces that no study uses are left out.
+    text : the configuration, in which files have the paths `inputs/<section>/<entry>/<name>`.
+    files : present paths of the files, by their paths in the text. Surfaces that no study uses are left out.
     """
     campaign = configuration.campaign
-    # Variants of a surface have its file.
+    # Variants of a surface have the same file as the original.
     named = {key: path for key, path in _named_files(campaign).items() if campaign.origin(*key) == key[1]}
     if not named:
         return configuration.text, {}
@@ -155,6 +159,6 @@ def collect_inputs(configuration: Configuration) -> tuple[str, dict[str, str]]:
         content[section][name] = (content[section][name] or {}) | {"path": stored}
         if section == "measurements" or (section, name) in used:
             files[stored] = path
-    # Every surface has its own path now.
+    # Every surface now has a path, so defaults must not contain one.
     (content.get("defaults") or {}).get("surfaces", {}).pop("path", None)
     return dump_yaml(content, configuration.origin), files

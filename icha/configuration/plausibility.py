@@ -1,6 +1,7 @@
-"""Find unusual values, most of which have a wrong unit.
+"""Find unusual values in a configuration; the usual cause is a wrong unit.
 
-An unusual value is refused, unless the list `confirmed` of the campaign contains its key; then it causes a warning.
+ICHA refuses an unusual value, unless the campaign's list `confirmed` contains its key. A confirmed value causes a
+warning.
 """
 
 from collections.abc import Collection, Iterator, Mapping
@@ -15,12 +16,12 @@ from icha.support.values import Problem, to_number, to_si
 from icha.surfaces.moments import self_affine_full_contact_energy
 
 CONFIRMED = "confirmed"
-# Sections in which keys of these names are quantities.
+# Sections whose keys are checked.
 _SECTIONS = ("defaults", "surfaces", "materials", "studies")
 
 
 class Usual(NamedTuple):
-    """The range of the usual values of a key, and the reason for its bounds."""
+    """Usual range of the values of a key, and the reason for this range."""
 
     si_unit: str
     least: str
@@ -29,7 +30,7 @@ class Usual(NamedTuple):
     or_zero: bool = False
 
     def contains(self, value: Any) -> bool:
-        """Return whether a written value is usual. Invalid values count as usual, because other checks report them."""
+        """Return whether a value is in the usual range; True for invalid values, which other checks report."""
         try:
             number = self._read(value)
         except ValueError:
@@ -40,18 +41,18 @@ class Usual(NamedTuple):
         return to_number(value) if self.si_unit == "1" else to_si(value, self.si_unit)
 
     def __str__(self):
-        """Return the range and its reason, for messages."""
+        """Return the usual range and its reason, as text for messages."""
         return f"{'0 or ' if self.or_zero else ''}{self.least} to {self.most} ({self.why})"
 
 
 _SIDE = Usual("m", "1 nm", "1 m", "from a few atoms to a machine part")
 _WAVE = Usual("m", "0.1 nm", "1 m", "from an atom to a machine part")
-_SLOPE = Usual("1", "1e-4", "5", "from superpolished mirrors, 1e-3, to fracture surfaces, about 1")
+_SLOPE = Usual("1", "1e-4", "5", "superpolished mirrors have 1e-3, fracture surfaces about 1")
 _OF_ENERGY = "van der Waals forces give 10 to 200 mJ/m^2, clean metals 1 to 3 J/m^2"
-_OF_RANGE = "chemical bonds reach less than 1 nm, van der Waals forces some nm, what grids resolve some 100 nm"
+_OF_RANGE = "chemical bonds have less than 1 nm, van der Waals forces some nm; grids may need some 100 nm"
 # Usual values by key. The ranges contain every reasonable value and exclude most values with a wrong unit prefix.
 USUAL = {
-    "contact_modulus": Usual("Pa", "1 kPa", "2000 GPa", "from soft gels to diamond against something rigid, 1150 GPa"),
+    "contact_modulus": Usual("Pa", "1 kPa", "2000 GPa", "from soft gels to diamond on a rigid body, 1150 GPa"),
     "surface_energy": Usual("J/m^2", "0.001 mJ/m^2", "3 J/m^2", _OF_ENERGY, or_zero=True),
     "interaction_range": Usual("m", "0.05 nm", "1 um", _OF_RANGE),
     "period": _SIDE,
@@ -65,12 +66,12 @@ USUAL = {
 
 
 class Unusual(NamedTuple):
-    """An unusual value.
+    """A value outside the usual range of its key.
 
     Attributes
     ----------
-    location : location in the configuration.
-    source : origin of a value that is not in the configuration, with a blank before it.
+    location : keys that lead to the value in the configuration.
+    source : text for messages, with a blank before it: origin of a value that is not in the configuration.
     """
 
     location: tuple
@@ -80,12 +81,12 @@ class Unusual(NamedTuple):
 
     @property
     def key(self) -> str:
-        """Key for the list `confirmed`; for an entry of a list, the key of the whole list."""
+        """Key of the value for the list `confirmed`; entries of a list have the key of the list."""
         return ".".join(entry for entry in self.location if isinstance(entry, str))
 
 
 def unusual_values(written: Mapping) -> list[Unusual]:
-    """Find all unusual values in a configuration as it was written."""
+    """Return all unusual values in the content of a configuration file."""
     return [found for section in _SECTIONS for found in _unusual((section,), written.get(section))]
 
 
@@ -101,42 +102,42 @@ def _unusual(location: tuple, value: Any) -> Iterator[Unusual]:
 
 
 def unusual_topography(location: tuple, section: Any, period: float, rms_slope: float | None) -> Iterator[Unusual]:
-    """Find the unusual values of a topography from a file.
+    """Yield an unusual size and an unusual rms slope of a topography from a file.
 
     Parameters
     ----------
-    location, section : location and section of the surface in the configuration.
+    location, section : keys that lead to the surface in the configuration, and the section of the surface.
     period : side of the square, m.
-    rms_slope : measured slope; None if no study uses it.
+    rms_slope : measured rms slope; None if no study uses the measured slope.
     """
     if getattr(section, "size", section) is None and not _SIDE.contains(f"{period!r} m"):
         yield Unusual((*location, "size"), formatting.length(period), _SIDE, " in the file")
     if rms_slope is not None and not _SLOPE.contains(rms_slope):
-        source = " (it depends on units, size and numbers for missing points)"
+        source = " (the slope depends on units, size and numbers for missing points)"
         yield Unusual((*location, "height_unit"), f"rms slope {rms_slope:.3g}", _SLOPE, source)
 
 
 def plausibility_problems(
     unusual: Collection[Unusual], confirmed: Any, addition: str = f"`{CONFIRMED}: [{{}}]` at the top level"
 ) -> Iterator[Problem]:
-    """Report unusual values whose keys are not in the list `confirmed`; `addition` states how to confirm a key {}."""
+    """Yield a problem for each unusual value whose key is not confirmed; `addition` says how to confirm the key {}."""
     for each in unusual:
         if not (isinstance(confirmed, list) and each.key in confirmed):
-            reason = f"is unusual{each.source}; expected {each.usual}. Correct it, or add {addition.format(each.key)}"
-            yield each.location, each.value, f"{reason} if it is intended"
+            reason = f"is unusual{each.source}; expected {each.usual}. Correct the value, or add "
+            yield each.location, each.value, f"{reason}{addition.format(each.key)} if you intend this value"
 
 
 _RATIO = Usual(
     "1",
     f"{FULL_CONTACT_BELOW:g}",
     "inf",
-    "below, full contact has the lower energy and the asperity model is not applicable: use a rougher surface, a "
-    "stiffer material, or `models: [boundary_elements]`",
+    "for smaller values full contact has the lower energy, and the asperity model does not apply; use a rougher "
+    "surface, a stiffer material, or `models: [boundary_elements]`",
 )
 
 
 def energy_ratio(campaign: Campaign, contact) -> float:
-    """Return U_full/dgamma of a contact, which has a surface, an rms slope and a material."""
+    """Return U_full/dgamma of a contact: elastic energy of full contact per area, divided by the work of adhesion."""
     surface, material = campaign.surfaces[contact.surface], campaign.materials[contact.material]
     if isinstance(surface, SelfAffineSurface):
         energy = self_affine_full_contact_energy(*surface.lengths_and_hurst)
@@ -147,7 +148,7 @@ def energy_ratio(campaign: Campaign, contact) -> float:
 
 
 def sticky_runs(campaign: Campaign) -> Iterator[Unusual]:
-    """Find the stickiest asperity run of every study, if full contact has the lower energy in it."""
+    """Yield for each study the asperity run with the smallest U_full/dgamma, if full contact has the lower energy."""
     for name, study in campaign.studies.items():
         if DEFAULT_MODEL not in study.models:
             continue

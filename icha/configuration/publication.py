@@ -1,4 +1,4 @@
-"""Section `publication`: metadata of a deposit, which only a deposit needs."""
+"""Section `publication`: authors, version and other metadata of a deposit."""
 
 import datetime
 import re
@@ -25,21 +25,21 @@ RESOURCES = tuple(
 # Characters of a web address (RFC 3986).
 _ADDRESS = r"[^\s<>\"{}|\\^`\x00-\x1f\u200b-\u200f]+"
 _ARXIV = r"arXiv:([0-9]{4}\.[0-9]{4,5}|[a-z-]+(\.[A-Z]{2})?/[0-9]{7})(v[0-9]+)?"
-# Crockford's digits of base 32, and those of Python.
+# Conversion of Crockford's digits to base 32 into the digits of Python.
 _FROM_CROCKFORD = str.maketrans("0123456789abcdefghjkmnpqrstvwxyz", "0123456789abcdefghijklmnopqrstuv")
 
 
 def _line(value: str) -> str:
-    """Refuse a text with line breaks or tabs, or without a visible character."""
+    """Return a text of one line; raise ValueError for line breaks, tabs, or a text without visible characters."""
     if "\n" in value or "\t" in value:
         raise ValueError(
-            "holds a line break or a tab; expected text of one line (in YAML, >- and |- end it without one)"
+            "contains a line break or a tab; expected text of one line (in YAML, >- and |- end without a line break)"
         )
     return _prose(value)
 
 
 def _prose(value: str) -> str:
-    """Refuse a text without a visible character."""
+    """Return a text; raise ValueError if the text has no visible character."""
     if not any(char.isprintable() and not char.isspace() for char in value):
         raise ValueError("is blank; expected text")
     return value
@@ -50,7 +50,8 @@ Prose = Annotated[Text, AfterValidator(_prose)]
 
 
 def _orcid(value: str) -> str | None:
-    """Return the ORCID in a text or a web address, if its check digit is right (ISO 7064 mod 11-2)."""
+    """Return the ORCID in a text or web address; None if there is none or its check digit is wrong (ISO 7064)."""
+    # The check digit follows ISO 7064 mod 11-2.
     plain = re.sub(r"^https?://orcid\.org/", "", value)
     if not re.fullmatch(r"([0-9]{4}-){3}[0-9]{3}[0-9X]", plain):
         return None
@@ -59,20 +60,20 @@ def _orcid(value: str) -> str | None:
 
 
 def _ror(value: str) -> str | None:
-    """Return the address of a ROR identifier, if its check digits are right (ISO 7064 mod 97-10)."""
+    """Return the web address of a ROR identifier; None if its check digits are wrong (ISO 7064 mod 97-10)."""
     found = re.fullmatch(r"(?:https?://ror\.org/)?(0([0-9a-hjkmnp-tv-z]{6})([0-9]{2}))", value.lower())
     right = found and int(found[3]) == 98 - int(found[2].translate(_FROM_CROCKFORD), 32) * 100 % 97
     return f"https://ror.org/{found[1]}" if right else None
 
 
 def _doi(value: str) -> str | None:
-    """Return the DOI in a text or an address of doi.org."""
+    """Return the DOI in a text or in an address of doi.org; None for other texts."""
     plain = re.sub(r"(?i)^(https?://(dx\.)?doi\.org/|doi:)", "", value)
     return plain if re.fullmatch(rf"10\.[0-9]{{4,9}}/{_ADDRESS}", plain) else None
 
 
 def _date(value: str) -> str | None:
-    """Return the date in a text, as year-month-day."""
+    """Return the date in a text as year-month-day; None for other texts."""
     try:
         return datetime.date.fromisoformat(value).isoformat()
     except ValueError:
@@ -80,12 +81,12 @@ def _date(value: str) -> str | None:
 
 
 def _matching(pattern: str) -> Callable[[str], str | None]:
-    """Make a function that returns a text if it matches a pattern."""
+    """Return a function that returns a text if the text matches a pattern, else None."""
     return lambda value: value if re.fullmatch(pattern, value) else None
 
 
 def _checked(read: Callable[[str], str | None], what: str, example: str):
-    """Make the type of a text; `read` returns its plain form, or None if the text is wrong."""
+    """Return the type of a text; the function `read` returns the plain form of a text, or None for a wrong text."""
 
     def check(value: Any) -> str:
         # The YAML reader turns a date into a `datetime.date`, and a version such as 1.10 into the number 1.1.
@@ -106,7 +107,7 @@ Identifier = _checked(lambda value: _doi(value) or _web(value), "a DOI, arXiv:12
 FunderId = _checked(lambda value: _doi(value) or _ror(value), "a ROR identifier, or a DOI", "https://ror.org/00k4n6c32")
 Date = _checked(_date, "year, month and day", "2026-01-31")
 Community = _checked(_matching(r"[a-z0-9_-]+"), "the end of the address of a community of Zenodo", "contact-mechanics")
-# Part of the name of a folder.
+# The version is part of the name of a folder.
 Version = _checked(
     _matching(r"[0-9A-Za-z]([0-9A-Za-z.+_-]{0,38}[0-9A-Za-z])?"),
     "letters and digits, with . + - _ between them, in quotes if it looks like a number",
@@ -118,15 +119,15 @@ class Author(Section):
     """An author of the data: a person with `family_names` and `given_names`, or an organisation with `name`."""
 
     family_names: Line | None = None
-    """Family names of a person."""
+    """Family names of the author, if the author is a person."""
     given_names: Line | None = None
-    """Given names of a person."""
+    """Given names of the author, if the author is a person."""
     name: Line | None = None
-    """Name of an organisation or a team."""
+    """Name of the author, if the author is an organisation or a team."""
     orcid: Orcid | None = None
-    """ORCID of a person, such as `0000-0002-1825-0097`."""
+    """ORCID of the person, such as `0000-0002-1825-0097`."""
     affiliation: Line | None = None
-    """Institution of a person."""
+    """Institution of the person."""
     ror: Ror | None = None
     """ROR identifier of the institution, such as `https://ror.org/03yrm5c26`."""
 
@@ -149,17 +150,17 @@ class Author(Section):
 
     @property
     def orcid_address(self) -> str | None:
-        """Web address of the ORCID, if there is one."""
+        """Web address of the ORCID; None without an ORCID."""
         return self.orcid and f"https://orcid.org/{self.orcid}"
 
     @property
     def full_name(self) -> str:
-        """Name with given names before family names."""
+        """Name of the author with given names before family names."""
         return self.name or f"{self.given_names} {self.family_names}"
 
     @property
     def sorted_name(self) -> str:
-        """Name with family names before given names."""
+        """Name of the author with family names before given names."""
         return self.name or f"{self.family_names}, {self.given_names}"
 
 
@@ -169,7 +170,7 @@ class Funding(Section):
     funder: Line
     """Name of the funder."""
     funder_id: FunderId | None = None
-    """Identifier of the funder: a ROR identifier (`https://ror.org/…`), or a DOI of the funder registry."""
+    """Identifier of the funder: a ROR identifier (`https://ror.org/…`), or a DOI from the funder registry."""
     award_number: Line | None = None
     """Number of the grant."""
     award_title: Line | None = None
@@ -179,55 +180,57 @@ class Funding(Section):
 
 
 class RelatedIdentifier(Section):
-    """A work with a relation to the deposit, such as the paper that it supplements, or data that it uses."""
+    """Another work with a relation to the deposit, such as the paper about the data, or data that the campaign uses."""
 
     identifier: Identifier
-    """A DOI, `arXiv:…`, or a web address."""
+    """DOI, `arXiv:…`, or web address of the other work."""
     relation: Literal[RELATIONS]
-    """Relation of the deposit to the other work, by DataCite's names, such as `IsSupplementTo` or `Cites`."""
+    """Relation of the deposit to the other work, with a name that DataCite defines, such as `IsSupplementTo` or
+    `Cites`."""
     resource: Literal[RESOURCES] | None = None
-    """Type of the other work, by DataCite's names, such as `JournalArticle`."""
+    """Type of the other work, with a name that DataCite defines, such as `JournalArticle`."""
 
 
 class KnownFailure(Section):
-    """A run with a failed check that is nevertheless published, with an explanation."""
+    """A run that is published although one of its checks failed, with an explanation."""
 
     run: Line
     """Name of the run as in `verdict.txt`, such as `study/surface/seed1/slope1/material`."""
     reason: Prose
-    """Explanation for readers: the reason why the check failed, and the reason to publish the data nevertheless."""
+    """Explanation for users of the data: the reason why the check failed, and the reason to publish the run
+    nevertheless."""
 
 
 class Publication(Section):
-    """Metadata of a deposit. Only the target `publish` needs them."""
+    """Metadata of a deposit. Only the target `publish` needs this section."""
 
     version: Version | None = None
-    """Version of the data, such as `1.0.0`; required to publish."""
+    """Version of the data, such as `1.0.0`. Required for publication."""
     date: Date | None = None
-    """Day of publication, such as `2026-01-31`; required to publish."""
+    """Day of publication, such as `2026-01-31`. Required for publication."""
     authors: Annotated[list[Author], AfterValidator(distinct)] = []
-    """Authors of the data; at least one is required to publish."""
+    """Authors of the data. At least one author is required for publication."""
     title: Line | None = None
-    """Title of the deposit. Default: that of the campaign."""
+    """Title of the deposit. Default: the title of the campaign."""
     summary: Prose | None = None
-    """Abstract. Default: the summary of the campaign."""
+    """Abstract of the deposit. Default: the summary of the campaign."""
     license: Line | None = None
-    """Licence of the data, an SPDX identifier. Default: that of the campaign."""
+    """Licence of the data, as an SPDX identifier. Default: the licence of the campaign."""
     keywords: Annotated[list[Line], AfterValidator(distinct)] = []
-    """Keywords."""
+    """Keywords of the deposit."""
     funding: Annotated[list[Funding], AfterValidator(distinct)] = []
-    """Sources of funding."""
+    """Sources of funding for the work."""
     related_identifiers: Annotated[list[RelatedIdentifier], AfterValidator(distinct)] = []
     """Papers, data and programs with a relation to the deposit."""
     doi: Doi | None = None
-    """DOI of this version, if one is reserved."""
+    """DOI of this version of the data, if a DOI is reserved."""
     communities: Annotated[list[Community], AfterValidator(distinct)] = []
     """Communities of Zenodo to which the deposit is submitted."""
     known_failures: Annotated[list[KnownFailure], AfterValidator(distinct)] = []
-    """Runs with failed checks that are nevertheless published."""
+    """Runs that are published although a check failed."""
 
     def problems(self, campaign: Any) -> Iterator[Problem]:
-        """Report known failures of runs that the `icha.configuration.campaign.Campaign` does not have."""
+        """Yield a problem for each entry of `known_failures` whose run is not in the campaign."""
         if not self.known_failures:
             return
         runs = {
@@ -243,6 +246,6 @@ class Publication(Section):
 
 
 def missing_metadata(publication: Publication) -> list[str]:
-    """Return a line for each key that a deposit needs and that is missing in the section."""
+    """Return a message for each key of the section that a deposit needs and that is missing."""
     missing = [key for key in ("version", "date", "authors") if not getattr(publication, key)]
     return [f"publication.{key}: is missing; expected: {Publication.model_fields[key].description}" for key in missing]

@@ -1,4 +1,4 @@
-"""The JSON schema of configuration files and the tables of their keys, generated from the sections.
+"""Generate the JSON schema of configuration files, and the tables of all keys in config/README.md.
 
 `python -m icha.configuration.schema` writes both to their files.
 """
@@ -17,10 +17,10 @@ MARK = "<!-- generated from the model: make schema -->\n"
 
 
 def json_schema() -> str:
-    """Return the schema that editors use to check and complete a configuration."""
+    """Return the JSON schema with which editors check and complete configuration files."""
     schema = _schema()
     for name in (*(kind.__name__ for kind in SURFACE_KINDS.values()), "Material", "Study"):
-        # A required key may be among the defaults instead.
+        # The defaults may contain a required key, so the schema must not require the key in every entry.
         schema["$defs"][name].pop("required", None)
     schema["$schema"] = "https://json-schema.org/draft/2020-12/schema"
     return json.dumps(schema, indent=2, ensure_ascii=False) + "\n"
@@ -28,12 +28,12 @@ def json_schema() -> str:
 
 def _schema() -> dict:
     text = json.dumps(Campaign.model_json_schema())
-    # Rename the section as in the configuration, and remove line breaks from descriptions.
+    # Use the section's name `Material`, and remove line breaks from descriptions.
     return json.loads(re.sub(r"\\n *", " ", text.replace("MaterialSection", "Material")))
 
 
 def key_tables() -> str:
-    """Return every key with its description and default, a Markdown table for each section."""
+    """Return a Markdown table for each section, with the default and the meaning of every key."""
     schema = _schema()
     places: dict[str, list[str]] = {}
     for name, place in _sections(schema, schema, ""):
@@ -43,7 +43,7 @@ def key_tables() -> str:
 
 
 def _sections(section: dict, schema: dict, place: str) -> Iterator[tuple[str, str]]:
-    """Yield the name and the place of all sections within a section, such as `Study` and `studies.<name>`."""
+    """Yield class name and location of all sections inside a section, such as `Study` and `studies.<name>`."""
     for key, value in section["properties"].items():
         text = json.dumps(value)
         where = f"{place}{key}" + (".<name>" if "patternProperties" in text else "")
@@ -66,7 +66,7 @@ def _table(heading: str, section: dict) -> str:
 
 
 def readme_with_tables(text: str) -> str:
-    """Return `text` with the tables after the mark."""
+    """Return the text of config/README.md with new tables of keys after the marker."""
     return text.split(MARK)[0] + MARK + "\n" + key_tables()
 
 

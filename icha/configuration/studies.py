@@ -1,4 +1,4 @@
-"""Section `studies`, and the sections `finite_range` and `boundary_element_loops`, which belong to studies."""
+"""Section `studies`, and the sections `finite_range` and `boundary_element_loops`, whose entries refer to studies."""
 
 import math
 from collections.abc import Callable, Iterator
@@ -54,7 +54,7 @@ from icha.support.values import (
     unknown,
 )
 
-# Word that stands for the measured slope of a topography.
+# Value of `rms_slopes` that means the measured slope of a topography.
 MEASURED = "measured"
 
 
@@ -83,7 +83,7 @@ SCALAR_SCHEMA = {"type": ["string", "number", "boolean"]}
 
 
 def scalar(value: Any) -> Any:
-    """Refuse a value that is a list or a mapping."""
+    """Return a number, text or boolean; raise ValueError for a list or a mapping."""
     if not isinstance(value, str | int | float):
         raise ValueError("is not a single value; expected a number, a text, true or false")
     return value
@@ -99,30 +99,30 @@ Values = Annotated[
 
 
 class Targets(Section):
-    """The targets of the loading path: exactly one of the three lists."""
+    """The targets of the loading path. Exactly one of the three lists must be given."""
 
     reduced_pressures: stops(ReducedPressure, increasing) | None = Field(
         default=None,
-        description=f"Reduced pressures p/(E* h'rms), increasing; with asperities up to {MAX_REDUCED_PRESSURE}.",
+        description=f"Reduced pressures p/(E* h'rms), increasing. Largest for asperities: {MAX_REDUCED_PRESSURE}.",
     )
     area_fractions: stops(AreaFraction, increasing) | None = Field(
         default=None,
-        description=f"Contact area fractions A/A0, increasing; with asperities up to {MAX_AREA_FRACTION}.",
+        description=f"Contact area fractions A/A0, increasing. Largest for asperities: {MAX_AREA_FRACTION}.",
     )
     mean_separations: stops(Length, decreasing) | None = None
-    """Mean separations with their unit, decreasing."""
+    """Mean separations with unit, decreasing."""
 
     _check = model_validator(mode="after")(exactly_one)
 
     @property
     def states(self) -> list[tuple[str, float]]:
-        """Kind and value (SI units) of every target."""
+        """Kind (such as reduced_pressure) and value (SI units) of every target."""
         ((kinds, values),) = self.model_dump(exclude_none=True).items()
         return [(kinds.removesuffix("s"), value) for value in values]
 
     @property
     def last(self) -> tuple[str, float]:
-        """Kind and value (SI units) of the last target."""
+        """Kind (such as reduced_pressure) and value (SI units) of the last target."""
         return self.states[-1]
 
 
@@ -130,30 +130,30 @@ EVERY_STOP = "every_stop"
 
 
 def _list_or_word(value: Any, read_list: Callable[[Any], Any]) -> Any:
-    """Read a list of snapshots, or the word that stands for all targets."""
+    """Validate a list of snapshots, or the word `every_stop`."""
     if isinstance(value, str) and value != EVERY_STOP:
         raise ValueError(f"is not a choice; expected a list of snapshots, or {EVERY_STOP!r}")
     return value if value == EVERY_STOP else read_list(value)
 
 
 class _OrEveryStop:
-    """Annotation for the JSON schema: a list, or the word `every_stop`."""
+    """Annotation that adds the word `every_stop` to the JSON schema of a list."""
 
     def __get_pydantic_json_schema__(self, core_schema: Any, handler: Callable[[Any], dict]) -> dict:
-        """Return the schema of the list or the word."""
+        """Return the JSON schema: the list, or the word `every_stop`."""
         return {"anyOf": [handler(core_schema), {"const": EVERY_STOP}]}
 
 
 class TurningPoint(Snapshot):
-    """A state at which the path turns: exactly one of the keys. Loads may be tensile (negative) or zero."""
+    """A state at which the loading direction changes. Exactly one key must be given. Tensile loads are negative."""
 
     reduced_pressure: number(FloatRange(most=LARGEST_REDUCED_PRESSURE)) | None = None
-    """At this p/(E* h'rms)."""
+    """Reduced pressure p/(E* h'rms) of the turning point."""
     relative_load: number(NUMBER) | None = None
-    """At this p/E* = F/(E* A0)."""
+    """Relative load p/E* = F/(E* A0) of the turning point."""
 
 
-# Names and descriptions of the parameters that a study may vary: all except files and sections.
+# Names and descriptions of the parameters that a study may vary: all keys except kinds, files and sections.
 SCALARS: dict[str, str] = {}
 for _section in (*SURFACE_KINDS.values(), MaterialSection):
     for _name, _field in _section.model_fields.items():
@@ -162,19 +162,19 @@ for _section in (*SURFACE_KINDS.values(), MaterialSection):
 
 
 def _section_of_scalars(name, kind, doc, fields=None):
-    """Make a section with a key of the type `kind` for every parameter that a study may vary."""
+    """Make a section with one key for every parameter that a study may vary; `kind` is the type of the keys."""
     scalars = {key: (kind | None, Field(default=None, description=text)) for key, text in SCALARS.items()}
     return create_model(name, __base__=Section, __doc__=doc, __module__=__name__, **(fields or {}), **scalars)
 
 
 Vary = _section_of_scalars(
-    "Vary", Values, "Parameters of surfaces and materials that a study varies: one value or a list each."
+    "Vary", Values, "Parameters of surfaces and materials that a study varies. Each key takes one value or a list."
 )
 Scalar = Annotated[Any, AfterValidator(scalar), WithJsonSchema(SCALAR_SCHEMA)]
 Case = _section_of_scalars(
     "Case",
     Scalar,
-    "An entry of an explicit list of runs. Parameters that it does not give take all values of the lists of the study.",
+    "An entry of `cases`. If the entry has no value for a parameter, the parameter takes all values of the study.",
     {
         "surface": (Name | None, Field(default=None, description="Name of a surface.")),
         "seed": (Seed | None, Field(default=None, description="Seed of the random phases.")),
@@ -185,50 +185,51 @@ Case = _section_of_scalars(
 
 
 class Study(Section):
-    """All combinations of surfaces, seeds, slopes and materials, along one loading path."""
+    """Runs for all combinations of surfaces, seeds, slopes and materials. All runs follow the same loading path."""
 
     surfaces: list_of_names() = []
     """Names of surfaces."""
     seeds: Seeds = [1]
-    """Seeds of the random phases: a list, or a range such as `1..50`. Surfaces from a file have no seeds and are used
+    """Seeds of the random phases: a list, or a range such as `1..50`. A surface from a file has no seeds and is used
     once."""
     rms_slopes: Slopes = []
-    """Rms slopes h'rms to which the heights of each topography are scaled. `measured` stands for the slope of the
-    topography in its file."""
+    """Rms slopes h'rms to which the heights of each topography are scaled. With `measured`, a topography from a file
+    keeps its own slope."""
     materials: list_of_names() = []
     """Names of materials."""
     vary: Vary | None = None
-    """Values of parameters that replace those of the surfaces and materials in this study, in all combinations."""
+    """Values of parameters of surfaces and materials for this study. The study runs all combinations of these
+    values."""
     zip: list[Annotated[list[Text], Field(min_length=2)]] = []
-    """Groups of lists whose entries are combined one by one (first with first, second with second) instead of in all
-    combinations, such as `[[rms_slopes, surface_energy]]`."""
+    """Groups of lists that are combined entry by entry (first with first, second with second) instead of in all
+    combinations. Example: `[[rms_slopes, surface_energy]]`."""
     cases: Annotated[list[Case], Field(min_length=1)] | None = None
-    """An explicit list of runs instead of all combinations. Parameters that a case does not give take all values of the
-    lists of the study."""
+    """Explicit list of runs, instead of all combinations. If a case has no value for a parameter, the parameter takes
+    all values of the study."""
     models: Annotated[list[Literal[tuple(MODELS)]], Field(min_length=1), AfterValidator(distinct)] = [DEFAULT_MODEL]
-    """Contact models of every run: `asperities` is fast; `boundary_elements`, in the limit of a short range of
-    attraction, needs a periodic surface and a grid of at least 4 cells (better 8) per shortest wavelength."""
+    """Contact models of every run. `asperities` is fast. `boundary_elements` assumes a very short range of attraction;
+    it needs a periodic surface and a grid with at least 4 (better 8) cells per shortest wavelength."""
     targets: Targets
     """Targets of the loading path."""
     snapshots: (
         Annotated[list[Snapshot], AfterValidator(distinct), WrapValidator(_list_or_word), _OrEveryStop()] | None
     ) = None
-    """States at which the run saves its spots and distributions. The path reaches each of these states exactly.
-    `every_stop` stands for all targets. Default: the last target."""
+    """States at which each run saves its contact spots and distributions. The path reaches each of these states
+    exactly. `every_stop` means all targets. Default: the last target."""
     unload: StrictBool = False
-    """True to unload after loading, until the surfaces no longer touch."""
+    """If true, each run unloads after loading until the surfaces no longer touch."""
     turning_points: list[TurningPoint] = []
-    """States at which the path turns after its last target: at the first one unloading ends, at the second one the next
-    loading ends, and so on."""
+    """States at which the path turns after the last target. The first unloading ends at the first state, the next
+    loading at the second state, and so on."""
     control: Literal["separation", "load"] = "separation"
-    """Quantity that is imposed: the mean separation or the load. Under load control the state jumps where the curve of
-    load against separation turns back, and all targets and turning points must be loads."""
+    """Controlled quantity: the mean separation or the load. Under load control the contact jumps where the curve of
+    load against separation turns back. All targets and turning points must then be loads."""
     max_step: number(STEP) = DEFAULT_STEP
-    """Largest change of mean separation between two equilibria, in units of h_rms."""
+    """Largest change of the mean separation between two equilibria, in units of the rms height."""
 
     @property
     def own_snapshots(self) -> list[tuple[str, float]]:
-        """Kind and value of the states that the runs of the study save."""
+        """Kind and value (SI units) of each state that the study's runs save, without the loads of `finite_range`."""
         if self.snapshots is None:
             return [self.targets.last]
         if self.snapshots == EVERY_STOP:
@@ -236,7 +237,7 @@ class Study(Section):
         return [snapshot.kind_and_value for snapshot in self.snapshots]
 
     def path_settings(self, snapshots: list[tuple[str, float]] | None) -> dict:
-        """Return the arguments of the path of the runs (`icha.Path`), without unused ones."""
+        """Return the arguments of `icha.Path` for the runs of the study, without unused arguments."""
         settings = self.targets.model_dump(exclude_none=True) | {"snapshots": snapshots, "max_step": self.max_step}
         if self.unload or self.turning_points:
             settings |= {
@@ -249,25 +250,26 @@ class Study(Section):
         return settings
 
     def problems(self, snapshots: list[tuple[str, float]] | None) -> Iterator[Problem]:
-        """Yield the reasons why the study cannot run with these snapshots (`Campaign.snapshots_of`)."""
+        """Yield the problems that prevent the study from running; `snapshots` come from `Campaign.snapshots_of`."""
         alone = self.models == [DEFAULT_MODEL]
         # The smallest slope makes the largest reduced pressure.
         slope = min((slope for slope in self.rms_slopes if slope != MEASURED), default=math.inf)
         most = (MAX_REDUCED_PRESSURE if DEFAULT_MODEL in self.models else LARGEST_REDUCED_PRESSURE) * slope
         for location, kind, value in self._states():
-            # Beside another model, asperities end loading at the limit of their range, but must begin within it.
+            # If a study has both models, asperity runs end at the limit of the asperity model, but the first target
+            # must be below.
             needed = alone or (DEFAULT_MODEL in self.models and (location[-1] == 0 or location[0] == "turning_points"))
             if needed and kind in ASPERITY_RANGES and value > ASPERITY_RANGES[kind].most:
                 reason = f"is out of range; expected {ASPERITY_RANGES[kind].expected}, or models: [boundary_elements]"
                 yield location, value, reason
             if kind == RELATIVE_LOAD and value > most:
-                reason = f"at rms slope {slope:g} is a reduced pressure of {value / slope:g}"
+                reason = f"is a reduced pressure of {value / slope:g} at rms slope {slope:g}"
                 yield location, value, f"{reason}; expected relative loads up to {most:g}"
         if self.unload or self.turning_points or self.control != "separation":
             yield from self._path_problems(snapshots)
 
     def _states(self) -> Iterator[tuple[tuple, str, float]]:
-        """Yield location, kind and value of the targets, snapshots and turning points in the configuration."""
+        """Yield location (keys), kind and value of each target, snapshot and turning point."""
         for k, (kind, value) in enumerate(self.targets.states):
             yield ("targets", f"{kind}s", k), kind, value
         snapshots = [] if self.snapshots == EVERY_STOP else self.snapshots or []
@@ -277,7 +279,7 @@ class Study(Section):
                 yield (key, k, kind), kind, value
 
     def _path_problems(self, snapshots):
-        """Report the reason why `icha.Path` refuses the settings."""
+        """Yield a problem if `icha.Path` refuses the settings."""
         try:
             Path(**self.path_settings(snapshots))
         except ValueError as error:
@@ -294,25 +296,27 @@ _Labels = list_of_names(Label)
 
 
 class BesideStudy(Section):
-    """Boundary elements on the topographies of a study."""
+    """Settings of boundary elements that solve the contacts of a study at a finite range of attraction."""
 
     study: Name
     """Name of the study with the topographies."""
     surfaces: _Labels | None = None
-    """Surfaces of the study. Default: all."""
+    """Surfaces of the study to solve. Default: all."""
     seeds: Seeds | None = None
-    """Seeds of the study. Default: all."""
+    """Seeds of the study to solve. Default: all."""
     rms_slopes: Annotated[list[Positive], Field(min_length=1), AfterValidator(distinct)] | None = None
-    """Rms slopes of the study. Default: all."""
+    """Rms slopes of the study to solve. Default: all."""
     materials: _Labels | None = None
-    """Materials of the study. Default: all. With adhesion, the grid must resolve their `interaction_range`."""
+    """Materials of the study. Default: all. The grid must resolve the `interaction_range` of materials with
+    adhesion."""
     tolerance: number(TOLERANCE) = 1e-8
-    """Relative error at which the solver has converged."""
+    """The solver stops when its relative error is below this value."""
     refinement: integer(REFINEMENT) = 1
-    """Number of cells of the solver per cell of the surface's grid, along a side. The heights are interpolated."""
+    """Ratio of the solver's grid to the grid of the surface, along a side. Heights between the nodes are
+    interpolated."""
 
     def problems(self, campaign: Any) -> Iterator[Problem]:
-        """Report entries that the `icha.configuration.campaign.Campaign` does not have, or that cannot be solved."""
+        """Yield the problems of this entry: names that the campaign does not define, and unsolvable contacts."""
         yield from unknown(("study",), self.study, campaign.studies)
         if self.study in campaign.studies:
             yield from self._study_problems(campaign, campaign.studies[self.study])
@@ -334,7 +338,7 @@ class BesideStudy(Section):
         pairs = list(dict.fromkeys((each.surface, each.material) for each in contacts))
         for name in dict.fromkeys(name for name, _ in pairs):
             if campaign.is_free(name):
-                reason = f"has the surface {name!r} with free edges; expected a study of periodic surfaces"
+                reason = f"contains the surface {name!r} with free edges; expected a study of periodic surfaces"
                 yield ("study",), self.study, reason
             elif campaign.grid(name) is not None:
                 nodes = campaign.grid(name) * self.refinement
@@ -345,20 +349,21 @@ class BesideStudy(Section):
 
 
 class BoundaryElements(BesideStudy):
-    """Boundary elements at a finite range of attraction on the topographies of a study, to compare with its runs."""
+    """Boundary elements that solve the contacts of a study at a finite range of attraction, for comparison."""
 
     reduced_pressures: stops(ReducedPressure, increasing)
-    """Loads p/(E* h'rms), increasing. The runs of the study save a snapshot at each of these loads."""
+    """Reduced pressures p/(E* h'rms) to solve, increasing. The runs of the study save a snapshot at each of these
+    loads."""
 
 
 class BoundaryElementLoops(BesideStudy):
-    """Boundary elements at a finite range of attraction, loaded to the largest load of a study and unloaded."""
+    """Boundary elements at a finite range of attraction: loading to the largest load of a study, then unloading."""
 
     separation_step: number(STEP) = 0.05
-    """Change of the mean gap from one solution to the next, in units of h_rms."""
+    """Change of the mean gap from one solution to the next, in units of the rms height."""
 
     def _study_problems(self, campaign, study):
-        """Report also a study that does not unload, or not from a reduced pressure."""
+        """Yield the problems of the base class, and a problem if the study does not unload from a reduced pressure."""
         if not study.unload or study.turning_points or study.targets.last[0] != "reduced_pressure":
             reason = "does not unload after its last reduced pressure; expected a study with `reduced_pressures`, "
             yield ("study",), self.study, f"{reason}`unload: true` and no turning points"

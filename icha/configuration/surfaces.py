@@ -23,24 +23,24 @@ from icha.support.values import (
 
 
 class MaterialSection(Section):
-    """An elastic half-space and its interface with a rough surface."""
+    """Material of the elastic half-space, and adhesion between the half-space and the rough surface."""
 
     model_config = ConfigDict(title="Material")
 
     contact_modulus: Modulus
-    """Composite elastic modulus E*."""
+    """Composite elastic modulus E* (contact modulus)."""
     surface_energy: SurfaceEnergy
-    """Work of adhesion Δγ per area; `0 J/m^2` means no adhesion."""
+    """Work of adhesion Δγ. The value `0 J/m^2` means no adhesion."""
     interaction_range: Length
-    """Range ε of the attraction, which determines when asperities jump into contact. The Tabor parameter of a surface
-    with rms curvature 1/R is μ = (RΔγ²/E*²)^(1/3)/ε."""
+    """Range ε of the attraction. The range determines when asperities jump into contact. The Tabor parameter is μ =
+    (RΔγ²/E*²)^(1/3)/ε, where 1/R is the rms curvature of the surface."""
     flaw_radius: Length | None = None
-    """Radius a of the largest flaw of the interface. Full contact then opens at √(πE*Δγ/(2a)), the tension at which a
-    penny-shaped crack grows, if this is less than the theoretical strength 1.03 Δγ/ε. Default: no flaw."""
+    """Radius a of the largest flaw of the interface. With a flaw, full contact opens at the tension √(πE*Δγ/(2a)), at
+    which a penny-shaped crack grows, or at the theoretical strength 1.03 Δγ/ε if that is smaller. Default: no flaw."""
 
 
 def _unit_of_length(value: Any) -> float:
-    """Return a unit such as `um`, or a multiple of a unit such as `0.1 mm`, in metres."""
+    """Convert a unit such as `um`, or a multiple of a unit such as `0.1 mm`, to metres."""
     expected = "expected a unit of length, such as 'um', or a multiple of one, such as '0.1 mm'"
     if not isinstance(value, str):
         raise ValueError(f"is not a unit; {expected}")
@@ -49,9 +49,9 @@ def _unit_of_length(value: Any) -> float:
 
 
 def _sides(value: Any) -> tuple[float, float]:
-    """Read the sides of a scan along x and y, m: one length, or a list of two."""
+    """Return the sides of a scan along x and y, m, from one length or a list of two lengths."""
     sides = value if isinstance(value, list | tuple) else [value, value]
-    expected = "expected one length, such as '90 um', or a list of two: along x and y"
+    expected = "expected one length, such as '90 um', or a list of two lengths, along x and y"
     if len(sides) != 2:
         raise ValueError(f"has {len(sides)} entries; {expected}")
     return _length(sides[0], expected), _length(sides[1], expected)
@@ -77,76 +77,79 @@ Sides = Annotated[tuple[float, float], BeforeValidator(_sides), WithJsonSchema(_
 
 
 class Crop(Section):
-    """The square to cut out of a scan."""
+    """The square that is cut out of a scan."""
 
     x: Position
-    """Distance between the left edges of the square and of the scan."""
+    """Distance from the left edge of the scan to the left edge of the square."""
     y: Position
-    """Distance between the first rows of the square and of the scan."""
+    """Distance from the first row of the scan to the first row of the square."""
     side: Length
     """Side of the square."""
 
 
 class _SurfaceFromFile(Section):
     random: ClassVar[bool] = False
-    # The waves of a file are not known.
+    # The shortest wavelength of a surface from a file is unknown.
     cells_per_short_wave: ClassVar[float] = math.inf
 
 
 class MeasuredSurface(_SurfaceFromFile):
-    """A measured topography and its preparation. The mean height is always removed."""
+    """A measured topography, and the steps that prepare it for contact models. The mean height is always removed."""
 
     kind: Literal["measured"]
     """A topography from a measurement."""
     path: File
     """File of the topography, relative to the configuration file."""
     format: Literal["auto", "npy", "netcdf", "matrix", "xyz", "hdf5", "fourier", "instrument"] = "auto"
-    """Format of the file: `npy`; `netcdf`; `matrix` (text, a row of heights per line); `xyz` (text, x y z per line in
-    any order); `hdf5`; `fourier` (text, qx qy Re Im per line); `instrument` (a format of a microscope that
-    SurfaceTopography can read). `auto` chooses by the ending of the file name and, for text, by the number of
-    columns."""
+    """Format of the file: `npy`; `netcdf`; `matrix` (text, a row of heights in each line); `xyz` (text, x y z in each
+    line, in any order); `hdf5`; `fourier` (text, qx qy Re Im in each line); `instrument` (a microscope's format that
+    SurfaceTopography can read). With `auto`, ICHA chooses the format by the ending of the file name and, for text, by
+    the number of columns."""
     columns: Annotated[list[integer(IntegerRange(1))], Field(min_length=3, max_length=3)] | None = None
-    """Columns of x, y and z in a text, counted from 1, such as `[1, 2, 3]`. Required if a line has more than three
-    numbers."""
+    """Numbers (from 1) of the columns x, y and z of a text file, such as `[1, 2, 3]`. Required if the file has more
+    than three columns."""
     data: Text | None = None
-    """Array or channel to use if the file has several: name of the variable (netcdf), path of the dataset (hdf5), name
-    of the channel (instrument). Default: the only one, or the default of the file."""
+    """Array or channel with the heights, if the file has several: name of the variable (netcdf), path of the dataset
+    (hdf5), or name of the channel (instrument). Default: the only array, or the file's default channel."""
     first_axis: Literal["y", "x"] = "y"
-    """First axis of the array in npy, netcdf, hdf5 and matrix files: `y` if a row of the array is a line along x, else
-    `x`. ICHA ignores this key if the dimensions in the file are named x and y."""
+    """First axis of the array in npy, netcdf, hdf5 and matrix files: `y` if each row of the array is a line along x,
+    else `x`. ICHA ignores this key if the dimensions in the file have the names x and y."""
     height_unit: UnitOfLength | None = None
-    """Unit of the heights, such as `nm` or `0.1 mm`. Required unless the file contains it. If you give it, the unit in
-    the file is not used."""
+    """Unit of the heights, such as `nm` or `0.1 mm`. Required if the file does not contain the unit. This key replaces
+    the unit in the file."""
     lateral_unit: UnitOfLength | None = None
-    """Unit of the coordinates x and y; with `format: fourier`, unit of 1/q. Default: the unit in the file, else the
-    unit of the heights."""
+    """Unit of the coordinates x and y; with `format: fourier`, unit of 1/q. Default: the unit in the file or, if there
+    is none, the unit of the heights."""
     size: Sides | None = None
-    """Size of the whole scan: one length, or two lengths, along x and y. The pixel size is the size of the scan divided
-    by the number of pixels. Required unless the file contains it. If you give it, the size in the file is not used."""
+    """Size of the whole scan: one length, or a list of two lengths, along x and y. The size of a pixel is the size of
+    the scan divided by the number of pixels. Required if the file does not contain the size. This key replaces the size
+    in the file."""
     touches_first: Literal["high", "low"] = "high"
-    """Points that touch first: those with the largest numbers in the file (`high`), or with the smallest (`low`)."""
+    """Points that touch the elastic body first: the points with the largest (`high`) or the smallest (`low`) numbers in
+    the file."""
     missing: Literal["refuse", "fill"] = "refuse"
-    """Treatment of points without a height: `refuse` the file, or `fill` them with the solution of Laplace's
-    equation."""
+    """Treatment of points without a height. `refuse`: ICHA refuses the file. `fill`: the solution of Laplace's equation
+    fills the points."""
     crop: Crop | None = None
-    """The square to use. Default: the largest one, in the middle."""
+    """The square to cut out of the scan. Default: the largest square in the middle of the scan."""
     detrend: Literal["none", "tilt", "curvature"] | None = None
-    """Trend to remove besides the mean height: `none`, the mean plane (`tilt`), or the paraboloid that fits best
-    (`curvature`). Default: `tilt`; for a periodic topography `none`."""
+    """Trend to remove in addition to the mean height: `none`, the best plane (`tilt`), or the best paraboloid
+    (`curvature`). Default: `tilt`, or `none` with `boundary: periodic`."""
     cutoff: Length | None = None
     """Cut-off wavelength (nesting index) of a Gaussian S-filter (ISO 25178-3, areal filter of ISO 16610-61). The filter
-    removes shorter waves and halves the amplitude of waves of this length, before the edges are treated. At least 4
-    pixels. Default: no filter."""
+    removes shorter waves, and halves the amplitude of waves of this length. The edges are treated after the filter. The
+    cut-off must be at least 4 pixels. Default: no filter."""
     boundary: Literal["periodic", "window", "mirror", "free"]
-    """Treatment of the edges. `periodic`: the topography repeats as it is. `window`: the heights fall smoothly to their
-    mean towards the edges, and the topography repeats. `mirror`: the topography and its mirror images form a periodic
-    cell of twice the side. `free`: one square on a half-space that extends beyond the square."""
+    """Treatment of the edges. `periodic`: the unchanged topography repeats. `window`: the heights fall smoothly to the
+    mean height at the edges, and the topography repeats. `mirror`: the topography and its mirror images form a periodic
+    cell of twice the side. `free`: the topography is a single square; the half-space is larger than the square."""
     taper: number(FloatRange(above=0, most=0.5)) | None = None
-    """Only with `boundary: window`: width of the strip along each edge in which the heights fall to their mean, as a
-    fraction of the side. Default: 0.1."""
+    """Only with `boundary: window`: width of the strip along each edge in which the heights fall to the mean height,
+    divided by the side of the square. Default: 0.1."""
     grid: integer(GRID) | None = None
-    """Nodes along a side of the prepared surface, which is resampled by Fourier interpolation. A coarser grid loses the
-    shortest waves. Default: as many nodes as the scan has (`mirror`: twice as many)."""
+    """Number of nodes along a side of the prepared surface. Fourier interpolation resamples the heights to this grid. A
+    coarser grid loses the shortest waves. Default: the number of nodes of the scan (with `mirror`, twice this
+    number)."""
 
     @model_validator(mode="after")
     def _check_boundary(self):
@@ -160,12 +163,12 @@ class MeasuredSurface(_SurfaceFromFile):
 
     @property
     def preparation(self) -> dict:
-        """Arguments of `icha.surfaces.measured.settings.Preparation`: all keys except kind and path, in SI units."""
+        """Arguments of `icha.surfaces.measured.settings.Preparation`, in SI units: all keys except kind and path."""
         settings = self.model_dump(exclude={"kind", "path"})
         settings["detrend"] = self.detrend or ("none" if self.boundary == "periodic" else "tilt")
         settings["taper"] = (self.taper or 0.1) if self.boundary == "window" else None
         if self.cutoff is None:
-            # Results of earlier versions, which did not have this key, stay valid.
+            # Without this key, checksums of settings are those of earlier versions, and old results remain valid.
             del settings["cutoff"]
         if self.columns is None:
             del settings["columns"]
@@ -173,7 +176,7 @@ class MeasuredSurface(_SurfaceFromFile):
 
 
 class SelfAffineSurface(Section):
-    """A random periodic surface from spectral synthesis, self-affine with roll-off."""
+    """A random periodic surface with a self-affine spectrum with roll-off, generated by spectral synthesis."""
 
     random: ClassVar[bool] = True
 
@@ -182,26 +185,26 @@ class SelfAffineSurface(Section):
     period: Length
     """Side L of the periodic cell."""
     rolloff_wavelength: Length
-    """Roll-off wavelength 2π/q0: the spectrum is flat at longer wavelengths. At most the period."""
+    """Roll-off wavelength 2π/q0, at most the period. The spectrum is flat at longer wavelengths."""
     short_wavelength: Length
-    """Shortest wavelength 2π/q1. It must be less than the roll-off wavelength and at least 2 grid cells. Less than 4
-    grid cells give a warning; 8 are recommended."""
+    """Shortest wavelength 2π/q1. The length must be less than the roll-off wavelength and at least 2 grid cells. A
+    length below 4 grid cells causes a warning; 8 grid cells are recommended."""
     hurst: number(HURST)
     """Hurst exponent H, in (0, 1]."""
     grid: integer(GRID)
-    """Grid points along a side of the cell."""
+    """Number of nodes along a side of the periodic cell."""
     amplitudes: Literal["fixed", "gaussian"] = "fixed"
-    """Amplitudes of the waves: `fixed` by the spectrum, so that all seeds have the same rms height and slope, or
-    `gaussian`, random with the spectrum as their mean square."""
+    """Amplitudes of the waves. `fixed`: every amplitude has the value of the spectrum, so all seeds have the same rms
+    height and slope. `gaussian`: amplitudes are random, and their mean square is the spectrum."""
 
     @property
     def lengths_and_hurst(self) -> tuple[float, float, float, float]:
-        """Period, roll-off and shortest wavelength (m), and the Hurst exponent."""
+        """Period, roll-off wavelength and shortest wavelength, m, and Hurst exponent."""
         return self.period, self.rolloff_wavelength, self.short_wavelength, self.hurst
 
     @property
     def cells_per_short_wave(self) -> float:
-        """Grid cells per shortest wavelength."""
+        """Number of grid cells per shortest wavelength."""
         return self.grid * self.short_wavelength / self.period
 
     def grid_of_cells(self, cells: int) -> int:
@@ -211,14 +214,14 @@ class SelfAffineSurface(Section):
     @field_validator("rolloff_wavelength", "short_wavelength", "grid")
     @classmethod
     def _check_wavelengths(cls, value, info):
-        """Check the order of the wave vectors qL <= q0 < q1, and that the grid resolves them."""
+        """Refuse wavelengths unless qL <= q0 < q1 and the grid resolves the shortest wavelength 2π/q1."""
         period, rolloff, short = map(info.data.get, ("period", "rolloff_wavelength", "short_wavelength"))
         if info.field_name == "rolloff_wavelength":
             if period is not None and value > period * (1 + ROUNDING):
-                raise ValueError(f"is longer than the period (q0 < qL); expected at most {period:g} m")
+                raise ValueError(f"is longer than the period; expected at most {period:g} m")
         elif info.field_name == "short_wavelength":
             if rolloff is not None and value >= rolloff * (1 - ROUNDING):
-                reason = "is not shorter than the roll-off wavelength (q1 <= q0)"
+                reason = "is not shorter than the roll-off wavelength"
                 raise ValueError(f"{reason}; expected less than {rolloff:g} m")
         elif None not in (period, short) and value * short / period < 2 * (1 - ROUNDING):
             least = math.ceil(2 * period / short * (1 - ROUNDING))
@@ -230,19 +233,19 @@ class SelfAffineSurface(Section):
 
 
 class FileSurface(_SurfaceFromFile):
-    """A periodic height map from a file, for example a published surface."""
+    """A periodic height map from a file, such as a published surface."""
 
     kind: Literal["file"]
     """A height map from a file."""
     path: File
-    """File of a square array of heights, first axis y: `.npy`, or netCDF (`.nc`) with a variable `height`; relative to
-    the configuration file. Heights are positive towards the elastic body."""
+    """File with a square array of heights, relative to the configuration file: `.npy`, or netCDF (`.nc`) with a
+    variable `height`. The first axis is y. Heights are positive towards the elastic body."""
     height_unit: UnitOfLength
-    """Unit of the heights in the file, such as `um`. Each study scales the heights to its rms slopes."""
+    """Unit of the heights in the file, such as `um`. Each study scales the heights to the rms slopes of the study."""
     period: Length
     """Side L of the periodic cell."""
 
 
-# Sections of surfaces, by their key `kind`.
+# Classes of the sections of surfaces, by the value of the key `kind`.
 SURFACE_KINDS = {"self_affine": SelfAffineSurface, "file": FileSurface, "measured": MeasuredSurface}
 AnySurface = Annotated[SelfAffineSurface | FileSurface | MeasuredSurface, Field(discriminator="kind")]

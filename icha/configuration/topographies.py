@@ -1,4 +1,4 @@
-"""Read topographies from files: their facts for campaigns, and `icha.read_scan` for scripts."""
+"""Read surfaces from files: properties for the checks of a campaign, and `icha.read_scan` for scripts."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 def inspect_topographies(campaign: Campaign) -> tuple[dict[str, Topography], list[Problem]]:
-    """Return the facts of every topography from a file that a study uses, and the problems with these files."""
+    """Return the properties of all surfaces from files that studies use, and the problems of these files."""
     contacts = [each for study in campaign.studies for each in campaign.contacts(study)]
     of_measured_slope = {each.surface for each in contacts if each.rms_slope == MEASURED}
     facts, problems = {}, []
@@ -41,16 +41,16 @@ def inspect_topographies(campaign: Campaign) -> tuple[dict[str, Topography], lis
     return facts, problems
 
 
-# Facts of topographies, by path, settings, time and size of the file.
+# Known properties of topographies, by path, settings, time and size of the file.
 _KNOWN: dict[tuple, Topography] = {}
 
 
 def inspect_file(section: MeasuredSurface | FileSurface) -> Topography:
-    """Return the facts of a topography from a file, which is read again only if it has changed."""
+    """Return the properties of a surface from a file; an unchanged file is read only once."""
     try:
         stat = os.stat(section.path)
         version = stat.st_mtime_ns, stat.st_size
-    except (OSError, ValueError):  # reading the file reports what is wrong
+    except (OSError, ValueError):  # `read_surface` reports the error
         version = None
     key = section.path, section.model_dump_json(), version
     if key not in _KNOWN:
@@ -59,7 +59,7 @@ def inspect_file(section: MeasuredSurface | FileSurface) -> Topography:
         _KNOWN[key] = Topography(
             surface.grid,
             surface.period,
-            # Six digits, which are part of file names, are more than any instrument has.
+            # File names contain the slope with six digits; no instrument is more accurate.
             float(f"{slope:.6g}"),
             sha256_of(Path(section.path)),
             surface.full_contact_energy / slope**2,
@@ -69,8 +69,8 @@ def inspect_file(section: MeasuredSurface | FileSurface) -> Topography:
 
 
 def read_surface(section: MeasuredSurface | FileSurface) -> Surface:
-    """Read and prepare the surface of a file, as its section of the configuration describes."""
-    # These modules import SciPy, which takes time; campaigns without such a surface do not need it.
+    """Read a surface from a file, and prepare it as its section of the configuration describes."""
+    # The modules below import SciPy, which takes time; campaigns without surfaces from files do not need SciPy.
     if isinstance(section, MeasuredSurface):
         from icha.surfaces.measured.topography import prepared_topography
 
@@ -82,21 +82,21 @@ def read_surface(section: MeasuredSurface | FileSurface) -> Surface:
 
 
 def read_scan(path: str | os.PathLike, *, confirmed: Collection[str] = (), **keywords: Any) -> Surface:
-    """Read a measured topography and prepare it as a campaign does.
+    """Read a measured topography from a file and prepare a surface, with the same steps as in a campaign.
 
     Parameters
     ----------
-    path : file of the topography.
-    confirmed : names of the keywords with unusual values that you intend; "height_unit" also confirms the slope.
-    keywords : keys of a measured surface in a configuration, with values in the same form, such as `size="32 um"`,
+    path : path of the file.
+    confirmed : names of keywords whose unusual values you intend; "height_unit" also confirms an unusual rms slope.
+    keywords : keys of a surface of kind `measured`, with values as in a configuration file, such as `size="32 um"`,
         `height_unit="nm"` and `boundary="window"`. `boundary` is required; `size` and `height_unit` are required unless
         the file contains them.
 
     Raises
     ------
     ConfigurationError
-        A ValueError, if a key is missing or wrong, if the file cannot be read or prepared with these keys, or if a
-        size or slope is unusual and not confirmed.
+        A ValueError. Raised if a key is missing or wrong, if the file cannot be read or prepared with these keys, or if
+        an unusual size or slope is not confirmed.
     """
     from icha.configuration.plausibility import plausibility_problems, unusual_topography, unusual_values
     from icha.surfaces.measured.settings import UnfitTopography

@@ -1,4 +1,4 @@
-"""Read and write YAML files of configurations, with overrides and defaults."""
+"""Read and write configurations as YAML; apply overrides and defaults."""
 
 import re
 from collections.abc import Iterator, Mapping
@@ -14,12 +14,12 @@ from icha.configuration.surfaces import SURFACE_KINDS
 from icha.support import formatting
 from icha.support.input_files import problem_with_path
 
-# Limits of a file: bytes; values, with aliases expanded; nested sections; characters of a number.
+# Limits of a file: bytes; number of values after expansion of aliases; nested sections; characters of a number.
 _MOST_BYTES, _MOST_VALUES, _DEEPEST, _LONGEST_NUMBER = 10**6, 10**6, 50, 100
 
 
 def read_yaml(path: Path) -> dict:
-    """Read a YAML file that contains a mapping; raise ConfigurationError if it does not, or if it has a key twice."""
+    """Read a YAML file; raise ConfigurationError if the content is not a mapping, or if a key occurs twice."""
     text, line, problem = _read_text(path), 0, ""
     try:
         content = yaml.load(text, Loader=_Loader)
@@ -60,10 +60,10 @@ _TOO_DEEP = f"the file has more than {_DEEPEST} nested sections or lists"
 
 
 def excessive_size(content: Any) -> str:
-    """Describe why a configuration is too large to be checked; empty if it is not.
+    """Return a message if a configuration is too large to be checked; otherwise an empty text.
 
-    Aliases count with all of their values, because a few lines of nested aliases can have billions of values. Defaults
-    count once for every entry that they fill.
+    Each alias counts with all its values, because a few lines of nested aliases can have billions of values. A default
+    value counts once for every entry that receives it.
     """
     for count, depth in enumerate(_depths(content)):
         if depth > _DEEPEST:
@@ -74,23 +74,23 @@ def excessive_size(content: Any) -> str:
 
 
 def _depths(content: Any, depth: int = 1) -> Iterator[int]:
-    """Yield the number of nested sections and lists of every value."""
+    """Yield the depth of every value: the number of sections and lists that contain the value."""
     yield depth
     for each in content.values() if isinstance(content, Mapping) else content if isinstance(content, list) else ():
         yield from _depths(each, depth + 1)
 
 
 class _Loader(yaml.SafeLoader):
-    """A YAML loader that refuses repeated keys, and reads numbers as their authors mean them."""
+    """A YAML loader that refuses repeated keys, and does not read numbers such as 064 as octal numbers."""
 
     def construct_unless_text(self, node, construct):
-        """Construct the value of a scalar; if this fails, return its text, which the section then checks.
+        """Convert a scalar to a Python value; if this fails, return its text, for which the section reports an error.
 
-        Construction fails for `0b_`, which looks like a number, for 30 February, which looks like a date, and for
-        integers of thousands of digits, which Python refuses.
+        Conversion fails for `0b_` (similar to a number), for 30 February (similar to a date), and for integers with
+        thousands of digits.
         """
         text = self.construct_scalar(node)
-        # YAML 1.1 would read a time such as 1:30 as a number of base 60.
+        # YAML 1.1 would read a time such as 1:30 as a number to base 60.
         if len(text) > _LONGEST_NUMBER or (":" in text and not node.tag.endswith("timestamp")):
             return text
         # YAML 1.1 would read 064 as an octal number, which no author of a configuration means.
@@ -119,21 +119,21 @@ for _kind in ("int", "float", "timestamp"):
 
 
 def dump_yaml(content: Mapping, origin: str) -> str:
-    """Return the text of a configuration, with its keys in their order and a line for each value.
+    """Return a configuration as YAML text, with the keys in their order and one line for each value.
 
-    Raises ConfigurationError, which names the file `origin`, if the text is too long to be read again.
+    Raises ConfigurationError if the text is too long to be read again; the message contains the path `origin`.
     """
     text = yaml.safe_dump(dict(content), sort_keys=False, allow_unicode=True, width=110)
     if len(text.encode()) > _MOST_BYTES:
         raise ConfigurationError(
-            f"{origin}: the copy for the results, with a line for each value, is longer than "
-            f"{formatting.size(_MOST_BYTES)}; expected fewer values, such as ranges of seeds"
+            f"{origin}: the copy of the configuration, with a line for each value, is longer than "
+            f"{formatting.size(_MOST_BYTES)}; expected fewer values. Use ranges of seeds"
         )
     return text
 
 
 def merge(content: Mapping, overrides: Mapping) -> dict:
-    """Return `content` with the values of `overrides`. A list replaces the whole former list."""
+    """Return `content` with the values of `overrides`; mappings are merged, and lists are replaced as a whole."""
     result = dict(content)
     for key, value in overrides.items():
         inside = result.get(key)
@@ -143,7 +143,7 @@ def merge(content: Mapping, overrides: Mapping) -> dict:
 
 
 def _find_defaults(content: Mapping) -> Iterator[tuple[str, Mapping, Mapping]]:
-    """Yield every section that has defaults, with its defaults and entries, if both are mappings."""
+    """Yield name, defaults and entries of every section that has defaults, if defaults and entries are mappings."""
     defaults = content.get("defaults")
     for section in Defaults.model_fields if isinstance(defaults, Mapping) else ():
         given, entries = defaults.get(section), content.get(section)
@@ -152,7 +152,7 @@ def _find_defaults(content: Mapping) -> Iterator[tuple[str, Mapping, Mapping]]:
 
 
 def apply_defaults(content: Mapping) -> dict:
-    """Return `content` with its `defaults` filled into the entries; a surface gets only the keys that its kind has."""
+    """Return `content` with default values in all entries; a surface receives only the keys of its kind."""
     filled = {
         section: {
             name: _fill_in(entry or {}, given) if isinstance(entry, Mapping | None) else entry
@@ -164,7 +164,7 @@ def apply_defaults(content: Mapping) -> dict:
 
 
 def _fill_in(entry: Mapping, given: Mapping) -> dict:
-    """Return an entry with its defaults, without the keys that only surfaces of other kinds have."""
+    """Return an entry with default values `given`, except for keys that only surfaces of other kinds have."""
     kinds = [section.model_fields for section in SURFACE_KINDS.values()]
     kind = SURFACE_KINDS.get(str(entry.get("kind", given.get("kind"))))
     others = set().union(*kinds).difference(kind.model_fields) if kind else set()
@@ -172,7 +172,7 @@ def _fill_in(entry: Mapping, given: Mapping) -> dict:
 
 
 def location_in_defaults(location: tuple, written: Mapping) -> tuple:
-    """Return the location at which a value was written: in its entry, or in the defaults of its section."""
+    """Return the location of a value in the file: in its entry, or in the defaults of its section."""
     for section, given, entries in _find_defaults(written):
         if len(location) > 2 and location[0] == section:
             entry = entries.get(location[1]) or {}

@@ -1,8 +1,8 @@
 """Checkpoints: save each equilibrium of a contact, so that an interrupted run can resume.
 
-The name of a checkpoint depends on all solves before it and on their order. If a path is repeated after an
-interruption, it loads its equilibria, bit by bit the same, up to the interruption. Another path loads only the
-equilibria that both paths have in common at their beginning.
+The name of a checkpoint depends on all earlier solves and on their order. If a path is repeated after an interruption,
+it loads exactly the same equilibria up to the interruption. A different path loads only those equilibria at its
+beginning that both paths have in common.
 """
 
 from __future__ import annotations
@@ -34,8 +34,8 @@ class CheckpointedContact:
     contact : `icha.contact.model.ContactModel`.
     of : text that identifies the contact.
     folder : folder of the checkpoints, one file each.
-    packed : function of a new state and of the state before it that returns arrays by name.
-    unpacked : function of these arrays and of the state before that returns the new state.
+    packed : function that returns arrays by name for a new state and the state before the new state.
+    unpacked : function that returns the new state for these arrays and the state before the new state.
     """
 
     contact: Any

@@ -1,4 +1,4 @@
-"""Interface of contact models: what a path needs of them, and what a run records of their states."""
+"""Interface of contact models: the methods that a path uses, and the values that a run records."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from icha.surfaces.summits import Asperities
     from icha.surfaces.surface import Surface
 
-# Quantities that the solver can keep constant.
+# Quantities that can be prescribed instead of the mean separation.
 PRESSURE, AREA_FRACTION = "pressure", "area_fraction"
 
 
@@ -23,8 +23,8 @@ class Control:
 
     Attributes
     ----------
-    quantity : PRESSURE (nominal, Pa) or AREA_FRACTION.
-    target : value of the quantity.
+    quantity : PRESSURE (nominal pressure, Pa) or AREA_FRACTION (contact area over nominal area).
+    target : prescribed value of the quantity.
     """
 
     quantity: str
@@ -36,7 +36,7 @@ class NotConverged(Exception):
 
 
 class BeyondModel(NotConverged):
-    """Error: the next target is outside the range of the model. The path up to there is a valid result."""
+    """Error: the next target is outside the range of the model. The path up to this target is a valid result."""
 
 
 class FullContact(NotConverged):
@@ -80,7 +80,7 @@ class Events:
 
     @classmethod
     def concatenate(cls, parts) -> Events:
-        """Return the events of several `Events` in one."""
+        """Return one `Events` with the events of several `Events`, in the same order."""
         parts = [cls(np.empty(0, np.int8), np.empty((0, 2)), np.empty(0, int), np.empty(0)), *parts]
         return cls(*(np.concatenate([getattr(part, name) for part in parts]) for name in cls.__match_args__))
 
@@ -104,7 +104,7 @@ def events_between(before: State, after: State) -> Events:
 
 
 class ContactModel(Protocol):
-    """Contact of one surface and one material; a path computes each equilibrium from the one before.
+    """Contact of one surface and one material; a path computes each equilibrium from the last equilibrium.
 
     Attributes
     ----------
@@ -133,7 +133,7 @@ class ContactModel(Protocol):
     def equilibrium(self, state: State, separation: float, control: Control | None = None, *, let_go: int = 0) -> State:
         """Find the equilibrium at another mean separation, load or area, starting from a state.
 
-        Raise `NotConverged` if it is not found, and `FullContact` if the contact spreads over the whole surface.
+        Raise `NotConverged` if there is no equilibrium, and `FullContact` if contact spreads over the whole surface.
 
         Parameters
         ----------
@@ -143,9 +143,9 @@ class ContactModel(Protocol):
         """
 
     def continue_from(self, state: State, before: State) -> State:
-        """Return a state with its events since another one than that from which it was found.
+        """Return a state with the history of the state `before` and the events between both states.
 
-        Only for models that predict steps.
+        A path uses this method only for models that predict steps.
         """
 
     def pressure(self, state: State) -> float:
@@ -173,7 +173,7 @@ class ContactModel(Protocol):
         """Return whether a spot approaches as the surfaces move apart, which happens only on an unstable branch."""
 
     def observables(self, surface: Surface) -> Observables:
-        """Return the object that computes what a run records of a state."""
+        """Return the object that computes the values that a run records of its states."""
 
 
 class Observables(Protocol):
@@ -186,7 +186,7 @@ class Observables(Protocol):
         """Return the values that a run records of every state."""
 
     def of_snapshot(self, state: State) -> dict[str, Any]:
-        """Return the distributions of gap and pressure, and the spots."""
+        """Return the distributions of gap and pressure in a state, and the properties of its spots."""
 
     def reasons_against(self, separations: Iterable[float], pressed: State | None) -> list[str]:
         """Return the reasons why the model does not represent the surface in the first loading.
@@ -199,7 +199,7 @@ class Observables(Protocol):
 
 
 # Edges of the bins of gap and pressure, the same for every model. The last bin includes all larger values. Gaps are in
-# h_rms: the first bin starts at zero, and there are 20 bins per decade after it. Pressures are in E* h'_rms: the bins
+# h_rms: the first bin starts at zero, and then there are 20 bins per decade. Pressures are in E* h'_rms: the bins
 # have equal width from -1 to 5, and there are 20 bins per decade in the tails. The tail of tension is long because the
 # distribution of JKR pressures falls as |p|^-3.
 GAPS_PER_DECADE = 20
@@ -210,9 +210,9 @@ PRESSURE_BINS = np.concatenate([-np.logspace(8, 0, 161)[:-1], np.linspace(-1, 5,
 def gap_bins(surface: Surface) -> np.ndarray:
     """Return the edges of the bins of the gap on a surface, m.
 
-    When the surfaces just touch, the largest gap is the height from the deepest pit to the highest peak. If it is more
-    than 31.6 h_rms, the last bin ends there. By Chebyshev's inequality less than 0.2 % of a surface lies so deep, so
-    that one bin is enough.
+    When the surfaces just touch, the largest gap is the height from the deepest pit to the highest peak. If this gap is
+    more than 31.6 h_rms, the last bin ends at this gap. By Chebyshev's inequality less than 0.2 % of a surface is so
+    deep, so that one bin is enough.
     """
     edges = GAP_BINS * surface.rms_height
     edges[-1] = max(edges[-1], np.ptp(surface.heights))

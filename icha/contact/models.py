@@ -2,7 +2,7 @@
 
 This module imports no solver, so that the fingerprints of figures, plans and configurations do not depend on solvers.
 The cost of a model is in `icha.planning.costs`, and its colours and markers are in `icha.figures.looks`, because a
-change of these must not recompute runs.
+change of costs or colours must not recompute runs.
 """
 
 from collections.abc import Iterable, Mapping
@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 # Largest error of an equilibrium of asperities, in h_rms.
 RESIDUAL_TOLERANCE = 1e-9
-# With adhesion a load is the difference of repulsion and attraction. If it is below this fraction of the repulsion, its
-# error is relative to this fraction of the repulsion, not to the load.
+# With adhesion a load is the difference of repulsion and attraction. If the load is less than this fraction of the
+# repulsion, the error of the load is relative to this fraction of the repulsion.
 SMALLEST_LOAD = 1e-4
 # Largest error of a prescribed area without adhesion if contact is counted in whole cells: in cells, and relative to
 # the area.
@@ -50,18 +50,18 @@ MODEL_PAPER = Paper(
 
 @dataclass(frozen=True)
 class PathAccuracy:
-    """Accuracy to which a path locates events, and knows work and largest tension, between two equilibria.
+    """Accuracy with which a path locates events, and computes work and largest tension between two equilibria.
 
     Attributes
     ----------
-    event : length of a step in which an event that changes the pressure counts as located, in h_rms.
+    event : step length, in h_rms, up to which an event in the step counts as located.
     loss : largest uncertainty of the work of one step with events, relative to the work so far.
     balance : largest difference between work and change of energy in a long step without events, relative to the work
         so far.
-    tension : largest error of the largest tension between two equilibria without an event, relative to it.
-    least_work : works below it are as uncertain as this one, J/m^2.
-    predicts_steps : whether the length of a step follows from the error of its work, which then counts in every step:
-        the pressure may jump without an event. Otherwise the length doubles.
+    tension : largest relative error of the largest tension between two equilibria without an event.
+    least_work : smallest work to which `loss` is relative, J/m^2.
+    predicts_steps : whether the error of the work decides the length of every step, because the pressure may jump
+        without an event. If False, the length of steps without events doubles.
     """
 
     event: float = 1e-12
@@ -81,17 +81,17 @@ class Model:
     words : name of the model in sentences and legends, in the plural.
     title : title of a run, before the names of surface and material.
     method : method in the summary of a run.
-    references : publications of its methods, separated by "; ".
+    references : publications on the method, separated by "; ".
     module : module whose `contact_of(surface, material)` returns an `icha.contact.model.ContactModel`.
-    folder : folder of its runs beside those of the default model; ends with a slash unless it is empty.
-    variables : variables that only its runs have: dimensions, unit, long name and type by name.
+    folder : folder for the runs of this model, with a slash at the end; empty for the default model.
+    variables : variables that only runs of this model have: dimensions, unit, long name and type by name.
     stiffness_error : largest relative error of the contact stiffness.
     by_summits : whether summits represent the surface. Spots then unite by a rule, which may cost or gain some energy.
-    by_cells : whether contact is counted in cells of the grid; its runs then have a map of the contact.
+    by_cells : whether contact is counted in cells of the grid; runs then contain a map of the contact.
     periodic_only : whether the model cannot press a square with free edges.
     least_cells : smallest number of grid cells per shortest wavelength; 0 for any number.
-    accuracy : accuracy to which a path resolves its events.
-    resumable : whether a run saves checkpoints (`resumable(contact, folder)` of its module).
+    accuracy : accuracy with which a path resolves its events.
+    resumable : whether a run saves checkpoints, by the function `resumable(contact, folder)` of `module`.
     """
 
     words: str
@@ -112,7 +112,7 @@ class Model:
 
 _WU = "J.-J. Wu, J. Phys. D: Appl. Phys. 43 (2010) 415303"
 _MAP = ("snapshot", "row", "column")
-# Model of runs that name no model, and model that others are compared with.
+# Model of runs without a model name, and model with which other models are compared.
 DEFAULT_MODEL, REFERENCE_MODEL = "asperities", "boundary_elements"
 # Models by their names in configurations, in files and in `icha.simulate`.
 MODELS = {
@@ -175,5 +175,5 @@ def model_of(attributes: Mapping[str, str]) -> Model:
 
 
 def first_model(models: Iterable[str]) -> str:
-    """Return that of some models that comes first in `MODELS`, for places that show only one model."""
+    """Return the one of several models that comes first in `MODELS`; used where only one model is shown."""
     return min(models, key=list(MODELS).index)

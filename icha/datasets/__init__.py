@@ -1,1 +1,1 @@
-"""Results as files: variables, attributes and netCDF files of surfaces, runs and campaigns."""
+"""Write and read results as netCDF files of surfaces, runs and campaigns, with described variables and attributes."""

@@ -1,8 +1,8 @@
 """Global attributes that describe every file, and the reasons why a run is not a result.
 
-The attributes are those of the CF conventions (section 2.6.2), and those of the Attribute Convention for Data Discovery
-(ACDD 1.3) that apply. Attributes of places and times do not apply; authors and date belong to a publication as a whole.
-Therefore the files do not claim to follow ACDD.
+The attributes follow the CF conventions (section 2.6.2) and partly the Attribute Convention for Data Discovery (ACDD
+1.3). The files do not claim to follow ACDD, because its attributes for places and times on earth do not apply. Authors
+and date describe a publication as a whole, and not a single file.
 """
 
 from collections import Counter
@@ -12,7 +12,7 @@ from importlib.metadata import version
 CONVENTIONS = "CF-1.11"
 KEYWORDS = ("contact mechanics", "rough surfaces", "tribology")
 
-# Processing levels: free text in ACDD, here one for every step from a topography to statistics.
+# Values of the ACDD attribute `processing_level`: one text for every step from a topography to statistics.
 INPUT, COMPUTED, COLLECTED, DERIVED, THEORY = (
     "topography, input of the computations",
     "result of one computation",
@@ -23,12 +23,12 @@ INPUT, COMPUTED, COLLECTED, DERIVED, THEORY = (
 
 
 def why_no_result(attrs: Mapping) -> str:
-    """Explain from a run's attributes why it is not a result (it ended early, or checks failed); "" if it is one."""
+    """Return the reason why a run is not a result (ended early, or failed checks) from its attributes; "" if it is."""
     return str(attrs.get("incomplete") or attrs.get("failed_checks", ""))
 
 
 def reasons_not_applicable(study: Mapping) -> Counter[str]:
-    """Count the runs of a study to which their model is not applicable, by reason."""
+    """Count the runs of a study to which the asperity model is not applicable, by reason."""
     return Counter(filter(None, study["applicability"].values.ravel().astype(str).tolist()))
 
 
@@ -46,12 +46,12 @@ def file_attributes(
 
     Parameters
     ----------
-    title, summary : its content, in a line and in sentences.
+    title, summary : content of the file, in one line and in sentences.
     level : one of the processing levels of this module.
-    programs : names of the Python packages that computed the content; their versions are added.
-    sources : programs with their versions, if other programs than the installed ones computed the content.
+    programs : names of the Python packages that computed the content; the installed versions are added.
+    sources : names and versions of programs, if other than the installed ones computed the content.
     references : publications of the methods.
-    keywords : besides those of all files.
+    keywords : keywords besides those that all files have.
     """
     source = "; ".join([*sources] or [f"{name} {version(name)}" for name in programs])
     found = {
@@ -60,7 +60,7 @@ def file_attributes(
         "keywords": ", ".join([*KEYWORDS, *keywords]),
         "Conventions": CONVENTIONS,
         "source": source,
-        # CF asks for an audit trail. Its first entry has no time: the same input gives the same bytes.
+        # CF requires a history of the file. The entry has no time, so that the same input gives the same bytes.
         "history": f"{level}: {source}",
         "processing_level": level,
         "references": references,
@@ -69,9 +69,9 @@ def file_attributes(
 
 
 def combine_attributes(title: str, summary: str, level: str, origins: Iterable[Mapping[str, str]]) -> dict[str, str]:
-    """Return the global attributes of a file made from datasets with the global attributes `origins`, in any order.
+    """Return the global attributes of a file that was made from datasets with the global attributes `origins`.
 
-    Programs, publications and further keywords are those of the datasets, each once.
+    The order of `origins` has no effect. Programs, publications and keywords of the datasets are listed once.
     """
     origins = list(origins)
     sources, references, keywords = (

@@ -1,4 +1,4 @@
-"""Build datasets from values, and from tables that describe their variables."""
+"""Build datasets from values and from tables that describe the variables."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ if TYPE_CHECKING:
 
 
 def build_dataset(table: Table, values: Mapping[str, Any], attrs: Mapping[str, str]) -> xr.Dataset:
-    """Build a dataset; its variables have the order of the table, with coordinates last.
+    """Build a dataset from values; variables have the order of the table, and coordinates come last.
 
     Parameters
     ----------
     table : descriptions of the variables (`icha.datasets.variables`).
-    values : numbers, texts or arrays of the variables that the dataset has.
+    values : numbers, texts or arrays by name of variable, for the variables that the dataset shall have.
     attrs : global attributes.
 
     Raises
@@ -27,7 +27,7 @@ def build_dataset(table: Table, values: Mapping[str, Any], attrs: Mapping[str, s
     ValueError
         If a value has no description.
     """
-    import xarray as xr  # which takes a while, and the vocabulary needs no more than `bin_table`
+    import xarray as xr  # imported here because the import is slow, and some callers do not build datasets
 
     variables = describe_variables(table, values)
     coordinates = {name: variables.pop(name) for name in table if name in variables and table[name].coordinate}
@@ -35,14 +35,14 @@ def build_dataset(table: Table, values: Mapping[str, Any], attrs: Mapping[str, s
 
 
 def describe_variables(table: Table, values: Mapping[str, Any]) -> dict[str, xr.Variable]:
-    """Make variables with dimensions, types and attributes, in the order of the table."""
+    """Make the variables of a dataset from values and descriptions, in the order of the table."""
     if unknown := values.keys() - table.keys():
         raise ValueError(f"variables without a description: {', '.join(sorted(unknown))}")
     return {name: make_variable(table[name], values[name]) for name in table if name in values}
 
 
 def make_variable(description: Variable, values: Any) -> xr.Variable:
-    """Make a variable with the dimensions, type and attributes of its description."""
+    """Make a variable from values, with the dimensions, type and attributes of the description."""
     import xarray as xr
 
     dtype = object if description.dtype is str else description.dtype
@@ -50,16 +50,16 @@ def make_variable(description: Variable, values: Any) -> xr.Variable:
 
 
 def get_values(thing: Any, *names: str) -> dict[str, Any]:
-    """Return attributes of a surface, a material or a spectrum by their names, which are also names of variables."""
+    """Return the named attributes of a surface, a material or a spectrum, as values of variables of the same name."""
     return {name: getattr(thing, name) for name in names}
 
 
 def stack_rows(
     table: Table, rows: Sequence[Mapping[str, Any]], dim: str, sizes: Mapping[str, int] = {}
 ) -> dict[str, np.ndarray]:
-    """Stack rows of values to arrays of the variables whose first dimension is `dim`; each row is one position.
+    """Stack rows to arrays, for the variables whose first dimension is `dim`; each row has the values of one position.
 
-    `sizes` gives the sizes of further dimensions.
+    `sizes` are the sizes of the other dimensions.
     """
     names = [name for name, described in table.items() if described.dims[:1] == (dim,) and name != dim]
     shapes = {name: (len(rows), *(sizes[each] for each in table[name].dims[1:])) for name in names}
@@ -68,9 +68,9 @@ def stack_rows(
 
 
 def concatenate_rows(table: Table, rows: Sequence[Mapping[str, Any]], dim: str, instance: str) -> dict[str, np.ndarray]:
-    """Concatenate the variables of a table along a ragged dimension, along which rows have different lengths.
+    """Concatenate arrays along the ragged dimension `dim`, along which the arrays of each row have different lengths.
 
-    The variable `<dim>_<instance>` gives the row of each value.
+    The variable `<dim>_<instance>` gives the number of the row to which each value belongs.
     """
     index = f"{dim}_{instance}"
     names = [name for name, described in table.items() if described.dims == (dim,) and name != index]
@@ -79,7 +79,7 @@ def concatenate_rows(table: Table, rows: Sequence[Mapping[str, Any]], dim: str, 
 
 
 def bin_values(quantity: str, edges: np.ndarray) -> dict[str, np.ndarray]:
-    """Return the values of the variables of `bin_table`."""
+    """Return centres, edges and bounds of bins, for the variables of `bin_table`."""
     return {
         f"{quantity}_bin_edges": edges,
         f"{quantity}_bin_centre": (edges[:-1] + edges[1:]) / 2,

@@ -1,4 +1,4 @@
-"""The campaign dataset: the runs of every study as full arrays along model, surface, seed, rms slope and material."""
+"""Build the campaign dataset, which arranges the runs of every study along labels, and select runs and snapshots."""
 
 import tempfile
 from collections.abc import Collection, Iterable, Mapping
@@ -23,7 +23,7 @@ from icha.datasets.variables.campaign import (
 from icha.datasets.variables.run import FURTHER
 from icha.path.targets import BETWEEN
 
-# Variables of the campaign dataset that describe a run.
+# Variables of the campaign dataset that describe a run; datasets of runs do not have these variables.
 _OF_EVERY_CAMPAIGN = ("status", "step_count", "failure")
 
 
@@ -33,7 +33,7 @@ def campaign_tree(
     design: Iterable[RunLabels | tuple] | None = None,
     attrs: Mapping[str, str] = {},
 ) -> xr.DataTree:
-    """Return the campaign dataset of some runs in memory; arguments and errors as `campaign_file.write_campaign`."""
+    """Return the campaign dataset of some runs in memory; arguments and errors are those of `write_campaign`."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "campaign.nc")
         write_campaign(runs, path, design=design, attrs=attrs)
@@ -41,7 +41,7 @@ def campaign_tree(
 
 
 def run_labels(tree: xr.DataTree) -> list[RunLabels]:
-    """List the labels of all runs in a campaign dataset, complete or not, in its order."""
+    """List the labels of all runs in a campaign dataset, also incomplete ones, in the order of the dataset."""
     found = []
     for study, node in tree.children.items():
         found += runs_of_status(node.to_dataset(), study, COMPUTED_RUNS)
@@ -49,18 +49,18 @@ def run_labels(tree: xr.DataTree) -> list[RunLabels]:
 
 
 def runs_of_status(study: xr.Dataset, name: str, statuses: Collection[int]) -> list[RunLabels]:
-    """List the labels of the runs of a study with one of these statuses, in the order of the dataset."""
+    """List the labels of the runs of a study whose status is one of `statuses`, in the order of the dataset."""
     found = np.argwhere(np.isin(study["status"].transpose(*LABELS).values, tuple(statuses)))
     return [RunLabels(name, *labels_at(study, place, LABELS)) for place in found.tolist()]
 
 
 def run_place(study: xr.Dataset, labels: RunLabels) -> dict[str, int]:
-    """Return the position of a run along the labels of its study's dataset.
+    """Return the position of a run along each label of the dataset of a study.
 
     Raises
     ------
     ValueError
-        If the study has no such value of a label; the message lists its values.
+        If the study does not have the value of a label; the message lists the values that it has.
     """
     wanted = {label: getattr(labels, label) for label in LABELS}
     try:
@@ -76,15 +76,16 @@ def run_place(study: xr.Dataset, labels: RunLabels) -> dict[str, int]:
 
 
 def select_run(tree: xr.DataTree, labels: RunLabels | tuple) -> xr.Dataset:
-    """Select one run of a campaign dataset, with its steps and its spots.
+    """Select one run of a campaign dataset, with all steps and spots of the run.
 
-    Its attributes are those of its file. They give reasons: `incomplete` why it failed, `beyond_model` why it ended at
-    the limit of its model, `failed_checks` which checks failed, `applicability` why its model is not applicable.
+    The run has the attributes of its file. Some attributes explain its status: `incomplete` (why the run failed),
+    `beyond_model` (why it ended at the limit of the model), `failed_checks` (which checks failed), and `applicability`
+    (why the model is not applicable).
 
     Raises
     ------
     ValueError
-        If the campaign has no such run; the message lists what it has.
+        If the campaign does not have the run; the message lists the values of the label that it has.
     """
     variables, attrs = variables_of_run(tree, labels)
     of_study = tree.children[RunLabels(*labels).study].dataset.coords
@@ -93,7 +94,7 @@ def select_run(tree: xr.DataTree, labels: RunLabels | tuple) -> xr.Dataset:
 
 
 def variables_of_run(tree: xr.DataTree, labels: RunLabels | tuple) -> tuple[dict[str, xr.Variable], dict]:
-    """Return variables and attributes as `select_run` does, but faster, because no dataset is built."""
+    """Return the variables and attributes of a run; faster than `select_run`, because no dataset is built."""
     labels = RunLabels(*labels)
     if labels.study not in tree.children:
         raise ValueError(f"no study {labels.study!r}; expected one of {', '.join(tree.children)}")
@@ -117,12 +118,12 @@ def variables_of_run(tree: xr.DataTree, labels: RunLabels | tuple) -> tuple[dict
             continue
         variable = of_study[tuple(index.get(dim, slice(None)) for dim in of_study.dims)].load()
         if ended_early and variable.ndim == 0 and variable.dtype.kind == "f" and np.isnan(variable.values):
-            continue  # a run that ended early has no such value
+            continue  # a run that ended early lacks this variable
         if variable.dtype.kind == "f" and variable.encoding.get("dtype") == np.dtype("int32"):
-            # Stored as a float because other runs lack it.
+            # An integer that some runs lack is a float in the campaign dataset.
             variable = xr.Variable(variable.dims, variable.values.astype(np.int32), variable.attrs)
         if ended_early and name in ("snapshot", "spot_snapshot"):
-            # Number its snapshots without those that only other runs have.
+            # Renumber the snapshots of the run, because other runs of the study may have more snapshots.
             numbers = np.searchsorted(index["snapshot"], variable.values)
             variable = xr.Variable(variable.dims, numbers, variable.attrs)
         variables[name] = variable
@@ -134,7 +135,7 @@ def variables_of_run(tree: xr.DataTree, labels: RunLabels | tuple) -> tuple[dict
 
 
 def _ragged_slice(study: xr.Dataset, dim: str, place: tuple[int, ...]) -> slice:
-    """Return where the spots or events of a run are; the runs follow each other in the order of their labels."""
+    """Return the slice of the spots or events of a run along `dim`; runs follow each other in the order of labels."""
     begin, end = 0, study.sizes[dim]
     for label, k in zip(LABELS, place, strict=True):
         column = study.variables[f"{dim}_{label}"].values[begin:end]
@@ -143,27 +144,27 @@ def _ragged_slice(study: xr.Dataset, dim: str, place: tuple[int, ...]) -> slice:
 
 
 def reduced_gap(data: xr.Dataset) -> xr.DataArray:
-    """Return the mean gap over the rms height, which figures show as the separation.
+    """Return the mean gap divided by the rms height, which figures show as the separation.
 
-    For a periodic surface it is the mean separation over the rms height. The mean separation of a free square is
-    measured to the half-space far away; only its mean gap can be compared with other surfaces.
+    On a periodic surface, mean gap and mean separation are equal. The mean separation of a free square is measured to
+    the half-space far away. Therefore only the mean gap of a free square can be compared with other surfaces.
     """
     gap = (data["mean_gap"] / data["rms_height"]).transpose(*data["reduced_separation"].dims)
     return data["reduced_separation"].where(data["boundary"] != "free", gap)
 
 
 def loading_stops(data: xr.Dataset) -> xr.DataArray:
-    """Mark the steps of a run, or of all runs of a study, that are stops of the first loading."""
+    """Return True for the steps of the first loading that have a target, in a run or in all runs of a study."""
     return (data["leg"] == 0) & (data["step_kind"] != BETWEEN)
 
 
 def find_snapshot(run: xr.Dataset, kind: str | None = None, target: float | None = None) -> int:
-    """Return the position of the first snapshot of a kind and target; None stands for any kind or any target.
+    """Return the position of the first snapshot with a kind and a target; None means any kind or any target.
 
     Raises
     ------
     ValueError
-        If the run has no such snapshot; the message lists those that it has.
+        If the run does not have the snapshot; the message lists the snapshots that it has.
     """
     snapshots = list(zip(run["snapshot_kind"].values.astype(str), run["snapshot_target"].values, strict=True))
     for k, (found, value) in enumerate(snapshots):

@@ -1,8 +1,8 @@
-"""The campaign dataset, written run by run, so that only a few numbers of each run stay in memory.
+"""Write the campaign dataset run by run, so that only a few numbers of each run stay in memory.
 
-The runs are read one after the other. Some facts of all runs are needed before the first run can be written: numbers of
-steps and spots, snapshots, widths of texts. These facts stay in memory. The values of the runs go to a temporary file.
-From there they are read in the order of the dataset, one block of neighbouring runs at a time.
+ICHA reads one run after the other and appends the values of the run to a temporary file. Numbers of steps and spots,
+snapshots and lengths of texts stay in memory, because they are needed before the first run can be written. Then ICHA
+reads the temporary file in the order of the dataset, one block of neighbouring runs at a time.
 """
 
 import itertools
@@ -34,20 +34,20 @@ from icha.datasets.variables.campaign import CAMPAIGN, RAGGED, index_variable
 from icha.datasets.variables.run import FURTHER
 from icha.support.atomic_files import whole_file
 
-# Largest number of runs in a block, and of values of each variable: a block takes some megabytes.
+# Largest number of runs in a block, and of values of each variable in a block, which then takes some megabytes.
 _RUNS_IN_BLOCK = 256
 VALUES_IN_BLOCK = 2**18
 _VALUES_IN_CHUNK = 2**16
-# Relative difference below which values that runs share are the same.
+# Largest relative difference between values of several runs that count as equal.
 _SAME = 1e-9
 
 _LAYOUT = (
-    "Variables of the runs along model, surface, seed, rms_slope and material. Spots and events of all runs, in this "
-    "order of the runs, are ragged arrays along spot and event: the variables with an instance_dimension say where "
-    "along that dimension each belongs, from 0; those that agree in all of them are of one snapshot of one run."
+    "Variables of the runs along model, surface, seed, rms_slope and material. Spots and events of all runs are ragged "
+    "arrays along spot and event, in this order of the runs. Each variable with the attribute instance_dimension gives "
+    "the position of each spot or event along that dimension, from 0. These positions identify run and snapshot."
 )
-_OWN_SLOPES = {"comment": "each surface has slopes of its own, along the dimension rms_slope in ascending order"}
-_STUDIES = "The runs of every study, a group for each."
+_OWN_SLOPES = {"comment": "each surface has different slopes, in ascending order along the dimension rms_slope"}
+_STUDIES = "The runs of every study, with one group for each study."
 # Attribute of the root of the file, which has no variables.
 _ACCESS = (
     "The data are in the groups, one for each study: {0}. With Python's xarray: "
@@ -56,14 +56,14 @@ _ACCESS = (
 
 
 class Column(NamedTuple):
-    """A variable of the runs in the file.
+    """A variable of the runs, as defined in the file.
 
     Attributes
     ----------
-    variable : the variable.
-    along : the labels that it varies with.
-    dims : its further dimensions.
-    fill : what stands for no value.
+    variable : the variable in the file.
+    along : labels that are dimensions of the variable.
+    dims : other dimensions of the variable.
+    fill : value that marks a missing value.
     """
 
     variable: netCDF4.Variable
@@ -72,7 +72,7 @@ class Column(NamedTuple):
     fill: float | int | bytes
 
     def pad(self, values: np.ndarray) -> np.ndarray:
-        """Pad texts of a run to the width that they have in the file; return numbers as they are."""
+        """Pad texts of a run to the width of texts in the file; return numbers unchanged."""
         if values.dtype.kind != "S":
             return values
         padded = np.zeros((*values.shape[:-1], self.variable.shape[-1]), "S1")
@@ -80,21 +80,21 @@ class Column(NamedTuple):
         return padded
 
     def slots(self, snapshots: list[int], values: np.ndarray) -> tuple[list[int] | slice, ...]:
-        """Index a run's values along `dims`; `snapshots` are the positions of its snapshots in the file."""
+        """Return the index of a run's values along `dims`; `snapshots` are positions of its snapshots in the file."""
         sizes = zip(self.dims, values.shape, strict=False)
         return tuple(snapshots if dim == "snapshot" else slice(0, size) for dim, size in sizes)
 
 
 class Group(NamedTuple):
-    """The group of a study: its dimensions and variables are defined, and no values are written yet.
+    """The group of a study, whose dimensions and variables are defined, but which has no values yet.
 
     Attributes
     ----------
-    study : the runs that belong there.
-    block : how many neighbouring runs are written at once, along every label.
-    columns : the variables of the runs, by name.
-    ragged : the variables along ragged dimensions, by dimension and name.
-    known : the variables whose values need no run, and these values.
+    study : the runs of the study.
+    block : number of neighbouring runs along every label that are written at once.
+    columns : variables of the runs, by name.
+    ragged : variables along ragged dimensions, by dimension and name.
+    known : variables that do not depend on the content of runs, with their values.
     """
 
     study: Arrangement
@@ -106,7 +106,7 @@ class Group(NamedTuple):
 
 def _group_attributes(study: Arrangement, attrs: Mapping[str, str]) -> dict:
     """Return the attributes of a study's group; `attrs` are those of the file."""
-    # The checksum is that of the campaign, and not that of one of the runs.
+    # config_sha256 is the checksum of the campaign, and not that of one of the runs.
     shared = {"license": study.origins[0].get("license"), "config_sha256": attrs.get("config_sha256")}
     return (
         combine_attributes(f"Study {study.name}", _LAYOUT, COLLECTED, study.origins)
@@ -132,7 +132,7 @@ def define_group(group: netCDF4.Dataset, study: Arrangement, attrs: Mapping[str,
     block = _block(sizes, LABELS, max(math.prod(sizes[dim] for dim in dims) for dims in varying))
 
     def define(name, attributes, along, dims, dtype, width=0, fill=None):
-        """Define a variable along labels and its own dimensions; one of texts has a width, in bytes."""
+        """Define a variable along labels and further dimensions; `width` is the length of texts in bytes."""
         options = _storage(sizes, block, along, dims, width or 1)
         attributes = {**attributes, **({"coordinates": coordinates[name]} if name in coordinates else {})}
         options |= {} if width or fill is None else {"fill_value": fill}
@@ -147,7 +147,7 @@ def define_group(group: netCDF4.Dataset, study: Arrangement, attrs: Mapping[str,
         if is_text(dtype):
             dtype, width, fill = np.dtype("S1"), max(entry.widths.get(name, 1) for entry in study.entries), b""
         elif dtype.kind != "f":
-            # 32 bits, which every netCDF tool reads, or flags.
+            # Every netCDF tool reads integers of 32 bits. Flags have 8 bits.
             dtype = np.dtype(np.int8 if dtype == np.int8 and not lacks else np.int32)
         variable = define(name, attributes, along, dims, dtype, width, fill if lacks and not width else None)
         columns[name] = Column(variable, along, dims, fill)
@@ -175,19 +175,19 @@ def define_group(group: netCDF4.Dataset, study: Arrangement, attrs: Mapping[str,
 
 
 def _storage(sizes, block, along, dims, width):
-    """Return the options of a variable: none if it is small, else it is compressed, block by block."""
+    """Return the storage options of a variable: none for a small one, else compression with one chunk per block."""
     shape = (*(sizes[dim] for dim in dims), *([width] if width > 1 else []))
     if math.prod(sizes[dim] for dim in along) * math.prod(shape) < LEAST_COMPRESSED:
         return {}
     if along != LABELS:
         block = _block(sizes, along, math.prod(shape))
     chunk = (*block, *shape) if along else tuple(min(size, _VALUES_IN_CHUNK) for size in shape)
-    # Each block is written at once, so that keeping more than one gains nothing.
+    # Each block is written at once, so that a cache of more than one block has no advantage.
     return COMPRESSION | {"chunksizes": chunk, "chunk_cache": 8 * math.prod(chunk)}
 
 
 def _block(sizes, along, values):
-    """Count the neighbouring runs that make a block, along every label; `values` is the number of values of each."""
+    """Return the number of neighbouring runs in a block, along every label; a run has `values` values."""
     left = max(1, min(_RUNS_IN_BLOCK, VALUES_IN_BLOCK // max(1, values)))
     block = []
     for size in reversed([sizes[label] for label in along]):
@@ -197,10 +197,10 @@ def _block(sizes, along, values):
 
 
 def _why_lacking(study, name):
-    """Return the attribute of a variable that some of the study's models do not have."""
+    """Return an attribute that names the models of the study without the variable; empty if there are none."""
     owners = [model for model, names in FURTHER.items() if name in names]
     lacking = [model for model in study.known["model"] if owners and model not in owners]
-    return {"missing": f"of runs by {' and '.join(lacking)}"} if lacking else {}
+    return {"missing": f"in runs with the model {' or '.join(lacking)}"} if lacking else {}
 
 
 def write_campaign(
@@ -211,26 +211,26 @@ def write_campaign(
     settings: Mapping[RunLabels | tuple, str] = {},
     attrs: Mapping[str, str] = {},
 ) -> None:
-    """Write all runs of a campaign to one netCDF-4 file: one group for each study, arrays along the labels of the runs.
+    """Write all runs of a campaign to one netCDF-4 file, with one group for each study and arrays along labels.
 
-    `docs/howto/dataset.md` describes the file. The maps of boundary elements stay in the files of the runs.
+    `docs/howto/dataset.md` describes the file. The file does not contain the maps of boundary elements.
 
     Parameters
     ----------
-    runs : pairs of labels (study, model, surface, seed, rms_slope, material) and run dataset, or its file. Names keep
-        the order of the design; seeds and slopes are sorted. A run is incomplete if its attribute `incomplete` states
-        the reason, or if it lacks snapshots of its study.
-    path : the file, which is complete or does not exist. The same runs give the same bytes.
-    design : labels of the runs of the campaign; without `design`, those of `runs`. Other combinations of these labels
-        are not in the design.
-    settings : expected checksums of the settings of runs (their attribute `config_sha256`), by the labels of the runs.
+    runs : pairs of labels (study, model, surface, seed, rms_slope, material) and run dataset, or path of its file.
+        Names keep the order of the design; seeds and slopes are sorted. A run is incomplete if its attribute
+        `incomplete` states the reason, or if it lacks snapshots of its study.
+    path : the file to write. A file appears only when it is complete. The same runs give the same bytes.
+    design : labels of all runs of the campaign. Default: the labels in `runs`. Other combinations of these labels have
+        the status `not_in_design`.
+    settings : expected checksums of the settings of runs (attribute `config_sha256`), by the labels of the runs.
     attrs : global attributes of the file (title, summary, campaign, license, …).
 
     Raises
     ------
     ValueError
-        Naming the run: if it is given twice, is not in the design, was computed with other settings than it should, or
-        if a value that it shares with other runs differs from theirs; if a file cannot be read.
+        If a run is given twice, is not in the design, or was computed with other settings than expected; if a value
+        that several runs share differs between them; if a file cannot be read. The message names the run.
     """
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -241,14 +241,14 @@ def write_campaign(
             names = [study.name for study in studies]
             described = combine_attributes("Campaign of rough contacts", _STUDIES, COLLECTED, origins)
             file.setncatts(described | {"comment": _ACCESS.format(", ".join(names), names[0])} | dict(attrs))
-            # All is defined before anything is written, which is quicker: see icha.datasets.files.
+            # Writing is faster if all variables are defined before: see icha.datasets.files.
             groups = [define_group(file.createGroup(study.name), study, attrs) for study in studies]
             for group in groups:
                 _write(group, spool)
 
 
 def _write(group: Group, spool: BinaryIO) -> None:
-    """Write all values of a group; the values of the runs are read from the temporary file, block by block."""
+    """Write all values of a group; `spool` is the temporary file, from which runs are read block by block."""
     for variable, values in group.known:
         variable[...] = values
     along_ragged = {name for variables in group.ragged.values() for name in variables}
@@ -298,9 +298,9 @@ def _write_ragged(
     values: Mapping[str, np.ndarray],
     snapshots: list[int],
 ) -> int:
-    """Write the values of a run along a ragged dimension, from index `begin` on; return their number.
+    """Write the values of a run along a ragged dimension, beginning at index `begin`; return the number of values.
 
-    Spots are sorted by the positions of their snapshots.
+    Spots are sorted by the positions of their snapshots in the file.
     """
     found = {name: values[name] for name in variables if name in values}
     count = len(next(iter(found.values()), ()))
@@ -315,7 +315,7 @@ def _write_ragged(
 
 
 def _put_shared(name: str, column: Column, known: np.ndarray, index: tuple, values: np.ndarray, run: RunLabels) -> None:
-    """Store a run's values of a variable that several runs share; values of earlier runs stay, and must be the same."""
+    """Store a run's values of a variable that several runs share; values of earlier runs must be equal and are kept."""
     present = known[index]
     unknown = present == column.fill
     equal = present == values if values.dtype.kind == "S" else abs(present - values) <= _SAME * abs(values)

@@ -1,4 +1,4 @@
-"""The runs of a campaign for its dataset: read one by one, and arranged along the axes of their study."""
+"""Read the runs of a campaign one by one, and arrange them along the axes of the campaign dataset."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ from icha.datasets.variables.campaign import (
 from icha.datasets.variables.run import CELLS, CYCLE, LOOP, OF_MODELS, RUN
 from icha.support.input_files import text
 
-# Dimensions and values of variables, by name. Texts are characters along a last dimension without a name.
+# Dimensions and values of variables, by name. Texts are arrays of characters; the dimension of characters has no name.
 Values = dict[str, tuple[tuple[str, ...], np.ndarray]]
-# Labels of a run, and its dataset or the file of its dataset.
+# Labels of a run, and the dataset of the run or the path of its file.
 LabelledRun = tuple[RunLabels | tuple, xr.Dataset | str | os.PathLike]
 
 _DIMS = {name: description.dims for name, description in (RUN | OF_MODELS | CYCLE | LOOP).items()}
@@ -39,14 +39,14 @@ _ATTRIBUTES = ("contact_model", "config_sha256", "applicability", *STATUS_ATTRIB
 
 
 def read_run_values(path: str | os.PathLike) -> tuple[Values, dict[str, str]]:
-    """Read the values of a run dataset, except maps, and its attributes that identify it and its status.
+    """Read the values of a run dataset, except maps, and the attributes that describe settings and status of the run.
 
     Raises
     ------
     ValueError
         If the file cannot be read or is not a run dataset.
     """
-    import h5py  # which takes a while, and most callers read no run
+    import h5py  # imported here because the import is slow, and most callers do not read runs
     from h5py import h5d, h5s
 
     with readable(path), h5py.File(path) as file:
@@ -54,7 +54,7 @@ def read_run_values(path: str | os.PathLike) -> tuple[Values, dict[str, str]]:
         values: Values = {}
         for name, dims in _DIMS.items():
             if name in file and not set(CELLS) & set(dims):
-                # The low-level interface of h5py takes less than half the time.
+                # The low-level interface of h5py takes less than half the time of the usual interface.
                 variable = h5d.open(file.id, name.encode())
                 values[name] = dims, np.empty(variable.shape, variable.dtype)
                 variable.read(h5s.ALL, h5s.ALL, values[name][1])
@@ -62,20 +62,20 @@ def read_run_values(path: str | os.PathLike) -> tuple[Values, dict[str, str]]:
 
 
 class Entry(NamedTuple):
-    """Facts of one run that stay in memory.
+    """Properties of one run that stay in memory.
 
     Attributes
     ----------
-    labels : the labels of the run.
-    source : its dataset, or the file of its dataset.
-    place : where its values begin in the temporary file, in bytes.
-    names : names of its variables.
-    sizes : sizes of its dimensions, by name.
-    widths : bytes of the longest text of each variable of texts.
-    snapshots : kind and target of its snapshots.
-    status : its status, if it has all snapshots of its study.
-    failure : why it is not complete; an empty text if it is.
-    applicability : attribute of its dataset.
+    labels : labels of the run.
+    source : dataset of the run, or path of its file.
+    place : position of the values of the run in the temporary file, bytes.
+    names : names of the variables of the run.
+    sizes : sizes of the dimensions of the run, by name.
+    widths : length in bytes of the longest text, for each variable with texts.
+    snapshots : kind and target of each snapshot of the run.
+    status : status of the run, if the run has all snapshots of its study.
+    failure : reason why the run is not complete; "" for a complete run.
+    applicability : reason why the model is not applicable to the run; "" if it is applicable.
     """
 
     labels: RunLabels
@@ -91,24 +91,24 @@ class Entry(NamedTuple):
 
     @property
     def extent(self) -> tuple[bool, int]:
-        """Whether the run did not end early, and its number of steps; a run with the largest has all variables."""
+        """Whether the run reached its end, and its number of steps; the run with the largest pair has all variables."""
         return self.status not in _ENDED_EARLY, self.sizes.get("step", 0)
 
 
 def spool_runs(
     runs: Iterable[LabelledRun], spool: BinaryIO, settings: Mapping[RunLabels | tuple, str] = {}
 ) -> dict[str, dict[RunLabels, Entry]]:
-    """Append the values of every run to a temporary file; return the facts of all runs, by study and labels.
+    """Append the values of every run to a temporary file; return the entries of all runs, by study and labels.
 
     Parameters
     ----------
-    runs, settings : as in `icha.datasets.campaign_file.write_campaign`.
+    runs, settings : parameters of `icha.datasets.campaign_file.write_campaign`.
     spool : the temporary file.
 
     Raises
     ------
     ValueError
-        Naming the run: if it is given twice, or was computed with other settings than expected.
+        If a run is given twice, or was computed with other settings than expected. The message names the run.
     """
     studies: dict[str, dict[RunLabels, Entry]] = {}
     # Most runs have the same variables and snapshots. Each combination is stored only once.
@@ -122,8 +122,8 @@ def spool_runs(
         if attrs.get("config_sha256") != settings.get(labels, attrs.get("config_sha256")):
             file = labels if isinstance(source, xr.Dataset) else source
             raise ValueError(
-                f"{file}: this run was computed with other settings than the configuration's. Remove it and repeat the "
-                "command, which computes it"
+                f"{file}: this run was computed with other settings than those of the configuration. Remove the file "
+                "and repeat the command, which computes the run again"
             )
         names, snapshots = frozenset(values), _snapshots_of(values)
         entries[labels] = Entry(
@@ -142,13 +142,13 @@ def spool_runs(
 
 
 def plain_labels(labels: RunLabels | tuple) -> RunLabels:
-    """Return labels with numbers of Python's own types."""
+    """Return labels with seed and slope as Python's int and float instead of types of numpy."""
     labels = RunLabels(*labels)
     return labels._replace(seed=int(labels.seed), rms_slope=float(labels.rms_slope))
 
 
 def _values_of(run: xr.Dataset) -> tuple[Values, dict]:
-    """Return the values and attributes of a run as `read_run_values` does for its file."""
+    """Return the values and attributes of a run in memory, in the form that `read_run_values` returns for a file."""
     values = {
         name: (variable.dims, characters(variable.values) if is_text(variable.dtype) else variable.values)
         for name, variable in run.drop_dims(CELLS, errors="ignore").variables.items()
@@ -157,13 +157,13 @@ def _values_of(run: xr.Dataset) -> tuple[Values, dict]:
 
 
 def _status_and_failure(attrs: Mapping) -> tuple[int, str]:
-    """Return the status of a run, and why it is not complete; an empty text if it is."""
+    """Return the status of a run, and the reason why the run is not complete; "" for a complete run."""
     found = [(status, str(attrs[name])) for status, name in STATUS_ATTRIBUTES.items() if name in attrs]
     return (*found, (COMPLETE, ""))[0]
 
 
 def _snapshots_of(values: Values) -> tuple[tuple[bytes, float], ...]:
-    """Return kind and target of the snapshots of a run."""
+    """Return the kind and the target of each snapshot of a run."""
     if "snapshot_kind" not in values:
         return ()
     kinds = (kind.tobytes().rstrip(b"\0") for kind in values["snapshot_kind"][1])
@@ -172,19 +172,19 @@ def _snapshots_of(values: Values) -> tuple[tuple[bytes, float], ...]:
 
 @dataclass(frozen=True, eq=False)
 class Arrangement:
-    """The runs of a study along its axes.
+    """The runs of a study, arranged along labels.
 
     Attributes
     ----------
-    name : of the study.
+    name : name of the study.
     known : values of the variables that list the runs: labels, `status`, `step_count`, `failure`, `applicability`.
-    variables : the variables of all models, each from one run.
-    coordinates : names of those that are coordinates.
-    origins : global attributes of a run of every model.
-    sizes : sizes of the dimensions that runs have in common.
-    snapshots : position of every snapshot, by kind and target.
-    entries : the computed runs, in the order of the axes.
-    positions : (n, 5) int, positions of the entries along the labels.
+    variables : variables of all models; each is taken from one run.
+    coordinates : names of the variables that are coordinates.
+    origins : global attributes of one run of every model.
+    sizes : sizes of the dimensions in the file, except ragged ones.
+    snapshots : position of every snapshot along the dimension `snapshot`, by kind and target.
+    entries : the computed runs, in the order of the labels.
+    positions : (n, 5) int, positions of the n entries along the five labels.
     """
 
     name: str
@@ -199,11 +199,11 @@ class Arrangement:
 
     @property
     def slope_dims(self) -> tuple[str, ...]:
-        """Dimensions of the rms slopes."""
+        """Dimensions of the coordinate `rms_slope`: with `surface` if surfaces have different slopes."""
         return slope_dims(self.known["rms_slope"])
 
     def dims_of(self, name: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
-        """Return the labels with which a variable of the runs varies, and its own dimensions; no labels if ragged."""
+        """Return the dimensions of a variable of the runs: labels (none for ragged variables), and other dimensions."""
         dims = self.variables[name].dims
         if name in self.sizes or set(RAGGED) & set(dims):
             return (), dims
@@ -213,7 +213,7 @@ class Arrangement:
         return along, dims
 
     def lacks(self, name: str) -> bool:
-        """Return True if a variable of the runs has no value somewhere."""
+        """Return True if a variable is missing in a run, or at a step or snapshot of a run."""
         along, dims = self.dims_of(name)
         columns = [LABELS.index(label) for label in along]
         having = np.array([name in entry.names for entry in self.entries])
@@ -232,7 +232,7 @@ def arrange_runs(
     Raises
     ------
     ValueError
-        Naming the run: if it is not in the design.
+        If a run is not in the design. The message names the run.
     """
     given = [labels for entries in studies.values() for labels in entries]
     asked: dict[str, dict[RunLabels, None]] = {}
@@ -249,9 +249,9 @@ def _arrange_study(name: str, found: dict[RunLabels, Entry], design: list[RunLab
     axes["seed"].sort()
     axes["rms_slope"] = arrange_slopes((labels.surface, labels.rms_slope) for labels in design)
     position = _positions(axes, design)
-    # In the order of the design, whatever the order in which they were given.
+    # The order of the design replaces the order in which the runs were given.
     entries = [found[labels] for labels in position if labels in found]
-    # For every model, a run that has all its variables.
+    # One run of every model that has all variables of the model.
     samples = [
         _sample(max(of_model, key=lambda entry: entry.extent).source)
         for model in axes["model"]
@@ -303,7 +303,7 @@ def _arrange_study(name: str, found: dict[RunLabels, Entry], design: list[RunLab
 
 
 def _positions(axes: Mapping[str, Any], design: list[RunLabels]) -> dict[RunLabels, tuple[int, ...]]:
-    """Return the position of every run of a design along the labels."""
+    """Return the position of every run of a design along each label."""
     at = {(label, value): k for label in LABELS if label != "rms_slope" for k, value in enumerate(axes[label])}
     rows = np.broadcast_to(axes["rms_slope"], (len(axes["surface"]), axes["rms_slope"].shape[-1])).tolist()
     for surface, row in zip(axes["surface"], rows, strict=True):
@@ -327,9 +327,9 @@ def _sizes(entries: list[Entry], dim: str) -> np.ndarray:
 
 
 def _snapshots(entries: list[Entry]) -> dict[tuple[bytes, float], int]:
-    """Assign numbers to the snapshots of a study, which are identified by kind and target.
+    """Assign a number to each snapshot of a study; kind and target identify a snapshot.
 
-    Runs may meet their stops, and take their snapshots, in different orders (a load and an area, for instance).
+    Runs may reach their targets in different orders, for instance a load before an area, and an area before a load.
     """
     longest = max(entries, key=lambda entry: entry.extent)
     known = dict.fromkeys(itertools.chain(longest.snapshots, *(entry.snapshots for entry in entries)))

@@ -1,10 +1,10 @@
 """Write and read datasets as netCDF-4 files, with the conventions that all files of ICHA share.
 
-A file appears whole or not at all. The same values always give the same bytes. All values are finite, except those of
-missing runs and those beyond the last step of a run.
+A file never appears before it is complete. The same values always give the same bytes. All values are finite, except
+values of missing runs and values after the last step of a run.
 
-Files of runs hold many small variables. ICHA defines all variables before it writes the first one. Each change between
-defining and writing takes the netCDF library time for all variables.
+Files of runs contain many small variables. ICHA defines all variables before it writes the first one, because the
+netCDF library needs time for all variables whenever it changes between defining and writing.
 """
 
 from __future__ import annotations
@@ -25,21 +25,21 @@ from icha.support.atomic_files import whole_file
 
 FLOAT_FILL = 9.969209968386869e36
 INTEGER_FILL = -(2**31) + 1
-# By this attribute xarray recognises text that is stored as characters. Every netCDF tool reads characters, and they
-# can be compressed, unlike strings of variable length.
+# With this attribute, xarray recognises text that is stored as characters. Every netCDF tool reads characters. Unlike
+# strings of variable length, characters can be compressed.
 TEXT = {"_Encoding": "utf-8"}
 
 
 def write_dataset(data: xr.Dataset | xr.DataTree, path: str | os.PathLike) -> None:
     """Write a dataset or a tree of datasets to the netCDF-4 file `path`.
 
-    Missing values are written as the variable's `_FillValue`. They are allowed in runs that are not complete by the
-    dataset's `status`, beyond the `step_count` steps of a run, and in variables with an attribute `missing`.
+    Missing values are written as the `_FillValue` of the variable. Missing values are allowed in runs whose `status` is
+    not complete, after the last step of a run (`step_count`), and in variables with the attribute `missing`.
 
     Raises
     ------
     ValueError
-        If a variable lacks units or holds another value that is not finite.
+        If a variable has no units, or has a value that is not finite and not allowed to be missing.
     """
     nodes = {"/": data}
     if isinstance(data, xr.DataTree):
@@ -47,7 +47,7 @@ def write_dataset(data: xr.Dataset | xr.DataTree, path: str | os.PathLike) -> No
     for group, dataset in nodes.items():
         _refuse_values_not_finite(dataset, f"{path}" if group == "/" else f"{path}, group {group}")
     with whole_file(path) as temporary, netCDF4.Dataset(temporary, "w") as file:
-        # All variables are written whole.
+        # Every variable is written completely, so that filling it before would waste time.
         file.set_fill_off()
         defined = [
             variable
@@ -59,7 +59,7 @@ def write_dataset(data: xr.Dataset | xr.DataTree, path: str | os.PathLike) -> No
 
 
 def _define(group: netCDF4.Dataset, dataset: xr.Dataset) -> list[tuple[netCDF4.Variable, np.ndarray]]:
-    """Define the dimensions and variables of a dataset in a group of a file; return variables with their values."""
+    """Define the dimensions and variables of a dataset in a group of a file; return each variable and its values."""
     define_dimensions(group, dataset.sizes)
     group.setncatts(dataset.attrs)
     coordinates = coordinates_of(dataset.variables, dataset.coords)
@@ -78,7 +78,7 @@ def _define(group: netCDF4.Dataset, dataset: xr.Dataset) -> list[tuple[netCDF4.V
             values = np.where(np.isnan(values), fill, values)
             values = values.astype(np.int32) if is_integer else values
         if variable.dims[-2:] == CELLS:
-            # Each map is a chunk, because maps are read one by one. Most of their values are zero.
+            # Each map is one chunk, because maps are read one by one. Maps are compressed, since most values are zero.
             storage |= COMPRESSION | {"chunksizes": (*[1] * (variable.ndim - 2), *variable.shape[-2:])}
         elif variable.size in COMPRESSED_SIZES:
             storage |= COMPRESSION
@@ -97,7 +97,7 @@ def _refuse_values_not_finite(dataset: xr.Dataset, where: str) -> None:
         if "missing" in variable.attrs:
             bad &= ~np.isnan(variable.values)
         if excused is not None and set(variable.dims) & set(excused.dims):
-            # A value that several runs share may be missing if all these runs are missing.
+            # A value that several runs share may be missing if all these runs are incomplete or missing.
             may_lack = excused.all([dim for dim in excused.dims if dim not in variable.dims]).variable
             if "step" in variable.dims:
                 may_lack = may_lack | (dataset["step"] >= dataset["step_count"]).variable
@@ -107,7 +107,7 @@ def _refuse_values_not_finite(dataset: xr.Dataset, where: str) -> None:
 
 
 def read_dataset(path: str | os.PathLike) -> xr.Dataset:
-    """Read a netCDF file of one group into memory.
+    """Read a netCDF file with a single group into memory.
 
     Raises
     ------
@@ -119,16 +119,16 @@ def read_dataset(path: str | os.PathLike) -> xr.Dataset:
 
 
 def has_groups(path: str | os.PathLike) -> bool:
-    """Return True if a netCDF file has groups, as a campaign dataset has; errors as `read_dataset`."""
+    """Return True if a netCDF file has groups, like a campaign dataset; raise the errors of `read_dataset`."""
     with readable(path), netCDF4.Dataset(path) as file:
         return bool(file.groups)
 
 
 def read_campaign(path: str | os.PathLike) -> xr.DataTree:
-    """Read a campaign dataset into memory, except for large arrays; errors as `read_dataset`.
+    """Read a campaign dataset into memory, except large arrays; raise the errors of `read_dataset`.
 
-    Arrays of more than 64 MB, such as distributions of thousands of runs, stay in the file until they are used; for a
-    single run (`icha.datasets.campaign.select_run`) only its own values are then read.
+    Arrays of more than 64 MB, such as distributions of thousands of runs, stay in the file until they are used. If a
+    single run is selected (`icha.datasets.campaign.select_run`), only the values of this run are read.
     """
     with readable(path):
         tree = xr.open_datatree(path, engine="netcdf4")
@@ -141,7 +141,7 @@ def read_campaign(path: str | os.PathLike) -> xr.DataTree:
 
 @contextmanager
 def readable(path: str | os.PathLike) -> Iterator[None]:
-    """Turn errors of reading into a ValueError that names the file."""
+    """Replace errors in reading a netCDF file by a ValueError that names the file."""
     try:
         yield
     except FileNotFoundError:
@@ -151,7 +151,7 @@ def readable(path: str | os.PathLike) -> Iterator[None]:
 
 
 def read_run(path: str | os.PathLike) -> xr.Dataset:
-    """Read a run dataset as `icha.simulate` returned it.
+    """Read the dataset of a run, which equals the dataset that `icha.simulate` returned.
 
     Raises
     ------
@@ -164,10 +164,10 @@ def read_run(path: str | os.PathLike) -> xr.Dataset:
 
 
 def check_is_run(variables: Container[Hashable], path: str | os.PathLike) -> None:
-    """Refuse a file without the variables that all runs have; `variables` are the names of the file's variables."""
+    """Raise ValueError if a file lacks a variable that all runs have; `variables` are the names in the file."""
     for name in ("mean_separation", "nominal_pressure", "contact_area_fraction", "contact_modulus"):
         if name not in variables:
-            raise ValueError(f"{path}: not a run dataset, it has no variable {name!r}")
+            raise ValueError(f"{path}: not a run dataset, because it has no variable {name!r}")
 
 
 def is_text(dtype: np.dtype) -> bool:
@@ -176,14 +176,14 @@ def is_text(dtype: np.dtype) -> bool:
 
 
 def characters(texts: np.ndarray) -> np.ndarray:
-    """Encode texts as characters (UTF-8) along a further, last dimension as long as the longest text, at least 1."""
+    """Encode texts as arrays of characters (UTF-8); the added last dimension has the length of the longest text."""
     texts = np.asarray(texts)
     encoded = np.ascontiguousarray(np.char.encode(texts.astype("U"), "utf-8"))
     return encoded.view("S1").reshape(*texts.shape, max(encoded.dtype.itemsize, 1))
 
 
 def define_dimensions(group: netCDF4.Dataset, sizes: Mapping[Hashable, int]) -> None:
-    """Define the dimensions of a group."""
+    """Define the dimensions of a group of a netCDF file; `sizes` are by name."""
     for name, size in sizes.items():
         group.createDimension(name, size)
 
@@ -201,20 +201,20 @@ def define_variable(
             group.createDimension(dims[-1], width)
     variable = group.createVariable(name, dtype, dims, **storage)
     variable.setncatts(dict(attrs))
-    # Values are written and read without conversion.
+    # The netCDF library must not convert the values.
     variable.set_auto_maskandscale(False)
     variable.set_auto_chartostring(False)
     return variable
 
 
 def is_refused(values: np.ndarray, attrs: Mapping[str, object]) -> np.ndarray:
-    """Mark the values of a variable that are not finite, except infinite ones that its attributes allow."""
+    """Return True for values of a variable that are not finite, except infinite values that `attrs` allow."""
     refused = ~np.isfinite(values)
     return refused & ~np.isposinf(values) if INFINITE in attrs else refused
 
 
 def not_finite(name: Hashable, dims: tuple[Hashable, ...], bad: np.ndarray) -> str:
-    """Describe which values of a variable are not finite; `bad` marks them."""
+    """Describe the values of a variable that are not finite; `bad` is True for these values."""
     first = ", ".join(f"{dim}={index}" for dim, index in zip(dims, np.argwhere(bad)[0], strict=True))
     text = f"{name!r} holds {np.count_nonzero(bad)} of {bad.size} values that are not finite"
     return f"{text}, the first at {first}" if first else text
@@ -225,13 +225,13 @@ def coordinates_of(
     coordinates: Collection[Hashable],
     dims: Mapping[Hashable, tuple[Hashable, ...]] = {},
 ) -> dict[Hashable, str]:
-    """Return the attribute `coordinates` (CF) of each variable that has coordinates besides those of its dimensions.
+    """Return the CF attribute `coordinates` for each variable that has coordinates besides those of its dimensions.
 
     Parameters
     ----------
-    variables : all variables of a group, by name. Bounds of coordinates have no coordinates.
-    coordinates : names of the coordinates.
-    dims : dimensions in the file, for variables that have other dimensions there.
+    variables : all variables of a group, by name. Bounds of coordinates do not get the attribute.
+    coordinates : names of the variables that are coordinates.
+    dims : dimensions in the file by name of variable, if they differ from those in `variables`.
     """
     dims = {name: variable.dims for name, variable in variables.items()} | dict(dims)
     without = {*coordinates, *(variable.attrs.get("bounds") for variable in variables.values())}

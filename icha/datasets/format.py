@@ -1,7 +1,7 @@
-"""The kinds of files that ICHA writes, and checks of files against their documented format.
+"""Identify the kinds of files that ICHA writes, and compare files with their documented format.
 
-The format of runs, surfaces and campaigns is described by the tables of `icha.datasets.variables`. A file may have more
-variables; they also have units and a long name.
+The tables of `icha.datasets.variables` describe the format of runs, surfaces and campaigns. A file may have other
+variables too, which must have units and a long name.
 """
 
 import os
@@ -22,7 +22,7 @@ from icha.support.input_files import bounded_memory, most_memory, problem_with_p
 
 RUN, SURFACE, CAMPAIGN = "run dataset", "surface file", "campaign dataset"
 SOLUTION = "boundary-element solution at a finite range"
-# Kinds whose format is not promised, with a variable that no other kind has.
+# Kinds of files whose format may change in later versions, each with a variable that no other kind has.
 _OTHERS = {
     "comparison of runs at common loads": "seed_count",
     "error of the model": "area_error",
@@ -31,11 +31,11 @@ _OTHERS = {
     "boundary-element loop at a finite range": "dissipated",
 }
 
-# Names of attributes that a file must not have, because the same input gives the same bytes.
+# Words in names of attributes that a file must not have, because the same input must give the same bytes.
 _REFUSED = re.compile("user|host|mail|date|time")
-# Largest relative difference by rounding between values that must be equal.
+# Largest relative difference due to rounding between values that must be equal.
 _ROUNDING = 1e-9
-# The unit of a target is that of its quantity, if all targets have the same one.
+# Possible units of targets: a length, or none for other quantities and for mixed targets.
 _UNITS_OF_TARGETS = dict.fromkeys(("step_target", "snapshot_target"), ("1", "m"))
 
 
@@ -43,7 +43,7 @@ class UnknownFile(ValueError):
     """A file that has no documented format, or is not a readable netCDF file."""
 
 
-# Variables of a study: those that list its runs, and the variables along the steps of every run.
+# Variables of a study: variables that list the runs, and variables along the steps of every run.
 _STUDY = {name: CAMPAIGN_TABLE[name] for name in ("status", "step_count", "failure")} | {
     name: each._replace(dims=(*LABELS, "step"))
     for name, each in of_run.RUN.items()
@@ -52,12 +52,12 @@ _STUDY = {name: CAMPAIGN_TABLE[name] for name in ("status", "step_count", "failu
 
 
 def identify_file(path: str | os.PathLike) -> tuple[str, xr.Dataset | xr.DataTree]:
-    """Return the kind of a file and its content: RUN, SURFACE, CAMPAIGN, or a kind whose format is not promised.
+    """Return the kind and the content of a file; the kind is RUN, SURFACE, CAMPAIGN or an undocumented kind.
 
     Raises
     ------
     UnknownFile
-        If it is of another kind, or cannot be read.
+        If the file is of another kind, or cannot be read.
     """
     if problem := problem_with_path(path):
         raise UnknownFile(f"{path}: {problem}; expected a file")
@@ -69,9 +69,9 @@ def identify_file(path: str | os.PathLike) -> tuple[str, xr.Dataset | xr.DataTre
             refuse_traps(path)
             data = read_campaign(path) if has_groups(path) else read_dataset(path)
         if isinstance(data, xr.DataTree):
-            # Large arrays are still in the file, and read when they are used.
+            # Large arrays stay in the file until they are used.
             require_room(sum(node.to_dataset(inherit=False).nbytes for node in data.subtree), most)
-    except Exception as error:  # whatever the libraries raise for files that are damaged or of another kind
+    except Exception as error:  # libraries raise various errors for damaged files and for files of another kind
         reason = str(error).removeprefix(f"{path}: ")
         raise UnknownFile(f"{path}: {reason}") from None
     groups = [data] if isinstance(data, xr.Dataset) else [node.to_dataset() for node in data.children.values()]
@@ -94,10 +94,10 @@ def problems_with_file(kind: str, data: xr.Dataset | xr.DataTree) -> list[str]:
 
     Parameters
     ----------
-    kind, data : as `identify_file` returns them.
+    kind, data : kind and content of the file from `identify_file`.
     """
     problems = [
-        f"attribute {name}: states who made the file, where or when; expected no such attribute"
+        f"attribute {name}: states by whom, where or when the file was made; expected no such attribute"
         for name in data.attrs
         if _REFUSED.search(name)
     ]
@@ -132,7 +132,7 @@ def _problems_with_run(run: xr.Dataset) -> Iterator[str]:
     ):
         error = abs(run[name] - expected)
         if expected.size and float(error.max()) > _ROUNDING * float(abs(expected).max()):
-            yield f"{name}: is not {formula}, but differs from it by up to {float(error.max()):.3g}"
+            yield f"{name}: differs from {formula} by up to {float(error.max()):.3g}; expected equal values"
 
 
 def _problems_with_surface(surface: xr.Dataset) -> Iterator[str]:
@@ -143,13 +143,13 @@ def _problems_with_surface(surface: xr.Dataset) -> Iterator[str]:
 
 
 def _problems_with_variables(data: xr.Dataset, table: Table, *further: Table) -> Iterator[str]:
-    """Compare variables with their descriptions; a further table applies if the file has one of its variables."""
+    """Yield differences of variables from `table`; a `further` table applies if the file has one of its variables."""
     for each in further:
         if each.keys() & data.variables.keys():
             table = table | each
     for name, described in table.items():
         if name not in data.variables:
-            # A run without snapshots, for instance, has no variables along `snapshot`.
+            # For example, a run without snapshots has no variables along `snapshot`.
             if set(described.dims) <= set(data.dims):
                 yield f"{name} is missing"
             continue

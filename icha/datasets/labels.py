@@ -1,9 +1,9 @@
-"""Labels of the runs of a campaign and of references, and their positions in a dataset.
+"""Labels of runs and of reference solutions, and the positions of labels in a dataset.
 
-Labels are the dimensions of a dataset, and their values are its coordinates. If all surfaces have the same rms slopes,
-`rms_slope` is one of the labels. Measured surfaces have different slopes, and an array of all surfaces and all slopes
-would be nearly empty. Then the coordinate `rms_slope(surface, rms_slope)` contains the slopes of every surface, with
-missing values after the last slope.
+Labels, such as surface and material, are the dimensions of a dataset. The values of the labels are the coordinates of
+the dataset. If all surfaces have the same rms slopes, the coordinate `rms_slope` has one dimension. Measured surfaces
+have different slopes, so that an array of all surfaces and all slopes would be nearly empty. Then the coordinate
+`rms_slope(surface, rms_slope)` contains the slopes of every surface, with missing values after the last slope.
 """
 
 from __future__ import annotations
@@ -18,17 +18,17 @@ from icha.contact.models import DEFAULT_MODEL, MODELS
 if TYPE_CHECKING:
     import xarray as xr
 
-# Paths of files below the folder of their kind, without ending, with fields in braces.
+# Patterns of paths below the folder for a kind of file. Paths have no ending, and fields stand in braces.
 RUN = "{study}/{surface}/seed{seed}/slope{slope}/{model_folder}{material}"
 CONTACT = "{entry}/{surface}/seed{seed}/slope{slope}/{material}"
 SOLUTION = CONTACT + "/p{pressure}"
 _NUMBERS = {"rms_slope": "slope", "reduced_pressure": "pressure"}
-# Relative difference below which two rms slopes are the same, from the rounding of scaled surfaces.
+# Largest relative difference between two rms slopes that count as equal. Scaling of surfaces causes rounding errors.
 _SAME_SLOPE = 1e-9
 
 
 def model_folder(model: str) -> str:
-    """Return the folder of a model in the path of a run, with a slash; empty text if the model has no folder."""
+    """Return the folder of a model in the path of a run, with a slash at the end; "" if the model has no folder."""
     return MODELS[model].folder
 
 
@@ -37,9 +37,9 @@ class RunLabels(NamedTuple):
 
     Attributes
     ----------
-    study, model, surface, material : names.
-    seed : of the surface.
-    rms_slope : as configured.
+    study, model, surface, material : names of study, model, surface and material.
+    seed : seed of the random surface.
+    rms_slope : rms slope of the surface, as in the configuration.
     """
 
     study: str
@@ -51,7 +51,7 @@ class RunLabels(NamedTuple):
 
     @property
     def path(self) -> str:
-        """Path of the run's dataset below the folder of runs, without ending."""
+        """Path of the run's file below the folder of runs, without ending."""
         return RUN.format(**path_fields(self))
 
     def __str__(self):
@@ -59,12 +59,12 @@ class RunLabels(NamedTuple):
         return self.path
 
 
-# Labels that are dimensions of a study.
+# Labels that are dimensions in the dataset of a study.
 LABELS = RunLabels._fields[1:]
 
 
 class ContactLabels(NamedTuple):
-    """Labels of a contact that an entry of `finite_range` or `boundary_element_loops` requests."""
+    """Labels of a reference solution that an entry of `finite_range` or `boundary_element_loops` requests."""
 
     entry: str
     surface: str
@@ -74,12 +74,12 @@ class ContactLabels(NamedTuple):
 
     @property
     def path(self) -> str:
-        """Path of its file below the folder of its kind, without ending."""
+        """Path of the file of the solution below the folder for this kind of file, without ending."""
         return CONTACT.format(**path_fields(self))
 
 
 class SolutionLabels(NamedTuple):
-    """Labels of a boundary-element solution: the entry that requests it, the run to compare, and the load."""
+    """Labels of a boundary-element solution: the requesting entry, labels of the compared run, and the load."""
 
     entry: str
     study: str
@@ -91,12 +91,12 @@ class SolutionLabels(NamedTuple):
 
     @property
     def run(self) -> RunLabels:
-        """The asperity run that is compared with it."""
+        """Labels of the asperity run that is compared with the solution."""
         return RunLabels(self.study, DEFAULT_MODEL, *self[2:6])
 
     @property
     def path(self) -> str:
-        """Path of its file below the folder of solutions, without ending."""
+        """Path of the file of the solution below the folder of solutions, without ending."""
         return SOLUTION.format(**path_fields(self))
 
     def __str__(self):
@@ -105,7 +105,7 @@ class SolutionLabels(NamedTuple):
 
 
 def path_fields(labels: RunLabels | ContactLabels | SolutionLabels) -> dict[str, str]:
-    """Return the values for the fields in braces of a path pattern."""
+    """Return the text for each field in a path pattern, by name of the field."""
     found = {
         _NUMBERS.get(name, name): number_label(value) if name in _NUMBERS else str(value)
         for name, value in labels._asdict().items()
@@ -119,15 +119,15 @@ def number_label(value: float) -> str:
 
 
 def arrange_slopes(pairs: Iterable[tuple[str, float]]) -> np.ndarray:
-    """Arrange rms slopes in ascending order: one row for all surfaces, or one row per surface if this is smaller.
+    """Arrange rms slopes in ascending order: one row for all surfaces, or one row per surface if that array is smaller.
 
     Parameters
     ----------
-    pairs : surface and rms slope of every run; surfaces keep the order in which they first appear.
+    pairs : surface and rms slope of every run. Surfaces keep the order in which they first appear.
 
     Returns
     -------
-    (slope,) float, or (surface, slope) float with NaN beyond the last slope of a surface.
+    (slope,) float, or (surface, slope) float with NaN after the last slope of a surface.
     """
     found: dict[str, set[float]] = {}
     for surface, slope in pairs:
@@ -140,18 +140,18 @@ def arrange_slopes(pairs: Iterable[tuple[str, float]]) -> np.ndarray:
 
 
 def slope_dims(slopes: np.ndarray) -> tuple[str, ...]:
-    """Return the dimensions of the coordinate `rms_slope` with values from `arrange_slopes`."""
+    """Return the dimensions of the coordinate `rms_slope` whose values are from `arrange_slopes`."""
     return ("surface", "rms_slope") if slopes.ndim == 2 else ("rms_slope",)
 
 
 def slopes_of(data: xr.Dataset) -> list[float]:
-    """List all rms slopes of a dataset, each once, in ascending order."""
+    """List all different rms slopes of a dataset in ascending order."""
     values = np.unique(data["rms_slope"].values)
     return values[np.isfinite(values)].tolist()
 
 
 def surfaces_and_slopes(data: xr.Dataset) -> list[tuple[str, float]]:
-    """List every surface and rms slope in a dataset."""
+    """List every combination of surface and rms slope in a dataset."""
     return [
         (surface, slope)
         for k, surface in enumerate(data["surface"].values.tolist())
@@ -161,7 +161,7 @@ def surfaces_and_slopes(data: xr.Dataset) -> list[tuple[str, float]]:
 
 
 def labels_at(data: xr.Dataset, place: Sequence[int], labels: Sequence[str]) -> list[Any]:
-    """Return the values of the labels at the indices `place`."""
+    """Return the values of the labels of a dataset at the indices `place`, one for each label."""
     at = dict(zip(labels, place, strict=True))
     coordinates = (data.variables[label] for label in labels)
     return [np.asarray(each.values[tuple(at[dim] for dim in each.dims)]).item() for each in coordinates]
@@ -173,10 +173,10 @@ def place_of(data: xr.Dataset, wanted: Mapping[str, Any]) -> dict[str, int]:
     Raises
     ------
     KeyError
-        With the name of a label that does not have the wanted value.
+        If a label does not have the wanted value; the argument is the name of the label.
     """
     at: dict[str, int] = {}
-    # The slope comes last because it may depend on the surface.
+    # The slope comes last because slopes may depend on the surface.
     for label in sorted(wanted, key="rms_slope".__eq__):
         values = slopes_at(data, at) if label == "rms_slope" else data.variables[label].values
         same = np.isclose(values, wanted[label], rtol=_SAME_SLOPE) if label == "rms_slope" else values == wanted[label]
@@ -187,6 +187,6 @@ def place_of(data: xr.Dataset, wanted: Mapping[str, Any]) -> dict[str, int]:
 
 
 def slopes_at(data: xr.Dataset, at: Mapping[str, int]) -> np.ndarray:
-    """Return the rms slopes, (slope,), of the surface at a position."""
+    """Return the rms slopes, (slope,) float, of the surface whose position is `at["surface"]`."""
     slopes = data.variables["rms_slope"]
     return slopes.values[at["surface"]] if slopes.ndim == 2 else slopes.values

@@ -1,4 +1,4 @@
-"""Paths of the files of a campaign below its folder of results, with fields in braces, and the storage of arrays."""
+"""Path patterns of all files in the folder of results of a campaign, and limits for the storage of arrays."""
 
 from __future__ import annotations
 
@@ -23,26 +23,26 @@ EXPLORER = "explore.html"
 RUN_TIMES = "run_times.tsv"
 CONFIGURATION = "config.used.yaml"
 DEPOSIT = "publish/{campaign}-{version}"
-# Smaller arrays are not compressed: their chunks would need the space that compression saves (measured in
-# docs/reference/dataset.md, "Compression").
+# Smallest number of values of compressed arrays. For smaller arrays, the chunks of compressed arrays need as much space
+# as compression saves (docs/reference/dataset.md, "Compression").
 LEAST_COMPRESSED = 1024
-# Number of values of arrays that are compressed. Larger arrays are heights: compression would save a sixth of their
-# space, and take 13 s at 8192 x 8192 nodes.
+# Numbers of values of compressed arrays. Larger arrays are heights of surfaces. Compression of heights would save only
+# a sixth of the space, and take 13 s for 8192 x 8192 nodes.
 COMPRESSED_SIZES = range(LEAST_COMPRESSED, 2**22)
 COMPRESSION = {"zlib": True, "complevel": 4, "shuffle": True}
-# Largest array of a campaign dataset that is read as a whole, in bytes.
+# Size in bytes of the largest array of a campaign dataset that is read as a whole.
 LEFT_IN_FILE = 2**26
 
 
 @dataclass(frozen=True)
 class ResultFiles:
-    """Paths of the results of a campaign, below its folder of results if one is given."""
+    """Paths of the results of the campaign `campaign`; paths begin with `folder`, unless `folder` is empty."""
 
     campaign: str
     folder: str = ""
 
     def path(self, pattern: str, case: NamedTuple | None = None, **names: object) -> str:
-        """Return the path of one file: the pattern, filled with the campaign, the labels of a case, and `names`."""
+        """Return the path of one file; fields of the pattern are the campaign, the labels of `case`, and `names`."""
         of_case = {} if case is None else labels.path_fields(case)
         return "/".join(filter(None, (self.folder, pattern.format(campaign=self.campaign, **of_case, **names))))
 
@@ -52,10 +52,10 @@ def job_file(path: str, kind: str, ending: str) -> str:
 
     Parameters
     ----------
-    path : the file, below the folder of results.
+    path : path of the file, relative to the folder of results.
     kind, ending : `logs` and `.log`, or `benchmarks` and `.jsonl`.
     """
     folder, _, rest = path.partition("/")
-    # Kinds of references have their own folders; the theories of the surfaces have none.
+    # Each kind of reference solution has a folder; the theories of the surfaces have none.
     job = rest if folder == "references" and "/" in rest else path
     return f"{kind}/{job.rpartition('.')[0]}{ending}"

@@ -1,4 +1,4 @@
-"""The file of a surface: its heights, statistics, power spectrum and origin."""
+"""Write and read the file of a surface, which contains heights, statistics, power spectrum and origin."""
 
 import os
 from collections.abc import Mapping
@@ -25,13 +25,13 @@ def write_surface(
     measured=None,
     attrs: Mapping[str, str] = {},
 ) -> None:
-    """Write a topography with its statistics, power spectrum and origin.
+    """Write a topography to a file, with statistics, power spectrum and origin.
 
     Parameters
     ----------
-    path : the file.
-    surface : the topography; campaigns scale it to rms slope 1.
-    name, seed : its labels in the campaign.
+    path : path of the file.
+    surface : the topography. Campaigns scale topographies to rms slope 1.
+    name, seed : labels of the surface in the campaign.
     spectrum : the `icha.surfaces.spectrum.SelfAffineSpectrum` of a random surface.
     measured : the `icha.surfaces.measured.topography.PreparedTopography` of a measured surface, before scaling.
     attrs : further global attributes.
@@ -77,9 +77,9 @@ def write_surface(
 
 
 def measured_scale(surface: xr.Dataset) -> float:
-    """Return the factor from the heights of a surface file to the measured heights; 1 if it was not measured.
+    """Return the ratio of the measured heights to the heights in a surface file; 1 for a random surface.
 
-    All topographies are stored at rms slope 1.
+    Surface files contain all topographies at rms slope 1.
     """
     if "measured_rms_slope" not in surface:
         return 1.0
@@ -92,12 +92,12 @@ def read_surface(path: str | os.PathLike) -> Surface:
     Raises
     ------
     ValueError
-        If the file cannot be read, lacks heights or period, or its heights are not finite, not square or flat.
+        If the file cannot be read, lacks heights or period, or has heights that are not finite, not square or flat.
     """
     dataset = read_dataset(path)
     for name in ("height", "period"):
         if name not in dataset:
-            raise ValueError(f"{path}: not a surface file, it has no variable {name!r}")
+            raise ValueError(f"{path}: not a surface file, because it has no variable {name!r}")
     try:
         heights = dataset["height"].transpose("y", "x").values
         return Surface(heights, float(dataset["period"]), dataset.attrs.get("boundary", PERIODIC))
@@ -106,7 +106,7 @@ def read_surface(path: str | os.PathLike) -> Surface:
 
 
 def read_spectral_moments(path: str | os.PathLike) -> SpectralMoments:
-    """Read the spectral moments of a surface file, without its heights.
+    """Read the spectral moments from a surface file, without reading the heights.
 
     Raises
     ------

@@ -1,1 +1,1 @@
-"""Make deposits of results, with metadata, provenance and checksums; verify, reproduce and upload deposits."""
+"""Make, verify, reproduce and upload deposits: published results with metadata, provenance and checksums."""

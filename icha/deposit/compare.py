@@ -1,19 +1,20 @@
 """Compare the results of a deposit with those of a rerun, variable by variable.
 
 With the same program, environment and kind of processor, the files of a rerun are identical byte for byte. On another
-processor the last digits of sums and transforms differ, and these differences grow in later computations. So numbers
-have a tolerance:
+processor, the last digits of sums and Fourier transforms differ, and these differences grow in later computations.
+Therefore two numbers count as equal within a tolerance:
 
-- Two numbers are the same if they differ by at most `TOLERANCE` of the larger one.
-- Values below `FLOOR` of the variable's largest value are compared as if they were that large: a value near zero is
-  often the difference of two large values, and has their absolute error.
-- Two residuals of a solver are the same if they differ by at most the largest residual that the solver accepts
-  (`NOISE`): all digits of a residual are rounding errors.
+- Two numbers are equal if their difference is at most `TOLERANCE` times the larger number.
+- For values smaller than `FLOOR` times the largest value of the variable, the difference is at most `TOLERANCE` times
+  `FLOOR` times this largest value. A value near zero is often a difference of two large values, whose absolute error
+  does not become smaller.
+- Two residuals of a solver are equal if they differ by at most the largest residual that the solver accepts (`NOISE`),
+  because all digits of a residual are rounding errors.
 
-Everything else must be equal: integers, text, places of missing values, dimensions, types, attributes. Storage
+Everything else must be equal: integers, text, positions of missing values, dimensions, types, attributes. Storage
 (chunks, compression, order in the file) is not compared. Figures and the report are drawn from the compared values.
-They may differ because other machines have other fonts and libraries. If only figures or the report differ, the
-comparison prints a remark and counts no difference.
+Figures may differ because other machines have other fonts and libraries. If only figures or the report differ, the
+comparison prints a remark, and the results still count as reproduced.
 """
 
 import os
@@ -36,13 +37,13 @@ VERDICTS = ("identical", "within tolerance", "different", "missing", "extra")
 IDENTICAL, WITHIN, DIFFERENT, MISSING, EXTRA = VERDICTS
 TOLERANCE = 1e-6
 FLOOR = 1e-6
-# Absolute differences that are within tolerance, by the name of the variable.
+# Largest absolute differences that are within tolerance, by the name of the variable.
 NOISE = {"residual": RESIDUAL_LIMIT, "gap_residual": RESIDUAL_LIMIT, "front_residual": FRONT_LIMIT}
-# Endings of the names of files that are made from the data; differences of these files are remarks.
+# Endings of the names of files that are made from the data. Differences between these files are only remarks.
 _DERIVED = (".png", ".pdf", ".html", "checks.json")
-# Largest number of variables in a table.
+# Largest number of variables that the text of a comparison lists.
 _MOST_LINES = 20
-# Longest text of an error and of a value, in characters.
+# Largest number of characters of an error, and of a value, in a message.
 _LONGEST_ERROR, _LONGEST_VALUE = 300, 60
 
 
@@ -51,9 +52,9 @@ class Difference(NamedTuple):
 
     Attributes
     ----------
-    name : the variable, group or dimension that differs; empty if the file as a whole differs.
+    name : name of the variable, group or dimension that differs; "" if the file as a whole differs.
     verdict : one of `VERDICTS` except `identical`.
-    detail : what differs; the value in the deposit comes first.
+    detail : description of the difference; the value in the deposit precedes that of the rerun.
     deviation : largest relative difference of the numbers; infinite if something else differs.
     """
 
@@ -64,7 +65,7 @@ class Difference(NamedTuple):
 
 
 class File(NamedTuple):
-    """A file of the results and its differences."""
+    """A file of the results, and its differences between deposit and rerun."""
 
     path: str
     differences: tuple[Difference, ...]
@@ -79,17 +80,17 @@ class File(NamedTuple):
 
     @property
     def kind(self) -> str:
-        """Part of the results that contains the file, such as `runs`."""
+        """First folder in the path of the file, such as `runs`."""
         return self.path.partition("/")[0]
 
     @property
     def is_remark(self) -> bool:
-        """True for a file that is made from the data and differs only in its bytes."""
+        """True if the file is made from the data, such as a figure, and differs only in its bytes."""
         return self.verdict == DIFFERENT and self.path.endswith(_DERIVED)
 
 
 class Comparison(NamedTuple):
-    """Comparison of all files, sorted by path."""
+    """Comparison of all files of a deposit with those of a rerun, sorted by path."""
 
     files: tuple[File, ...]
 
@@ -108,8 +109,8 @@ def compare_folders(
 
     Parameters
     ----------
-    deposit, rerun : folders that contain `dataset/`, `runs/`, ….
-    paths : the files to compare, relative to both folders; without `paths`, all computed files (`COMPUTED`).
+    deposit, rerun : folders of results, which contain `dataset/`, `runs/`, ….
+    paths : files to compare, relative to both folders. Default: all computed files (`COMPUTED`).
     """
     deposit, rerun = Path(deposit), Path(rerun)
     if paths is None:
@@ -118,10 +119,10 @@ def compare_folders(
 
 
 def _compare_files(deposit: Path, rerun: Path, path: str) -> File:
-    """Compare two files; a file that cannot be read is different."""
+    """Compare a file in two folders; a file that cannot be read counts as different."""
     try:
         return File(path, tuple(_differences(deposit, rerun)))
-    except Exception as error:  # a file from an unknown maker may cause any error
+    except Exception as error:  # a file of unknown origin may cause any error
         reason = textwrap.shorten(repr(error), _LONGEST_ERROR, placeholder=" …")
         return File(path, (Difference("", DIFFERENT, f"cannot be compared: {reason}"),))
 
@@ -143,7 +144,7 @@ def _differences(deposit: Path, rerun: Path) -> Iterator[Difference]:
 
 
 def _compare_groups(a: netCDF4.Dataset, b: netCDF4.Dataset, path: str) -> Iterator[Difference]:
-    """Compare two groups and the groups in them."""
+    """Yield the differences between two groups of netCDF files, including the groups inside them."""
     yield from _compare_attributes(a, b, f"{path}/ (attributes)")
     sizes_a, sizes_b = ({name: len(dim) for name, dim in group.dimensions.items()} for group in (a, b))
     for name, size, other in _paired(sizes_a, sizes_b):
@@ -160,7 +161,7 @@ def _compare_groups(a: netCDF4.Dataset, b: netCDF4.Dataset, path: str) -> Iterat
 
 
 def _paired(a: Mapping, b: Mapping) -> Iterator[tuple]:
-    """Return the keys of two mappings with both values; a missing value is None."""
+    """Yield each key of two mappings with both values; None stands for a missing value."""
     return ((key, a.get(key), b.get(key)) for key in dict.fromkeys([*a, *b]))
 
 
@@ -178,7 +179,7 @@ def _compare_variables(a: netCDF4.Variable, b: netCDF4.Variable, name: str) -> I
 
 
 def _values(variable: netCDF4.Variable) -> np.ndarray:
-    """Return the values of a variable; missing numbers are NaN."""
+    """Return the values of a variable in a file, with NaN for missing numbers."""
     variable.set_auto_maskandscale(False)
     values = np.asarray(variable[...])
     if values.dtype.kind == "f":
@@ -194,12 +195,12 @@ def _compare_attributes(a, b, name: str) -> Iterator[Difference]:
 
 
 def compare_values(a: np.ndarray, b: np.ndarray, *, noise: float = 0.0) -> Difference | None:
-    """Compare two arrays with the same shape and type; return None if they are identical.
+    """Compare two arrays of the same shape and type; return the difference, or None if the arrays are identical.
 
     Parameters
     ----------
-    a, b : values of the deposit and of the rerun; NaN is a missing value.
-    noise : absolute difference that is always within tolerance.
+    a, b : values in the deposit and in the rerun; NaN stands for a missing value.
+    noise : largest absolute difference that is within tolerance for values of any size.
     """
     if a.dtype.kind != "f":
         unequal = np.asarray(a != b)
@@ -214,7 +215,7 @@ def compare_values(a: np.ndarray, b: np.ndarray, *, noise: float = 0.0) -> Diffe
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
         deviation = np.asarray(abs(a - b) / np.maximum(size, max(FLOOR * largest, noise / TOLERANCE)))
     deviation[missing | (a == b)] = 0.0
-    deviation[np.isnan(deviation)] = np.inf  # only one value is infinite, or both with opposite signs
+    deviation[np.isnan(deviation)] = np.inf  # one value is infinite, or both are infinite with opposite signs
     most = float(deviation.max())
     detail = f"largest relative deviation {most:.2g}, {_place(a, b, np.argmax(deviation))}"
     if most <= TOLERANCE:
@@ -238,10 +239,10 @@ def _shown(value: object) -> str:
 
 
 def format_comparison(comparison: Comparison) -> str:
-    """Write the result as text: one line for each kind of file, and one for each variable that is not identical.
+    """Return the comparison as text, with one line for each kind of file, and for each variable that is not identical.
 
-    The largest deviations come first. At most `_MOST_LINES` variables that differ are listed, and as many variables
-    within tolerance.
+    The largest deviations come first. The text lists at most `_MOST_LINES` variables that differ, and at most
+    `_MOST_LINES` variables within tolerance.
     """
     kinds = sorted({file.kind for file in comparison.files}, key=COMPUTED.index)
     width = max(map(len, kinds), default=0)
@@ -257,12 +258,12 @@ def format_comparison(comparison: Comparison) -> str:
         if len(found) > _MOST_LINES:
             text.append(f"… and {len(found) - _MOST_LINES} more")
     if any(file.is_remark for file in comparison.files):
-        text.append("Figures, pages and checks are made from the data above; if only they differ, nothing is wrong.")
+        text.append("Figures, pages and checks are made from the data; if only these files differ, nothing is wrong.")
     return "\n".join(text)
 
 
 def _lines(comparison: Comparison, within: bool) -> list[str]:
-    """Return one line for each variable, either of those within tolerance (`within`) or of those that differ more."""
+    """Return one line for each variable within tolerance (`within`), or for each variable that differs by more."""
     grouped = defaultdict(list)
     for file in comparison.files:
         for each in file.differences:

@@ -1,14 +1,15 @@
-"""The deposit as a Workflow Run RO-Crate: what every file is, and which job made it from which files.
+"""Describe a deposit as a Provenance Run RO-Crate: the type of every file, and the job and inputs that made the file.
 
-Profiles: RO-Crate 1.1 (https://w3id.org/ro/crate/1.1) and Workflow Run Crate 0.5
-(https://w3id.org/ro/wfrun/workflow/0.5), with the profiles on which they build.
+Profiles: RO-Crate 1.1 (https://w3id.org/ro/crate/1.1) and Provenance Run Crate 0.5
+(https://w3id.org/ro/wfrun/provenance/0.5), with the profiles on which they build.
 
-The crate contains neither the times of jobs nor the person who ran them. So the same data always have the same crate.
+The crate does not contain the times of jobs or the person who ran them, so that the same data have the same crate.
 """
 
 import hashlib
 import json
 from collections.abc import Iterable, Mapping, Sequence
+from graphlib import TopologicalSorter
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -26,24 +27,24 @@ from icha.deposit.verify import CRATE, README, SOURCE
 _PROGRAM = f"{SOURCE}/"
 _WORKFLOW = f"{_PROGRAM}Snakefile"
 _LICENCE = f"{_PROGRAM}LICENSE"
-# Files of the source that the crate lists, besides the scripts of the jobs.
+# Files of the program's source that the crate lists, besides the scripts of the jobs.
 _SHOWN = {_WORKFLOW, f"{_PROGRAM}uv.lock", _LICENCE}
 
 _WORKFLOW_PROFILE = "https://w3id.org/workflowhub/workflow-ro-crate/1.0"
-# Term of run crates for a checksum (https://w3id.org/ro/terms/workflow-run/context).
+# Term for a checksum in Workflow Run RO-Crates (https://w3id.org/ro/terms/workflow-run/context).
 _TERMS = {"sha256": "https://w3id.org/ro/terms/workflow-run#sha256"}
 
 
 class Job(NamedTuple):
-    """One job of the workflow; paths of files are those in the deposit.
+    """One job of the workflow.
 
     Attributes
     ----------
-    rule : name of the rule of the workflow.
-    inputs, outputs : files that the job read and wrote; it wrote at least one file.
-    parameters : names and values of its settings.
-    description : what its script does.
-    script : the script that the job ran.
+    rule : name of the rule in the workflow.
+    inputs, outputs : paths in the deposit of the files that the job read and wrote; at least one file was written.
+    parameters : names and values of the settings of the job.
+    description : sentence on what the script does.
+    script : path in the deposit of the script that the job ran.
     """
 
     rule: str
@@ -63,16 +64,16 @@ def write_crate(
     revision: str,
     checksums: Mapping[str, str],
 ) -> None:
-    """Write the deposit's `ro-crate-metadata.json`.
+    """Write the file `ro-crate-metadata.json` of a deposit.
 
     Parameters
     ----------
-    folder : the deposit, which contains all files of `checksums`.
-    publication : metadata of the deposit; complete.
-    jobs : the jobs that made the results, in any order; the deposit contains all their files.
+    folder : folder of the deposit, which contains all files in `checksums`.
+    publication : complete metadata of the deposit.
+    jobs : jobs that made the results, in any order. The deposit contains all files that the jobs read and wrote.
     campaign : name of the campaign.
     revision : revision of the program whose source is in `source/`.
-    checksums : sha256 of every file, hexadecimal, by its path in the deposit.
+    checksums : hexadecimal sha256 of every file, by path in the deposit.
     """
     jobs = sorted(jobs, key=lambda job: job.outputs)
     crate = ROCrate()
@@ -91,7 +92,7 @@ def write_crate(
         files[path] = crate.add(File(crate, dest_path=path, properties={"name": path, **facts}))
     parts = [file for path, file in files.items() if path.startswith(_PROGRAM)]
     facts = {"version": revision, "identifier": revision, "hasPart": parts}
-    _set(crate.add(Dataset(crate, dest_path=_PROGRAM)), name="Source of the workflow and of its program", **facts)
+    _set(crate.add(Dataset(crate, dest_path=_PROGRAM)), name="Source of the workflow and of the program", **facts)
     number = version("snakemake")
     _set(crate.dereference("#snakemake"), name=f"Snakemake {number}", version=number)
     _describe_workflow(crate, files, revision, jobs)
@@ -103,8 +104,19 @@ def write_crate(
     (folder / CRATE).chmod(0o644)
 
 
+def _steps(jobs: Sequence[Job]) -> list[Job]:
+    """Return the first job of every rule, sorted so that each rule follows the rules whose files it reads."""
+    maker = {path: job for job in jobs for path in job.outputs}
+    # Lists and not sets, because the order must be the same in every process.
+    before = {job.outputs: [maker[path].outputs for path in job.inputs if path in maker] for job in jobs}
+    # Place of the last job of each rule, if every job follows the jobs that made its inputs.
+    latest = {maker[outputs[0]].rule: k for k, outputs in enumerate(TopologicalSorter(before).static_order())}
+    first = {job.rule: job for job in reversed(jobs)}
+    return [first[rule] for rule in sorted(latest, key=latest.get)]
+
+
 def _describe(crate: ROCrate, publication: Publication, campaign: str) -> None:
-    """Describe the deposit as a whole."""
+    """Add title, licence, authors and other metadata of the deposit to the crate."""
     licence = find_licence(publication.license)
     _set(
         crate.root_dataset,
@@ -141,28 +153,33 @@ def _add_organisation(crate: ROCrate, name: str, address: str | None) -> Entity:
 
 
 def _describe_workflow(crate: ROCrate, files: Mapping[str, File], revision: str, jobs: Sequence[Job]) -> None:
-    """Describe the workflow and its scripts, which are programs as well as files."""
+    """Add the workflow, one step for each rule, and the scripts to the crate; scripts are programs and files."""
     configuration = crate.dereference("#configuration")
     _set(files[CONFIGURATION], exampleOfWork=configuration)
-    tools = {job.script: job for job in jobs}
-    for script, job in tools.items():
+    tools, steps = {}, []
+    for position, job in enumerate(_steps(jobs), 1):
+        tools[job.script] = files[job.script]
         facts = {"version": revision, "programmingLanguage": crate.dereference("#python")}
-        _set(files[script], ["File", "SoftwareSourceCode"], name=job.rule, description=job.description, **facts)
+        _set(files[job.script], ["File", "SoftwareSourceCode"], name=job.rule, description=job.description, **facts)
+        facts = {"position": str(position), "workExample": files[job.script]}
+        steps.append(_add(crate, f"{_WORKFLOW}#{job.rule}", "HowToStep", name=job.rule, **facts))
     _set(
         files[_WORKFLOW],
-        ["File", "SoftwareSourceCode", "ComputationalWorkflow"],
+        ["File", "SoftwareSourceCode", "ComputationalWorkflow", "HowTo"],
         name="ICHA: adhesive rough contact by interacting and coalescing asperities",
         version=revision,
         conformsTo={"@id": "https://bioschemas.org/profiles/ComputationalWorkflow/1.0-RELEASE"},
         license=files[_LICENCE],
         programmingLanguage=crate.dereference("#snakemake"),
-        hasPart=[files[script] for script in tools],
+        hasPart=list(tools.values()),
+        step=steps,
         input=[configuration],
     )
 
 
 def _add_jobs(crate: ROCrate, jobs: Sequence[Job], files: Mapping[str, File], campaign: str, description: str) -> None:
-    """Add the run of the workflow, and every job in it."""
+    """Add the run of the workflow and every job of this run to the crate, with the step that started each job."""
+    engine = crate.dereference("#snakemake")
     made = {path for job in jobs for path in job.outputs}
     given = {path for job in jobs for path in job.inputs} - made | {CONFIGURATION}
     run = _add_action(
@@ -174,27 +191,32 @@ def _add_jobs(crate: ROCrate, jobs: Sequence[Job], files: Mapping[str, File], ca
         object=[files[path] for path in sorted(given)],
         result=[files[path] for path in sorted(made)],
     )
-    actions = [
-        _add_action(
+    actions, controls = [], []
+    for job in jobs:
+        key, name = quote(job.outputs[0]), f"{job.rule}: {job.outputs[0]}"
+        action = _add_action(
             crate,
-            f"#job/{quote(job.outputs[0])}",
-            name=f"{job.rule}: {job.outputs[0]}",
+            f"#job/{key}",
+            name=name,
             description=job.description,
             instrument=files[job.script],
             object=[*(files[path] for path in job.inputs), *(_add_value(crate, job, *each) for each in job.parameters)],
             result=[files[path] for path in job.outputs],
         )
-        for job in jobs
-    ]
+        actions.append(action)
+        facts = {"instrument": {"@id": f"{_WORKFLOW}#{job.rule}"}, "object": action}
+        controls.append(_add_action(crate, f"#control/{key}", "ControlAction", name=f"step {name}", **facts))
+    name = f"{campaign}, organised by {engine['name']}"
+    _add_action(crate, "#organised", "OrganizeAction", name=name, instrument=engine, object=controls, result=run)
     crate.root_dataset.append_to("mentions", [run, *actions])
 
 
-def _add_action(crate: ROCrate, key: str, **properties: Any) -> Entity:
-    return _add(crate, key, "CreateAction", **properties, actionStatus="http://schema.org/CompletedActionStatus")
+def _add_action(crate: ROCrate, key: str, kind: str = "CreateAction", **properties: Any) -> Entity:
+    return _add(crate, key, kind, **properties, actionStatus="http://schema.org/CompletedActionStatus")
 
 
 def _add_value(crate: ROCrate, job: Job, name: str, value: str) -> Entity:
-    """Return a setting of a job; jobs of a rule with the same setting share it."""
+    """Add a setting of a job to the crate and return it; jobs of one rule with the same setting share one entity."""
     digest = hashlib.sha256(value.encode()).hexdigest()[:16]
     key = f"#{job.rule}/{quote(name)}/{digest}"
     return crate.dereference(key) or _add(crate, key, "PropertyValue", name=name, value=value)
@@ -207,7 +229,7 @@ def _add(crate: ROCrate, key: str, kind: str | list[str], **properties: Any) -> 
 
 
 def _set(entity: Entity, kind: list[str] | None = None, **properties: Any) -> None:
-    """Set the properties of an entity, except empty ones, and its types if they are given."""
+    """Set the properties of an entity that are not empty, and the types of the entity if `kind` is given."""
     if kind:
         entity.properties()["@type"] = kind
     for name, value in properties.items():

@@ -1,7 +1,7 @@
-"""Make a deposit, as a folder and as a zip: results, and what others need to understand, verify and reproduce them.
+"""Make a deposit, as a folder and as a zip: results, and all that others need to understand and reproduce the results.
 
 The same results and the same revision of the program always give exactly the same files. A deposit contains no times
-and no names of people, machines or folders, except those that the results, the configuration and the source contain.
+and no names of people, machines or folders, except those in the results, the configuration and the source.
 """
 
 import json
@@ -18,7 +18,8 @@ from icha.configuration.campaign import Campaign
 from icha.configuration.cases import campaign_sha256, run_sha256
 from icha.datasets.files import read_campaign
 from icha.deposit.crate import Job, write_crate
-from icha.deposit.metadata import citation_cff, find_licence, zenodo_metadata
+from icha.deposit.dictionary import data_dictionary
+from icha.deposit.metadata import citation_cff, datacite_metadata, find_licence, zenodo_metadata
 from icha.deposit.program import Source
 from icha.deposit.readme import readme
 from icha.deposit.verify import CHECKSUMS, CRATE, README, SOURCE, ZENODO, files_of, problem_with_name
@@ -29,9 +30,9 @@ from icha.support.atomic_files import moving, sync_folder, whole_file
 from icha.support.checksums import is_whole, recorded_hash, sha256_of, stale
 
 _BLOCK = 2**20
-# Time of every file in a zip: the earliest time that a zip can contain.
+# Time of every file in the zip, the earliest that the format allows, so that the same files give the same zip.
 _NO_TIME = (1980, 1, 1, 0, 0, 0)
-# Number in an entry of a zip which means that the modes of files are those of Unix.
+# Number in an entry of a zip which states that file permissions are those of Unix.
 _UNIX = 3
 
 
@@ -46,23 +47,22 @@ def make_deposit(
     jobs: Sequence[Job],
     cost: Cost,
 ) -> None:
-    """Write a deposit to `folder` and its zip to `archive`; a complete deposit replaces an earlier one.
+    """Write a deposit to `folder` and a zip of the deposit to `archive`; an earlier deposit is replaced at the end.
 
     Parameters
     ----------
-    folder, archive : the deposit and its zip. The folder in the zip has the name of `folder`.
-    results : the campaign's folder of results.
-    files : paths of the published results in that folder: at least config.used.yaml, checks.json and the campaign
-        dataset.
-    campaign : its configuration, with complete metadata (`icha.configuration.publication.missing_metadata`).
-    source : the source of the program.
-    jobs : the jobs that made the results.
-    cost : expected cost of computing the campaign.
+    folder, archive : paths of the deposit and of the zip. The folder in the zip has the name of `folder`.
+    results : folder of results of the campaign.
+    files : paths of the published files in `results`: at least config.used.yaml, checks.json and the campaign dataset.
+    campaign : configuration with complete metadata (`icha.configuration.publication.missing_metadata`).
+    source : source of the program.
+    jobs : jobs that made the results.
+    cost : expected time and memory for computing the campaign.
 
     Raises
     ------
     ValueError
-        If a file has changed since its job wrote it, if some systems refuse the name of a file, or if the failed checks
+        If a file has changed since a job wrote it, if some systems refuse the name of a file, or if the failed checks
         are not exactly the known failures.
     """
     folder, archive, results = Path(folder), Path(archive), Path(results)
@@ -71,8 +71,8 @@ def make_deposit(
     if changed := [f"  {results / file}" for file in files if not is_whole(results, file, thorough=True)]:
         listed = "\n".join(changed)
         raise ValueError(
-            "not published, because these files have changed since their jobs wrote them. Remove them, and run the "
-            f"campaign again:\n{listed}"
+            "not published, because these files have changed since their jobs wrote them. Remove these files, and run "
+            f"the campaign again:\n{listed}"
         )
     staging = folder.with_name(f".{folder.name}.part")
     shutil.rmtree(staging, ignore_errors=True)
@@ -84,8 +84,8 @@ def make_deposit(
         source.export(staging / SOURCE)
         if wrong := [f"  {file!r} {why}" for file in files_of(staging) if (why := problem_with_name(file))]:
             listed = "\n".join(wrong)
-            raise ValueError(f"not published, because some systems refuse these names. Rename the files:\n{listed}")
-        _describe(staging, campaign, source.revision, cost)
+            raise ValueError(f"not published, because some systems refuse these file names. Rename them:\n{listed}")
+        _describe(staging, files, campaign, source.revision, cost)
         checksums = {path: sha256_of(staging / path) for path in files_of(staging)}
         write_crate(staging, publication, jobs, campaign=campaign.name, revision=source.revision, checksums=checksums)
         checksums[CRATE] = sha256_of(staging / CRATE)
@@ -102,19 +102,19 @@ def make_deposit(
 
 
 def refuse_mixed(results: Path, campaign: Campaign, recorded: Mapping[str, str]) -> None:
-    """Refuse results that were computed with other settings, or from other files than those in the folder.
+    """Raise ValueError if results were computed with other settings, or from other files than those in the folder.
 
     Parameters
     ----------
-    results : the campaign's folder of results.
-    campaign : its configuration.
-    recorded : checksums of the parameters that the workflow recorded for the jobs
-        (`icha.support.checksums.hash_parameters`), by the path of a result in that folder.
+    results : folder of results of the campaign.
+    campaign : configuration of the campaign.
+    recorded : checksums of the parameters that the workflow recorded for the job of each result
+        (`icha.support.checksums.hash_parameters`), by the path of the result in `results`.
 
     Raises
     ------
     ValueError
-        If there are such results; the message lists them with the reason.
+        If results do not belong together. The message lists these results with the reasons.
     """
     files = campaign_files(campaign)
     expected = {path: run_sha256(campaign, case) for path, case in files.runs.items()}
@@ -122,25 +122,27 @@ def refuse_mixed(results: Path, campaign: Campaign, recorded: Mapping[str, str])
     wrong = dict(stale(results, recorded))
     for path, sha256 in expected.items():
         if run_state(results / path, sha256)[0] not in (DONE, FAILED):
-            wrong[path] = "this file was not computed with the settings of the campaign"
+            wrong[path] = "was not computed with the settings of the campaign"
     for path, asked in recorded.items():
         if asked != recorded_hash(results, path):
-            wrong.setdefault(path, "the workflow has recorded another job for this file")
+            wrong.setdefault(path, "was made by another job than the workflow has recorded")
     if wrong:
         raise ValueError(
-            "not published, because these results do not belong together. Remove them, and repeat the command:\n"
+            "not published, because these results do not belong together. Remove these files and repeat the command:\n"
             + "\n".join(f"  {results / path}: {why}" for path, why in sorted(wrong.items()))
         )
 
 
-def _describe(staging: Path, campaign: Campaign, revision: str, cost: Cost) -> None:
-    """Write licence, citation, metadata and page of the deposit."""
+def _describe(staging: Path, files: Sequence[str], campaign: Campaign, revision: str, cost: Cost) -> None:
+    """Write licence, CITATION.cff, metadata, data dictionary and README.md of the deposit."""
     publication = campaign.deposit_metadata()
     _write(staging / "LICENSE.txt", find_licence(publication.license).page())
     _write(staging / "CITATION.cff", citation_cff(publication, revision))
-    _write(staging / ZENODO, json.dumps(zenodo_metadata(publication), indent=1, ensure_ascii=False) + "\n")
+    for name, metadata in ((ZENODO, zenodo_metadata(publication)), ("datacite.json", datacite_metadata(publication))):
+        _write(staging / name, json.dumps(metadata, indent=1, ensure_ascii=False) + "\n")
+    _write(staging / "data_dictionary.csv", data_dictionary(staging, files))
     error = staging / "aggregated/model_error.nc"
-    # Opened and not loaded, because the dataset may be large and the page shows little of it.
+    # The dataset may be large and the page shows little of it, so it is not loaded into memory.
     with xr.open_datatree(staging / f"dataset/{campaign.name}.nc", engine="netcdf4") as dataset:
         page = readme(
             campaign,
@@ -160,7 +162,7 @@ def _write(path: Path, text: str) -> None:
 
 
 def _write_zip(path: Path, folder: Path, name: str) -> None:
-    """Write a folder under a name to a zip; it is not compressed, because versions of zlib differ."""
+    """Write a folder to a zip, as a folder `name`, without compression, whose bytes depend on the version of zlib."""
     with zipfile.ZipFile(path, "w", zipfile.ZIP_STORED) as archive:
         for file in files_of(folder):
             status = (folder / file).stat()

@@ -1,4 +1,4 @@
-"""Metadata of a deposit: licence, citation (CITATION.cff), Zenodo, and attributes of the campaign dataset."""
+"""Metadata of a deposit: licence, CITATION.cff, files for Zenodo and DataCite, attributes of the campaign dataset."""
 
 import json
 import re
@@ -10,7 +10,7 @@ import yaml
 from packaging.licenses import InvalidLicenseExpression, canonicalize_license_expression
 
 from icha.configuration.campaign import Campaign
-from icha.configuration.publication import Author, Funding, Publication
+from icha.configuration.publication import Author, Funding, Publication, RelatedIdentifier
 from icha.contact.models import MODEL_PAPER
 from icha.deposit.verify import SOURCE, ZENODO, read_text
 
@@ -19,13 +19,13 @@ TABLES = yaml.safe_load((_FOLDER / "tables.yaml").read_text(encoding="utf-8"))
 
 
 class Licence(NamedTuple):
-    """A licence.
+    """A licence of data.
 
     Attributes
     ----------
-    identifier : its SPDX identifier.
-    name, address : its name and web address.
-    text : its text if ICHA has it, else empty.
+    identifier : SPDX identifier of the licence.
+    name, address : name and web address of the licence.
+    text : full text of the licence; "" if ICHA does not contain the text.
     """
 
     identifier: str
@@ -34,10 +34,10 @@ class Licence(NamedTuple):
     text: str
 
     def page(self) -> str:
-        """Write LICENSE.txt of a deposit whose data have this licence."""
+        """Return the text of LICENSE.txt of a deposit whose data have this licence."""
         statement = (
             f"Data, figures and texts of this deposit: {self.name} ({self.identifier})\n{self.address}\n\n"
-            f"The program in {SOURCE}/ has a licence of its own: {SOURCE}/LICENSE\n"
+            f"The program in {SOURCE}/ has another licence: {SOURCE}/LICENSE\n"
         )
         return f"{statement}\n{'-' * 72}\n\n{self.text}" if self.text else statement
 
@@ -48,7 +48,7 @@ def find_licence(identifier: str) -> Licence:
     Raises
     ------
     ValueError
-        If SPDX has no such licence or spells it differently, or if it is an expression of several licences.
+        If SPDX does not have the identifier or spells it differently, or if it combines several licences.
     """
     try:
         found = canonicalize_license_expression(identifier)
@@ -56,11 +56,11 @@ def find_licence(identifier: str) -> Licence:
         found = ""
     if not re.fullmatch(r"(?!LicenseRef-)[A-Za-z0-9.-]+", found):
         raise ValueError(
-            "is not a licence known to SPDX; expected one identifier of https://spdx.org/licenses, for data usually "
+            "is not a licence in the SPDX list; expected one identifier of https://spdx.org/licenses, for data usually "
             f"{' or '.join(TABLES['licences'])}"
         )
     if identifier != found:
-        raise ValueError(f"is not spelled as SPDX spells it; expected {found!r}")
+        raise ValueError(f"has another spelling in the SPDX list; expected {found!r}")
     if found not in TABLES["licences"]:
         return Licence(found, found, f"https://spdx.org/licenses/{found}.html", "")
     text = (_FOLDER / f"license_texts/{found}.txt").read_text(encoding="utf-8")
@@ -68,7 +68,7 @@ def find_licence(identifier: str) -> Licence:
 
 
 def licence_problem(campaign: Campaign) -> tuple[str, str] | None:
-    """Return key and text of a problem with the licence of a campaign's data; None if a deposit can have it."""
+    """Return configuration key and text of a problem with the licence of the data; None if there is no problem."""
     licence = campaign.deposit_metadata().license
     try:
         find_licence(licence)
@@ -78,7 +78,7 @@ def licence_problem(campaign: Campaign) -> tuple[str, str] | None:
 
 
 def acknowledgement(funding: Funding) -> str:
-    """Write an acknowledgement of the funder and the grant, with the address of the grant if it is known."""
+    """Return a sentence that acknowledges funder and grant, with the web address of the grant if it is known."""
     number = f"award {funding.award_number}" if funding.award_number else ""
     award = ": ".join(filter(None, (number, funding.award_title)))
     award = ", ".join(filter(None, (award, funding.award_url and web_address(funding.award_url))))
@@ -86,10 +86,9 @@ def acknowledgement(funding: Funding) -> str:
 
 
 def discovery_attributes(publication: Publication) -> dict[str, str]:
-    """Return the attributes of the Attribute Convention for Data Discovery (ACDD 1.3) for a dataset.
+    """Return attributes of the Attribute Convention for Data Discovery (ACDD 1.3) that describe a publication.
 
-    Semicolons separate several creators, because names contain commas. Every attribute lists the creators in the same
-    order.
+    Semicolons separate creators, because names contain commas. Every attribute lists the creators in the same order.
     """
     authors = publication.authors
     values = {
@@ -106,14 +105,14 @@ def discovery_attributes(publication: Publication) -> dict[str, str]:
 
 
 def web_address(identifier: str) -> str:
-    """Return the web address of a DOI, of `arXiv:…`, or of a web address itself."""
+    """Return the web address for a DOI or an identifier `arXiv:…`; return a web address unchanged."""
     if identifier.startswith("10."):
         return f"https://doi.org/{identifier}"
     return identifier.replace("arXiv:", "https://arxiv.org/abs/", 1)
 
 
 def citation_cff(publication: Publication, revision: str) -> str:
-    """Write CITATION.cff of the data, Citation File Format 1.2.0 (https://doi.org/10.5281/zenodo.5171937).
+    """Return CITATION.cff of the data, in Citation File Format 1.2.0 (https://doi.org/10.5281/zenodo.5171937).
 
     Parameters
     ----------
@@ -130,14 +129,14 @@ def citation_cff(publication: Publication, revision: str) -> str:
     }
     content = {
         "cff-version": "1.2.0",
-        "message": "If you use these data, please cite them as below, and the paper of their model (in references).",
+        "message": "If you use these data, please cite the data as below, and the paper of the model (in references).",
         "type": "dataset",
         "title": publication.title,
         "abstract": publication.summary,
         "authors": [_cff_author(author) for author in publication.authors],
         "version": publication.version,
         "date-released": publication.date,
-        # The format knows only the SPDX licences of 2021. Any other licence is given by its address.
+        # The format accepts only the SPDX licences of 2021. Any other licence is given by its web address.
         "license": licence.identifier if licence.text else None,
         "license-url": None if licence.text else licence.address,
         "commit": revision,
@@ -158,8 +157,8 @@ def _cff_author(author: Author) -> dict[str, str | None]:
 def zenodo_metadata(publication: Publication) -> dict[str, Any]:
     """Return the metadata of `.zenodo.json` in the format of Zenodo's deposit API (https://developers.zenodo.org).
 
-    Grants are listed if Zenodo has a record of the funder. The notes list all funding, and the runs that are published
-    although a check fails.
+    Grants are listed if Zenodo has a record of the funder. The notes list all funding, and all runs that are published
+    although a check failed.
     """
     notes = [f"{acknowledgement(funding)}." for funding in publication.funding]
     notes += [f"Published with a failed check: {each.run}. {each.reason}" for each in publication.known_failures]
@@ -202,18 +201,18 @@ def zenodo_metadata(publication: Publication) -> dict[str, Any]:
 
 
 def read_zenodo_metadata(folder: Path) -> dict[str, Any]:
-    """Read the metadata for Zenodo of a deposit from an unknown maker; raise ValueError if they are not a mapping."""
+    """Read the metadata for Zenodo from a deposit of unknown origin; raise ValueError if they are not a mapping."""
     try:
         metadata = json.loads(read_text(folder, ZENODO))
     except (ValueError, RecursionError) as error:
         raise ValueError(f"{ZENODO}: cannot be read: {error}") from None
     if not isinstance(metadata, dict):
-        raise ValueError(f"{ZENODO}: is not a mapping")
+        raise ValueError(f"{ZENODO}: is not a mapping; expected a JSON object")
     return metadata
 
 
 def summary_of(metadata: dict[str, Any]) -> dict[str, str]:
-    """Return title, version, authors, licence and communities of Zenodo metadata, whose values may have any type."""
+    """Return title, version, authors, licence and communities as text from Zenodo metadata with values of any type."""
 
     def join(entries: Any, key: str) -> str:
         entries = entries if isinstance(entries, list) else ()
@@ -224,18 +223,98 @@ def summary_of(metadata: dict[str, Any]) -> dict[str, str]:
     return texts | {"authors": join(metadata.get("creators"), "name"), "community": communities}
 
 
+def datacite_metadata(publication: Publication) -> dict[str, Any]:
+    """Return the metadata of `datacite.json` after DataCite's schema 4.5 (https://doi.org/10.14454/g8e5-6293).
+
+    The publisher is known only from a DOI of Zenodo. Otherwise it is `:tba`, DataCite's code for "to be announced".
+    """
+    licence = find_licence(publication.license)
+    paper = RelatedIdentifier(identifier=f"arXiv:{MODEL_PAPER.arxiv}", relation="Cites", resource="Preprint")
+    rights = {
+        "rights": licence.name,
+        "rightsUri": licence.address,
+        "rightsIdentifier": licence.identifier,
+        "rightsIdentifierScheme": "SPDX",
+        "schemeUri": "https://spdx.org/licenses/",
+    }
+    related = [
+        {
+            "relatedIdentifier": each.identifier,
+            "relatedIdentifierType": _datacite_type(each.identifier),
+            "relationType": each.relation,
+            "resourceTypeGeneral": each.resource,
+        }
+        for each in (*publication.related_identifiers, paper)
+    ]
+    content = {
+        "schemaVersion": "http://datacite.org/schema/kernel-4",
+        "doi": publication.doi,
+        "types": {"resourceTypeGeneral": "Dataset", "resourceType": "Simulation results"},
+        "creators": [_datacite_creator(author) for author in publication.authors],
+        "titles": [{"title": publication.title}],
+        "publisher": {"name": "Zenodo" if (publication.doi or "").startswith("10.5281/zenodo.") else ":tba"},
+        "publicationYear": publication.date[:4],
+        "dates": [{"date": publication.date, "dateType": "Issued"}],
+        "version": publication.version,
+        "language": "en",
+        "descriptions": [{"description": publication.summary, "descriptionType": "Abstract"}],
+        "subjects": [{"subject": keyword} for keyword in publication.keywords],
+        "rightsList": [rights],
+        "relatedIdentifiers": related,
+        "fundingReferences": [_datacite_funding(funding) for funding in publication.funding],
+    }
+    return _without_empty(content)
+
+
+def _datacite_creator(author: Author) -> dict[str, Any]:
+    identifier, scheme = (author.orcid_address, "ORCID") if author.is_person else (author.ror, "ROR")
+    named = {"nameIdentifier": identifier, "nameIdentifierScheme": scheme, "schemeUri": f"https://{scheme.lower()}.org"}
+    place = {"name": author.affiliation}
+    if author.ror:
+        place |= {
+            "affiliationIdentifier": author.ror,
+            "affiliationIdentifierScheme": "ROR",
+            "schemeUri": "https://ror.org",
+        }
+    return {
+        "name": author.sorted_name,
+        "nameType": "Personal" if author.is_person else "Organizational",
+        "givenName": author.given_names,
+        "familyName": author.family_names,
+        "nameIdentifiers": [named] if identifier else [],
+        "affiliation": [place] if author.affiliation else [],
+    }
+
+
+def _datacite_type(identifier: str) -> str:
+    return "DOI" if identifier.startswith("10.") else "arXiv" if identifier.startswith("arXiv:") else "URL"
+
+
+def _datacite_funding(funding: Funding) -> dict[str, Any]:
+    identifier = funding.funder_id or ""
+    registry = "ROR" if "ror.org" in identifier else "Crossref Funder ID" if "10.13039/" in identifier else "Other"
+    return {
+        "funderName": funding.funder,
+        "funderIdentifier": web_address(identifier),
+        "funderIdentifierType": identifier and registry,
+        "awardNumber": funding.award_number,
+        "awardTitle": funding.award_title,
+        "awardUri": funding.award_url and web_address(funding.award_url),
+    }
+
+
 def paragraphs(text: str) -> list[str]:
-    """Split a text at empty lines into paragraphs of one line each."""
+    """Split a text at empty lines into paragraphs, and join the lines of each paragraph."""
     return [" ".join(part.split()) for part in re.split(r"\n\s*\n", text) if part.strip()]
 
 
 def _html(texts: list[str]) -> str:
-    """Write paragraphs of plain text as HTML."""
+    """Return paragraphs of plain text as HTML."""
     return "".join(f"<p>{escape(text, quote=False)}</p>" for text in texts)
 
 
 def _without_empty(content: Any) -> Any:
-    """Remove empty entries of mappings, at all depths."""
+    """Return nested mappings and lists without empty entries of mappings."""
     if isinstance(content, dict):
         pruned = {key: _without_empty(value) for key, value in content.items()}
         return {key: value for key, value in pruned.items() if value not in (None, [], "")}

@@ -1,4 +1,4 @@
-"""The program that made the results: its source, as committed or as installed, and the packages of its environment.
+"""Identify the program that made the results: its source, as committed or installed, and the installed packages.
 
 `python -m icha.deposit.program` prints the locked versions for `pip install --constraint`.
 """
@@ -24,25 +24,25 @@ from icha.support.atomic_files import whole_file
 from icha.support.checksums import sha256_of
 from icha.support.program import INSTALLED, is_installed, own_workflow, package_of
 
-# Files and folders that compute the results: everything in them must be committed.
+# Files and folders of the program that computes results. Every file in these folders must be committed.
 PROGRAM = ("Snakefile", "icha/", "workflow/", "profiles/default/")
-# Configurations need not be committed, because a deposit contains the configuration that was used.
+# Folder of configurations, which need not be committed, because a deposit contains the configuration that was used.
 _CONFIGURATIONS = "config/"
-# File in a campaign's folder of results: versions of packages with which results may have been made.
+# File in the folder of results of a campaign that lists versions of packages with which results may have been made.
 MADE_WITH = "made_with.txt"
-# No setting of user or system changes what git reads.
+# With this environment, settings of the user or the system do not change what git reads.
 _GIT_ENVIRONMENT = {"GIT_CONFIG_GLOBAL": os.devnull, "GIT_CONFIG_NOSYSTEM": "1", "GIT_NO_REPLACE_OBJECTS": "1"}
-# Longest list of names in a message.
+# Largest number of names in a message.
 _MOST_NAMES = 20
 
 
 class Source(NamedTuple):
-    """The source of the program in an identified state.
+    """Source of the program at one revision.
 
     Attributes
     ----------
-    revision : the commit, or version and checksum of the installed files.
-    files : content and mode of every file, by its path in the repository.
+    revision : git commit, or version and checksum of the installed files.
+    files : content and permissions of every file, by path in the repository.
     """
 
     revision: str
@@ -63,14 +63,14 @@ def program_source(project: str | os.PathLike) -> Source:
     Raises
     ------
     ValueError
-        If the files differ from what was committed or installed; the message lists them and what to do.
+        If files differ from the committed or installed files. The message lists these files and advises what to do.
     """
     project = Path(project).resolve()
     return _installed_source(project.parent) if is_installed(project) else _committed_source(project)
 
 
 def program_files(workflow: Path) -> dict[str, Path]:
-    """List the files of workflow and package, by their paths in the repository; bytecode is left out."""
+    """Return the files of the workflow and of the package, except bytecode, by path in the repository."""
     found = {}
     for name in PROGRAM:
         top = package_of(workflow) if name == "icha/" else workflow / name
@@ -81,12 +81,12 @@ def program_files(workflow: Path) -> dict[str, Path]:
 
 
 def _committed_source(project: Path) -> Source:
-    """Return the source at the current commit of git; the project may be a folder of a larger repository."""
+    """Return the source at the current git commit; the project may be a folder inside a larger repository."""
     commit = _git(project, "rev-parse", "--verify", "--quiet", "HEAD^{commit}").decode("ascii").strip()
     packed = _git(project, "archive", "--format=tar", "HEAD")
     if not commit or not packed:
         raise ValueError(
-            f"{project}: is not under git, or nothing is committed yet, so the program that made the data cannot be "
+            f"{project}: is not a git repository or has no commit, so the program that made the data cannot be "
             "identified. Use a clone of the repository, or `git init`, `git add` and `git commit` this folder"
         )
     files, links = {}, []
@@ -104,14 +104,14 @@ def _committed_source(project: Path) -> Source:
     present = {name: project / name for name in recorded if (project / name).is_file()} | program_files(project)
     if wrong := [*links, *_changes(recorded, present, "not committed")]:
         raise ValueError(
-            f"{project}: differs from commit {commit[:12]}, so the deposit would not hold the program that made the "
-            f"data. Commit these changes with `git commit`, or undo them:\n{_listed(wrong)}"
+            f"{project}: differs from commit {commit[:12]}, so the deposit would not contain the program that made the "
+            f"data. Commit these changes with `git commit`, or undo the changes:\n{_listed(wrong)}"
         )
     return Source(commit, files)
 
 
 def _git(project: Path, *arguments: str) -> bytes:
-    """Return the output of git; empty if it fails."""
+    """Return the output of a git command; empty if the command fails."""
     inherited = {name: value for name, value in os.environ.items() if not name.startswith("GIT_")}
     command = ["git", "-c", "safe.directory=*", *arguments]
     try:
@@ -122,7 +122,7 @@ def _git(project: Path, *arguments: str) -> bytes:
 
 
 def _changes(recorded: Mapping[str, str], present: Mapping[str, Path], added: str) -> list[str]:
-    """List files that differ from their recorded checksums, and files without one, which the text `added` describes."""
+    """List files whose checksum differs from the recorded one, missing files, and `added` files without a record."""
     changed = [
         f"changed: {name}"
         for name, digest in recorded.items()
@@ -132,14 +132,14 @@ def _changes(recorded: Mapping[str, str], present: Mapping[str, Path], added: st
 
 
 def _installed_source(packages: Path) -> Source:
-    """Return the source as it was installed from a wheel, in the folder `packages`.
+    """Return the source of the program that was installed from a wheel into the folder `packages`.
 
-    Its revision is the version with the checksum of a list of all its files, as `sha256sum` would print it.
+    The revision is the version and a checksum. The checksum is that of the list which `sha256sum` prints for all files.
     """
     installed = next(iter(importlib.metadata.distributions(name="icha", path=[str(packages)])), None)
     if installed is None:
         raise ValueError(
-            f"{packages}: no distribution `icha` is installed here, so the program that made the data cannot be "
+            f"{packages}: the package `icha` is not installed here, so the program that made the data cannot be "
             "identified. Install it: pip install 'icha[workflow]'"
         )
     recorded = {
@@ -155,9 +155,9 @@ def _installed_source(packages: Path) -> Source:
     }
     if wrong := _changes(recorded, present, "not of the installed version"):
         raise ValueError(
-            f"{packages}: differs from icha {installed.version}, so the deposit would not hold the program that made "
-            "the data. Use `pip install --force-reinstall icha`, or a clone of the repository for changes of the "
-            f"program:\n{_listed(wrong)}"
+            f"{packages}: differs from icha {installed.version}, so the deposit would not contain the program that "
+            "made the data. Use `pip install --force-reinstall icha`. To change the program, use a clone of the "
+            f"repository:\n{_listed(wrong)}"
         )
     sums = "".join(f"{digest}  {name}\n" for name, digest in recorded.items())
     files = {name.removeprefix(f"{INSTALLED}/"): (present[name].read_bytes(), 0o644) for name in recorded}
@@ -170,7 +170,7 @@ def _listed(names: list[str]) -> str:
 
 
 def note_versions(results: Path) -> None:
-    """Add the installed versions of the packages that ICHA requires to the list in a campaign's folder of results."""
+    """Add the installed versions of required packages to the list `MADE_WITH` in the folder of results."""
     noted, installed = _noted(results), installed_versions()
     required = {canonicalize_name(Requirement(line).name) for line in importlib.metadata.requires("icha") or ()}
     now = {f"{name}=={installed[name]}" for name in required - {"icha"} if name in installed}
@@ -185,18 +185,18 @@ def _noted(results: Path) -> set[str]:
 
 
 def refuse_other_environment(project: Path, results: Path) -> None:
-    """Refuse to publish if the environment differs from the lock file, which the deposit promises.
+    """Raise ValueError if the installed packages differ from the lock file that the deposit contains.
 
     Parameters
     ----------
-    project : the folder of the workflow, with uv.lock.
-    results : the campaign's folder of results.
+    project : folder of the workflow, with uv.lock.
+    results : folder of results of the campaign.
 
     Raises
     ------
     ValueError
-        If a package is installed in another version than locked, if the imported package `icha` is not the project's,
-        or if results may have been made with other versions (`note_versions`).
+        If the version of an installed package is not the locked version, if the imported package `icha` is not that of
+        the project, or if results may have been made with other versions (`note_versions`).
     """
     lock = (project / "uv.lock").read_text(encoding="utf-8")
     wrong = version_differences(lock)
@@ -212,21 +212,21 @@ def refuse_other_environment(project: Path, results: Path) -> None:
             )
         problems = "\n".join(wrong)
         raise ValueError(
-            f"the environment is not that of uv.lock, which the deposit promises. Use {command}:\n{problems}"
+            f"the installed packages are not those of uv.lock, which the deposit contains. Use {command}:\n{problems}"
         )
     locked = locked_versions(lock)
     made_with = (line.partition("==")[::2] for line in sorted(_noted(results)))
     if other := [f"{name} {version}" for name, version in made_with if locked.get(name, version) != version]:
         raise ValueError(
             f"{results}: some results may have been made with other versions than those of uv.lock, which the deposit "
-            f"promises. Remove {results}, and run the campaign again:\n{_listed(other)}"
+            f"contains. Remove {results}, and run the campaign again:\n{_listed(other)}"
         )
 
 
 def version_differences(lock: str) -> list[str]:
-    """List the packages that are installed in another version than locked; `lock` is the text of uv.lock.
+    """List the installed packages whose version is not the locked version; `lock` is the text of uv.lock.
 
-    Packages that are locked but not installed are left out, since no environment has all optional packages.
+    Locked packages that are not installed are left out, since no environment has all optional packages.
     """
     locked = locked_versions(lock)
     return [
@@ -244,7 +244,7 @@ def installed_versions() -> dict[str, str]:
 def locked_versions(lock: str) -> dict[str, str]:
     """Return the version of every package in the text of a lock file, for this Python and system.
 
-    The project itself is left out, because it has no version there.
+    ICHA itself is left out, because the lock file does not contain the version of ICHA.
     """
     found = {}
     for package in tomllib.loads(lock)["package"]:

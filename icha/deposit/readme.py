@@ -1,4 +1,4 @@
-"""README.md of a deposit, the page for its readers."""
+"""Write README.md of a deposit, the page for readers of the deposit."""
 
 import re
 from collections import Counter
@@ -33,11 +33,11 @@ from icha.planning.requirements import further_software
 from icha.support import formatting
 
 _TEMPLATE = "README.md.jinja"
-# Number of entries after which a list is cut.
+# Largest number of entries of a list that are written.
 _MOST_NAMES = 12
-# A web address within a text, without punctuation after it.
+# A web address in a text, without the punctuation that follows the address.
 _ADDRESS = re.compile(r"(https?://[^\s<>|`\\]*[^\s<>|`\\.,;:!?()\[\]*_~'\"])")
-# Characters with a meaning in Markdown: anywhere in a line, and at its beginning.
+# Characters with a meaning in Markdown: anywhere in a line, and at the beginning of a line.
 _SPECIAL = re.compile(r"[\\`*\[\]<>|~$#]|(?<![^\W_])_|_(?![^\W_])|&(?=[#\w])")
 _SPECIAL_FIRST = re.compile(r"^(\d*)((?<!\d)[-+]|(?<=\d)[.)])(?!\w)")
 
@@ -52,15 +52,15 @@ def readme(
     sizes: Mapping[str, int],
     cost: Cost,
 ) -> str:
-    """Write README.md of a deposit.
+    """Return the text of README.md of a deposit.
 
     Parameters
     ----------
-    campaign : the configuration, with complete metadata.
-    revision : revision of the source.
-    dataset, checks, model_error : the results of the campaign.
-    sizes : bytes of every file, by its path in the deposit.
-    cost : expected cost of computing the whole campaign.
+    campaign : configuration with complete metadata.
+    revision : revision of the source of the program.
+    dataset, checks, model_error : results of the campaign.
+    sizes : size of every file in bytes, by path in the deposit.
+    cost : expected time and memory for computing the whole campaign.
     """
     publication = campaign.deposit_metadata()
     authors = "; ".join(author.sorted_name for author in publication.authors)
@@ -107,7 +107,7 @@ def _template() -> jinja2.Template:
 
 
 def _settings(campaign: Campaign) -> dict:
-    """Return the facts of the configuration, without the variants that studies make of surfaces and materials."""
+    """Return surfaces, materials and other settings for the page, without variants of surfaces and materials."""
     surfaces, materials = (
         {name: each for name, each in getattr(campaign, section).items() if campaign.origin(section, name) == name}
         for section in ("surfaces", "materials")
@@ -125,7 +125,7 @@ def _settings(campaign: Campaign) -> dict:
 
 
 def _outcome(publication: Publication, dataset: xr.DataTree, checks: Sequence[Check]) -> dict:
-    """Return the facts of the results: complete and incomplete runs, and their checks."""
+    """Return the results for the page: numbers of complete runs, incomplete runs, and checks."""
     known = {failure.run: failure.reason for failure in publication.known_failures}
     designs, incomplete, complete = [], [], []
     for name, node in dataset.children.items():
@@ -158,7 +158,7 @@ def _outcome(publication: Publication, dataset: xr.DataTree, checks: Sequence[Ch
 
 
 def _model_errors(tree: xr.DataTree) -> list[dict]:
-    """Return the range of the model's errors over loads, surfaces and slopes, for every entry and material."""
+    """Return the smallest and largest error of the model over loads, surfaces and slopes, by entry and material."""
     found = []
     for entry, node in tree.children.items():
         for material, errors in node.to_dataset().groupby("material"):
@@ -171,7 +171,7 @@ def _model_errors(tree: xr.DataTree) -> list[dict]:
 
 
 def _parts(sizes: Mapping[str, int]) -> list[dict]:
-    """List the parts of the deposit: path, content, number of files and bytes."""
+    """List the parts of the deposit with path, content, number of files, and size in bytes."""
     grouped: dict[str, list[int]] = {}
     for path, size in sizes.items():
         top = path.split("/")[0]
@@ -180,21 +180,21 @@ def _parts(sizes: Mapping[str, int]) -> list[dict]:
     rows = [(part if part in sizes else f"{part}/", part, content) for part, content in TABLES["contents"].items()]
     return [
         {"path": path, "content": content, "files": len(grouped[part]), "size": sum(grouped[part])}
-        for path, part, content in [*rows, (others, "", "citation, licence and metadata for Zenodo")]
+        for path, part, content in [*rows, (others, "", "citation, licence, and metadata for Zenodo and DataCite")]
         if part in grouped
     ]
 
 
 def _few(values: Sequence) -> str:
-    """Write a list, or the beginning of a long list and its length."""
+    """Return a list as text; a long list is cut, and its length is added in brackets."""
     shown = [markdown(value) for value in values]
     return ", ".join(shown) if len(shown) <= _MOST_NAMES else f"{', '.join(shown[:_MOST_NAMES])}, … ({len(shown)})"
 
 
 def markdown(text) -> str:
-    """Write plain text as one line of Markdown, also for a table; web addresses become links."""
+    """Return plain text as one line of Markdown, also for cells of tables; web addresses become links."""
     line = " ".join(str(text).split())
-    # Every second part is an address.
+    # Every second part of the split text is a web address.
     parts = [
         _link(part) if number % 2 else _SPECIAL.sub(r"\\\g<0>", part)
         for number, part in enumerate(_ADDRESS.split(line))
@@ -203,11 +203,11 @@ def markdown(text) -> str:
 
 
 def _link(address: str) -> str:
-    """Write a web address as a link."""
+    """Return a web address as a link in Markdown."""
     plain = re.sub(r"[\s<>|`\\]", lambda found: quote(found[0]), address)
     return f"<{plain}>"
 
 
 def _span(ends: tuple[float, float]) -> str:
-    """Write the smallest and the largest value of an error in per cent."""
+    """Return a text with the smallest and the largest error in per cent."""
     return "{:+z.1%} to {:+z.1%}".format(*ends)

@@ -1,6 +1,6 @@
-"""Preparation of the rerun of a deposit with the installed ICHA; nothing in the deposit is executed.
+"""Prepare the rerun of a deposit with the installed ICHA. No program in the deposit is executed.
 
-The deposit is a folder that `icha.deposit.verify.whole_deposit` has verified.
+The deposit is a folder that `icha.deposit.verify.whole_deposit` has verified before.
 """
 
 import re
@@ -25,24 +25,24 @@ from icha.support.input_files import refuse_traps
 from icha.support.values import NAME_PATTERN
 
 SMALLEST = "smallest"
-# In the source of a deposit: the version of the program, and the versions of all packages.
+# Files in the source of a deposit with the version of the program, and with the versions of all packages.
 _PYPROJECT, _LOCK = f"{SOURCE}/pyproject.toml", f"{SOURCE}/uv.lock"
-# In the folder of a rerun: file with the checksum of the deposit's SHA256SUMS; folder of configuration and results.
+# File with the checksum of the deposit's SHA256SUMS, and folder of configuration and results, in the folder of a rerun.
 _BEGUN, _PROJECT = "rerun-of.sha256", "data"
 _RUN = re.compile(r"runs(/[^/]+){4}/[^/]+\.nc")
 
 
 class RerunError(ValueError):
-    """A rerun cannot begin; the message is the reason."""
+    """A rerun of a deposit cannot begin; the message gives the reason."""
 
 
 def campaign_name(deposit: Path) -> str:
     """Return the name of the campaign in a deposit; raise `RerunError` if the deposit lacks what a rerun needs."""
     for file in (CONFIGURATION, _PYPROJECT, _LOCK):
         if not (deposit / file).is_file():
-            raise RerunError(f"the deposit has no {file}, so it cannot be computed again")
+            raise RerunError(f"the deposit has no {file}, without which its results cannot be computed again")
     try:
-        read_text(deposit, CONFIGURATION)  # refuses a file that is too large
+        read_text(deposit, CONFIGURATION)  # raises ValueError if the file is too large
         name = read_yaml(deposit / CONFIGURATION).get("name")
     except ValueError as error:
         raise RerunError(str(error).replace(f"{deposit}/", "")) from None
@@ -52,13 +52,13 @@ def campaign_name(deposit: Path) -> str:
 
 
 def other_versions(deposit: Path) -> list[str]:
-    """List the versions of ICHA and of packages that differ between the deposit and what is installed."""
+    """List ICHA and packages whose installed versions differ from the versions that made the deposit."""
     try:
         made_by = tomllib.loads(read_text(deposit, _PYPROJECT))["project"]["version"]
         wrong = version_differences(read_text(deposit, _LOCK))
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
         raise RerunError(
-            f"{_PYPROJECT} or {_LOCK} cannot be read; expected the version of the program, and a lock file of uv"
+            f"{_PYPROJECT} or {_LOCK} cannot be read; expected a file with the program's version, and a uv lock file"
         ) from None
     installed = version("icha")
     if made_by != installed:
@@ -67,17 +67,17 @@ def other_versions(deposit: Path) -> list[str]:
 
 
 def find_runs(only: Iterable[str], deposit: Path) -> list[str]:
-    """Return the paths of selected runs of a deposit.
+    """Return the paths of the runs in a deposit that a user selects by name.
 
     Parameters
     ----------
-    only : names such as `study/surface/seed1/slope1/material`, or `SMALLEST`.
-    deposit : its folder.
+    only : names of runs, such as `study/surface/seed1/slope1/material`, or `SMALLEST`.
+    deposit : folder of the deposit.
 
     Raises
     ------
     RerunError
-        If the deposit has no such run.
+        If the deposit does not have a run of this name.
     """
     runs = [name for name in files_of(deposit) if _RUN.fullmatch(name)]
     found = []
@@ -97,12 +97,12 @@ def find_runs(only: Iterable[str], deposit: Path) -> list[str]:
 
 
 def _smallest(deposit: Path, runs: list[str]) -> str:
-    """Return the complete run whose file and surface together have the fewest bytes."""
+    """Return the complete run with the smallest total size of the files of run and surface."""
     sizes = {run: sum((deposit / path).stat().st_size for path in add_surfaces([run], deposit)) for run in runs}
     for run in sorted(runs, key=lambda run: sizes[run]):
         if _is_complete(deposit, run):
             return run
-    raise RerunError(f"--only {SMALLEST}: no run of the deposit is complete; expected the name of a run that has steps")
+    raise RerunError(f"--only {SMALLEST}: no run of the deposit is complete; expected the name of a run with steps")
 
 
 def _is_complete(deposit: Path, run: str) -> bool:
@@ -110,27 +110,27 @@ def _is_complete(deposit: Path, run: str) -> bool:
         refuse_traps(deposit / run)
         with netCDF4.Dataset(deposit / run) as file:
             return "step" in file.dimensions and len(file.dimensions["step"]) > 0 and not why_no_result(file.__dict__)
-    except (OSError, ValueError, RuntimeError) as error:  # the last one for what the library cannot read
-        raise RerunError(f"{run}: is not a run: {error}") from None
+    except (OSError, ValueError, RuntimeError) as error:  # netCDF4 raises RuntimeError for damaged files
+        raise RerunError(f"{run}: is not the file of a run: {error}") from None
 
 
 def add_surfaces(runs: Iterable[str], deposit: Path) -> list[str]:
-    """Return the paths of runs, and of those of their surfaces that are in the deposit."""
+    """Return the paths of runs, and the paths of the surfaces of these runs that are in the deposit."""
     surfaces = dict.fromkeys("surfaces/{2}/{3}.nc".format(*run.split("/")) for run in runs)
     return [*runs, *(path for path in surfaces if (deposit / path).is_file())]
 
 
 def prepare_rerun(folder: Path, deposit: Path) -> Path:
-    """Copy configuration and inputs of a deposit to the folder of a rerun, unless they are there.
+    """Copy configuration and inputs of a deposit to the folder of a rerun, unless an earlier command did so.
 
     Raises
     ------
     RerunError
-        If the folder has other files or belongs to another deposit, or if the configuration cannot be run, for instance
-        because it names files outside the deposit.
+        If the folder has other files or belongs to another deposit, or if the configuration cannot be run, for example
+        because the configuration names files outside the deposit.
     """
     if folder.resolve().is_relative_to(deposit.resolve()):
-        raise RerunError(f"--folder {folder}: is in the deposit, which is only read; expected another folder")
+        raise RerunError(f"--folder {folder}: is inside the deposit, which must not change; expected another folder")
     digest = f"{sha256_of(deposit / CHECKSUMS)}\n"
     begun, project = folder / _BEGUN, folder / _PROJECT
     if begun.is_file():
@@ -138,7 +138,7 @@ def prepare_rerun(folder: Path, deposit: Path) -> Path:
             raise RerunError(f"--folder {folder}: belongs to another deposit; expected a new or empty folder")
     else:
         if folder.is_dir() and any(folder.iterdir()):
-            raise RerunError(f"--folder {folder}: has other files in it; expected a new or empty folder")
+            raise RerunError(f"--folder {folder}: contains other files; expected a new or empty folder")
         project.mkdir(parents=True)
         if (deposit / INPUTS).is_dir():
             shutil.copytree(deposit / INPUTS, project / INPUTS, copy_function=shutil.copyfile)

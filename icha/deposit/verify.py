@@ -1,7 +1,8 @@
-"""Verification of deposits from unknown makers.
+"""Verify deposits of unknown origin.
 
-Nothing is read before names, kinds and sizes of files have been inspected. A zip is extracted into an empty folder,
-within limits. Then every byte is compared with `SHA256SUMS`. Nothing in a deposit is executed.
+No file is read before names, kinds and sizes of all files have been inspected. A zip is extracted into an empty folder,
+if its size is within limits. Then every file is compared with its checksum in `SHA256SUMS`. No program in a deposit is
+executed.
 """
 
 import contextlib
@@ -19,22 +20,21 @@ from icha.support.checksums import sha256_of
 from icha.support.formatting import printable
 
 CHECKSUMS = "SHA256SUMS"
-# Files by which a deposit describes itself: to readers, as an RO-Crate, to Zenodo.
+# Files that describe a deposit: for readers, as an RO-Crate, and for Zenodo.
 README, CRATE, ZENODO = "README.md", "ro-crate-metadata.json", ".zenodo.json"
-# Folder of the program's source.
+# Folder of the program's source in a deposit.
 SOURCE = "source"
 # Results of a campaign, which `icha reproduce` computes again.
 COMPUTED = (
     *("dataset", "runs", "surfaces", "references", "aggregated", "figures"),
     *("report.html", "checks.json", "verdict.txt"),
 )
-# Largest file that is read as a whole (list of checksums, configuration, metadata), in bytes.
+# Largest size in bytes of a file that is read as a whole, such as the list of checksums.
 LARGEST_TEXT = 64_000_000
-# Longest name and longest path that common file systems accept, in bytes.
+# Largest lengths in bytes of a name and of a path that common file systems accept.
 _LONGEST_NAME, _LONGEST_PATH = 255, 1000
-# Limits that do not apply with the option `LARGE`: number of files; factor by which a zip may grow when extracted; size
-# that an extracted zip may always have, in bytes. ICHA does not compress deposits; zips of others have about a third of
-# the size.
+# Limits without the option `LARGE`: number of files; ratio of the sizes of an extracted zip and of the zip; size in
+# bytes that an extracted zip may always have. ICHA does not compress zips. Compression reduces zips to about a third.
 MOST_FILES, MOST_GROWTH, ALLOWANCE = 200_000, 50, 100_000_000
 LARGE = "--large"
 _LINE = re.compile(r"([0-9a-f]{64})  (.+)")
@@ -42,19 +42,19 @@ _BLOCK = 1 << 20
 
 
 class DamagedDeposit(ValueError):
-    """A deposit that is not whole; the arguments are the problems, one line each."""
+    """A deposit is damaged or incomplete; the arguments are the problems, one line each."""
 
 
 @contextlib.contextmanager
 def whole_deposit(path: str | os.PathLike, *, large: bool = False) -> Iterator[Path]:
-    """Verify a deposit and provide its folder; a zip is extracted into a temporary folder.
+    """Verify a deposit and yield its folder; a zip is extracted into a temporary folder.
 
-    Empty folders do not count, as in git.
+    Empty folders are ignored.
 
     Parameters
     ----------
-    path : its folder or its zip.
-    large : True to accept more files and bytes than `MOST_FILES`, `MOST_GROWTH` and `ALLOWANCE`.
+    path : folder or zip of the deposit.
+    large : True to accept a deposit that exceeds `MOST_FILES`, `MOST_GROWTH` and `ALLOWANCE`.
 
     Raises
     ------
@@ -75,7 +75,7 @@ def whole_deposit(path: str | os.PathLike, *, large: bool = False) -> Iterator[P
 
 
 def files_of(folder: Path) -> list[str]:
-    """Paths of all files below a folder, sorted."""
+    """Return the sorted paths of all files in a folder and its subfolders, relative to the folder."""
     return sorted(path.relative_to(folder).as_posix() for path in folder.rglob("*") if not path.is_dir())
 
 
@@ -85,7 +85,7 @@ def read_text(folder: Path, name: str) -> str:
     Raises
     ------
     ValueError
-        If it has more than `LARGEST_TEXT` bytes, or is not UTF-8.
+        If the file has more than `LARGEST_TEXT` bytes, or is not UTF-8.
     """
     size = (folder / name).stat().st_size
     if size > LARGEST_TEXT:
@@ -94,7 +94,7 @@ def read_text(folder: Path, name: str) -> str:
 
 
 def problem_with_name(name: str) -> str:
-    """Return why a file name must not be in a deposit; empty text if the name means the same file on every system."""
+    """Return the reason why a deposit must not contain a file of this name; "" if every system accepts the name."""
     names = name.split("/")
     if name.startswith("/") or re.match("[A-Za-z]:", name):
         return "is an absolute path"
@@ -110,10 +110,10 @@ def problem_with_name(name: str) -> str:
 
 
 def _extract(path: Path, folder: Path, large: bool) -> Path:
-    """Extract a zip into an empty folder and return the single folder in it.
+    """Extract a zip into an empty folder and return the single folder that the zip contains.
 
-    Python's zipfile removes `..` and roots from names, turns links into plain files, and reads no more bytes of a file
-    than the zip declares.
+    Python's zipfile is safe: it removes `..` and roots from names, extracts links as plain files, and reads no more
+    bytes of a file than the zip declares.
     """
     name = printable(path.name)
     if not path.is_file():
@@ -136,7 +136,7 @@ def _extract(path: Path, folder: Path, large: bool) -> Path:
                 )
             archive.extractall(folder)
     except (zipfile.BadZipFile, NotImplementedError, RuntimeError, EOFError, zlib.error) as error:
-        # Damaged, encrypted, or compressed by an unknown method.
+        # The zip is damaged, encrypted, or compressed by an unknown method.
         raise DamagedDeposit(f"{name}: not a readable zip archive: {printable(error)}") from None
     found = sorted(os.listdir(folder))
     if len(found) != 1 or not (folder / found[0]).is_dir():
@@ -151,11 +151,11 @@ def _too_many(count: int) -> str:
 
 
 def _problems(folder: Path, large: bool) -> Iterator[str]:
-    """Compare the files in a folder with its list of checksums."""
+    """Yield the differences between the files in a folder and the list of checksums in the folder."""
     found, special = _inspect(folder, large)
     yield from (f"{printable(name)}: {problem}" for name, problem in special.items())
     if CHECKSUMS not in found:
-        yield f"{CHECKSUMS}: is missing, so this is not a whole deposit"
+        yield f"{CHECKSUMS}: is missing, so this is not a complete deposit"
         return
     try:
         lines = read_text(folder, CHECKSUMS).splitlines()
@@ -182,7 +182,7 @@ def _problems(folder: Path, large: bool) -> Iterator[str]:
 
 
 def _inspect(folder: Path, large: bool) -> tuple[set[str], dict[str, str]]:
-    """List the files below a folder, and problems with names and kinds of others; links are not followed."""
+    """Return the acceptable files in a folder, and problems with names and kinds of the others; follow no links."""
     found: set[str] = set()
     problems: dict[str, str] = {}
     pending = [""]

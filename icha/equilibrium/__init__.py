@@ -1,7 +1,7 @@
-"""Interacting asperities: equilibrium of all contact spots at a given separation, load or area, and its observables.
+"""Interacting asperities: the equilibrium of all contact spots at a given separation, load or area.
 
-`interacting_asperities` is the contact model that a path follows. `solver` searches for an equilibrium: it alternates
-Newton steps (`newton`) for the equations of the present spots (`equations`) with jumps into and out of contact
-(`jumps`) and the coalescence and splitting of spots (`unions`). `sites` and `iteration_state` hold the tables that pass
-between them, and `distributions` evaluates gap and pressure in an equilibrium.
+`interacting_asperities` contains the contact model. `solver` finds an equilibrium by alternating Newton steps and
+events. `equations` contains the equations of equilibrium, `newton` the Newton steps, `jumps` the jumps into and out of
+contact, and `unions` the coalescence of spots and the splitting of unions. `sites` and `iteration_state` define the
+tables that these modules use. `distributions` computes the distributions of gap and pressure.
 """

@@ -1,4 +1,4 @@
-"""Distributions of gap and pressure over the nominal area, and the part of every grid cell that spots cover."""
+"""Distributions of gap and pressure over the nominal area, and the fraction of every grid cell that spots cover."""
 
 import numpy as np
 
@@ -12,16 +12,16 @@ from icha.surfaces.surface import Surface
 
 
 def cover_grid(period: float, grid: int, centres, radii, free_square: bool = False) -> tuple[np.ndarray, np.ndarray]:
-    """Return the fraction of the cell around each node that discs cover, and whether the node is in a disc, (n, n).
+    """Return the area fraction of every grid cell that discs cover, and a mask of the nodes inside discs, both (n, n).
 
-    Where discs overlap, their fractions add up and may exceed 1.
+    A cell is the square around a grid node. If discs overlap, their fractions add up and may exceed 1.
 
     Parameters
     ----------
     period : side of the square, m.
-    grid : nodes along a side, n.
-    centres, radii : (m, 2) and (m,) float, m.
-    free_square : whether each disc exists once; otherwise it repeats with the period.
+    grid : number n of grid nodes along a side.
+    centres, radii : (k, 2) and (k,) float, centres and radii of the discs, m.
+    free_square : True if each disc exists once; False if the discs repeat periodically.
     """
     blocks = on_cores(lambda rows: _cover_rows(period, grid, centres, radii, rows, free_square), row_blocks(grid))
     cover, inside = zip(*blocks, strict=True)
@@ -29,18 +29,19 @@ def cover_grid(period: float, grid: int, centres, radii, free_square: bool = Fal
 
 
 def gap_distribution(law: JKR, surface: Surface, state: ContactState) -> dict:
-    """Return the distribution P(u) of the gap over the nominal area, as a dictionary with the keys below.
+    """Return the distribution P(u) of the gap in an equilibrium, as a dictionary with the keys below.
 
-    A cell on the edge of a spot counts with its fraction outside the spot. If its node lies inside the spot, this
-    fraction has gap zero. The last bin includes larger gaps. The gaps are evaluated by blocks of rows to save memory.
+    If a spot covers part of a grid cell, only the uncovered fraction of the cell is counted. The gap of this fraction
+    is the gap at the node of the cell, or zero if the node lies inside the spot. The last bin includes all larger gaps.
+    The gaps are computed in blocks of grid rows to save memory.
 
     Returns
     -------
     gap_density : (bins,) float, P(u) in the bins of `icha.contact.model.gap_bins`, 1/m.
-    overlap_fraction : area fraction of negative gaps, where the surfaces overlap in the model.
-    area_beyond_edges : A/A0 minus the area fraction that spots cover. Spots may reach over the edges of a free square,
-        and two spots that have split may overlap. The sum of the integral of P(u), A/A0 and overlap_fraction is
-        1 + area_beyond_edges.
+    overlap_fraction : fraction of the nominal area with negative gap, where the surfaces overlap in the model.
+    area_beyond_edges : contact area fraction A/A0 minus the fraction of the nominal area that spots cover. The
+        value is not zero if spots reach over the edges of a free square, or if two spots that have split
+        overlap. The sum of the integral of P(u), A/A0 and overlap_fraction is 1 + area_beyond_edges.
     """
     edges = gap_bins(surface)
     spots, a = state.spots, state.spots.contact_radius
@@ -48,11 +49,11 @@ def gap_distribution(law: JKR, surface: Surface, state: ContactState) -> dict:
     field = DisplacementField(law, period, grid, spots.position, a, spots.radius_of_curvature, free_square)
 
     def count_cells(rows, w):
-        """Count the cells of a range of rows by their gaps; sum the covered and the doubly covered fractions."""
+        """Return the uncovered area by bins of the gap, the covered area, and the repeatedly covered area, in cells."""
         u = w + (state.separation - surface.heights[rows])
         cover, inside = _cover_rows(period, grid, spots.position, a, rows, free_square)
         u[inside] = 0.0
-        # Bin 0 is the overlap.
+        # Bin 0 contains the negative gaps.
         index = np.where(u < 0, 0, _gap_bin(u, edges) + 1).ravel()
         cut = np.flatnonzero(cover)
         hidden = np.bincount(index[cut], weights=np.clip(cover.ravel()[cut], 0.0, 1.0), minlength=len(edges))
@@ -69,11 +70,11 @@ def gap_distribution(law: JKR, surface: Surface, state: ContactState) -> dict:
 
 
 def _gap_bin(u, edges):
-    """Return the index i of the bin edges[i] <= u < edges[i + 1] of every gap u; the last bin has larger gaps too."""
+    """Return for every gap u the index i of its bin, edges[i] <= u < edges[i + 1]; the last bin has no upper limit."""
     last = len(edges) - 2
     decade = np.log10(np.maximum(u / edges[1], 1.0))
     index = np.minimum(decade * GAPS_PER_DECADE + 1, last).astype(np.intp)
-    # Close to an edge the logarithm may round to the wrong side.
+    # Close to an edge of a bin, rounding of the logarithm may give the neighbouring bin.
     index -= u < edges[index]
     index += (u >= edges[index + 1]) & (index < last)
     return index
@@ -82,8 +83,9 @@ def _gap_bin(u, edges):
 def pressure_distribution(law: JKR, surface: Surface, spots: Spots) -> dict:
     """Return the distribution P(p) of the pressure over the nominal area, as a dictionary with the keys below.
 
-    P(p) follows from a closed form for every spot, without a grid. The integral of P(p) is A/A0. The sum of density
-    times width times mean over the bins is F/A0. The last bin, which ends at 500 E* h'_rms, includes larger pressures.
+    P(p) is the sum of an exact formula over all spots and needs no grid. The integral of P(p) is A/A0. The integral of
+    p P(p), computed with the mean pressure of each bin, is F/A0. The last bin ends at 500 E* h'_rms, and includes all
+    larger pressures.
 
     Returns
     -------
@@ -96,10 +98,10 @@ def pressure_distribution(law: JKR, surface: Surface, spots: Spots) -> dict:
     if len(a):
         largest = np.max(law.pressure(0.0, a, R))
         for k, p in enumerate([*edges[:-1], max(edges[-1], largest)]):
-            # Area and force at pressures below p, of every spot.
+            # Area of every spot where the pressure is below p, and the force on this area.
             areas, forces = law.pressure_distribution(p, a, R)
             area[k], force[k] = np.sum(areas), np.sum(forces)
-        # The pressure at the edge of a JKR spot is minus infinity: the first bin includes all lower pressures.
+        # The pressure at the edge of a JKR spot is minus infinity, so the first bin includes all lower pressures.
         area[0] = force[0] = 0.0
     content, load = np.diff(area), np.diff(force)
     mean = np.divide(load, content, out=np.zeros(len(content)), where=content > 0)
@@ -109,13 +111,13 @@ def pressure_distribution(law: JKR, surface: Surface, spots: Spots) -> dict:
 def _cover_rows(period, grid, centres, radii, rows, free_square=False):
     """Return the results of `cover_grid` for a range of rows, given as a slice."""
     if free_square:
-        # In a cell of twice the side no disc returns at the opposite edge.
+        # On a square of twice the side, a disc that crosses an edge does not reappear at the opposite edge.
         parts = _cover_rows(cell_of(period, free_square), cell_of(grid, free_square), centres, radii, rows)
         return tuple(part[:, :grid] for part in parts)
     spacing = period / grid
     cover = np.zeros((rows.stop - rows.start) * grid)
     inside = np.zeros(len(cover), dtype=bool)
-    # Discs of similar size share the width of their windows, a power of two of cells.
+    # The window of a disc is 2^k cells wide. Discs with windows of the same width are computed together.
     width = 2 ** np.ceil(np.log2(radii / spacing + 2)).astype(int)
     for cells in np.unique(width):
         same = np.flatnonzero((width == cells) & (radii > 0))
@@ -129,13 +131,13 @@ def _cover_rows(period, grid, centres, radii, rows, free_square=False):
 
 
 def _disc_area_left_below(x, y, a):
-    """Return the area of the disc of radius a around the origin that lies left of x and below y."""
+    """Return the area left of x and below y of a disc of radius a around the origin."""
     x, y = np.clip(x, -a, a), np.clip(y, -a, a)
     left, below = _disc_area_left(x, a), _disc_area_left(y, a)
-    # The lines at x and y cut the disc into four parts; this one is left and below.
+    # The lines at x and y divide the disc into four parts. The result is the area of the lower left part.
     corner = x**2 + y**2 < a**2
     quarter = 0.5 * (left + below) + x * y - 0.25 * np.pi * a**2
-    # A corner outside the disc leaves one of the four parts empty.
+    # If the two lines cross outside the disc, at least one of the four parts is empty.
     outside = np.where(
         (x < 0) & (y < 0),
         0.0,
@@ -145,5 +147,5 @@ def _disc_area_left_below(x, y, a):
 
 
 def _disc_area_left(x, a):
-    """Return the area of the disc of radius a around the origin that lies left of x, -a <= x <= a."""
+    """Return the area left of x, -a <= x <= a, of a disc of radius a around the origin."""
     return a**2 * (0.5 * np.pi + np.arcsin(x / a)) + x * np.sqrt(np.maximum(a**2 - x**2, 0.0))

@@ -1,14 +1,14 @@
-"""Equations of equilibrium, eq. (4), their error at given approaches, and the prescribed load or area.
+"""Equations of equilibrium of all spots, eq. (4) of the paper, with a prescribed separation, load or area.
 
 The unknowns are the local approaches delta_i of the spots in contact:
 
     delta_i + w_i(a(delta)) = h_i - u,        a_i = a_law(delta_i),
 
-Here h_i is the height of the asperity, u the mean separation, and w_i the displacement of the half-space at spot i by
-all other spots and all images. On a free half-space there are no images, and u is the distance between the mean plane
-of the surface and the half-space far away. This distance may be negative because the loaded part sinks in; the mean gap
-is u plus the mean of w over the square. While the equations are solved, a spot below its jump-off approach keeps its
-jump-off radius (zero for Hertz's law). So the equations have a value for all approaches.
+Here h_i is the height of the asperity, u the mean separation, and w_i the displacement of the half-space at spot i,
+caused by all other spots and all periodic images. On a free half-space there are no images, and u is the distance
+between the mean plane of the surface and the half-space far away. The distance may be negative because the loaded part
+of the half-space sinks in. The mean gap is u plus the mean of w over the square. During the Newton steps, a spot below
+its jump-off approach keeps its jump-off radius (zero without adhesion). So the equations are defined for any approach.
 """
 
 from dataclasses import dataclass
@@ -23,18 +23,18 @@ from icha.half_space.interaction import Interaction
 
 # Largest relative error of a prescribed load or area.
 TARGET_TOLERANCE = 1e-11
-# Weight of the error of a load or area relative to the error of the equilibrium, so that one tolerance is enough.
+# Factor for the relative error of a load or area, so that RESIDUAL_TOLERANCE limits this error too.
 _TARGET_WEIGHT = RESIDUAL_TOLERANCE / TARGET_TOLERANCE
-# The interaction is set up for larger contact radii than the present ones, so that several evaluations can use it: for
-# the radii at approaches larger by _APPROACH_AHEAD h_rms, times _RADIUS_AHEAD.
+# The interaction is set up for larger contact radii than the present radii, so that several evaluations can use it. The
+# larger radii are _RADIUS_AHEAD times the radii at approaches that are larger by _APPROACH_AHEAD h_rms.
 _APPROACH_AHEAD = 0.02
 _RADIUS_AHEAD = 1.2
 
 
 def nominal_value(contact: AsperityContact, quantity: str, a, R) -> float:
-    """Return the nominal pressure (Pa) or the contact area fraction of spots, as `quantity` names it.
+    """Return the nominal pressure (Pa) or the contact area fraction of n spots; `quantity` selects one of the two.
 
-    a, R : (n,) float, contact radii and radii of curvature, m.
+    a, R : (n,) float, contact radii and radii of curvature of the spots, m.
     """
     if quantity == PRESSURE:
         return float(np.sum(contact.law.force(a, R))) / contact.area
@@ -42,14 +42,14 @@ def nominal_value(contact: AsperityContact, quantity: str, a, R) -> float:
 
 
 def nominal_derivative(contact: AsperityContact, quantity: str, a, R):
-    """Return the derivatives of `nominal_value` with respect to the n contact radii, (n,)."""
+    """Return the derivatives of nominal pressure or contact area fraction with respect to n contact radii, (n,)."""
     if quantity == PRESSURE:
         return contact.law.force_derivative(a, R) / contact.area
     return 2 * np.pi * a / contact.area
 
 
 def radius_slope(law: JKR, a, R, approach, jump_off_approach):
-    """Return da/d(delta) of n spots, (n,): zero past jump-off, and limited near jump-off, where it is infinite."""
+    """Return da/d(delta) of n spots, the derivative of radius by approach: zero past jump-off, limited near it."""
     slope = np.zeros(len(a))
     touching = (a > 0) & (approach >= jump_off_approach)
     slope[touching] = law.radius_derivative(a[touching], R[touching])
@@ -58,17 +58,17 @@ def radius_slope(law: JKR, a, R, approach, jump_off_approach):
 
 @dataclass(frozen=True, eq=False)
 class Evaluation:
-    """Values of the equations at given approaches of n sites.
+    """Values of the equations of equilibrium at given approaches of n sites.
 
     Attributes
     ----------
-    approach : (n,) float, m.
+    approach : (n,) float, approaches of the sites, m.
     separation : mean separation, m.
-    a : (n,) float, contact radii, m.
+    a : (n,) float, contact radii of the sites, m.
     equilibrium_height : (n,) float, asperity heights at which these approaches would be an equilibrium, m.
-    error : (n,) float, left side minus right side of the equations, m.
+    error : (n,) float, left side minus right side of each equation, m.
     control_error : nominal pressure (Pa) or area fraction minus the prescribed value; 0 if none is prescribed.
-    repulsion : nominal pressure by the repulsive parts of the forces alone, Pa; 0 if no load is prescribed.
+    repulsion : sum of the repulsive parts of all forces over the nominal area, Pa; 0 if no load is prescribed.
     interaction : elastic interaction of the spots.
     """
 
@@ -90,7 +90,7 @@ class Equations:
     ----------
     contact : contact of the asperities.
     sites : table of n sites.
-    control : prescribed load or area; the separation is then one more unknown.
+    control : prescribed load or area, for which the separation is one more unknown; None for a given separation.
     """
 
     contact: AsperityContact
@@ -98,9 +98,9 @@ class Equations:
     control: Control | None = None
 
     def evaluate(self, approach, separation: float, interaction: Interaction | None = None) -> Evaluation:
-        """Evaluate contact radii, displacements and errors at approaches (n,) and a mean separation, m.
+        """Compute contact radii, displacements and errors at given approaches (n,) and mean separation, m.
 
-        interaction : interaction of the last evaluation. It is used again if its exact pairs suffice for the new radii.
+        interaction : interaction of an earlier evaluation, used again unless it was set up for smaller contact radii.
         """
         contact, sites, law = self.contact, self.sites, self.contact.law
         present, R = sites.present, sites.radius_of_curvature
@@ -124,10 +124,10 @@ class Equations:
         return Evaluation(approach, separation, a, equilibrium_height, error, control_error, repulsion, interaction)
 
     def error_size(self, evaluation: Evaluation, target_weight: float = _TARGET_WEIGHT) -> float:
-        """Return the larger error: of the sites in h_rms, or the relative one of the load or area times a weight."""
+        """Return the larger error: the error of the sites in h_rms, or the weighted relative error of load or area."""
         size = float(np.max(np.abs(evaluation.error), initial=0.0)) / self.contact.rms_height
         if self.control is None:
             return size
-        # If a load is the small difference of attraction and repulsion, its error is relative to the repulsion.
+        # If the load is a small difference of repulsion and attraction, its error is relative to the repulsion.
         unit = max(abs(self.control.target), SMALLEST_LOAD * evaluation.repulsion)
         return max(size, abs(evaluation.control_error) / unit * target_weight)

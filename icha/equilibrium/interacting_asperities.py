@@ -27,12 +27,12 @@ _UNSTABLE_RESPONSE = 10.0
 class InteractingAsperities(AsperityContact):
     """Asperities that interact through the half-space and unite where they overlap: a `ContactModel`."""
 
-    # Largest contact area fraction of a state. Targets may be up to 0.25; the search for them goes beyond 0.25.
+    # Largest contact area fraction of a state. A target is at most 0.25, but the search for a target may exceed 0.25.
     largest_area_fraction = 1.5 * 0.25
     path_accuracy = MODELS[DEFAULT_MODEL].accuracy
 
     def untouched(self) -> ContactState:
-        """Return the state without contact at the separation at which the first asperity is about to jump in."""
+        """Return the state without contact, at the mean separation at which the first asperity is about to jump in."""
         asperities = self.asperities
         separation = float(np.max(asperities.height - self.jump_in_approach))
         return ContactState(
@@ -51,7 +51,7 @@ class InteractingAsperities(AsperityContact):
         return find_equilibrium(self, state, separation, control, let_go=let_go)
 
     def continue_from(self, state: ContactState, before: ContactState) -> ContactState:
-        """Refuse: paths do not ask this of a model that does not predict steps."""
+        """Raise `NotImplementedError`: a path calls this method only for models that predict steps."""
         raise NotImplementedError
 
     def pressure(self, state: ContactState) -> float:
@@ -65,7 +65,7 @@ class InteractingAsperities(AsperityContact):
     def mean_gap(self, state: ContactState) -> float:
         """Return the mean gap, m; on a periodic surface the mean separation.
 
-        On a free square it is the mean separation plus the mean displacement by the forces at the spots' centres.
+        On a free square it is the mean separation plus the mean displacement by point forces at the spots' centres.
         """
         if not self.asperities.free:
             return state.separation
@@ -92,9 +92,10 @@ class InteractingAsperities(AsperityContact):
         """Return the elastic energy minus the energy of adhesion, over the nominal area, J/m^2; zero without contact.
 
         The energy of a spot is that of a single JKR contact, plus half its force times the displacement by the other
-        spots. Each displacement is taken at the centre of a spot, as in eq. (4), although the spot has an area.
+        spots. The displacement is taken at the centre of a spot, as in eq. (4), although the spot has an area.
         Therefore the interaction of two spots of different size is not exactly reciprocal. Along a path without events,
-        the change of the energy differs from the work done by a fraction of order (a/r)^2 of the interaction energy.
+        the change of the energy differs from the work done by a fraction of order (a/r)^2 of the interaction energy,
+        where r is the distance of the spots.
         """
         spots, law = state.spots, self.law
         a, R = spots.contact_radius, spots.radius_of_curvature
@@ -102,27 +103,27 @@ class InteractingAsperities(AsperityContact):
         return float(np.sum(law.energy(a, R) + 0.5 * law.force(a, R) * displacement)) / self.area
 
     def is_unstable(self, state: ContactState) -> bool:
-        """Return whether d(delta)/du of any spot exceeds 10, which happens only on an unstable branch."""
+        """Return whether any spot is unstable: its approach grows with the separation, d(delta)/du > 10."""
         return bool(np.max(state.sites.response[state.contact_index], initial=0.0) > _UNSTABLE_RESPONSE)
 
     def observables(self, surface: Surface) -> AsperityObservables:
-        """Return the object that computes what a run records of a state."""
+        """Return the object that computes the values that a run records of its states."""
         return AsperityObservables(self, surface)
 
 
 @dataclass(frozen=True, eq=False)
 class AsperityObservables:
-    """`icha.contact.model.Observables` of interacting asperities on a surface."""
+    """Values that a run with interacting asperities records of its states; see `icha.contact.model.Observables`."""
 
     contact: InteractingAsperities
     surface: Surface
 
     def of_contact(self) -> dict:
-        """Return an empty dictionary: there are no values of this model that are the same in all states."""
+        """Return an empty dictionary, because no value of this model is the same in all states."""
         return {}
 
     def of_step(self, state: ContactState) -> dict:
-        """Return the residual, the number of barred asperities, and the fraction of spots outside Wu's range."""
+        """Return residual, number of barred asperities, and fraction of single spots outside the range of eq. (3)."""
         law, spots = self.contact.law, state.spots
         verified = law.is_jump_in_verified(spots.radius_of_curvature[spots.members == 1])
         outside = np.count_nonzero(~verified) / max(len(verified), 1)
@@ -160,8 +161,8 @@ class AsperityObservables:
         )
         if departure > LARGEST_DEPARTURE:
             reasons.append(
-                "the tops are not parabolic over the contact spots: at the contact edge the real depth and the "
-                f"paraboloid's differ by a factor of {np.exp(departure):.2g} on average, expected at most "
+                "the tops are not parabolic over the contact spots: at the edge of contact, the depths of the surface "
+                f"and of the paraboloid differ on average by a factor of {np.exp(departure):.2g}; expected at most "
                 f"{np.exp(LARGEST_DEPARTURE):.2g}"
             )
         return reasons

@@ -1,4 +1,4 @@
-"""State of the search for an equilibrium: the sites, what is known of the asperities, and the events so far."""
+"""State of the search for an equilibrium: the sites, the asperities, and the events so far."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from icha.equilibrium.sites import CONTACT, AsperityContact, ContactState, Sites
 
 @dataclass(frozen=True, eq=False)
 class IterationState:
-    """State of the search for an equilibrium. It is immutable: every event creates a new state.
+    """State of the search for an equilibrium. The state is immutable: every event creates a new state.
 
     Attributes
     ----------
@@ -23,9 +23,9 @@ class IterationState:
     site_of_asperity, last_approach, last_separation, barred_count : as in `ContactState`.
     released_from : (asperities,) int, site of the union that released an asperity in the last jump-off; -1 for others.
     was_released : (asperities,) bool, whether a union has released an asperity during this search.
-    barred : (asperities,) bool, whether an asperity has broken contact during this search; it may not make it again.
-    new_unions : sites of the unions whose heights are not known yet.
-    log : events so far, as rows of kind, position, members, energy and asperity.
+    barred : (asperities,) bool, whether an asperity may not make contact, because it broke contact during this search.
+    new_unions : indices of the sites of unions whose heights are not known yet.
+    log : events of this search so far, each a row of kind, position, members, energy and asperity.
     """
 
     contact: AsperityContact
@@ -44,7 +44,7 @@ class IterationState:
 
     @classmethod
     def towards(cls, contact: AsperityContact, state: ContactState, separation: float) -> IterationState:
-        """Return the start of a search from an equilibrium: approaches are extrapolated linearly to a separation, m."""
+        """Start a search: return the state of an equilibrium with its approaches extrapolated to a separation, m."""
         count, before = len(contact.asperities), state.sites
         sites = replace(
             before,
@@ -57,7 +57,7 @@ class IterationState:
             start=state,
             unloading=separation > state.separation,
             sites=sites,
-            # -1 takes the last entry.
+            # Asperities without a site have the index -1 and take the last value of `index`, which is -1.
             site_of_asperity=state.site_of_asperity if index is None else index[state.site_of_asperity],
             last_approach=state.last_approach,
             last_separation=state.last_separation,
@@ -69,7 +69,7 @@ class IterationState:
 
     @property
     def without_site(self) -> np.ndarray:
-        """True where an asperity belongs to no site, neither alone nor in a union nor under a spot, (asperities,)."""
+        """Mask (asperities,) of the asperities without a site: no spot, union or candidate contains them."""
         without_site = self.site_of_asperity < 0
         single = (self.sites.asperity >= 0) & self.sites.present
         without_site[self.sites.asperity[single]] = False
@@ -81,25 +81,25 @@ class IterationState:
         return [row[4] for row in self.log if row[0] == JUMP_IN]
 
     def with_approach(self, approach) -> IterationState:
-        """Return the state with other approaches (n,) of the sites, m."""
+        """Return a copy of the state with other approaches (n,) of its sites, m."""
         return replace(self, sites=replace(self.sites, approach=approach))
 
     def with_events(self, kind, position, members, energy=0.0, asperity=-1) -> IterationState:
-        """Return the state after adding k events of one kind to its log.
+        """Return a copy of the state with k more events of one kind in its log.
 
-        position : (k, 2) float, m. All other arguments are (k,), or one value for all events.
+        position : (k, 2) float, m. The other arguments are arrays (k,), or one value for all events.
         """
         columns = (np.broadcast_to(each, len(position)) for each in (members, energy, asperity))
         rows = ((kind, *row) for row in zip(position, *columns, strict=True))
         return replace(self, log=(*self.log, *rows))
 
     def without_jumps_in(self, asperity) -> IterationState:
-        """Return the state after removing the jump-ins of these asperities from its log."""
+        """Return a copy of the state whose log does not contain the jump-ins of given asperities (indices)."""
         dropped = set(asperity.tolist())
         return replace(self, log=tuple(row for row in self.log if row[0] != JUMP_IN or row[4] not in dropped))
 
     def events(self) -> Events:
-        """Return the log as `Events`."""
+        """Return all events of the search so far, in one `Events` object."""
         if not self.log:
             return Events.concatenate(())
         kind, position, members, energy, _ = zip(*self.log, strict=True)

@@ -1,10 +1,10 @@
 """Jumps of asperities into contact and out of it.
 
-Jump-in: an asperity out of contact whose approach reaches the jump-in approach, eq. (3), becomes a site. Without
-adhesion contact forms at an approach of zero and without a jump. In that case all asperities that may come into contact
-are candidates: they are unknowns of the equations, and the solution shows which of them are in contact. Jump-off: a
-spot past the end of its stable branch breaks contact. If this spot is a union, it releases its asperities. A released
-asperity stays in contact if it has a stable state.
+Jump-in: an asperity makes contact when its approach reaches the jump-in approach, eq. (3). Without adhesion contact
+forms at an approach of zero and without a jump. Therefore, without adhesion all asperities that may come into contact
+are candidates. The approaches of the candidates are unknowns of the equations, and the solution shows which candidates
+are in contact. Jump-off: a spot past the end of its stable branch breaks contact. If this spot is a union, the union
+releases its asperities. A released asperity stays in contact if it has a stable state.
 """
 
 from dataclasses import replace
@@ -18,33 +18,33 @@ from icha.equilibrium.iteration_state import IterationState
 from icha.equilibrium.sites import CANDIDATE, CONTACT
 from icha.half_space.interaction import displacement_at
 
-# Growth of the approach of an asperity out of contact, over the decrease of the separation: largest and usual value.
+# Largest and usual increase of the approach of an asperity out of contact, relative to the decrease of the separation.
 _FASTEST_APPROACH = 3.0
 _PROBABLE_APPROACH = 1.2
 # Jumps of other spots may increase an approach by up to x h_rms + y |delta_off|, where delta_off is the jump-off
-# approach of the bluntest asperity. The pairs are x and y: the guess holds during the search, the bound at its end.
+# approach of the bluntest asperity. Each pair contains x and y: the guess during the search, the bound at its end.
 _SUDDEN_GUESS = 0.02, 2.0
 _SUDDEN_BOUND = 1.0, 10.0
-# Largest relative difference of the distances from jump-off of spots that break contact together.
+# Spots break contact together if the increases of separation up to their jump-offs differ by at most this fraction.
 _SAME_STRENGTH = 1e-3
 
 
 def add_candidates(state: IterationState, separation: float) -> IterationState:
-    """Add as candidates the asperities that will probably be in contact at a separation, m; without adhesion only."""
+    """Without adhesion: add the asperities that will probably touch at a separation, m, to the sites as candidates."""
     fall = state.last_separation - separation
     growth = _PROBABLE_APPROACH * fall + _sudden_growth(state.contact, _SUDDEN_GUESS)
     candidates = np.flatnonzero((state.last_approach + growth > 0) & state.without_site)
-    # The approach of an asperity that was just in contact is not known, but it is small.
+    # If an asperity was in contact just before, its approach is not known, but it is small.
     expected = np.where(np.isfinite(fall), state.last_approach + fall, 0.0)
     return _add_sites(state, candidates, CANDIDATE, expected[candidates])
 
 
 def apply_jump_in(state: IterationState, evaluation: Evaluation, margin: float) -> tuple[IterationState, bool]:
-    """Bring asperities into contact whose approaches exceed their jump-in approaches by more than a margin, m.
+    """Bring those asperities into contact whose approach exceeds the jump-in approach by more than a margin, m.
 
     An asperity under a spot becomes part of this spot. An asperity that a union has just released stays in contact if
-    its approach exceeds the jump-off approach. If any asperity of a union stays in contact, the union has split.
-    Return the new state and whether sites were added.
+    its approach exceeds the jump-off approach. If any asperity of a released union stays in contact, a split of this
+    union is logged. Return the new state, and whether sites were added.
     """
     contact, law, asperities = state.contact, state.contact.law, state.contact.asperities
     spots = np.flatnonzero((evaluation.a > 0) & state.sites.present)
@@ -72,7 +72,7 @@ def apply_jump_in(state: IterationState, evaluation: Evaluation, margin: float) 
     splits, jumping = np.unique(source[source >= 0]), ready[source < 0]
     state = state.with_events(SPLIT, state.sites.position[splits], state.sites.members[splits])
     if contact.adhesive:
-        # The jump releases energy at the jump-in approach; any further approach is work done on the spot.
+        # The jump releases its energy at the jump-in approach. Any further approach is work done on the spot.
         R = asperities.radius_of_curvature[jumping]
         energy = -law.energy(law.contact_radius(contact.jump_in_approach[jumping], R), R)
         state = state.with_events(JUMP_IN, asperities.position[jumping], 1, energy, jumping)
@@ -80,14 +80,14 @@ def apply_jump_in(state: IterationState, evaluation: Evaluation, margin: float) 
 
 
 def _sudden_growth(contact, reach):
-    """Return by how much jumps of other spots may increase an approach, m; `reach` is a pair like _SUDDEN_GUESS."""
+    """Return the largest increase of an approach by jumps of other spots, m; `reach` is a pair like _SUDDEN_GUESS."""
     heights, jumps = reach
     largest_jump = -contact.law.jump_off_approach(np.max(contact.asperities.radius_of_curvature))
     return heights * contact.rms_height + jumps * largest_jump
 
 
 def _evaluate_approaches(state, evaluation, spots, margin):
-    """Evaluate the approaches of all asperities that may have reached jump-in; return the state and their indices."""
+    """Compute the approaches of all asperities that may have reached jump-in; return the state and these indices."""
     contact, asperities, sites = state.contact, state.contact.asperities, state.sites
     reach = state.last_approach + _FASTEST_APPROACH * np.abs(state.last_separation - evaluation.separation)
     reach += _sudden_growth(contact, _SUDDEN_GUESS if margin > 0 else _SUDDEN_BOUND)
@@ -108,7 +108,7 @@ def _evaluate_approaches(state, evaluation, spots, margin):
 
 
 def _largest_of_each_group(state, jumping):
-    """Return the indices of jumping asperities without those that would lie under the larger spot of another one."""
+    """Return those jumping asperities (indices) that would not lie under a larger spot of another jumping asperity."""
     asperities = state.contact.asperities
     if len(jumping) < 2:
         return jumping
@@ -119,7 +119,7 @@ def _largest_of_each_group(state, jumping):
 
 
 def _add_sites(state, asperity, status, approach):
-    """Append asperities, given by their indices (k,), to the sites, with one status and approaches (k,), m."""
+    """Return the state with new sites for k asperities (indices); `status` is one value, approaches are (k,), m."""
     if not len(asperity):
         return state
     asperities, site_of_asperity = state.contact.asperities, state.site_of_asperity
@@ -142,11 +142,11 @@ def _add_sites(state, asperity, status, approach):
 
 
 def apply_jump_off(state: IterationState, evaluation: Evaluation, margin: float) -> IterationState:
-    """Break the contact of all spots whose approaches are below their jump-off approaches by more than a margin, m.
+    """Break the contact of all spots whose approach is below the jump-off approach by more than a margin, m.
 
-    Without adhesion only unions break contact here, because a single asperity with a negative approach exerts no force.
-    If a spot that has formed during this search is past jump-off, only such new spots break contact, because the others
-    may then be stable again.
+    If spots that have formed during this search are past jump-off, only these new spots break contact, because the
+    older spots may be stable afterwards. Without adhesion only unions break contact here, because a single asperity
+    with a negative approach exerts no force. Return the new state.
     """
     sites = state.sites
     breaking = sites.status == CONTACT
@@ -161,9 +161,9 @@ def apply_jump_off(state: IterationState, evaluation: Evaluation, margin: float)
 
 
 def break_closest_to_jump_off(state: IterationState, separation: float, let_go: int) -> IterationState:
-    """Break the contact of the `let_go` spots that would reach jump-off first, and of spots equally close to it.
+    """Break the contact of the `let_go` spots closest to jump-off, and of spots equally close; return the new state.
 
-    The approaches of all sites are reset to those at the start of the search.
+    The approaches of all sites are reset to their values at the start of the search.
 
     separation : mean separation to which the search has extrapolated the approaches, m.
     """
@@ -178,9 +178,9 @@ def break_closest_to_jump_off(state: IterationState, separation: float, let_go: 
 def _break_contact(state, breaking):
     """Break the contact of the spots where the mask `breaking` (n,) is True, and log their jump-offs.
 
-    A union releases its asperities, each at most once during a search. All other asperities are barred: they may not
-    make contact again at this separation. If an asperity jumped in during this search, its jump-in is removed from the
-    log, and no jump-off is logged.
+    A union releases its asperities, each at most once during a search. All other asperities in broken spots are barred:
+    they may not make contact again at this separation. If an asperity has jumped in during this search, its jump-in is
+    removed from the log, and no jump-off is logged.
     """
     sites, law = state.sites, state.contact.law
     new = np.isin(sites.asperity, state.jumped_in) & breaking
@@ -189,14 +189,14 @@ def _break_contact(state, breaking):
     energy = law.energy(law.jump_off_radius(R), R)
     state = state.without_jumps_in(sites.asperity[new])
     state = state.with_events(JUMP_OFF, sites.position[spots], sites.members[spots], energy)
-    # -1 takes the last entry.
+    # Asperities without a site have the index -1 and take the appended value False.
     freed = np.append(breaking, False)[state.site_of_asperity]
     released = np.append(breaking & (sites.asperity < 0), False)[state.site_of_asperity] & ~state.was_released
     return replace(
         state,
         sites=sites.remove(breaking),
         site_of_asperity=np.where(freed, -1, state.site_of_asperity),
-        last_separation=np.where(freed, np.inf, state.last_separation),  # the approach is not known
+        last_separation=np.where(freed, np.inf, state.last_separation),  # the present approach is not known
         released_from=np.where(released, state.site_of_asperity, state.released_from),
         was_released=state.was_released | released,
         barred=state.barred | (freed & ~released),

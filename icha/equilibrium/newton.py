@@ -1,4 +1,4 @@
-"""Newton's method for the equations of equilibrium between events; GMRES solves its linear equations approximately.
+"""Newton's method for the equations of equilibrium of the present spots; GMRES solves the linear equations.
 
 The unknowns are the approaches of the sites: the spots and, without adhesion, the candidates for contact. A candidate
 with a negative approach exerts no force, so the solution shows which candidates are in contact.
@@ -16,7 +16,7 @@ from icha.equilibrium.sites import CONTACT
 
 # Largest number of halvings of a Newton step.
 _MAX_HALVINGS = 8
-# Largest error of the response of the approaches to the separation.
+# Largest error of the response d(delta)/du of the approaches to the mean separation.
 _RESPONSE_ERROR = MODELS[DEFAULT_MODEL].stiffness_error
 # Relative errors of linear solves: with the approximate matrix, and with the exact matrix.
 _LINEAR_TOLERANCE = 3e-3
@@ -29,15 +29,15 @@ _KRYLOV = 50
 _LARGEST_CHANGE = 0.2
 # Contact radius, in jump-off radii, below which a step towards jump-off changes the radius instead of the approach.
 _NEAR_JUMP_OFF = 1.5
-# A spot past jump-off returns to contact only if its distance from jump-off is at most this fraction of its step.
+# A spot past jump-off returns to contact only if its distance from jump-off is less than this fraction of its error.
 _PAST_JUMP_OFF = 0.2
 
 
 def newton_step(equations: Equations, evaluation: Evaluation, size: float) -> tuple[Evaluation, bool, bool]:
-    """Take one Newton step, and halve it until the error is smaller than its present `size`, in h_rms.
+    """Take one Newton step, halved until the error is smaller than `size`, the error before the step in h_rms.
 
-    Return the evaluation after the step, or the old one if no step reduces the error; whether the error is smaller; and
-    whether the exact matrix was needed.
+    If no step with the approximate matrix reduces the error, the exact matrix is used. Return the evaluation after the
+    step, or the old evaluation if all steps fail; whether the error is smaller; and whether the matrix was exact.
     """
     for exact in (False, True):
         step, separation_step = _solve_step(equations, evaluation, exact)
@@ -54,7 +54,10 @@ def newton_step(equations: Equations, evaluation: Evaluation, size: float) -> tu
 
 
 def solve_response(equations: Equations, evaluation: Evaluation) -> np.ndarray:
-    """Return the response x = d(delta)/du of every site, (n,): solve (1 + W' da/d(delta)) x = -1 with W' = dw/da."""
+    """Return the response x = d(delta)/du of the approach of every site to the mean separation, (n,).
+
+    The response solves (1 + W' da/d(delta)) x = -1, where W' = dw/da is the derivative of the displacements.
+    """
     sites = equations.sites
     response = np.full(len(sites), -1.0)
     present, _, exact, approximate = _linearise(equations, evaluation)
@@ -70,20 +73,20 @@ def solve_response(equations: Equations, evaluation: Evaluation) -> np.ndarray:
             (approximate, _LINEAR_TOLERANCE) if solves < _APPROXIMATE_SOLVES else (exact, _EXACT_TOLERANCE)
         )
         x = x + _solve_linear(lambda y, product=product: y + product(y), defect, tolerance)
-    raise NotConverged(f"the response of {len(present)} spots to the separation was not found")
+    raise NotConverged(f"no solution for the response of {len(present)} spots to a change of the separation")
 
 
 def _linearise(equations, evaluation):
     """Linearise the displacements at the m present sites as functions of their approaches.
 
-    Return the indices of these sites and their da/d(delta), both (m,), and two functions, an exact and an approximate
-    one, that turn changes of the approaches (m,) into changes of the displacements (m,).
+    Return the indices of these sites and their da/d(delta), both (m,), and two functions. Both functions return the
+    changes of the displacements (m,) for given changes of the approaches (m,): one is exact, the other approximate.
     """
     sites = equations.sites
     present = np.flatnonzero(sites.present)
     a, R = evaluation.a[present], sites.radius_of_curvature[present]
     jump_off_approach, approach = sites.jump_off_approach[present], evaluation.approach[present]
-    # A spot that is about to return past jump-off is treated as if it were on the stable branch.
+    # A spot past jump-off that returns to contact is treated as if it were on the stable branch.
     approach = np.where(
         _returns_to_contact(sites, evaluation)[present] & equations.contact.adhesive, jump_off_approach, approach
     )
@@ -106,7 +109,7 @@ def _linearise(equations, evaluation):
 
 
 def _solve_step(equations, evaluation, exact):
-    """Return the full Newton step by the exact or approximate matrix: changes of approaches (n,) and separation, m."""
+    """Return the Newton step by the exact or approximate matrix: changes of approaches (n,) and separation, m."""
     contact, sites, control = equations.contact, equations.sites, equations.control
     present, slope, exact_product, approximate_product = _linearise(equations, evaluation)
     product, tolerance = (exact_product, _EXACT_TOLERANCE) if exact else (approximate_product, _LINEAR_TOLERANCE)
@@ -115,8 +118,8 @@ def _solve_step(equations, evaluation, exact):
     if control is None:
         step[present] = _solve_linear(lambda x: x + product(x), -evaluation.error[present], tolerance)
         return step, 0.0
-    # The separation is one more unknown. Changes of the approaches are measured from those that the last response gives
-    # for the change of the separation. So the bordered matrix is close to the identity matrix.
+    # The separation is one more unknown. The last response predicts a change of each approach for the change of the
+    # separation. The unknowns are the differences from this prediction, so that the matrix is close to the identity.
     last = sites.response[present]
     R = sites.radius_of_curvature[present]
     gradient = slope * nominal_derivative(contact, control.quantity, evaluation.a[present], R)
@@ -125,7 +128,7 @@ def _solve_step(equations, evaluation, exact):
         raise NotConverged("no contact radius changes with the separation, so the load or area cannot be reached")
 
     def bordered(x):
-        """Multiply by the matrix of the approaches and the separation, which is the last entry of x (m + 1,)."""
+        """Multiply the matrix by changes x (m + 1,) of the approaches and, as the last value, of the separation."""
         y = x[:size] + x[size] * last
         return np.append(y + product(y) + x[size], np.sum(gradient * y) / rate)
 
@@ -137,11 +140,11 @@ def _solve_step(equations, evaluation, exact):
 
 
 def _take_step(equations, evaluation, step):
-    """Return the approaches (n,) after a step (n,), m, with care near jump-off.
+    """Return the approaches (n,) after a Newton step (n,), m, which is modified for spots near jump-off.
 
     Near jump-off the radius changes as the square root of the distance from jump-off, and the equations are smooth
     functions of the radius. Therefore a step towards jump-off is taken as a step of the radius. A spot far past
-    jump-off returns to jump-off at most. For a spot a little past jump-off, a quadratic equation gives the square root
+    jump-off returns at most to jump-off. For a spot a little past jump-off, a quadratic equation gives the square root
     of its new distance from jump-off.
     """
     approach = evaluation.approach + step
@@ -173,7 +176,7 @@ def _take_step(equations, evaluation, step):
 
 
 def _returns_to_contact(sites, evaluation):
-    """Return where a spot is a little past jump-off and its error moves it back into contact, (n,) bool."""
+    """Return a mask (n,) of the spots that are a little past jump-off and whose error moves them back into contact."""
     gap = sites.jump_off_approach - evaluation.approach
     return (sites.status == CONTACT) & (gap >= 0) & (gap < -_PAST_JUMP_OFF * evaluation.error)
 

@@ -41,9 +41,9 @@ class AsperityContact(MaterialUnits):
         return self.asperities.period**2
 
 
-# Status of a site: in contact; a candidate for contact, only without adhesion; or removed.
+# Status of a site: in contact, candidate for contact (only without adhesion), or removed.
 CONTACT, CANDIDATE, REMOVED = 1, 2, 3
-# The half-space is set up again when the number of sites has grown by this factor, or this fraction of them is removed.
+# The half-space is set up again if the number of sites has grown by the factor, or this fraction of them is removed.
 _GROWTH = 1.5
 _REMOVED_FRACTION = 0.25
 
@@ -57,7 +57,7 @@ class MergeRecord:
     union_radius : contact radius of the union when the spots united, m.
     touching_radius : contact radius of the union below which the two spots would no longer overlap, m.
     contact_radius : (2,) float, contact radii of the two spots, m.
-    columns : the other properties of the two spots, by the names of `Sites.UNITED`.
+    columns : other properties of the two spots, two values for each name in `Sites.UNITED`.
     """
 
     union_radius: float
@@ -75,23 +75,23 @@ class MergeRecord:
 
 @dataclass(frozen=True, eq=False)
 class Sites:
-    """Table of n sites: spots in contact, candidates for contact, and removed ones; with a half-space for all of them.
+    """Table of n sites (spots in contact, candidates for contact, removed sites), with a half-space for all sites.
 
     Attributes
     ----------
-    position : (n, 2) float, m.
-    height, radius_of_curvature : (n,) float, m.
+    position : (n, 2) float, positions of the asperities, or the centres of unions, m.
+    height, radius_of_curvature : (n,) float, heights and radii of curvature of asperities and unions, m.
     jump_off_approach : (n,) float, approaches at which the spots jump out of contact, m.
     asperity : (n,) int, index of the asperity; -1 for a union.
     members : (n,) int, number of asperities in the spot.
     union : (n,) object, `MergeRecord` of a union; None for other sites.
-    split_number : (n,) int, number of the split that a spot comes from; -1 for others.
+    split_number : (n,) int, the same number for the two spots from one split of a union; -1 for other sites.
     status : (n,) int, CONTACT, CANDIDATE or REMOVED.
-    approach : (n,) float, last known approach, m.
+    approach : (n,) float, last known approach of each site, m.
     response : (n,) float, derivative of the approach with respect to the mean separation.
     was_in_contact : (n,) bool, whether the site was in contact before the present search for equilibrium.
     half_space : elastic half-space with a point at every site.
-    arranged : number of sites when the half-space was set up.
+    arranged : number of sites when the half-space was set up for the last time.
     """
 
     position: np.ndarray
@@ -109,7 +109,7 @@ class Sites:
     half_space: PointHalfSpace
     arranged: int
 
-    # Columns that a union records of its spots.
+    # Columns of the two spots of a union that its `MergeRecord` contains.
     UNITED = ("position", "height", "radius_of_curvature", "asperity", "members", "union")
 
     def __len__(self) -> int:
@@ -128,14 +128,14 @@ class Sites:
 
     @property
     def present(self) -> np.ndarray:
-        """True where a site is in contact or a candidate, (n,) bool."""
+        """Mask of the sites that are in contact or candidates for contact, (n,) bool."""
         return self.status != REMOVED
 
     def append(self, law: JKR, *, status, was_in_contact, split_number=-1, **more) -> Sites:
-        """Return the table with k more sites.
+        """Return a table with k more sites.
 
         status, was_in_contact, split_number : one value for all new sites.
-        more : the other columns of `Sites`, arrays of k rows.
+        more : position, height, radius_of_curvature, asperity, members, union and approach, arrays of k rows.
         """
         count = len(more["height"])
         more |= {
@@ -151,16 +151,16 @@ class Sites:
         return Sites(**arrays, half_space=self.half_space.extended(more["position"]), arranged=self.arranged)
 
     def remove(self, which) -> Sites:
-        """Return the table with the status REMOVED for some sites, given by a mask (n,) or by indices."""
+        """Return a table in which given sites have the status REMOVED; `which` is a mask (n,) or indices."""
         status = self.status.copy()
         status[which] = REMOVED
         return replace(self, status=status)
 
     def compact(self) -> tuple[Sites, np.ndarray | None]:
-        """Delete removed sites if they are many, or if the table has grown by half since the half-space was set up.
+        """Return the table without removed sites, if these are over a quarter or the table has grown by over a half.
 
-        Return the table, and the new index of every site, (n + 1,) int: -1 for removed sites and in the last place. The
-        index is None if the table is unchanged.
+        Return also the new index of every site, (n + 1,) int: -1 for removed sites, and -1 as the last value. If the
+        table is unchanged, the index is None. Growth is counted from the last time the half-space was set up.
         """
         removed = self.status == REMOVED
         if len(self) <= _GROWTH * self.arranged and np.count_nonzero(removed) <= _REMOVED_FRACTION * len(self):
@@ -182,12 +182,12 @@ _ARRAYS = tuple(name for name in Sites.__match_args__ if name not in ("half_spac
 
 @dataclass(frozen=True, eq=False)
 class Spots:
-    """Contact spots, single asperities or unions.
+    """Properties of contact spots, each a single asperity or a union.
 
     Attributes
     ----------
-    position : (m, 2) float, centres, m.
-    height, radius_of_curvature, contact_radius, approach : (m,) float, m.
+    position : (m, 2) float, centres of the spots, m.
+    height, radius_of_curvature, contact_radius, approach : (m,) float, one value for each spot, m.
     members : (m,) int, number of asperities in each spot.
     """
 
@@ -211,15 +211,15 @@ class ContactState:
     ----------
     separation : mean separation u, m.
     sites : table of sites, n of them.
-    contact_radius : (n,) float, zero out of contact, m.
+    contact_radius : (n,) float, contact radius of each site, zero out of contact, m.
     site_of_asperity : (asperities,) int, site to which an asperity belongs: its own spot, a union that contains it, or
         a spot that covers it; -1 for an asperity out of contact.
-    last_approach : (asperities,) float, approach of an asperity when it was evaluated last, m.
-    last_separation : (asperities,) float, mean separation at that evaluation, m; inf if there was none since contact.
+    last_approach : (asperities,) float, approach of an asperity out of contact at its last evaluation, m.
+    last_separation : (asperities,) float, mean separation at this evaluation, m; inf if the approach is not known.
     residual : largest error of the equilibrium, in h_rms.
-    barred_count : number of asperities out of contact beyond their jump-in approach. They have broken contact at this
-        separation, and may not make contact again.
-    history : events of every equilibrium of the path up to this state.
+    barred_count : number of asperities beyond their jump-in approach that stay out of contact, because they have broken
+        contact at this separation.
+    history : events of the path up to this state, one `Events` for each equilibrium with events.
     """
 
     separation: float
@@ -239,7 +239,7 @@ class ContactState:
 
     @cached_property
     def spots(self) -> Spots:
-        """Sites in contact."""
+        """Properties of the sites in contact."""
         names = ("position", "height", "radius_of_curvature", "approach", "members")
         columns = {name: getattr(self.sites, name)[self.contact_index] for name in names}
         return Spots(contact_radius=self.contact_radius[self.contact_index], **columns)

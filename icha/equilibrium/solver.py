@@ -1,7 +1,7 @@
 """Search for the equilibrium of all contact spots at a given mean separation, load or contact area.
 
-The search alternates Newton steps, which solve the equations for the present spots, and events, which change the spots:
-jumps into and out of contact, coalescence of spots, and on unloading splits of unions.
+The search alternates Newton steps and events. Newton steps solve the equations for the present spots. Events change the
+spots: jumps into and out of contact, coalescence of spots, and on unloading splits of unions.
 """
 
 import hashlib
@@ -19,8 +19,8 @@ from icha.equilibrium.newton import newton_step, solve_response
 from icha.equilibrium.sites import CANDIDATE, CONTACT, AsperityContact, ContactState
 from icha.equilibrium.unions import absorb_covered, merge_overlapping, set_union_heights, split_unions
 
-# Error in h_rms below which the search applies events. Events that are due by less than ten times the error are applied
-# only when the equations are solved.
+# Error in h_rms below which the search applies events. If the condition of an event is exceeded by less than ten times
+# the error, the event waits until the equations are solved.
 _EVENT_TOLERANCE = 3e-4
 _EVENT_MARGIN = 10.0
 # Largest number of Newton steps between two events, and of all steps with the exact matrix. If more are needed, the
@@ -74,10 +74,10 @@ def find_equilibrium(
             wait = not changed
         if not changed:
             if steps == _MAX_NEWTON_STEPS:
-                raise NotConverged(f"equilibrium error {size:.2e} h_rms after {steps} Newton steps")
+                raise NotConverged(f"equilibrium error still {size:.2e} h_rms after {steps} Newton steps")
             if exact_steps == _MAX_EXACT_STEPS:
                 steps_taken = f"{exact_steps} Newton steps with the exact matrix"
-                raise NotConverged(f"equilibrium error {size:.2e} h_rms after {steps_taken}")
+                raise NotConverged(f"equilibrium error still {size:.2e} h_rms after {steps_taken}")
             evaluation, smaller, exact = newton_step(equations, evaluation, size)
             exact_steps += exact
             if smaller:
@@ -92,18 +92,18 @@ def find_equilibrium(
 
 
 def apply_events(state: IterationState, evaluation: Evaluation, margin: float) -> tuple[IterationState, bool]:
-    """Apply all jumps and unions that are due by more than a margin, m, and on unloading all splits.
+    """Apply all jumps and unions whose conditions are exceeded by more than a margin, m, and on unloading all splits.
 
-    Return the new state and whether there was any event. Raise `FullContact` if half the nominal area is in contact.
+    Return the new state, and whether there was any event. Raise `FullContact` if half the nominal area is in contact.
     """
     contact = state.contact
     area = nominal_value(contact, AREA_FRACTION, evaluation.a, state.sites.radius_of_curvature)
     if area > _FULL_CONTACT:
-        raise FullContact(f"the contact area reached {area:.2f} of the nominal area")
+        raise FullContact(f"the contact area reached {area:.2f} of the nominal area, above the limit {_FULL_CONTACT}")
     before = state = state.with_approach(evaluation.approach)
     state = apply_jump_off(state, evaluation, margin)
     changed = state is not before
-    # Without adhesion the expected contacts are candidates already; others are found when the equations are solved.
+    # Without adhesion the probable contacts are already candidates. Others are added when the equations are solved.
     if contact.adhesive or margin == 0:
         state, jumped = apply_jump_in(state, evaluation, margin)
         changed |= jumped
@@ -115,7 +115,7 @@ def apply_events(state: IterationState, evaluation: Evaluation, margin: float) -
 
 
 def _count_round(state, visited):
-    """Count in `visited` how often events have led to the same spots; raise `NotConverged` if they do not end."""
+    """Count in `visited` how often events have led to the same spots; raise `NotConverged` if events do not end."""
     sites = state.sites
     places = np.rint(sites.position[sites.status == CONTACT] / (_SAME_PLACE * state.contact.asperities.period))
     checksum = hashlib.sha256(np.sort(places @ (1.0, 2 / _SAME_PLACE)).tobytes()).digest()
@@ -126,7 +126,7 @@ def _count_round(state, visited):
 
 
 def _absorb_and_evaluate(state, evaluation, control):
-    """Remove new contacts under other spots, and return state and evaluation without them."""
+    """Remove new spots that lie under other spots; return the state and the evaluation without these new spots."""
     after = absorb_covered(state, evaluation)
     if after is not state:
         equations = Equations(state.contact, after.sites, control)
@@ -135,9 +135,9 @@ def _absorb_and_evaluate(state, evaluation, control):
 
 
 def _merge_after_failed_step(state, evaluation, margin, size):
-    """Return the state after merging overlapping spots, because no Newton step succeeds; raise `NotConverged` if none.
+    """Merge overlapping spots because no Newton step succeeds; raise `NotConverged` if there are no such spots.
 
-    If no spots overlap by more than the margin, m, pairs merge in which one spot covers the centre of the other.
+    If no spots overlap by more than the margin, m, those pairs merge in which one spot covers the centre of the other.
     size : error of the equilibrium, in h_rms.
     """
     before = state.with_approach(evaluation.approach)
@@ -172,7 +172,7 @@ def _build_contact_state(state, evaluation, control):
 
 
 def _update_candidates(state, evaluation):
-    """Turn candidates with a positive approach into contacts, and contacts without one into candidates; no adhesion."""
+    """Without adhesion: turn candidates with a positive approach into contacts, and all others into candidates."""
     sites, status, site_of_asperity = state.sites, state.sites.status.copy(), state.site_of_asperity.copy()
     made = np.flatnonzero((status == CANDIDATE) & (evaluation.approach > 0))
     status[made] = CONTACT

@@ -1,8 +1,8 @@
 """Coalescence of spots, the splitting of unions on unloading, and new contacts that lie inside other spots.
 
-Overlapping spots become one spot, a union (`icha.asperity.jkr.JKR.union`). The height of the union is chosen so that it
-is in equilibrium at the moment of coalescence. New contacts inside other spots are removed, because the equations are
-singular where the edge of one spot passes through the centre of another.
+Two overlapping spots become one spot, a union (`icha.asperity.jkr.JKR.union`). The height of the union is chosen so
+that the union is in equilibrium at the moment of coalescence. New contacts inside other spots are removed, because the
+equations are singular when the edge of one spot passes through the centre of another spot.
 """
 
 from dataclasses import replace
@@ -20,11 +20,11 @@ from icha.surfaces.square import periodic_difference
 def merge_overlapping(
     state: IterationState, evaluation: Evaluation, margin: float = 0.0, *, deep: bool = False
 ) -> IterationState:
-    """Replace pairs of overlapping spots by unions; each spot merges with at most one other spot.
+    """Replace pairs of overlapping spots by unions; each spot merges with at most one other. Return the new state.
 
     Parameters
     ----------
-    margin : error of the approaches, m; spots merge only if this error cannot explain their overlap.
+    margin : error of the approaches, m; two spots merge only if this error cannot explain their overlap.
     deep : whether only those pairs merge in which one spot covers the centre of the other. On unloading, a pair that
         has split from one union during this path merges again only if `deep` is True.
     """
@@ -63,7 +63,7 @@ def merge_overlapping(
 
 
 def set_union_heights(state: IterationState, evaluation: Evaluation) -> tuple[IterationState, Evaluation]:
-    """Give new unions the heights at which they are in equilibrium; return state and evaluation with these heights."""
+    """Set the heights of new unions so that these are in equilibrium; return state and evaluation with the heights."""
     if not len(state.new_unions):
         return state, evaluation
     height = state.sites.height.copy()
@@ -85,7 +85,7 @@ def _select_merging_pairs(state, evaluation, margin, deep):
         overlap &= (sites.split_number[first] < 0) | (sites.split_number[first] != sites.split_number[second])
     overlap = np.flatnonzero(overlap)
     if margin > 0 and len(overlap):
-        # An error of the approach is an error of the radius, about R/(2a) times as large.
+        # An error of the approach causes an error of the radius that is about R/(2a) times as large.
         i, j, R = first[overlap], second[overlap], sites.radius_of_curvature
         overlap = overlap[depth[overlap] > margin * 0.5 * (R[i] / a[i] + R[j] / a[j])]
     if deep:
@@ -96,7 +96,7 @@ def _select_merging_pairs(state, evaluation, margin, deep):
 
 
 def _record_unions(state, pairs, a, radius):
-    """Return the `MergeRecord` of every pair (k, 2), from contact radii of the spots (n,) and of the unions (k,), m."""
+    """Return a `MergeRecord` for every pair (k, 2); `a`, `radius`: contact radii of spots (n,) and unions (k,), m."""
     unions = np.full(len(pairs), None)
     sites, (i, j) = state.sites, pairs.T
     offset = periodic_difference(sites.position[j], sites.position[i], state.contact.asperities.cell)
@@ -109,7 +109,7 @@ def _record_unions(state, pairs, a, radius):
 
 
 def _log_contacts_of_candidates(state, candidates):
-    """Log that candidates, given by their sites, have come into contact, because they become parts of unions."""
+    """Log the jump-in of candidates that become part of unions, given by their site indices; return the new state."""
     sites, site_of_asperity = state.sites, state.site_of_asperity.copy()
     asperity = sites.asperity[candidates]
     site_of_asperity[asperity] = candidates
@@ -118,7 +118,7 @@ def _log_contacts_of_candidates(state, candidates):
 
 
 def split_unions(state: IterationState, evaluation: Evaluation) -> IterationState:
-    """Split the unions whose contact radii are below the radii at which their two spots just touch."""
+    """Split every union whose contact radius is below the radius at which its two spots would just touch."""
     a, sites = evaluation.a, state.sites
     touching = np.array([0.0 if union is None else union.touching_radius for union in sites.union[: len(a)]])
     split = np.flatnonzero((sites.status[: len(a)] == CONTACT) & (a < touching))
@@ -128,7 +128,7 @@ def split_unions(state: IterationState, evaluation: Evaluation) -> IterationStat
 
 
 def _split_union(state, site, a):
-    """Replace a union by its two spots; their radii shrink by the same factor as that of the union, now a, m."""
+    """Replace a union by its two spots, with radii reduced by the same factor as the radius of the union, now a, m."""
     sites, law, union = state.sites, state.contact.law, state.sites.union[site]
     contact_radius = union.contact_radius * (a / union.union_radius)
     merged = state.site_of_asperity == site
@@ -144,13 +144,13 @@ def _split_union(state, site, a):
         was_in_contact=True,
         split_number=np.max(sites.split_number) + 1,
     )
-    # The approach of asperities under the union is not known.
+    # The approaches of other asperities under the union are not known.
     last_separation = np.where(merged, np.inf, state.last_separation)
     return replace(state, sites=sites, site_of_asperity=site_of_asperity, last_separation=last_separation)
 
 
 def absorb_covered(state: IterationState, evaluation: Evaluation) -> IterationState:
-    """Remove the spots that have formed in this search under another spot; that spot then contains their asperities."""
+    """Remove spots that have formed in this search under another spot; the covering spot gets their asperities."""
     sites, a, interaction, old = state.sites, evaluation.a, evaluation.interaction, state.sites.was_in_contact
     i, j, r = interaction.target, interaction.source, interaction.r
     inside = np.flatnonzero((r < a[j]) & (a[i] > 0) & ~old[i])

@@ -1,4 +1,4 @@
-"""Captions of the figures: their texts, and the numbers of runs that a figure lacks or marks."""
+"""Captions of the figures, and sentences that count missing or marked runs of a figure."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ def caption_of(name: str) -> str:
 
 
 def count_runs(campaign: xr.DataTree, studies: Sequence[str]) -> str:
-    """Count the runs of some studies that a figure of means lacks, and those to which the model is not applicable.
+    """Describe how many runs of some studies are missing in a figure, and to how many the model is not applicable.
 
     Returns
     -------
-    Sentences for the end of a caption; "" if all runs are complete and the asperity model is applicable to them.
+    Sentences for the end of a caption; "" if all runs are complete and the asperity model is applicable to all runs.
     """
     from icha.datasets.variables.campaign import COMPLETE, COMPUTED_RUNS, FAILED_CHECKS, INCOMPLETE, MISSING
 

@@ -41,18 +41,18 @@ _UNLOADING = {"ls": BRANCH_DASHES["unloading"], "lw": 0.7, "zorder": 2.2}
 
 
 def gap_label(data: xr.Dataset) -> str:
-    """Return the label of the mean gap; on periodic surfaces the mean gap is the mean separation."""
+    """Return the axis label of the mean gap; on periodic surfaces, the mean gap equals the mean separation."""
     return GAP_LABEL if (data["boundary"] == "free").any() else SEPARATION_LABEL
 
 
 class Curve(NamedTuple):
-    """The runs of one contact against load.
+    """The runs of one material, surface and rms slope against load.
 
     Attributes
     ----------
     runs : the runs.
-    stops : steps of the runs at the targets of their study, by seed.
-    look : look of the markers, arguments of `Axes.plot`.
+    stops : steps of the runs at the targets of the study, by seed.
+    look : arguments of `Axes.plot` for the markers.
     """
 
     runs: select.ContactRuns
@@ -65,8 +65,8 @@ class Curves(NamedTuple):
 
     Attributes
     ----------
-    lines : the curves of the study's `shown_model`.
-    crosses : curves with boundary elements, if the lines are of the asperity model.
+    lines : curves of the model that figures of the study show (`shown_model`).
+    crosses : curves of boundary elements, if `lines` are curves of the asperity model; otherwise empty.
     looks : colours and markers of the lines.
     handles : legend entries by name: materials, surfaces, slopes and models.
     """
@@ -107,9 +107,9 @@ def _curve(runs, look):
 
 
 def cross_look(looks: Looks, contact: Contact, model: str = SHORT_RANGE) -> dict:
-    """Return the look of boundary elements: crosses in the colour of the contact."""
+    """Return arguments of `Axes.plot` for boundary elements: crosses in the colour of the material or surface."""
     colour, adhesive = looks.colour(contact), looks.adhesive(contact[0])
-    # Without adhesion, crosses are larger, so that both are visible if they coincide.
+    # Crosses without adhesion are larger than crosses with adhesion, so that both are visible if they coincide.
     size = (8 if adhesive else 11) * (1 if len(looks.contacts) <= FEW_LINES else 0.7)
     look = {"color": colour, "mec": colour, "ms": size, "zorder": 6 + adhesive}
     return look | {"ls": "none", "marker": MODEL_MARKERS[model], "mew": 1.0}
@@ -121,7 +121,7 @@ def model_name(dataset: xr.Dataset) -> str:
 
 
 def snapshot_looks(campaign: xr.DataTree, study: str, lines: Sequence[select.Snapshots]) -> tuple[list[dict], Looks]:
-    """Return the looks of the snapshots of a study, one for each of the lines, and all looks of the figure."""
+    """Return the arguments of `Axes.plot` for each line of a figure of one snapshot, and the `Looks` of the figure."""
     dataset = campaign[study].to_dataset()
     groups = [line.runs for line in lines]
     looks = Looks(campaign, dataset, [group.contact for group in groups])
@@ -189,7 +189,7 @@ def draw_curves(
 
 
 def _draw_line(axes, line, points):
-    """Draw a single run with markers, or the mean of several seeds at common loads as a line, with their scatter."""
+    """Draw a single run with markers, or the mean of several seeds at common loads with the scatter of the seeds."""
     from icha.analysis.common_loads import at_common_loads
 
     members, asked = [points(run) for run in line.stops.values()], line.runs.asked
@@ -198,7 +198,7 @@ def _draw_line(axes, line, points):
         if len(load):
             draw_members(axes, load, values, line.look, positive=True, asked=asked)
             return np.tile(load, len(values)), values.ravel()
-    # A single run, or runs that share no load and have no mean.
+    # A single run, or runs that have no mean because they have no load in common.
     for load, values in members:
         axes.plot(load, values, **line.look)
         if len(members) < asked:
@@ -207,7 +207,7 @@ def _draw_line(axes, line, points):
 
 
 def _draw_crosses(axes, line, points):
-    """Draw a curve of boundary elements as crosses; several seeds have their mean at common loads."""
+    """Draw a curve of boundary elements as crosses; for several seeds, draw the mean over the seeds at common loads."""
     from icha.analysis.common_loads import at_common_loads
 
     load, values = at_common_loads([points(run) for run in line.stops.values()], logarithmic=True)
@@ -218,7 +218,7 @@ def _draw_crosses(axes, line, points):
 
 
 def _draw_unloading(panels, line):
-    """Draw the unloading of every run of a line where the load is compressive; the ranges of the axes do not change."""
+    """Draw the unloading of every run of a line at compressive loads, without a change of the limits of the axes."""
     for leg in [leg for run in line.runs.by_seed.values() for leg in select.unloading_legs(run)]:
         for axes, points in panels.items():
             load, values = points(leg)
@@ -236,9 +236,9 @@ def add_legend(figure: Figure, panels: Sequence[Axes], curves: Curves) -> None:
 
 
 def drop_rounding_errors(values: np.ndarray) -> np.ndarray:
-    """Return the values that exceed rounding errors, which a logarithmic axis can show."""
+    """Return the values that are larger than rounding errors; a logarithmic axis can show these values."""
     return values[values > _ROUNDING * values.max(initial=0.0)]
 
 
-# Bound of rounding errors over the largest value.
+# Largest rounding error, divided by the largest value.
 _ROUNDING = 1e-7

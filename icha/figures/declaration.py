@@ -1,12 +1,12 @@
 """The declaration of a figure: its options in a configuration, and the files from which it is drawn.
 
-A module `fig<number>_<words>` of this folder is a figure: it has a `DECLARATION` and a function `figure` that draws it.
-`icha.figures.registry` finds the module by its name, so no list of figures exists. Reading a configuration imports the
-modules of all figures. Therefore these modules import libraries for drawing, and modules that need xarray, only inside
-the functions that draw.
+Every figure is a module `fig<number>_<words>` of this folder, with a `DECLARATION` and a function `figure` that draws.
+`icha.figures.registry` finds these modules by their names, so no list of figures exists. When ICHA reads a
+configuration, it imports the modules of all figures. Therefore these modules import libraries for drawing, and modules
+that need xarray, only inside the functions that draw.
 
-The function `figure` takes the data of the `inputs`, and the `arguments` of the options as keywords. It raises
-`icha.figures.select.NothingToDraw` if no run in the figure is complete.
+The function `figure` takes the data of the `inputs`, and the `arguments` of the options as keywords. The function
+raises `icha.figures.select.NothingToDraw` if no run in the figure is complete.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ from icha.datasets.labels import RunLabels
 from icha.path.states import Snapshot
 from icha.support.values import Label, Name, Positive, Problem, Section, Seed, list_names, unknown
 
-# A configuration (`icha.configuration.campaign.Campaign`), which stands above this folder.
+# The class `icha.configuration.campaign.Campaign`, which modules of this folder must not import.
 Campaign = Any
 _NOT_UNLOADED = "is not unloaded; expected a study with `unload: true`"
-# Files by the names of the arguments that are read from them: one, or a list of them.
+# Paths of files by the names of the arguments of `figure`: one path, or a list of paths.
 Inputs = dict[str, str | list[str]]
 
 
@@ -34,7 +34,7 @@ class FigureOptions(Section):
     """The section of a figure in a configuration."""
 
     def problems(self, campaign: Campaign) -> Iterator[Problem]:
-        """Yield the problems of the options that are not the problem of a single value, such as an unknown study."""
+        """Yield the problems of the options with respect to the campaign, such as a study that does not exist."""
         yield from ()
 
     def studies_of(self, campaign: Campaign) -> tuple[str, ...]:
@@ -42,12 +42,12 @@ class FigureOptions(Section):
         return ()
 
     def arguments(self, campaign: Campaign) -> dict[str, Any]:
-        """Return the arguments of the function that draws the figure, without the data."""
+        """Return the keyword arguments of the function `figure`, except the data."""
         return self.model_dump(exclude_none=True)
 
 
 def dataset_only(campaign: Campaign, options: FigureOptions, files: results.ResultFiles) -> Inputs:
-    """Return the inputs of a figure that needs only the campaign dataset."""
+    """Return the campaign dataset, the only input of many figures."""
     return {"campaign": files.path(results.DATASET)}
 
 
@@ -64,13 +64,13 @@ def dataset_and_model_error(campaign: Campaign, options: ComparedFigure, files: 
 
 @dataclass(frozen=True)
 class Declaration:
-    """Everything about a figure except its drawing.
+    """Description, options and input files of a figure.
 
     Parameters
     ----------
     description : what the figure shows, in one line, for authors of configurations.
-    options : the class of the figure's section; the first line of its docstring is part of the schema.
-    inputs : function that returns the input files. netCDF files are read; of other files the paths are passed on.
+    options : class of the section in a configuration; the first line of the docstring of the class is in the schema.
+    inputs : function that returns the input files. `figure` gets the datasets of netCDF files and the paths of others.
     holds_topography : whether drawing needs memory for arrays of the size of the surface.
     """
 
@@ -89,11 +89,11 @@ class StudyFigure(FigureOptions):
     study: Name = Field(description="Name of the study that is drawn.")
 
     def studies_of(self, campaign: Campaign) -> tuple[str, ...]:
-        """Return the name of the study."""
+        """Return the name of the study, the only one that the figure shows."""
         return (self.study,)
 
     def problems(self, campaign: Campaign) -> Iterator[Problem]:
-        """Yield a problem if the study does not exist; else yield the problems of the study."""
+        """Yield a problem if the study does not exist; otherwise yield `study_problems`."""
         yield from unknown(("study",), self.study, campaign.studies)
         if self.study in campaign.studies:
             yield from self.study_problems(campaign, campaign.studies[self.study])
@@ -146,14 +146,15 @@ class SnapshotFigure(StudyFigure):
         yield from super().study_problems(campaign, study)
         snapshots = campaign.snapshots_of(self.study)
         if snapshots == []:
-            yield ("study",), self.study, "keeps no snapshot to draw; expected a study with `snapshots`"
+            yield ("study",), self.study, "has no snapshot to draw; expected a study with `snapshots`"
         elif self.snapshot is not None and self.snapshot.kind_and_value not in (snapshots or []):
-            kept = list_names(f"{kind} {value:g}" for kind, value in snapshots or []) or "none, because it names none"
+            kept = list_names(f"{kind} {value:g}" for kind, value in snapshots or []) or "none"
             kind, value = self.snapshot.kind_and_value
-            yield ("snapshot",), f"{kind} {value:g}", f"is not kept by study {self.study!r}; expected one of: {kept}"
+            problem = f"is not a snapshot of study {self.study!r}; expected one of: {kept}"
+            yield ("snapshot",), f"{kind} {value:g}", problem
 
     def arguments(self, campaign: Campaign) -> dict[str, Any]:
-        """Return the arguments, with the kind and the target of the snapshot instead of the snapshot."""
+        """Return the arguments of `figure`, with the `kind` and the `target` of the snapshot."""
         arguments = super().arguments(campaign)
         if arguments.pop("snapshot", None) is not None:
             arguments["kind"], arguments["target"] = self.snapshot.kind_and_value
@@ -178,7 +179,7 @@ class UnloadedFigure(StudyFigure):
 
 
 class RunFigure(TopographyFigure):
-    """A figure of one run; options that are left out take the study's first value."""
+    """A figure of one run. An option that is left out has the first value in the study."""
 
     rms_slope: Positive | None = Field(default=None, description="Rms slope to show. Default: the first of the study.")
     material: Label | None = Field(
@@ -186,13 +187,13 @@ class RunFigure(TopographyFigure):
     )
 
     def arguments(self, campaign: Campaign) -> dict[str, Any]:
-        """Return the arguments, with the labels of the run instead of the options that choose the run."""
+        """Return the arguments of `figure`, with the labels of the run."""
         arguments = super().arguments(campaign)
         others = arguments.keys() - set(RunLabels._fields)
         return {name: arguments[name] for name in others} | {"run": tuple(self.run(campaign))}
 
     def run(self, campaign: Campaign) -> RunLabels:
-        """Return the first requested run with adhesion; without any, return the first requested run."""
+        """Return the first run with adhesion that fits the options, or the first run that fits if none has adhesion."""
         model = first_model(campaign.studies[self.study].models)
         wanted = self.model_dump(include=set(RunLabels._fields), exclude_none=True)
         runs = [RunLabels(self.study, model, *contact) for contact in campaign.contacts(self.study)]
@@ -201,14 +202,14 @@ class RunFigure(TopographyFigure):
 
 
 class ComparedFigure(StudyFigure):
-    """A comparison of a study with boundary elements. The study needs both `models`, or an entry of `finite_range`."""
+    """A figure that compares a study with boundary elements. It needs both `models`, or an entry of `finite_range`."""
 
     def study_problems(self, campaign: Campaign, study: Any) -> Iterator[Problem]:
         """Also yield a problem if the study has no boundary elements at the same loads."""
         yield from super().study_problems(campaign, study)
         if campaign.compares_models(self.study) or is_solved_at_finite_range(campaign, self.study):
             return
-        expected = "both `models` and reduced_pressures as targets, or a study that an entry of finite_range names"
+        expected = "both `models` and targets `reduced_pressures`, or a study that an entry of `finite_range` names"
         yield ("study",), self.study, f"has no boundary elements at the same loads; expected a study with {expected}"
 
 
@@ -218,7 +219,7 @@ def is_solved_at_finite_range(campaign: Campaign, study: str) -> bool:
 
 
 def problems_of_unloading(campaign: Campaign, studies: Mapping[tuple, str]) -> Iterator[Problem]:
-    """Yield a problem for each study, by its location, that does not exist or does not unload completely."""
+    """Yield a problem for each study that does not exist or does not unload; `studies` are names by location."""
     for location, name in studies.items():
         yield from unknown(location, name, campaign.studies)
         if name in campaign.studies and not campaign.studies[name].unload:

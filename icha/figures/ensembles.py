@@ -1,4 +1,4 @@
-"""Means over seeds: lines with confidence bands, points with bars, or the single seeds if they are few."""
+"""Draw means over seeds, as lines with confidence bands or points with bars; few seeds are drawn one by one."""
 
 from __future__ import annotations
 
@@ -26,12 +26,15 @@ _CROSS = {"ls": "none", "marker": "x", "mew": 0.7, "label": FEWER_SEEDS}
 
 
 def draw_members(axes: Axes, x: np.ndarray, members: np.ndarray, look: dict, *, positive: bool, asked: int = 0) -> None:
-    """Draw the mean of the members (members, k) of an ensemble as a line, with the scatter of several members.
+    """Draw the mean over the members of an ensemble as a line, with the scatter of several members.
 
     Parameters
     ----------
-    positive : whether the axis is logarithmic. If so, the band is positive, and zeros are left out.
-    asked : number of requested members; marks of means over fewer members are crossed.
+    x : (k,) float, positions on the x axis.
+    members : (members, k) float, values of every member; NaN where a member has no value.
+    look : arguments of `Axes.plot` for the line.
+    positive : True for a logarithmic axis: the confidence band is positive, and zeros are left out.
+    asked : number of requested members; markers of means over fewer members are crossed out.
     """
     mean, known = ensemble(members).mean, np.isfinite(members)
     if len(members) > 1:
@@ -42,7 +45,7 @@ def draw_members(axes: Axes, x: np.ndarray, members: np.ndarray, look: dict, *, 
 
 
 def _break_lines(known, *rows):
-    """Insert NaN into each row wherever the known members (members, k) change, so that lines are interrupted there."""
+    """Insert NaN into each row where the set of `known` members, (members, k), changes, to interrupt the line there."""
     breaks = 1 + np.flatnonzero((known[:, 1:] != known[:, :-1]).any(axis=0))
     return [np.insert(np.asarray(row, float), breaks, np.nan, axis=-1) for row in rows]
 
@@ -50,15 +53,15 @@ def _break_lines(known, *rows):
 def mark_fewer(
     axes: Axes, x: np.ndarray, y: np.ndarray, known: np.ndarray, look: dict, asked: int | np.ndarray, every: int = 1
 ) -> None:
-    """Draw crosses over the marks of means over fewer members than requested.
+    """Draw a cross over each marker of a mean over fewer members than requested.
 
     Parameters
     ----------
     x, y : (k,) float, the means.
-    known : (members, k) bool, whether a mean includes a member.
-    look : look of the marks, arguments of `Axes.plot`.
-    asked : number of requested members, for all points or for each.
-    every : a mark stands at every so many points.
+    known : (members, k) bool, True where a member has a value.
+    look : arguments of `Axes.plot` for the markers.
+    asked : number of requested members, for all points or for each point.
+    every : number of points from one marker to the next.
     """
     counts = known.sum(axis=0)
     fewer = (counts > 0) & (counts < asked)
@@ -68,7 +71,7 @@ def mark_fewer(
 
 
 def _draw_scatter(axes, x, members, colour, *, positive):
-    """Draw the confidence band of the mean, or every member if they are few; a band does not change the axes."""
+    """Draw the confidence band of the mean, or every member if they are few; a band does not extend the axes."""
     over = ensemble(members)
     if over.count.min(initial=len(members)) < ENOUGH:
         # A single point has no line.
@@ -83,19 +86,19 @@ def _draw_scatter(axes, x, members, colour, *, positive):
 
 
 def join_bins(edges: np.ndarray, contents: np.ndarray, least: float) -> tuple[np.ndarray, np.ndarray]:
-    """Join neighbouring bins until each has the content `least`, summed over all members.
+    """Join neighbouring bins until the content of each, summed over all members, is at least `least`.
 
-    Empty bins at both ends are left out. The last joined bin also takes what remains.
+    Empty bins at both ends are left out. Bins that remain at the end belong to the last joined bin.
 
     Parameters
     ----------
     edges : (bins + 1,) float, edges of the bins.
-    contents : (members, bins) float, content of each bin.
-    least : least content of a joined bin.
+    contents : (members, bins) float, content of each bin (number or fraction).
+    least : smallest content of a joined bin.
 
     Returns
     -------
-    Edges of the joined bins, and densities (members, joined bins). Both are empty if all bins are empty.
+    Edges of the joined bins, and contents over bin width (members, joined bins). Both are empty if all bins are empty.
     """
     filled = np.flatnonzero(contents.any(axis=0))
     if not len(filled):
@@ -114,16 +117,16 @@ def join_bins(edges: np.ndarray, contents: np.ndarray, least: float) -> tuple[np
 def draw_points(
     axes: Axes, x: np.ndarray, members: np.ndarray, look: dict, *, positive: bool, asked: int | np.ndarray = 0
 ) -> ErrorbarContainer:
-    """Draw the means of an ensemble as points with confidence bars, or with dots of the members if they are few.
+    """Draw the means of an ensemble as points with confidence bars; if members are few, draw them as dots instead.
 
     A line joins neighbouring points only if they are means over the same members.
 
     Parameters
     ----------
-    x : (k,) or (members, k) float.
-    members : (members, k) float, NaN where a member has no value.
-    positive : whether the values are positive. If so, the bars are positive too.
-    asked : number of requested members, for all points or for each; marks of means over fewer members are crossed.
+    x : (k,) or (members, k) float, positions on the x axis.
+    members : (members, k) float, values of every member; NaN where a member has no value.
+    positive : True if the values are positive; both ends of the bars are then positive too.
+    asked : number of requested members, for all or for each point; markers of means over fewer members are crossed out.
     """
     known, over = np.isfinite(members), ensemble(members)
     x = np.where(known, x, np.nan)
@@ -141,21 +144,21 @@ def draw_points(
 
 
 class Points:
-    """A line of points, which are means over seeds, in the order of x.
+    """A line of points in ascending order of x; each point is a mean over seeds.
 
     Means are over the seeds that all points have. If no seed is common to all points, means are over all seeds.
 
     Parameters
     ----------
     groups : the runs of each point.
-    quantities : names of the variables x, y, and further y.
-    factor : factor from the values of y to their unit in the figure.
+    quantities : names of the variables along x and y, and of further variables along y.
+    factor : factor that converts the values of y to the unit in the figure.
 
     Attributes
     ----------
     members : (quantities, seeds, k) float, values of every seed; NaN if a point does not have the seed.
-    same_seeds : whether all points are means over the same seeds.
-    asked : (k,) int, numbers of requested seeds.
+    same_seeds : True if all points are means over the same seeds.
+    asked : (k,) int, number of requested seeds of each point.
     """
 
     def __init__(self, groups: Sequence[ContactRuns], *quantities: str, factor: float = 1.0):
@@ -182,7 +185,7 @@ class Points:
         return np.isfinite(self.members[0]).sum(axis=0).tolist()
 
     def draw(self, axes: Axes, look: dict, quantity: int = 1) -> ErrorbarContainer:
-        """Draw a quantity, given by its position, against x."""
+        """Draw a quantity, given by its position in `quantities`, against x."""
         return draw_points(axes, self.members[0], self.members[quantity], look, positive=True, asked=self.asked)
 
 
@@ -199,7 +202,7 @@ def points_handles(counts: Iterable[int]) -> dict[str, Line2D]:
 
 
 def _handles(counts, looks):
-    """Return legend entries; `looks` has words and look of means over many seeds first, and of means over few next."""
+    """Return legend entries; `looks` are a text and a look for means over many seeds, then for means over few seeds."""
     sizes, found = {int(count) for count in counts if count > 1}, {}
     for enough, (words, look) in zip((True, False), looks.items(), strict=True):
         if group := {size for size in sizes if (size >= ENOUGH) == enough}:

@@ -1,4 +1,4 @@
-"""Error of the asperity model against load, which figures 10 and 11 draw."""
+"""Draw errors of the asperity model against load, for figures 10 and 11."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-# Largest number of surfaces and slopes with which all materials share a panel.
+# Largest number of lines of one material with which all materials share a panel.
 _MOST_LINES = 2
-# Points at the same load are drawn apart by this ratio, so that their bars do not hide each other.
+# Ratio of the drawn loads of neighbouring points at the same load, so that their bars do not hide each other.
 _APART = 1.025
-# Ratio by which the axis of loads extends beyond the loads, and the least ratio from its middle to its ends, which
-# leaves room for a label.
+# Ratio by which the load axis extends beyond the loads, and smallest ratio of the end to the middle of the load axis,
+# which leaves room for a tick label.
 _MARGIN, _LEAST_REACH = 1.2, 1.6
 
 
@@ -32,7 +32,7 @@ _MARGIN, _LEAST_REACH = 1.2, 1.6
 def draw_errors(
     campaign: xr.DataTree, model_error: xr.DataTree, *, study: str, labels: Mapping[str, str], percent: bool
 ) -> Figure:
-    """Draw variables of the model error against load, a panel for each, for every surface, slope and material.
+    """Draw variables of the model error against load, with one panel for each variable.
 
     Parameters
     ----------
@@ -40,7 +40,7 @@ def draw_errors(
     model_error : `icha.analysis.model_error.model_error` of the campaign.
     study : name of the study; all entries that compare its runs are drawn.
     labels : labels of the axes by the names of the variables.
-    percent : whether the variables are relative errors, drawn in per cent. Other variables are never negative.
+    percent : True for relative errors, which are drawn in per cent; False for variables that are never negative.
     """
     curves = _curves(model_error, study, list(labels))
     contacts = [contact for contact, _ in curves]
@@ -79,9 +79,9 @@ def draw_errors(
 
 
 def _curves(model_error, study, names) -> dict[tuple[Contact, bool], list[xr.Dataset]]:
-    """Return the errors of all entries that compare a study, by contact and whether the asperity model is applicable.
+    """Return the errors of a study by contact (material, surface, slope) and whether the asperity model is applicable.
 
-    The entries of one contact are solutions in the limit of a short range, at finite ranges, and on several grids.
+    The errors of one contact come from solutions in the limit of a short range, at finite ranges, or on several grids.
     """
     found = {}
     for contact, errors in select_errors(model_error, study):
@@ -91,12 +91,12 @@ def _curves(model_error, study, names) -> dict[tuple[Contact, bool], list[xr.Dat
             if any(np.isfinite(shown[name].values).any() for name in names):
                 found.setdefault((contact, applicable), []).append(shown)
     if not found:
-        raise NothingToDraw(f"study {study}: no run beside boundary elements is complete")
+        raise NothingToDraw(f"study {study}: no run that was compared with boundary elements is complete")
     return found
 
 
 def _name(looks, contact, entries, k, *, own_rows):
-    """Return the name of entry `k` of a contact, which distinguishes it from the other entries."""
+    """Return a legend name that distinguishes entry `k` of a contact from the other entries."""
     truths = [errors.attrs["truth"] for errors in entries]
     words = [looks.place_name(contact[1:]) if own_rows else looks.name(contact)]
     words += ["at finite range"] if len(set(truths)) > 1 and truths[k] == FINITE_RANGE else []

@@ -1,4 +1,4 @@
-"""Fig. 11: error of distributions of pressure and gap, and of the contact map, against load."""
+"""Fig. 11: errors of the distributions of pressure and gap and of the contact map, against load."""
 
 from __future__ import annotations
 

@@ -45,10 +45,11 @@ DECLARATION = Declaration(
 
 # Largest number of loops with which all slopes share a panel.
 _MOST_LOOPS = 4
-# If the tension over the largest pressure is smaller, an inset enlarges it. Range of the inset over the tension.
+# Largest ratio of tension to pressure at which an inset enlarges the tension.
 _SMALL_TENSION = 0.25
+# Largest pressure in the inset, divided by the largest tension.
 _REACH = 1.4
-# Distance between the marks of boundary elements, in lengths of the diagonal of the panel.
+# Distance between the markers of boundary elements, divided by the diagonal of the panel.
 _APART = 0.025
 _LOOP = {"lw": 0.9}
 _PULL_OFF = {"ls": "none", "mec": "black", "mew": 0.7, "ms": 4.6, "zorder": 6}
@@ -66,8 +67,8 @@ class _Loop(NamedTuple):
     ----------
     rms_slope : slope of the run.
     run : the run.
-    truths : boundary elements of the same contact.
-    look : look of the lines and marks, arguments of `Axes.plot`.
+    truths : runs with boundary elements on the same topography, with the same material.
+    look : arguments of `Axes.plot` for lines and markers.
     """
 
     rms_slope: float
@@ -91,9 +92,9 @@ def figure(
     Parameters
     ----------
     campaign : the campaign dataset.
-    loops : loading and unloading of runs of the study with boundary elements at finite ranges, if there are any.
-        Only those of the topography are shown.
-    surface, seed : labels of the topography. Default: those of the first complete run.
+    loops : loading and unloading with boundary elements at finite ranges, if there are any. Only loops on the same
+        topography are shown.
+    surface, seed : labels of the topography. Default: surface and seed of the first complete run.
     """
     from icha.analysis.model_error import difference_of_contacts
 
@@ -132,7 +133,7 @@ def figure(
 
 
 def _draw(ax, loop, names, *, turn):
-    """Draw a loop and a mark at its pull-off; with `turn` also a mark at its first turning point."""
+    """Draw a loop with a marker at pull-off; with `turn`, also draw a marker at the end of the first loading."""
     run, colour = loop.run, loop.look["color"]
     for branch, leg in select.branches(run):
         ax.plot(*(leg[name] for name in names), ls=BRANCH_DASHES[branch], color=colour, **_LOOP)
@@ -149,7 +150,7 @@ def _draw(ax, loop, names, *, turn):
 
 
 def _enlarge(ax, loops):
-    """Add an inset that enlarges the panel of loads around zero load, if there is tension but it is small."""
+    """Add an inset that enlarges the region around zero load, if the tension is small but not zero."""
     from matplotlib.ticker import MaxNLocator
 
     separations, pressures, areas = (
@@ -172,7 +173,7 @@ def _enlarge(ax, loops):
 
 
 def _handles(looks, loops, *, marked):
-    """Return the legend entries by name; `marked`: whether markers distinguish the loops."""
+    """Return the legend entries by name; `marked` is True if markers distinguish the loops."""
     handles = looks.handles(**_LOOP, **({} if marked else {"marker": "none"}))
     for branch, dashes in BRANCH_DASHES.items():
         handles[branch] = legend_handle(color=GREY, ls=dashes, **_LOOP)
@@ -185,5 +186,5 @@ def _handles(looks, loops, *, marked):
 
 
 def _truth_name(truth):
-    """Return the legend name of boundary elements; those at a finite range have no attribute `contact_model`."""
+    """Return the legend name of boundary elements; files at a finite range have no attribute `contact_model`."""
     return SHORT_RANGE if truth.attrs.get("contact_model") == REFERENCE_MODEL else FINITE_RANGE

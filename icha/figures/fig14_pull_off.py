@@ -1,4 +1,4 @@
-"""Fig. 14: pull-off against the rms slope and against the largest load."""
+"""Fig. 14: pull-off pressure against the rms slope and against the largest load."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 class PullOffFigure(StudyFigure):
-    """A figure of the pull-off of all runs of some studies."""
+    """A figure of the pull-off pressure of all runs of some studies."""
 
     load_studies: list_of_names() | None = Field(
         default=None, description="Names of studies that differ in their largest load, for a second panel."
@@ -41,19 +41,19 @@ class PullOffFigure(StudyFigure):
 
 
 DECLARATION = Declaration(
-    description="Pull-off against rms slope, and against the largest load.", options=PullOffFigure
+    description="Pull-off pressure against rms slope, and against the largest load.", options=PullOffFigure
 )
 
-# If the ratio of the largest to the smallest value is larger, the axis is logarithmic.
+# Largest ratio of the largest to the smallest value for which the axis is linear.
 _SPAN = 30.0
 _LINE = {"lw": 0.9}
-# Variable along y.
+# Variable on the y axis.
 _Y = "pull_off_pressure"
 
 
 @in_style
 def figure(campaign: xr.DataTree, *, study: str, load_studies: Sequence[str] = ()) -> Figure:
-    """Draw the pull-off of all runs of the studies, averaged over the seeds, against slope and largest load."""
+    """Draw the mean pull-off pressure over the seeds against slope, and against the largest load of the path."""
     load_studies = list(dict.fromkeys(load_studies))
     by_slope = select_detached_lines(campaign, [study], along_slopes=True)
     by_load = select_detached_lines(campaign, load_studies)
@@ -87,7 +87,7 @@ def figure(campaign: xr.DataTree, *, study: str, load_studies: Sequence[str] = (
 
 
 def _scale(ax, values):
-    """Scale the y axis so that it shows all values: logarithmic if they span decades, but linear near zero."""
+    """Choose a y axis that shows all values: logarithmic and linear near zero if they span decades, else linear."""
     positive = drop_rounding_errors(values)
     if len(positive) and positive.max() > _SPAN * positive.min():
         least = 10.0 ** np.floor(np.log10(positive.min()))

@@ -1,4 +1,4 @@
-"""Fig. 15: energy lost in a cycle against the largest contact area, and its parts."""
+"""Fig. 15: energy lost in a cycle against the largest contact area, and the causes of the loss."""
 
 from __future__ import annotations
 
@@ -20,21 +20,24 @@ if TYPE_CHECKING:
 
 
 class LossFigure(FigureOptions):
-    """A figure of the energy lost in the runs of some studies."""
+    """A figure of the energy lost in a cycle of loading and unloading, for all runs of some studies."""
 
     studies: list_of_names()
-    """Studies that are drawn; lines join those that differ only in their largest load."""
+    """Names of the studies that are drawn. Lines are fitted to runs that differ only in their largest load."""
 
     def studies_of(self, campaign: Campaign) -> tuple[str, ...]:
-        """Return all studies."""
+        """Return the names of all studies of the figure."""
         return tuple(dict.fromkeys(self.studies))
 
     def problems(self, campaign: Campaign) -> Iterator[Problem]:
-        """Yield the problems of studies that are unknown or do not unload completely."""
+        """Yield a problem for each study that does not exist or does not unload."""
         yield from problems_of_unloading(campaign, {("studies", k): name for k, name in enumerate(self.studies)})
 
 
-DECLARATION = Declaration(description="Energy lost in a loop against contact area, and its parts.", options=LossFigure)
+DECLARATION = Declaration(
+    description="Energy lost in a cycle against the largest contact area, and the causes of the loss.",
+    options=LossFigure,
+)
 
 # Parts of the loss, with names and looks of their bars. No bar has the colour of a material.
 PARTS = {
@@ -44,12 +47,12 @@ PARTS = {
     "loss_by_load_jump": ("jumps at controlled load", {"fc": "0.85", "hatch": "xxxx"}),
     "loss_unattributed": ("unattributed", {"fc": "white", "hatch": "...."}),
 }
-# Least number of points of a fit, because a straight line passes through any two points.
+# Smallest number of points of a fit, because a straight line passes through any two points.
 _LEAST_POINTS = 3
 _FIT_POINTS = 100
-# If the ratios of the largest to the smallest area and loss are both larger, the axes are logarithmic.
+# The axes are logarithmic if the ratio of the largest to the smallest value exceeds this number for area and loss.
 _SPAN = 30.0
-# Smaller parts have no entry in the legend.
+# Smallest part of the loss, as a fraction of all parts, that has an entry in the legend.
 _LEAST_SHARE = 1e-6
 # Opacity of the bars of runs for which the asperity model is not applicable.
 _PALE = 0.35
@@ -57,7 +60,7 @@ _PALE = 0.35
 
 @in_style
 def figure(campaign: xr.DataTree, *, studies: Sequence[str]) -> Figure:
-    """Draw the loss of all runs with adhesion of the studies, averaged over the seeds, and its parts."""
+    """Draw the mean loss over the seeds for runs with adhesion, and the parts of the loss by cause."""
     from matplotlib.patches import Patch
 
     studies = list(dict.fromkeys(studies))
@@ -117,14 +120,14 @@ def fit_line(x: np.ndarray, y: np.ndarray, along: np.ndarray) -> tuple[np.ndarra
 
 
 def shares(line: Sequence[ContactRuns]) -> dict[str, float]:
-    """Return the parts of the loss at the largest load of a line, divided by the sum of their magnitudes."""
+    """Return the parts of the loss at the largest load of a line, divided by the sum of the magnitudes of all parts."""
     parts = Points(line, "largest_reduced_pressure", *PARTS).means[1:, -1]
     total = np.abs(parts).sum()
     return dict(zip(PARTS, parts / total if total > 0 else parts, strict=True))
 
 
 def _draw_parts(ax, runs, looks):
-    """Draw the parts of the loss of every line as a bar; return the names of the parts that are not zero."""
+    """Draw the parts of the loss of every line as a stacked bar; return the names of the parts that are not zero."""
     bars = {key: shares(line) for key, line in runs.items()}
     shown = [name for name in PARTS if any(abs(bar[name]) >= _LEAST_SHARE for bar in bars.values())]
     for position, ((contact, applicable), bar) in enumerate(bars.items()):

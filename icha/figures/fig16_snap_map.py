@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 class SnapMapFigure(RunFigure, UnloadedFigure):
-    """A figure of the events of one run; options that are left out take the study's first value."""
+    """A figure of the events of one run. An option that is left out has the first value in the study."""
 
 
 def inputs(campaign: Campaign, options: SnapMapFigure, files: results.ResultFiles) -> Inputs:
@@ -40,16 +40,16 @@ DECLARATION = Declaration(
 
 
 _RED = (0.9, 0.0, 0.05)
-# For each kind of event: name in the legend, branch whose events the map shows, and look of the marks. Events that form
-# a spot or a union are black, events that break them are red. Other colours stand for materials.
+# For each kind of event: name in the legend, branch whose events the map shows, and look of the marks. Events in which
+# spots form or unite are black, events in which spots break or separate are red. Other colours stand for materials.
 _KINDS = {
     "jump_in": ("spot formed", "loading", {"marker": "o", "mfc": BLACK, "mec": BLACK}),
     "jump_off": ("spot broken", "unloading", {"marker": "o", "mfc": "none", "mec": _RED}),
     "coalescence": ("union", "loading", {"marker": "D", "mfc": "none", "mec": BLACK}),
     "split": ("union undone", "unloading", {"marker": "+", "mec": _RED}),
 }
-# Up to _FEW events have marks of _SIZE points. The marks of more events are smaller, so that the area of all marks is
-# about the same, but not smaller than _LEAST_SIZE.
+# Size of the marks in points, for up to _FEW events. With more events the marks are smaller, so that the area of all
+# marks is about the same. The smallest size is _LEAST_SIZE.
 _FEW = 60
 _SIZE = 5.0
 _LEAST_SIZE = 1.6
@@ -57,7 +57,7 @@ _LEAST_SIZE = 1.6
 
 @in_style
 def figure(campaign: xr.DataTree, surface: xr.Dataset, *, run: Sequence) -> Figure:
-    """Draw the events of one run over its topography and against the separation.
+    """Draw the events of one run on a map of the topography, and the number of events against the mean separation.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ def _draw_places(ax, topography, events):
     handles = {}
     for name, (words, _, look) in _KINDS.items():
         shown = marks[name]
-        # If a spot forms and breaks at one place, its marks are a ring around a dot, or a square around a cross.
+        # Rings are larger than dots, and squares larger than crosses, so that both marks at one position are visible.
         ring = 1.6 if name in ("jump_off", "coalescence") else 1.0
         x, y = (events[axis][shown] * topography.length for axis in "xy")
         (points,) = ax.plot(x, y, **{"ls": "none", "ms": ring * size, "mew": 0.9} | look)
@@ -102,7 +102,7 @@ def _draw_places(ax, topography, events):
 
 
 def _draw_counts(ax, events):
-    """Draw the number of events so far against the separation, for each kind of event in loading and unloading."""
+    """Draw the cumulative number of events against the mean separation, by kind of event and branch."""
     from matplotlib.ticker import MaxNLocator
 
     for name, (_, _, look) in _KINDS.items():
@@ -118,7 +118,7 @@ def _draw_counts(ax, events):
 
 
 def _events(run):
-    """Return the events of the first loading and the last unloading: kind, branch, x and y in m, u/h_rms."""
+    """Return kind, branch, position (m) and u/h_rms of the events in the first loading and the last unloading."""
     steps = run["event_step"].values.astype(int)
     leg = run["leg"].sel(step=steps).values
     shown = (leg == 0) | (leg == unloading_legs(run)[-1]["leg"].values[-1])

@@ -1,4 +1,4 @@
-"""Fig. 1: force and contact radius of one asperity against its approach."""
+"""Fig. 1: force and contact radius of one asperity against approach."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 class JKRFigure(FigureOptions):
-    """The force-approach curve of one asperity."""
+    """A figure of force and contact radius of one asperity against approach."""
 
     tabor_parameter: Positive = Field(default=3.0, description="Tabor parameter, which sets the jump-in distance.")
 
@@ -28,7 +28,7 @@ DECLARATION = Declaration(
 
 @in_style
 def figure(*, tabor_parameter: float = 3.0) -> Figure:
-    """Draw the law in its own units, a in (Δγ R²/E*)^(1/3), δ in (Δγ² R/E*²)^(1/3) and F in Δγ R."""
+    """Draw the JKR law in reduced units: a in (Δγ R²/E*)^(1/3), δ in (Δγ² R/E*²)^(1/3) and F in Δγ R."""
     from icha.asperity.jkr import JKR
     from icha.asperity.material import Material
 
@@ -73,6 +73,6 @@ def figure(*, tabor_parameter: float = 3.0) -> Figure:
 
 
 def _arrow(ax, x, start, end, colour):
-    """Draw an arrow head in the middle of a jump at x."""
+    """Draw an arrow head in the middle of a jump, a vertical line at x."""
     tail, tip = ((x, start + share * (end - start)) for share in (0.45, 0.55))
     ax.annotate("", tip, tail, arrowprops={"arrowstyle": "-|>", "color": colour, "shrinkA": 0, "shrinkB": 0})

@@ -1,4 +1,4 @@
-"""Fig. 2: contact area and mean separation against load, with theories and published points."""
+"""Fig. 2: contact area and mean separation against load, with theories and published results."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 
 def inputs(campaign: Campaign, options: StudyFigure, files: results.ResultFiles) -> Inputs:
-    """Return the campaign dataset, theories for its first surface, and the model error if it has finite ranges."""
+    """Return the campaign dataset, theories for the first surface, and the model error at finite ranges if any."""
     found = dataset_and_theories(campaign, options, files)
     if is_solved_at_finite_range(campaign, options.study):
         found["model_error"] = files.path(results.MODEL_ERROR)
@@ -43,11 +43,11 @@ DECLARATION = Declaration(
     inputs=inputs,
 )
 
-# Height of the panels of differences over that of the panels above them.
+# Height of the lower panels, which show differences, divided by the height of the upper panels.
 _LOWER = 0.42
-# Loads with a smaller relative difference are the same; they differ because each model has its own tolerance.
+# Largest relative difference of equal loads of two models, which reach a load within different tolerances.
 _SAME_LOAD = 1e-6
-# Ticks of the axis of separations if it spans less than two decades.
+# Ticks of the separation axis if the axis spans less than two decades.
 _SEPARATIONS = (0.05, 0.1, 0.2, 0.3, 0.5, 0.7, 1, 1.5, 2, 3, 5)
 # Function that returns the points of a run, and symbol of the quantity.
 _QUANTITIES = ((curves.area_points, "A"), (curves.gap_points, r"\bar{u}"))
@@ -62,14 +62,14 @@ def figure(
     Parameters
     ----------
     campaign : the campaign dataset.
-    references : theories and points for the study's first surface (`icha.references.theories`), if any.
-    model_error : boundary elements at a finite range (`icha.analysis.model_error.model_error`), if any.
+    references : theories and published results for the study's first surface (`icha.references.theories`), if any.
+    model_error : values of boundary elements at a finite range (`icha.analysis.model_error.model_error`), if any.
     """
     shown, dataset = curves.study_curves(campaign, study), campaign[study].to_dataset()
     if solved := _finite_range_curves(model_error, study, shown.looks):
         shown.crosses.extend(solved)
         shown.handles[FINITE_RANGE] = model_handle(FINITE_RANGE, ms=8)
-    # The crosses begin with the limit of a short range, which is used if there is one. Finite ranges only bound it.
+    # Solutions in the limit of a short range come first and are preferred, because finite ranges only bound this limit.
     truths = {truth.runs.contact: truth for truth in reversed(shown.crosses)}
     compared = [(line, truths[line.runs.contact]) for line in shown.lines if line.runs.contact in truths]
     fig, axes = new_panels(4.5, 2, sharex=True, height_ratios=(1, _LOWER)) if compared else new_panels(3.3)
@@ -105,7 +105,7 @@ def figure(
 
 
 def _finite_range_curves(model_error, study, looks):
-    """Return the curves of boundary elements at a finite range, from a model error."""
+    """Return the curves of boundary elements at a finite range, which the dataset `model_error` contains."""
     found = []
     for contact, errors in select_errors(model_error, study):
         material, surface, slope = contact
@@ -121,9 +121,10 @@ def _finite_range_curves(model_error, study, looks):
 
 
 def _difference(line, truth, points):
-    """Return loads, and differences (seeds, loads) of a curve from boundary elements of the same seeds, in per cent.
+    """Return loads, and relative differences (seeds, loads) in per cent between a curve and boundary elements.
 
-    The loads are those of the curve within the loads of boundary elements, whose values are interpolated.
+    The loads are the loads of the curve within the range of boundary elements. Values of boundary elements are
+    interpolated to these loads.
     """
     from icha.analysis.common_loads import at_common_loads, interpolate
 
@@ -142,7 +143,7 @@ def _difference(line, truth, points):
 
 
 def _draw_references(left, right, references, limits):
-    """Draw theories of rough contact, within the limits of the loads, and published points."""
+    """Draw published results and theories of rough contact; `limits` are the smallest and the largest load."""
     p, black = references["reduced_pressure"].values, {"color": BLACK, "lw": 1, "zorder": 2}
     shown = (p >= limits[0] / 1.5) & (p <= limits[1] * 1.5)
     left.plot(p[shown], references["persson_area_fraction"].values[shown], label="Persson", **black)
@@ -161,7 +162,7 @@ def _draw_references(left, right, references, limits):
 
 
 def _draw_separate_summits(left, right, references, dataset, looks):
-    """Draw the theories of separate summits as thin lines, if any; that of Fuller & Tabor for each material."""
+    """Draw theories of separate summits: Greenwood & Williamson, and Fuller & Tabor for each material."""
     theories = []
     if "greenwood_williamson_reduced_pressure" in references:
         theories.append(("Greenwood & Williamson", (0, (5, 2, 1, 2)), GREY, "greenwood_williamson", references))

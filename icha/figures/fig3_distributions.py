@@ -25,9 +25,9 @@ DECLARATION = Declaration(
     options=SnapshotFigure,
 )
 
-# Least number of grid cells in a point of P(u). Bins with fewer cells are joined with their neighbours.
+# Smallest number of grid cells in a bin of P(u). Bins with fewer cells are joined with their neighbours.
 _LEAST_CELLS = 100
-# The same for P(p) of boundary elements, which have few nodes in contact.
+# Smallest number of nodes in a bin of P(p) of boundary elements, which have few nodes in contact.
 _LEAST_NODES = 25
 # Largest number of markers of boundary elements.
 _BESIDE_MARKERS = 14
@@ -35,13 +35,14 @@ _BESIDE_MARKERS = 14
 
 @in_style
 def figure(campaign: xr.DataTree, *, study: str, kind: str | None = None, target: float | None = None) -> Figure:
-    """Draw the distributions of every material on the first surface and slope of a study, means over the seeds."""
+    """Draw mean distributions over the seeds, for every material on the first surface and slope of a study."""
     from icha.analysis.model_error import state_of
 
     lines = select_snapshots(campaign, study, kind, target)
     each_look, looks = snapshot_looks(campaign, study, lines)
     fig, [(left, right)] = new_panels(3.1)
     lowest, highest, top, floor = -0.3, 0.3, 0.0, 1.0
+    tails = []
     for line, look in zip(lines, each_look, strict=True):
         u, densities = gap_densities(line.members)
         drawn = {"positive": True, "asked": line.runs.asked}
@@ -60,9 +61,13 @@ def figure(campaign: xr.DataTree, *, study: str, kind: str | None = None, target
             dashed = TRUTH_LINE | {"color": look["color"], "marker": MODEL_MARKERS[SHORT_RANGE]}
             ax.plot(at, densities.mean(axis=0), markevery=1 + len(at) // _BESIDE_MARKERS, **dashed)
             top = densities.mean(axis=0).max(initial=top) if ax is right else top
+        tails.append((line.truths, look["color"]))
     logarithmic_axes(left)
     logarithmic_axes(right, "y")
     left.set_ylim(floor / 2)
+    for truths, colour in tails:
+        p, density = singular_tail(truths, 1.05 * lowest)
+        right.semilogy(p, density, ls=":", lw=1.1, color=colour, zorder=3)
     load = np.mean([float(state_of(run, at)["reduced_pressure"]) for run, at in lines[-1].members])
     _finish(left, right, (lowest, highest), top, load)
     add_snapshot_legend(fig, [left, right], campaign[study].to_dataset(), lines, looks)
@@ -70,7 +75,7 @@ def figure(campaign: xr.DataTree, *, study: str, kind: str | None = None, target
 
 
 def _finish(left, right, pressures, highest, load):
-    """Label both panels, draw Persson's theory for a reduced pressure, and set the limits of the panel of pressures."""
+    """Label both panels, draw Persson's theory at the reduced pressure `load`, and set the limits of the axes."""
     from icha.references.persson import persson_pressure_density
 
     if load > 0:
@@ -85,8 +90,26 @@ def _finish(left, right, pressures, highest, load):
     right.set(xlabel=f"contact pressure  $p/({unit})$", ylabel=rf"$P(p)\; {unit}$")
 
 
+def singular_tail(members: Sequence[tuple[xr.Dataset, int]], lowest: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return p/(E* h'_rms) and P(p) E* h'_rms beyond the tension that the grid resolves, as the mean over snapshots.
+
+    At a distance x from the edge of contact the tension is K_c/sqrt(2 pi x), with K_c^2 = 2 E* dgamma. Along the length
+    L of the edge this gives the density P(p) = L K_c^2/(pi |p|^3 A0). The tail reaches from the resolved tension to
+    the pressure `lowest`; it is empty without adhesion.
+    """
+    (run, _), *_ = members
+    unit = float(run["contact_modulus"]) * float(run["rms_slope"])
+    first = -float(run["resolved_tension"]) / unit
+    if not lowest < first < 0:
+        return np.empty(0), np.empty(0)
+    edge = np.mean([float(run["spot_perimeter"][run["spot_snapshot"] == at].sum()) for run, at in members])
+    intensity = 2 * float(run["contact_modulus"]) * float(run["surface_energy"]) / (np.pi * float(run["period"]) ** 2)
+    p = np.linspace(first, lowest, 100)
+    return p, edge * intensity / (np.abs(p) ** 3 * unit**2)
+
+
 def gap_densities(members: Sequence[tuple[xr.Dataset, int]]) -> tuple[np.ndarray, np.ndarray]:
-    """Return u/h_rms (k,) and P(u) h_rms (members, k) of snapshots; bins with few cells are joined."""
+    """Return gaps u/h_rms (k,) and densities P(u) h_rms (members, k) of snapshots; bins with few cells are joined."""
     (first, _), *_ = members
     edges = first["gap_bin_edges"].values / float(first["rms_height"])
     contents = np.array([run["gap_density"].values[at] * float(run["rms_height"]) for run, at in members])
@@ -99,9 +122,9 @@ def gap_densities(members: Sequence[tuple[xr.Dataset, int]]) -> tuple[np.ndarray
 def pressure_densities(
     members: Sequence[tuple[xr.Dataset, int]], *, joined: bool = False
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return p/(E* h'_rms) (k,) and P(p) E* h'_rms (members, k) of the bins of snapshots that are not empty.
+    """Return pressures p/(E* h'_rms) (k,) and densities P(p) E* h'_rms (members, k) of bins that are not empty.
 
-    `joined` joins bins with few nodes, for boundary elements, which have few nodes in contact.
+    With `joined`, bins with few nodes are joined. Boundary elements have few nodes in contact.
     """
     (first, _), *_ = members
     unit = float(first["contact_modulus"]) * float(first["rms_slope"])

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 class MapFigure(SnapshotFigure, RunFigure):
-    """A figure of one snapshot of one run; options that are left out take the study's first value."""
+    """A figure of one snapshot of one run. An option that is left out has the first value in the study."""
 
 
 def inputs(campaign: Campaign, options: MapFigure, files: results.ResultFiles) -> Inputs:
@@ -39,15 +39,15 @@ DECLARATION = Declaration(
     description="Contact spots over the topography.", options=MapFigure, inputs=inputs, holds_topography=True
 )
 
-# The window that is enlarged has a quarter of the side of the surface. It is halved as long as it is wider than
-# _WIDEST_IN_RADII mean radii of the spots, and has at least _LEAST_CELLS cells a side after the division.
+# Side of the surface over the side of the enlarged window. The window is halved again while it is wider than
+# _WIDEST_IN_RADII mean radii of the spots, and while its half has at least _LEAST_CELLS cells a side.
 _ZOOM = 4
 _WIDEST_IN_RADII = 40
 _LEAST_CELLS = 64
-# More spots are drawn as an image, also in PDF files, which would otherwise be large.
+# Largest number of spots that are drawn as vector graphics. More spots become an image, so that PDF files stay small.
 _MANY_SPOTS = 2000
 _RED = (0.9, 0.0, 0.05)
-# Names and colours of nodes: without contact, in contact by one of the models, and by both.
+# Names and colours of nodes that are in contact in no model, in one of the models, and in both models.
 _STATES = (("", "white"), ("asperities only", _RED), ("boundary elements only", "black"), ("both", "0.72"))
 
 
@@ -81,7 +81,7 @@ def figure(
     at = find_snapshot(data, kind, target)
     state, beside = state_of(data, at), None
     kind, target = str(data["snapshot_kind"].values[at]), float(data["snapshot_target"].values[at])
-    # The path of boundary elements may have ended before this snapshot.
+    # The run with boundary elements may have ended before this snapshot.
     if truth is not None and (same := snapshot_if_any(truth, kind, target)) is not None:
         beside = state_of(truth, same)
     topography = topography_of(data, surface)
@@ -116,9 +116,9 @@ def figure(
 
 
 def _view(run, at, topography):
-    """Return the spots as circles (`wrap_circles`), and the lower left corner and the side of a window to enlarge.
+    """Return the spots as circles (`wrap_circles`), and the lower left corner and the side of the enlarged window.
 
-    The window is around the largest spot. All lengths are in the unit of the axes.
+    The centre of the window is the largest spot. All lengths are in the unit of the axes.
     """
     from icha.datasets.campaign import spots_of
 
@@ -135,7 +135,7 @@ def _view(run, at, topography):
 
 
 def _draw_boundary_elements(panels, topography, window, heights, beside, covered):
-    """Draw the contact of boundary elements over the topography, around the enlarged spots, and beside asperities."""
+    """Draw contact regions of boundary elements over the topography, with enlarged spots, and the overlap of models."""
     from matplotlib.colors import LinearSegmentedColormap, to_rgb
     from matplotlib.patches import Patch
 
@@ -158,7 +158,7 @@ def _draw_boundary_elements(panels, topography, window, heights, beside, covered
 
 
 def _window(nodes, side, corner, width):
-    """Return the nodes of a periodic map in a window, and the borders of their cells in x and in y."""
+    """Return the nodes of a periodic map in a window, and the x and y coordinates of the edges of the cells."""
     cell = side / len(nodes)
     columns, rows = (
         np.arange(start, start + int(np.ceil(width / cell)) + 2) for start in np.floor(corner / cell).astype(int)

@@ -21,7 +21,7 @@ class SlopesAndMaterialsFigure(TruthFigure):
     """A figure of all runs of a study, with boundary elements and measurements."""
 
     def arguments(self, campaign: Campaign) -> dict[str, Any]:
-        """Return the arguments, with `measurements` as the function `figure` takes them."""
+        """Return the arguments of `figure`, with the `measurements`."""
         known = []
         for each in self.measurements(campaign):
             names = ("label", "columns", "material", "rms_slope")
@@ -64,10 +64,10 @@ def figure(
     ----------
     campaign : the campaign dataset.
     tables : files of measured curves; panel (b) shows only those whose slope is known.
-    measurements : of each table its `label`, `columns` (headings of load and area, with factors), `load_unit` (the
-        divisor that turns a load into p/(E* h'rms)), and `material` and `rms_slope`, None if they are not known.
+    measurements : for each table: `label`; `columns` (headings of load and area, with factors); `load_unit` (load
+        over p/(E* h'rms)); `material` and `rms_slope`, None if they are not known.
     """
-    # Open markers, because curves coincide.
+    # Open markers do not hide each other where curves coincide.
     curves = study_curves(campaign, study, boundary_elements, mfc="none")
     fig, [(left, right)] = new_panels(3.5, sharey=True)
     draw_curves(curves, {left: area_points, right: _points_at_load}, unloading=True)
@@ -81,7 +81,7 @@ def figure(
 
 
 def _draw_measured(left, right, table, known, colour, dashes):
-    """Draw a measured curve; in panel (b) only if its slope is known."""
+    """Draw a measured curve in panel (a), and also in panel (b) if the rms slope is known."""
     load, area = read_columns(table, known["columns"])
     pressure, slope = load / known["load_unit"], known["rms_slope"]
     look = {"color": colour, "ls": dashes, "lw": 1.1, "zorder": 1}

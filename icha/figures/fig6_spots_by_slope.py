@@ -31,7 +31,7 @@ class SlopesFigure(TopographyFigure):
         kinds = [kind for kind, _ in campaign.snapshots_of(self.study) or []]
         for kind in ("relative_load", "area_fraction"):
             if kind not in kinds:
-                yield ("study",), self.study, f"has no snapshot of kind {kind}; expected a study with one"
+                yield ("study",), self.study, f"has no snapshot of kind {kind}; expected a study with such a snapshot"
 
 
 DECLARATION = Declaration(
@@ -54,13 +54,13 @@ def figure(
     seed: int | None = None,
     material: str | None = None,
 ) -> Figure:
-    """Draw the spots of all slopes for one surface, seed and material; those left out are the study's first."""
+    """Draw the spots of all slopes for one surface, seed and material; each defaults to the first of the study."""
     from matplotlib.patches import Patch
 
     runs = select_by_labels(select_runs(campaign, study), surface=surface, seed=seed, material=material)
     by_slope = {labels.rms_slope: run for labels, run in runs}
     slopes = sorted(by_slope, reverse=True)
-    # From dark to bright; the colours of the palette are those of materials.
+    # Slopes have colours from dark to bright, because the other colours stand for materials.
     colours = dict(zip(slopes, graded_colours(len(slopes)), strict=True))
 
     fig, [panels] = new_panels(3.8, sharey=True)
@@ -79,7 +79,7 @@ def figure(
 
 
 def _draw_slopes(ax, runs, kind, colours, length):
-    """Draw the spots of the runs, by slope, at their first snapshot of a kind."""
+    """Draw the spots of each slope at the first snapshot of a kind; `runs` are runs by slope."""
     from matplotlib.collections import PatchCollection
     from matplotlib.patches import Wedge
 

@@ -17,19 +17,19 @@ if TYPE_CHECKING:
 
 
 DECLARATION = Declaration(
-    description="Contact stiffness against load, with theory.", options=StudyFigure, inputs=dataset_and_theories
+    description="Contact stiffness against load, with a theory.", options=StudyFigure, inputs=dataset_and_theories
 )
 
 
 @in_style
 def figure(campaign: xr.DataTree, references: xr.Dataset | None = None, *, study: str) -> Figure:
-    """Draw all runs of a study, and theory for its first surface (`icha.references.theories`), if any."""
+    """Draw all runs of a study, and the theory for the study's first surface (`icha.references.theories`), if any."""
     curves = study_curves(campaign, study)
     fig, [(left, right)] = new_panels(3.3)
     (pressures, stiffnesses), _ = draw_curves(curves, {left: stiffness_points, right: _over_pressure})
     right.set_yscale("linear")
     if not len(pressures):
-        raise NothingToDraw(f"study {study}: no stop with a positive load and a positive stiffness to draw")
+        raise NothingToDraw(f"study {study}: no step of the first loading has a positive load and a positive stiffness")
     x = (drop_rounding_errors(pressures).min() / 1.6, pressures.max() * 1.6)
     ratio = stiffnesses / pressures
     if references is not None and "persson_reduced_stiffness" in references:
@@ -54,7 +54,7 @@ def _over_pressure(run):
 
 
 def stiffness_points(run: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
-    """Return reduced pressures and K h_rms/(E* h'_rms) = -dp*/d(u/h_rms) of the steps at which both are positive."""
+    """Return reduced pressures p* and reduced stiffnesses -dp*/d(u/h_rms) of the steps at which both are positive."""
     unit = float(run["contact_modulus"] * run["rms_slope"] / run["rms_height"])
     p, stiffness = run["reduced_pressure"].values, run["contact_stiffness"].values / unit
     positive = (p > 0) & (stiffness > 0)

@@ -25,16 +25,16 @@ DECLARATION = Declaration(
     description="Sizes of the contact patches of every material, on the study's first surface.", options=SnapshotFigure
 )
 
-# Least number of patches in a plotted point of the density; bins with fewer are joined with their neighbours.
+# Smallest number of patches in a bin of the density. Bins with fewer patches are joined with their neighbours.
 _LEAST_PATCHES = 10
 _BINS_PER_DECADE = 8
-# Largest number of points of a cumulative curve that are distinguishable.
+# Largest number of points of a cumulative curve; more points would not be distinguishable.
 _CURVE_POINTS = 300
 
 
 @in_style
 def figure(campaign: xr.DataTree, *, study: str, kind: str | None = None, target: float | None = None) -> Figure:
-    """Draw the patch sizes of every material on the first surface and slope of a study, means over the seeds."""
+    """Draw mean numbers of patches by size over the seeds, for every material on a study's first surface and slope."""
     lines = select_snapshots(campaign, study, kind, target)
     each_look, looks = snapshot_looks(campaign, study, lines)
     fig, [(left, right)] = new_panels(3.1, sharex=True)
@@ -64,7 +64,7 @@ def figure(campaign: xr.DataTree, *, study: str, kind: str | None = None, target
 
 
 def patch_areas(run: xr.Dataset, snapshot: int) -> np.ndarray:
-    """Return the areas of the contact patches of one snapshot, m², increasing; spots of no area are left out."""
+    """Return the areas in m² of the contact patches of one snapshot, in ascending order; zero areas are left out."""
     from icha.datasets.campaign import spots_of
 
     area = np.sort(np.pi * spots_of(run, snapshot)["spot_radius"].values ** 2)
@@ -72,16 +72,18 @@ def patch_areas(run: xr.Dataset, snapshot: int) -> np.ndarray:
 
 
 def patch_density(areas: Sequence[np.ndarray], nominal_area: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return the number of patches per area of a patch and nominal area; bins with few patches are joined.
+    """Return the number of patches per nominal area and per interval of the patch area, in bins of the patch area.
+
+    Bins with few patches are joined.
 
     Parameters
     ----------
-    areas : increasing areas of the patches of every member of an ensemble.
+    areas : patch areas of every member of an ensemble, in ascending order.
 
     Returns
     -------
-    Areas (k,), and densities (members, k): the sum of density times width times nominal area over the points is the
-    number of a member's patches.
+    Patch areas (k,) and densities (members, k). The number of patches in a bin is density times bin width times
+    nominal area.
     """
     pooled = np.sort(np.concatenate(areas))
     if not len(pooled):
@@ -94,12 +96,12 @@ def patch_density(areas: Sequence[np.ndarray], nominal_area: float) -> tuple[np.
 
 
 def patches_above(areas: Sequence[np.ndarray], nominal_area: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return areas (k,), and numbers of patches at least that large per nominal area (members, k).
+    """Return patch areas (k,), and the numbers of patches (members, k) per nominal area that are at least as large.
 
-    `areas` as for `patch_density`.
+    The argument `areas` is that of `patch_density`.
     """
     pooled = np.sort(np.concatenate(areas))
-    # Evenly spaced on the logarithmic axis of the number, so that the few largest patches are all shown.
+    # The numbers of patches are evenly spaced on a logarithmic axis, so that the few largest patches are all shown.
     ranks = np.unique(np.rint(np.geomspace(1, len(pooled), _CURVE_POINTS)).astype(int)) if len(pooled) else []
     at = pooled[len(pooled) - np.asarray(ranks, int)[::-1]]
     return at, np.array([len(area) - np.searchsorted(area, at) for area in areas]) / nominal_area

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
 DECLARATION = Declaration(
     description=(
-        "Contact area and mean separation against the Tabor parameter. The study needs materials with adhesion that "
-        "differ in their `interaction_range`."
+        "Contact area and mean separation against the Tabor parameter, for studies whose materials differ in "
+        "`interaction_range`."
     ),
     options=SnapshotFigure,
 )
@@ -31,14 +31,14 @@ _STATE = ("contact_area_fraction", "reduced_separation")
 
 @in_style
 def figure(campaign: xr.DataTree, *, study: str, kind: str | None = None, target: float | None = None) -> Figure:
-    """Draw all runs of a study at one snapshot."""
+    """Draw the states of all runs of a study at one snapshot against the Tabor parameter."""
     from icha.analysis.model_error import state_of
     from icha.datasets.campaign import find_snapshot
 
     groups = group_by_contact(campaign, select_runs(campaign, study, ragged=False))
     run = next(iter(groups[-1].by_seed.values()))
     shown = snapshot_label(run, find_snapshot(run, kind, target))
-    # Materials that differ only in their range of attraction form one line, which has the name of the first material.
+    # Materials that differ only in the range of attraction form one line with the name of the first material.
     materials: dict[tuple, str] = {}
     curves: dict[tuple, list[ContactRuns]] = {}
     bare: dict[tuple, list[ContactRuns]] = {}
@@ -52,7 +52,7 @@ def figure(campaign: xr.DataTree, *, study: str, kind: str | None = None, target
         elif group.applicable:
             bare.setdefault(contact, []).append(group)
     if not curves:
-        raise NothingToDraw(f"study {study}: no complete run with adhesion, so none with a Tabor parameter")
+        raise NothingToDraw(f"study {study}: no complete run with adhesion, without which no Tabor parameter exists")
 
     dataset = campaign[study].to_dataset()
     contacts = [contact for contact, _ in curves]
@@ -89,6 +89,6 @@ def _finish(ax, smallest):
         ax.axvspan(low, WU_HOLDS_FROM, color="0.93", lw=0, zorder=0)
     ax.set_xlim(low, high)
     ax.set_xlabel(r"Tabor parameter  $\mu$")
-    # Room above and below, so that differences of a few per mille do not fill the panel.
+    # The limits of the axis are wider than the values, so that differences of a few per mille do not fill the panel.
     bottom, top = ax.get_ylim()
     ax.set_ylim(0.95 * bottom, 1.05 * top)

@@ -1,9 +1,9 @@
 """Colours, markers and legends of lines, which are the same in all figures of a campaign.
 
-A colour stands for a material, and a marker for a model: closed markers for asperities with adhesion, open markers for
-asperities without adhesion, crosses for boundary elements. The shape of open and closed markers distinguishes surfaces
-and slopes. Many materials, or many surfaces and slopes, have graded colours from dark to bright, and the legend names
-some of them.
+The colour of a marker shows the material. Crosses are results of boundary elements. Closed markers are results of the
+asperity model with adhesion, open markers those without adhesion. The shape of closed and open markers distinguishes
+surfaces and slopes. Many materials, or many surfaces and slopes, have graded colours from dark to bright. The legend
+then names only some of them.
 """
 
 from __future__ import annotations
@@ -24,37 +24,37 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
 
-# Material, surface and rms slope of a line; the slope is None if slopes are not distinguished.
+# A contact: material, surface and rms slope of a line. The slope is None if slopes are not distinguished.
 Contact = tuple[str, str, float | None]
 
-# The colours of Okabe and Ito without black, which is for theories, and darker colours of the same hues.
+# The colours of Okabe and Ito except black, and darker colours of the same hues. Black lines are theories.
 MATERIAL_COLOURS = (*COLOURS[:-1], "#004166", "#803800", "#005A42", "#80436A", "#805800", "#2B6C94")
 MARKERS = ("o", "s", "^", "D", "v", "p", "*")
 
 ASPERITIES_NAME = MODELS["asperities"].words
-# Markers by the name of the model in legends.
+# Markers in legends by the name of the model.
 MODEL_MARKERS = {ASPERITIES_NAME: "o", SHORT_RANGE: "+", FINITE_RANGE: "1"}
 UNLOADING_MARKERS = {SHORT_RANGE: "x", FINITE_RANGE: "2"}
 BRANCH_DASHES = {"loading": "-", "unloading": (0, (4, 2))}
 # Look of lines of boundary elements that are drawn beside lines of asperities.
 TRUTH_LINE = {"ls": (0, (3, 2)), "lw": 0.8, "ms": 5, "mew": 0.8, "zorder": 5}
 
-# Largest number of materials, or of surfaces and slopes, that have distinct colours. More have graded colours.
+# Largest number of materials, or of surfaces and slopes, with distinct colours. A larger number has graded colours.
 MOST_COLOURS = len(COLOURS)
 # Largest number of lines of normal width in a figure; more lines are thin.
 FEW_LINES = 6
-# Sizes of markers in points, and widths of lines in sizes of markers. Curves without adhesion are widest, and each
-# material is narrower than the one before, so that curves that coincide are all visible.
+# Marker sizes in points, and line width over marker size. Curves without adhesion are widest, and the curve of each
+# material is narrower than that of the previous material, so that curves that coincide are all visible.
 _BARE_SIZE, _ADHESIVE_SIZE, _LEAST_SIZE, _NARROWER = 6.0, 4.6, 1.8, 0.75
 _LINE_WIDTH = 0.22
-# End of the graded colours that are used; brighter colours are invisible on white.
+# End of the range of graded colours (0 dark, 1 bright); brighter colours are invisible on white.
 _BRIGHTEST = 0.9
 # Largest number of graded colours that a legend names.
 _MOST_NAMED = 9
-# Fraction of a colour in its pale form; the rest is white.
+# Fraction of the original colour in a pale colour; the rest is white.
 _PALENESS = 0.4
 
-# Label of runs for which the asperity model is not applicable, in figures of several runs and of one run.
+# Labels of runs for which the asperity model is not applicable: in figures of several runs, and in figures of one run.
 NOT_APPLICABLE = "pale: asperity model not applicable"
 NOT_APPLICABLE_ALONE = "asperity model not applicable"
 
@@ -62,20 +62,20 @@ NOT_APPLICABLE_ALONE = "asperity model not applicable"
 class Looks:
     """Colour, marker and name of every line of a figure.
 
-    A place is a surface and an rms slope.
+    A `contact` is a material, a surface and an rms slope; a `place` is a surface and an rms slope.
 
     Parameters
     ----------
     campaign : the campaign dataset; the order of its materials gives their colours.
     interfaces : modulus, surface energy and range of attraction of the materials.
     contacts : material, surface and rms slope of every line.
-    by_place : whether colours distinguish places instead of materials. Many places always have colours.
+    by_place : True if colours distinguish places instead of materials. More than `MOST_COLOURS` places have colours.
     """
 
     def __init__(
         self, campaign: xr.DataTree, interfaces: xr.Dataset, contacts: Iterable[Contact], *, by_place: bool = False
     ):
-        """Distribute colours and markers."""
+        """Assign colours and markers to the lines."""
         self.contacts = list(dict.fromkeys(contacts))
         self.interfaces = interfaces
         self.materials = list(dict.fromkeys(material for material, *_ in self.contacts))
@@ -101,16 +101,16 @@ class Looks:
         return float(self.interfaces["surface_energy"].sel(material=material)) > 0
 
     def colour(self, contact: Contact) -> str:
-        """Return the colour of a contact; grey if no line of the figure has its colour."""
+        """Return the colour of a contact; grey if the figure has no line of this material or place."""
         material, *place = contact
         return self._colours.get(tuple(place) if self.by_place else material, GREY)
 
     def material_colour(self, material: str | None) -> str:
-        """Return the colour of a material; black if no line shows it, or if colours distinguish places."""
+        """Return the colour of a material; black if the figure does not show the material or has colours for places."""
         return self._colours.get(material, BLACK)
 
     def look(self, contact: Contact, *, applicable: bool = True) -> dict:
-        """Return arguments of `Axes.plot` for a line; pale if the asperity model is not applicable."""
+        """Return arguments of `Axes.plot` for a line; colours are pale if the asperity model is not `applicable`."""
         material, *place = contact
         colour, size, adhesive = self.colour(contact), self._sizes[material], self.adhesive(material)
         look = {
@@ -128,9 +128,9 @@ class Looks:
         return look if applicable else _pale(look)
 
     def handles(self, **changed: object) -> dict[str, Line2D]:
-        """Return the legend entries of materials and places by name; `changed` overrides the looks of the lines.
+        """Return the legend entries of materials, surfaces and slopes by name.
 
-        If there are many names, only some have an entry.
+        If there are many names, only some have an entry. `changed` are arguments of `Axes.plot` that replace others.
         """
         material, place = self.materials[0], self.places[0]
         if self.by_place:
@@ -147,11 +147,11 @@ class Looks:
         return {name: legend_handle(**look) for name, look in found.items()}
 
     def material_name(self, material: str) -> str:
-        """Return modulus and surface energy of a material in words."""
+        """Return a text with the modulus and the surface energy of a material."""
         return material_label(self.interfaces, material)
 
     def place_name(self, place: tuple[str, float | None]) -> str:
-        """Return surface and rms slope in words; each is left out if the figure has only one."""
+        """Return surface and rms slope as text; a surface or slope that all lines have in common is left out."""
         surface, slope = place
         surfaces, slopes = (set(each) for each in zip(*self.places, strict=True))
         words = [surface] if len(surfaces) > 1 else []
@@ -161,14 +161,14 @@ class Looks:
         """Return a name that distinguishes a line from the other lines of the figure."""
         material, *place = contact
         place = self.place_name(tuple(place))
-        # A single material has no name if colours distinguish places.
+        # If colours distinguish surfaces and slopes, the legend does not name a single material.
         if place and self.by_place and len(self.materials) == 1:
             return place
         return ", ".join(filter(None, [self.material_name(material), place]))
 
 
 def looks_of_studies(campaign: xr.DataTree, studies: Sequence[str], contacts: Iterable[Contact]) -> Looks:
-    """Return the looks of lines of some studies; if all have one material, colours distinguish surfaces and slopes."""
+    """Return the `Looks` for lines of some studies; with a single material, colours distinguish surfaces and slopes."""
     import xarray as xr
 
     contacts = list(contacts)
@@ -178,13 +178,13 @@ def looks_of_studies(campaign: xr.DataTree, studies: Sequence[str], contacts: It
 
 
 def material_colours(campaign: xr.DataTree) -> dict[str, str]:
-    """Return a colour for every material of a campaign dataset, in the order in which its studies name them."""
+    """Return a colour for every material of a campaign dataset, in the order of the studies."""
     materials = (name for study in campaign.children.values() for name in study["material"].values.tolist())
     return dict(zip(dict.fromkeys(materials), itertools.cycle(MATERIAL_COLOURS)))
 
 
 def _pale(look):
-    """Return the look of runs for which the asperity model is not applicable: open markers in a lighter colour."""
+    """Return a look with open markers in a lighter colour, for runs to which the asperity model is not applicable."""
     from matplotlib.colors import to_hex, to_rgb
 
     colour = to_hex([1 - _PALENESS * (1 - part) for part in to_rgb(look["color"])])
@@ -192,7 +192,7 @@ def _pale(look):
 
 
 def graded_colours(count: int) -> list[str]:
-    """Return colours from dark to bright."""
+    """Return `count` colours from dark to bright, as hexadecimal text."""
     import matplotlib as mpl
     from matplotlib.colors import to_hex
 
@@ -200,15 +200,15 @@ def graded_colours(count: int) -> list[str]:
 
 
 def some_of(names: Sequence) -> list:
-    """Return all names if they are few; else return evenly spaced ones, including the first and the last."""
+    """Return all names if they are few; otherwise return some, evenly spaced, including the first and the last."""
     at = np.unique(np.rint(np.linspace(0, len(names) - 1, min(len(names), _MOST_NAMED))).astype(int))
     return [names[k] for k in at]
 
 
 # --- legends ---
 
-FEWER_SEEDS = "crossed: mean over fewer seeds than requested"
-# Largest number of names in the larger font.
+FEWER_SEEDS = "crossed out: mean over fewer seeds than requested"
+# Largest number of legend entries for which the legend has the larger font.
 _MANY_NAMES = 12
 _MOST_COLUMNS = 4
 
@@ -216,7 +216,7 @@ _MOST_COLUMNS = 4
 def legend_below(figure: Figure, handles: Mapping[str, object]) -> None:
     """Add a legend below the panels, with an entry for each handle, in as many columns as fit.
 
-    The height of the figure grows by that of the legend. Therefore the legend is drawn last.
+    The legend increases the height of the figure. Therefore it must be added last.
     """
     marks = named_handles(figure.axes)
     handles = dict(handles) | {name: marks[name] for name in (FEWER_SEEDS, NOT_APPLICABLE) if name in marks}
@@ -240,5 +240,5 @@ def named_handles(panels: Iterable[Axes]) -> dict[str, object]:
 
 
 def model_handle(name: str, **look: object) -> Line2D:
-    """Return the legend entry of a model; `look` has keywords of `Axes.plot`."""
+    """Return the legend entry of a model; `look` are keyword arguments of `Axes.plot`."""
     return legend_handle(**{"ls": "none", "marker": MODEL_MARKERS[name], "color": GREY, "mec": GREY, "ms": 6} | look)

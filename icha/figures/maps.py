@@ -1,4 +1,4 @@
-"""Maps of a surface, and contact spots as circles of true size."""
+"""Draw maps of a surface, and contact spots as circles of true size."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.image import AxesImage
 
-# Largest number of cells a side that are distinguishable in a panel.
+# Largest number of cells along a side that are distinguishable in a panel.
 _MOST_CELLS = 1024
 
 
 class Topography(NamedTuple):
-    """Heights of a run, in the units of the axes.
+    """Heights of the topography of a run, with the units of the axes.
 
     Attributes
     ----------
     heights : (n, n) float along y and x, heights in the surface file.
-    scale : factor from `heights` to the heights of the run in `height_unit`.
+    scale : factor that converts `heights` to the heights of the run in `height_unit`.
     highest : largest magnitude of the heights of the run, in `height_unit`.
     height_unit : unit of the heights.
     side : side of the surface in `length_unit`.
-    length : factor from metres to `length_unit`.
+    length : factor that converts metres to `length_unit`.
     length_unit : unit of the axes x and y.
     """
 
@@ -40,7 +40,7 @@ class Topography(NamedTuple):
     length_unit: str
 
     def draw(self, axes: Axes, **look) -> AxesImage:
-        """Draw a map of the heights; `look` has keywords of `Axes.imshow`."""
+        """Draw a map of the heights; `look` are keyword arguments of `Axes.imshow`."""
         return draw_map(axes, self.heights, self.side, self.scale, **look)
 
     def label(self, axes: Axes) -> None:
@@ -54,7 +54,7 @@ def topography_of(run: xr.Dataset, surface: xr.Dataset) -> Topography:
     """Return the topography of a run from the dataset of its surface file."""
     heights = surface["height"].transpose("y", "x").values
     factor = float(run["rms_height"]) / float(surface["rms_height"])
-    # Without a copy of the array, which may be large.
+    # The array may be large, so no copy is made.
     highest = max(float(heights.max()), -float(heights.min())) * factor
     period = float(run["period"])
     length, length_unit = choose_unit(period, "m")
@@ -63,7 +63,7 @@ def topography_of(run: xr.Dataset, surface: xr.Dataset) -> Topography:
 
 
 def draw_map(axes: Axes, nodes: np.ndarray, side: float, scale: float = 1.0, **look) -> AxesImage:
-    """Draw a periodic map of nodes (n, n) times `scale`, or means over blocks of many nodes.
+    """Draw a map of the values `nodes` (n, n) times `scale` on a periodic grid; for large n, draw means over blocks.
 
     Nodes are the centres of the cells of the image. The first row and column are repeated at the opposite border.
     """
@@ -75,7 +75,7 @@ def draw_map(axes: Axes, nodes: np.ndarray, side: float, scale: float = 1.0, **l
 
 
 def average_blocks(nodes: np.ndarray, most: int = _MOST_CELLS) -> np.ndarray:
-    """Return means over blocks of nodes of nearly equal size, if there are more than `most` nodes a side."""
+    """Return means over blocks of nodes, at most `most` blocks along a side; return few nodes unchanged."""
     count = min(len(nodes), most)
     if count == len(nodes):
         return nodes
@@ -86,7 +86,7 @@ def average_blocks(nodes: np.ndarray, most: int = _MOST_CELLS) -> np.ndarray:
 
 
 def wrap_circles(x, y, radius, period: float, boundary: str) -> np.ndarray:
-    """Return centre and radius, (m, 3), of circles and their periodic images that reach into [0, L)²."""
+    """Return x, y and radius, (m, 3), of circles and of their periodic images that overlap the cell [0, L)²."""
     steps = (-period, 0.0, period) if boundary == "periodic" else (0.0,)
     shifts = np.array([(dx, dy) for dx in steps for dy in steps])
     centres = np.column_stack([x, y])[:, None, :] + shifts
@@ -96,7 +96,7 @@ def wrap_circles(x, y, radius, period: float, boundary: str) -> np.ndarray:
 
 
 def draw_spots(axes: Axes, circles: np.ndarray, **look) -> None:
-    """Add circles, (m, 3) of x, y and radius in data units, to axes."""
+    """Draw contact spots as circles, (m, 3) float of x, y and radius in the units of the axes."""
     from matplotlib.collections import EllipseCollection
 
     x, y, radius = circles.T

@@ -1,4 +1,4 @@
-"""Find and draw the figures, which are the modules of this folder with names that begin with `fig` and a number."""
+"""Find and draw the figures; each figure is a module of this folder whose name begins with `fig` and a number."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def figure_number(name: str) -> int:
 
 
 def figure_module(name: str) -> ModuleType:
-    """Return the module of a figure."""
+    """Import the module of a figure and return it."""
     return importlib.import_module(f"icha.figures.{name}")
 
 
@@ -45,9 +45,9 @@ def draw_figure(
     inputs: Mapping[str, str | Sequence[str]],
     arguments: Mapping[str, Any],
 ) -> None:
-    """Draw a figure and write it to `png` and `pdf`; if none of its runs is complete, the page only has a message.
+    """Draw a figure and write it to `png` and `pdf`; if none of its runs is complete, write a page with a message.
 
-    `inputs` and `arguments` are those that the declaration of the figure returns.
+    The declaration of the figure gives `inputs` and `arguments`.
     """
     from icha.figures.select import NothingToDraw
 
@@ -55,13 +55,13 @@ def draw_figure(
     try:
         figure = figure_module(name).figure(**data, **arguments)
     except NothingToDraw as reason:
-        print(f"An empty page: {reason}")
+        print(f"Nothing to draw, so the page contains only a message: {reason}")
         figure = _empty_page(str(reason))
     save(figure, png, pdf)
 
 
 def _read(files):
-    """Return the dataset or tree of a netCDF file, a list for several files, or the path of any other file."""
+    """Read netCDF files: return a dataset or tree, or a list for several files; return paths of other files unread."""
     from icha.datasets.files import has_groups, read_campaign, read_dataset
 
     if not isinstance(files, str | os.PathLike):

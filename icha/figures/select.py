@@ -1,4 +1,4 @@
-"""Select what a figure shows from a campaign dataset."""
+"""Select the runs, snapshots and errors that a figure shows from the datasets of a campaign."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ if TYPE_CHECKING:
 
 
 class NothingToDraw(ValueError):
-    """No complete run of the kind that a figure shows; the message names what is missing."""
+    """The campaign has no complete run that the figure could show; the message names what is missing."""
 
 
 class ContactRuns(NamedTuple):
-    """The complete runs of one material, surface and rms slope with one model: one run for each seed.
+    """The complete runs of one model, material, surface and rms slope: one run for each seed.
 
-    Runs for which the asperity model is not applicable are in a group of their own.
+    Runs for which the asperity model is not applicable form a separate group.
 
     Attributes
     ----------
     labels : labels of the first run.
     by_seed : the runs, by seed.
     asked : number of seeds that the study requests.
-    applicable : whether the asperity model is applicable to the runs.
+    applicable : True if the asperity model is applicable to the runs.
     """
 
     labels: RunLabels
@@ -64,7 +64,7 @@ def select_runs(
 
     Parameters
     ----------
-    ragged : whether the runs include their spots and events, which take long to select.
+    ragged : True if the runs shall include their spots and events, which take long to select.
     model : name of the model. Default: the `shown_model` of the study.
 
     Raises
@@ -97,12 +97,12 @@ def asked_seeds(study: xr.Dataset, labels: RunLabels) -> int:
 
 
 def is_applicable(run: xr.Dataset) -> bool:
-    """Return whether the asperity model is applicable to a run, as far as known."""
+    """Return False if a run states a reason why the asperity model is not applicable, otherwise True."""
     return not run.attrs.get("applicability")
 
 
 def shown_model(study: xr.Dataset) -> str:
-    """Return the model that figures of a study show: asperities, or the study's first model if it has no asperities."""
+    """Return the model that figures of a study show: the asperity model, or the first model of a study without it."""
     return first_model(study["model"].values.tolist())
 
 
@@ -139,7 +139,7 @@ def select_complete_run(campaign: xr.DataTree, labels: RunLabels) -> xr.Dataset:
 
 
 def path_steps(run: xr.Dataset) -> xr.Dataset:
-    """Return the steps of the first loading at the targets of the study, without targets added for snapshots."""
+    """Return the steps of the first loading at the targets of the study; targets of rarer kinds are left out."""
     from icha.datasets.campaign import loading_stops
 
     run = run.isel(step=loading_stops(run).values)
@@ -149,7 +149,7 @@ def path_steps(run: xr.Dataset) -> xr.Dataset:
 
 
 def branches(run: xr.Dataset) -> Iterator[tuple[str, xr.Dataset]]:
-    """Yield the branch (loading or unloading) and the steps of every leg; a leg begins where the previous leg ends."""
+    """Yield the branch (loading or unloading) and the steps of every leg, with the last step of the previous leg."""
     legs = run["leg"].values
     for leg in np.unique(legs):
         steps = np.flatnonzero(legs == leg)
@@ -157,18 +157,18 @@ def branches(run: xr.Dataset) -> Iterator[tuple[str, xr.Dataset]]:
 
 
 def unloading_legs(run: xr.Dataset) -> list[xr.Dataset]:
-    """Return the unloading legs of a run; each begins at its turning point."""
+    """Return the steps of each unloading leg of a run; the first step is the turning point before the leg."""
     return [leg for branch, leg in branches(run) if branch == "unloading"]
 
 
 class Snapshots(NamedTuple):
-    """The runs of one contact, and the position of a snapshot of the same state in each run.
+    """Runs that differ only in their seed, and the position of a snapshot of the same state in each run.
 
     Attributes
     ----------
     runs : the runs.
-    members : each run, and the position of its snapshot.
-    truths : the same for runs with boundary elements, if they have the snapshot. Empty if `runs` are boundary elements.
+    members : each run with the position of its snapshot.
+    truths : each boundary-element run with the position of its snapshot; empty if `runs` have boundary elements.
     """
 
     runs: ContactRuns
@@ -179,7 +179,7 @@ class Snapshots(NamedTuple):
 def select_snapshots(
     campaign: xr.DataTree, study: str, kind: str | None = None, target: float | None = None
 ) -> list[Snapshots]:
-    """Return a snapshot of every run of the `shown_model` on the first surface and slope of a study."""
+    """Return the same snapshot of every run on the first surface and slope of a study, with the `shown_model`."""
     from icha.analysis.model_error import snapshot_if_any
     from icha.datasets.campaign import find_snapshot
 
@@ -215,7 +215,7 @@ def snapshot_label(run: xr.Dataset, snapshot: int) -> str:
 
 
 def select_errors(model_error: xr.DataTree | None, study: str) -> Iterator[tuple[tuple[str, str, float], xr.Dataset]]:
-    """Yield the errors of each contact of a study from all entries of a model error, along seeds and loads.
+    """Yield the model errors of a study along seeds and loads, for each entry, material, surface and slope.
 
     Parameters
     ----------
@@ -223,7 +223,7 @@ def select_errors(model_error: xr.DataTree | None, study: str) -> Iterator[tuple
 
     Yields
     ------
-    Material, surface and rms slope; errors of one entry for this contact, all NaN if the entry does not have it.
+    Material, surface and rms slope; dataset of the errors, all NaN if the entry lacks this combination.
     """
     for node in model_error.children.values() if model_error is not None else ():
         if node.attrs["study"] != study:
@@ -235,7 +235,7 @@ def select_errors(model_error: xr.DataTree | None, study: str) -> Iterator[tuple
 
 
 def asked_of_entry(errors: xr.Dataset) -> int:
-    """Return the number of seeds that an entry of a model error requests for a contact."""
+    """Return the number of seeds that an entry requests; `errors` is one dataset of `select_errors`."""
     from icha.datasets.variables.campaign import NOT_IN_DESIGN
 
     return int((errors["status"] != NOT_IN_DESIGN).sum("seed"))
@@ -248,15 +248,15 @@ ROUNDING = 1e-9
 
 
 def select_unloaded_runs(campaign: xr.DataTree, study: str) -> list[tuple[RunLabels, xr.Dataset]]:
-    """Return the runs of a study that unload, without their spots and events.
+    """Return the runs of a study that unload, without spots and events.
 
-    Their reduced separation is the mean separation over the rms height, because the integral of the pressure over the
-    mean separation is the work. On a free square, the mean gap is different from the mean separation.
+    The reduced separation of these runs is the mean separation over the rms height, because the integral of the
+    pressure over the mean separation is the work. On a free square, mean gap and mean separation differ.
 
     Raises
     ------
     NothingToDraw
-        If no run is complete, or none unloads.
+        If no run is complete, or if no run unloads.
     """
     runs = [(labels, run) for labels, run in select_runs(campaign, study, ragged=False) if unloading_legs(run)]
     if not runs:
@@ -271,16 +271,17 @@ def select_detached_lines(
 
     Parameters
     ----------
-    along_slopes : whether a line has points at several rms slopes. If not, every rms slope has its own line.
+    along_slopes : True if a line joins points at several rms slopes. If False, every rms slope has its own line.
 
     Returns
     -------
-    For each line, the runs of its points. A line is given by its contact, and whether the asperity model is applicable.
+    Runs of the points of each line. The key of a line is material, surface and slope, and whether the asperity model is
+    applicable.
 
     Raises
     ------
     NothingToDraw
-        If there is no such run, or if no run of a study is complete.
+        If no run was unloaded to complete separation, or if no run of a study is complete.
     """
     found = {}
     for study in studies:
@@ -304,6 +305,6 @@ def pull_off_step(run: xr.Dataset) -> int | None:
 
 
 def name_model(axes: Axes, campaign: xr.DataTree, studies: Iterable[str]) -> None:
-    """Write the name of the model of some studies above a panel."""
+    """Write the name of the model that figures of some studies show above a panel."""
     models = dict.fromkeys(shown_model(campaign[study].to_dataset()) for study in studies)
     axes.set_title(", ".join(MODELS[model].words for model in models), loc="right")

@@ -1,6 +1,6 @@
-"""Style of all figures, labels, units, and files with the same bytes whenever they are drawn from the same data.
+"""Style, labels and units of all figures. The same data always give figure files with the same bytes.
 
-Matplotlib is imported only where something is drawn, so that reading a configuration does not wait for it.
+Matplotlib is imported only inside functions that draw, so that ICHA reads a configuration quickly.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ RC = {
 
 @contextmanager
 def _style():
-    """Draw in the style above, whatever the user's settings."""
+    """Set the style `RC` for all drawing inside the context; matplotlib settings of the user have no effect."""
     import matplotlib as mpl
 
     with mpl.rc_context():
@@ -78,7 +78,7 @@ in_style = _style()
 
 
 def new_figure(width: float, height: float) -> Figure:
-    """Return an empty figure of a size in inches, without a window and without pyplot's global state."""
+    """Return an empty figure, width and height in inches, without a window and without pyplot's global state."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -100,7 +100,7 @@ def new_panels(
 
 
 def save(figure: Figure, png: str | os.PathLike, pdf: str | os.PathLike) -> None:
-    """Write a figure to both formats, without the date and the name of the software."""
+    """Write a figure as PNG and as PDF, without the date and the name of the software."""
     with _style():
         with whole_file(png) as temporary:
             figure.savefig(temporary, format="png", metadata={"Software": None})
@@ -110,7 +110,7 @@ def save(figure: Figure, png: str | os.PathLike, pdf: str | os.PathLike) -> None
 
 
 def logarithmic_axes(axes: Axes, directions: str = "xy") -> None:
-    """Make axes logarithmic; axes with fewer than two powers of ten have labels at twos and fives as well."""
+    """Make axes logarithmic; axes with fewer than two powers of ten also have labels at 2 and 5 times powers of ten."""
     for direction in directions:
         axes.set(**{f"{direction}scale": "log"})
         axis = getattr(axes, f"{direction}axis")
@@ -118,7 +118,7 @@ def logarithmic_axes(axes: Axes, directions: str = "xy") -> None:
 
 
 def _minor_label(axis, value, _):
-    """Return the label of a tick between powers of ten."""
+    """Return the label of a tick between powers of ten; "" for most ticks."""
     low, high = sorted(axis.get_view_interval())
     exponent = np.floor(np.log10(value))
     digit = value / 10.0**exponent
@@ -128,7 +128,7 @@ def _minor_label(axis, value, _):
 
 
 def legend_handle(x=(), y=(), **look) -> Line2D:
-    """Return a line for a legend, without axes; `look` has the keywords of `Axes.plot`."""
+    """Return a line that is only drawn in a legend; `look` are keyword arguments of `Axes.plot`."""
     from matplotlib.lines import Line2D
 
     return Line2D(x, y, **look)
@@ -140,7 +140,7 @@ def panel_label(axes: Axes, letter: str) -> None:
 
 
 def format_number(value: float) -> str:
-    """Return a value in text, such as `0.01`, `25`, or `3.2 × 10⁻⁵` in mathtext."""
+    """Return a number as text, such as `0.01`, `25`, or `3.2 × 10⁻⁵` in mathtext."""
     if value == 0:
         return "0"
     exponent = int(np.floor(np.log10(abs(value)) + 1e-12))
@@ -156,9 +156,9 @@ INTERFACE = ["contact_modulus", "surface_energy", "interaction_range"]
 
 
 def material_label(study: xr.Dataset, material: str) -> str:
-    """Return modulus and surface energy of a material, in the same units for a whole study, for legends.
+    """Return a legend text with the modulus and the surface energy of a material, in the same units for a whole study.
 
-    The range of attraction is added if modulus and energy do not distinguish two materials of the study.
+    The range of attraction is added if two materials of the study have the same modulus and surface energy.
     """
     values = study.sel(material=material)
     words, alike = [], True
@@ -173,5 +173,5 @@ def material_label(study: xr.Dataset, material: str) -> str:
 
 
 def slope_label(slope: float) -> str:
-    """Return an rms slope in text."""
+    """Return a legend text with an rms slope."""
     return rf"$h_{{\mathrm{{rms}}}}^{{\prime}}$ = {slope:g}"

@@ -2,13 +2,14 @@
 
 A point force F displaces the half-space by F/(pi E* r). The sum includes all periodic images, and a uniform
 counter-pressure that keeps the mean displacement zero. Ewald's method splits 1/r into two halves. The smooth half,
-erf(alpha r)/r, is summed as a Fourier series with non-uniform FFTs; each mode is (2/(E* q)) erfc(q/(2 alpha)) over the
-area of the cell. The short-ranged half, erfc(alpha r)/r, is summed over near pairs. Forces at points have moments: the
-k-th moment acts by the k-th power of the plane Laplacian of 1/r (`icha.half_space.grid_displacement`).
+erf(alpha r)/r, is summed as a Fourier series with non-uniform FFTs. Each Fourier mode of this half is
+(2/(E* q)) erfc(q/(2 alpha)), divided by the area of the periodic cell. The short-ranged half, erfc(alpha r)/r, is
+summed over pairs of near points. A point may also have moments of a pressure. The displacement by the k-th moment is
+proportional to the k-th power of the plane Laplacian, applied to 1/r (`icha.half_space.grid_displacement`).
 
-A single square on a free half-space has no images. It is put into a periodic cell of twice its side, in which two
-points of the square are closer to each other than to any image. Then the displacement by images and counter-pressure
-is subtracted (`icha.half_space.free_square`), so that the sum of F/(pi E* r) over the square remains.
+A single square on a free half-space has no images. The square is placed in a periodic cell of twice its side, in which
+two points of the square are closer to each other than to any image. Then the displacement by images and
+counter-pressure is subtracted (`icha.half_space.free_square`): the sum of F/(pi E* r) over the square remains.
 """
 
 from __future__ import annotations
@@ -28,14 +29,14 @@ from icha.surfaces.square import cell_of, periodic_difference
 # Value of alpha r at which both halves of the Ewald sum are cut off, erfc(4.3) = 1.2e-9, and tolerance of the FFTs.
 _CUT = 4.3
 _NUFFT_TOLERANCE = 1e-9
-# The same for the approximate sum that a linear solve uses: erfc(2.75) = 1e-4.
+# Cut-off and tolerance of the approximate sum that linear solves use, erfc(2.75) = 1e-4.
 _LOOSE_CUT = 2.75
 _LOOSE_NUFFT_TOLERANCE = 1e-4
-# Mean number of points in the near field of a point: if the pairs are used in many sums, and if they are used once.
+# Mean number of points in the near field of a point, if its pairs are used in many sums, and if they are used once.
 NEIGHBOURS = 60
 NEIGHBOURS_ONCE = 20
-# Distance, in mean spacings of the points, below which the fields of the moments are constant. They are singular at
-# r = 0, and exact displacements replace them there.
+# Distance, in mean spacings of the points, below which the fields of the moments are constant. The fields are singular
+# at r = 0, and exact displacements replace them close to r = 0.
 _FLOOR = 0.05
 
 
@@ -68,7 +69,7 @@ def short_mean(alpha, contact_modulus, period):
 class _SmoothSum:
     """Function that sums the smooth half of the displacement with non-uniform FFTs.
 
-    Making the FFT plans takes long. They depend only on the number of modes; points are set when they change.
+    Making the FFT plans takes long. The plans depend only on the number of modes; points are set when they change.
     """
 
     def __init__(self, period, alpha, contact_modulus, cut, tolerance, dtype=np.complex128):
@@ -89,7 +90,7 @@ class _SmoothSum:
         self._points = [None, None]
 
     def _set_points(self, which, points):
-        """Set the points (n, 2), m, of plan 0 (sources) or plan 1 (targets), unless they are set already."""
+        """Set the points (n, 2), m, of plan 0 (sources) or plan 1 (targets), unless these points are already set."""
         if self._points[which] is not points:
             angle = (points * (2 * np.pi / self._period)).astype(self._real)
             self._plans[which].setpts(np.ascontiguousarray(angle[:, 1]), np.ascontiguousarray(angle[:, 0]))
@@ -125,7 +126,7 @@ class Ewald:
     contact_modulus : E*, Pa.
     reach : radius of the near field, in which the short-ranged half is summed, m.
     floor : distance below which the fields of the moments are constant, m.
-    free : whether the points lie in the quarter [0, period/2]^2, on a free half-space.
+    free : True for a free half-space, whose points lie in the quarter [0, period/2]^2 of the cell.
     """
 
     period: float
@@ -136,9 +137,9 @@ class Ewald:
 
     @classmethod
     def choose(cls, period, contact_modulus, count, neighbours, free=False):
-        """Choose the split for `count` points of which `neighbours` on average are in the near field of a point.
+        """Return the split for `count` points, with `neighbours` points on average in the near field of a point.
 
-        period : side of the square, m; free : whether the square is single.
+        period : side of the square, m; free : whether the square has no periodic images.
         """
         spacing = period / np.sqrt(max(count, 1))
         cell = cell_of(period, free)
@@ -151,11 +152,11 @@ class Ewald:
         return 0.5 * self.period if self.free else self.period
 
     def bases(self, points):
-        """Return `free_square.basis` of the y and the x of points (n, 2); None on a periodic surface."""
+        """Return `free_square.basis` of the y and x coordinates of points (n, 2), m; None on a periodic surface."""
         return (basis(points[:, 1], self.period), basis(points[:, 0], self.period)) if self.free else None
 
     def image_displacement(self, sources, targets, moments):
-        """Return the displacement (n,), m, at the targets by the images of the sources; both are given by `bases`."""
+        """Return the displacement (n,), m, at targets by the images of sources; both arguments come from `bases`."""
         field = image_field(*sources, moments, self.period, self.contact_modulus)
         by, bx = targets
         return np.einsum("ia,ia->i", by @ field, bx)
@@ -167,12 +168,12 @@ class Ewald:
 
     @cached_property
     def smooth(self):
-        """Accurate function for the smooth half."""
+        """Function that sums the smooth half accurately."""
         return _SmoothSum(self.period, self.alpha, self.contact_modulus, _CUT, _NUFFT_TOLERANCE)
 
     @cached_property
     def loose(self):
-        """Fast function for the smooth half, accurate to a thousandth."""
+        """Function that sums the smooth half fast, with a relative error of about 1e-3."""
         return _SmoothSum(
             self.period, self.alpha, self.contact_modulus, _LOOSE_CUT, _LOOSE_NUFFT_TOLERANCE, np.complex64
         )
@@ -184,12 +185,12 @@ class Ewald:
 
     @cached_property
     def mean(self):
-        """Value of `short_mean` for this split, m/N."""
+        """Mean of the short-ranged half of the displacement by a unit force, m/N."""
         return short_mean(self.alpha, self.contact_modulus, self.period)
 
     @cached_property
     def self_displacement(self):
-        """Smooth half at r = 0 by a unit force and by a unit second moment, m/N and 1/(N m): a point's own part."""
+        """Smooth half at r = 0, a point's own displacement: by a unit force, m/N, and unit second moment, 1/(N m)."""
         value, laplacian = _smooth_kernel(np.zeros(1), self.alpha)
         scale = 1 / (np.pi * self.contact_modulus)
         return scale * value[0], scale * laplacian[0]
@@ -197,7 +198,7 @@ class Ewald:
     def kernels(self, r):
         """Return the short-ranged displacement at distances r by unit moments k = 0, 1, 2, three arrays.
 
-        They are erfc(alpha r)/r, its plane Laplacian, and 1/r^5, divided by pi E*.
+        The arrays are erfc(alpha r)/r, the plane Laplacian of erfc(alpha r)/r, and 1/r^5, all divided by pi E*.
         """
         r, alpha, scale = np.maximum(r, self.floor), self.alpha, 1 / (np.pi * self.contact_modulus)
         inverse, x2 = 1 / r, (alpha * r) ** 2
@@ -210,7 +211,7 @@ class Ewald:
         return force, moment, scale * inverse**2 / r
 
     def point_displacement(self, r):
-        """Return the displacement at distances r by unit moments k = 0, 1, 2 that this sum contains, three arrays."""
+        """Return the displacement in this Ewald sum at distances r by unit moments k = 0, 1, 2, three arrays."""
         raised = np.maximum(r, self.floor)
         force, moment = 1 / raised, 1 / raised**3
         fourth = np.where(r <= self.reach, 1 / raised**5, 0.0)
@@ -228,16 +229,16 @@ class Ewald:
 class PointHalfSpace:
     """Half-space with forces and moments at n points, and its displacement at the same points.
 
-    The displacement at a point does not include that by the point's own force, but that by its images.
+    The displacement at a point includes the displacement by the images of the point, but not by the point itself.
 
     Attributes
     ----------
     ewald : split of the sum.
-    points : (n, 2) float, m.
+    points : (n, 2) float, positions, m.
     pairs : near pairs of points as three arrays (later, earlier, distance), each pair once.
     near : matrices of the short-ranged displacement by unit moments k = 0, 1, 2: for each k an (n, n) lower triangular
         matrix and its transpose.
-    near_loose : the same for forces alone, accurate to a thousandth.
+    near_loose : (n, n) lower triangular matrix for unit forces alone and its transpose, with a relative error of 1e-3.
     bases : `Ewald.bases` of the points; None on a periodic surface.
     """
 
@@ -262,7 +263,7 @@ class PointHalfSpace:
         return cls._assemble(ewald, points, None, found.max(axis=1), found.min(axis=1))
 
     def extended(self, points) -> PointHalfSpace:
-        """Return the half-space with more points (k, 2) after the present ones."""
+        """Return the half-space with k more points (k, 2), m, after the present points."""
         known, period = len(self.points), self.ewald.period
         points = np.mod(points, period)
         tree = cKDTree(points, boxsize=period)
@@ -274,7 +275,7 @@ class PointHalfSpace:
 
     @classmethod
     def _assemble(cls, ewald, points, before, later, earlier):
-        """Build the half-space from these pairs of points and those of the half-space `before`, if it is not None."""
+        """Build the half-space from new pairs of points, and from those of another half-space `before`, or None."""
         n, known = len(points), 0 if before is None else len(before.points)
         difference = periodic_difference(points[later], points[earlier], ewald.period)
         r = np.sqrt(difference[:, 0] ** 2 + difference[:, 1] ** 2)
@@ -304,7 +305,7 @@ class PointHalfSpace:
         return self._subtract_mean_and_images(w, force, moment)
 
     def approximate_displacement(self, force):
-        """Return the displacement (n,), m, by forces alone, accurate to a thousandth, which a linear solve needs."""
+        """Return the displacement (n,), m, by forces alone, with a relative error of about 1e-3, for linear solves."""
         w = self.ewald.loose(self.points, self.points, force)
         for half in self.near_loose:
             w += half @ force

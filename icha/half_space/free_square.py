@@ -1,8 +1,9 @@
 """Single square on a free half-space: removal of the images from a periodic sum.
 
 The square lies in a periodic cell of twice its side. The nearest image of a point is at least one side of the square
-away, so that the displacement by images is smooth. It is interpolated by Lagrange polynomials through n Chebyshev nodes
-along each side (the error falls as 5.8^-n) and subtracted from the periodic sum; the plain sum of 1/r remains.
+away, so that the displacement by images is smooth. The smooth displacement is interpolated by Lagrange polynomials
+through n Chebyshev nodes along each side; the error falls as 5.8^-n. If the displacement by images is subtracted from
+the periodic sum, the plain sum of 1/r remains.
 """
 
 from functools import lru_cache
@@ -10,16 +11,17 @@ from functools import lru_cache
 import numpy as np
 from scipy.special import erf, erfc
 
-# Number of Chebyshev nodes along a side; the remainder is 2e-14 of the displacement by images.
+# Number of Chebyshev nodes along a side; the relative error of the displacement by images is 2e-14.
 _NODES = 18
-# Parameter alpha of the Ewald sum of the table, in 1/cell, and cuts of its halves, in cells and modes: erfc(6) = 2e-17.
+# Ewald sum in `image_potential`: parameter alpha, in 1/cell; and cut-offs of its halves, in cells and in modes, where
+# terms are below 2e-17.
 _ALPHA = 3.0
 _REACH = 3
 _HIGHEST = 6
 
 
 def basis(x, cell: float) -> np.ndarray:
-    """Return the values of the Lagrange polynomials through the Chebyshev nodes at x (n,), m: (n, nodes).
+    """Return the values (n, nodes) of the Lagrange polynomials of the Chebyshev nodes at coordinates x (n,), m.
 
     cell : period of the sum, m; x is in [0, cell/2].
     """
@@ -36,17 +38,17 @@ def basis(x, cell: float) -> np.ndarray:
 def image_field(by, bx, moments, cell: float, contact_modulus: float) -> np.ndarray:
     """Return the displacement by all images of m spots at the Chebyshev nodes of y and x, (nodes, nodes), m.
 
-    It includes the uniform displacement that makes the mean of the periodic sum zero.
+    The result includes the uniform displacement that makes the mean of the periodic sum zero.
 
     Parameters
     ----------
-    by, bx : (m, nodes) float, `basis` of the spots.
-    moments : for k = 0, 1, …: (m,) float, integral of p s^(2k) / (4^k k!^2), N m^(2k).
+    by, bx : (m, nodes) float, `basis` of the y and x coordinates of the spots.
+    moments : for k = 0, 1, …: (m,) float, integral of p s^(2k) / (4^k k!^2) at distances s from a centre, N m^(2k).
     cell : period of the sum, m.
     """
     _, _, second = _chebyshev()
     field = np.zeros((_NODES, _NODES))
-    # The k-th moment acts by the k-th power of the Laplacian: they are summed by Horner's rule.
+    # The k-th moment is multiplied by the k-th power of the Laplacian. Horner's rule sums all moments.
     for k, moment in enumerate(reversed(moments)):
         if k:
             field = (second @ field + field @ second.T) / cell**2
@@ -80,7 +82,7 @@ def _image_potential_matrix():
 
 
 def image_potential(y, x):
-    """Return the sum of 1/r over all images in cells of side 1, minus a uniform background; |x|, |y| <= 1/2."""
+    """Return the sum of 1/r over all images of a point, in cells of side 1, minus a uniform background."""
     r = np.hypot(y, x)
     safe = np.where(r > 0, r, 1.0)
     potential = -np.where(r > 0, erf(_ALPHA * safe) / safe, 2 * _ALPHA / np.sqrt(np.pi))
@@ -98,10 +100,10 @@ def image_potential(y, x):
 
 
 def mean_displacement(side: float, contact_modulus: float, position, force) -> float:
-    """Return the mean displacement of a square of a free half-space by point forces (n,) at (n, 2) in it, m.
+    """Return the mean displacement, m, of a square on a free half-space by point forces (n,) at positions (n, 2).
 
-    By reciprocity it follows from the displacement of the points by a uniform pressure on the square. Each of the four
-    rectangles around a point contributes x asinh(y/x) + y asinh(x/y).
+    By reciprocity, a point force causes the mean displacement that a uniform pressure on the square with the same
+    resultant causes at the point. Each of the four rectangles around a point contributes x asinh(y/x) + y asinh(x/y).
     """
     x, y = ([distance, side - distance] for distance in np.clip(position.T, 0.0, side))
     potential = sum(_corner_potential(width, height) for width in x for height in y)

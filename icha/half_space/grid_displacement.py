@@ -1,13 +1,14 @@
 """Displacement of the half-space at all nodes of a grid, and the nodes around every spot.
 
 The sum over spots and images is split as in `icha.half_space.ewald`: a smooth half by its Fourier series, and a
-short-ranged half in a window around every spot. The time depends on the total area of the windows. Four moments of the
-pressure represent a spot beyond five radii, so that small spots have small windows. The smooth half of a large spot
-must be smooth on the scale of that spot. So spots of similar size form groups, and every group has a Fourier series of
-its own length.
+short-ranged half in a window around every spot. The time depends on the total area of the windows. Farther than five
+radii from a spot, four moments of the pressure represent the spot, so that small spots have small windows. The smooth
+half of a large spot must be smooth on the scale of this spot. Therefore spots of similar size form groups, and every
+group has a Fourier series with a different number of modes.
 
-With the moments M_k = integral of p r^(2k) / (4^k k!^2) a spot displaces points far away by the sum over k of
-M_k Lap^k (1/(pi E* r)). Its Fourier transform is that of a point force, with the sum of M_k (-q^2)^k as the force.
+The moments of a spot are M_k = integral of p r^(2k) / (4^k k!^2). Far from the spot, the displacement is the sum over k
+of M_k Lap^k (1/(pi E* r)), with the plane Laplacian Lap. The Fourier transform of this sum is that of a point force of
+the size sum of M_k (-q^2)^k.
 """
 
 import math
@@ -28,12 +29,13 @@ from icha.surfaces.square import cell_of
 # Value of alpha r at which both halves of the Ewald sum are cut off, erfc(4.6) = 8e-11, and tolerance of the FFTs.
 _CUT = 4.6
 _NUFFT_TOLERANCE = 1e-12
-# Distance, in radii of a spot, beyond which its four moments represent it, up to 1e-8 of the displacement at its edge.
+# Distance from a spot, in contact radii, beyond which four moments represent the spot. The error is then 1e-8 of the
+# displacement at the edge of the spot.
 _WINDOW = 5.0
 _MOMENTS = 4
 # Ratio of the widths of windows of neighbouring groups of spots.
 _LADDER = math.sqrt(2)
-# Number of nodes in a block of rows, and in the windows that are evaluated at a time, so that they fit into the cache.
+# Number of nodes in a block of rows, and in the windows that are evaluated together, so that both fit into the cache.
 _BLOCK = 2**19
 _BATCH = 2**15
 # Value of (alpha r)^2 below which the smooth half is a power series, and number of terms of that series.
@@ -42,7 +44,7 @@ _SERIES_LENGTH = 15
 
 
 def row_blocks(grid: int) -> list[slice]:
-    """Divide the rows of a grid into blocks; their size depends on the grid alone, not on the number of cores."""
+    """Divide the rows of a grid into blocks, whose size does not depend on the number of cores; return slices."""
     return blocks(grid, max(_BLOCK // grid, 1))
 
 
@@ -50,17 +52,17 @@ def row_blocks(grid: int) -> list[slice]:
 class DisplacementField:
     """Displacement w of the half-space at the nodes of a regular grid by m spots: the sum of eq. (9).
 
-    It is periodic and has zero mean; on a free half-space it is the sum over the spots without images. At a node under
-    a spot it includes the displacement by this spot.
+    The displacement is periodic and has zero mean. On a free half-space there are no images, and the mean
+    is not zero. At a node under a spot, the displacement by this spot is included.
 
     Attributes
     ----------
     law : law of one spot.
     period : side of the square, m.
-    grid : nodes along a side; it may be coarser than the grid of the surface.
-    centres : (m, 2) float, m.
-    contact_radius, radius_of_curvature : (m,) float, m.
-    free : whether the square is single.
+    grid : number of nodes along a side; this grid may be coarser than the grid of the surface.
+    centres : (m, 2) float, centres of the spots, m.
+    contact_radius, radius_of_curvature : (m,) float, one value for each spot, m.
+    free : whether the square is on a free half-space, without periodic images.
     """
 
     law: JKR
@@ -73,7 +75,7 @@ class DisplacementField:
 
     @property
     def _cell(self):
-        """Period of the sum, m. For a single square, this is twice its side, and the effect of images is subtracted."""
+        """Period of the sum, m; on a free half-space twice the side of the square."""
         return cell_of(self.period, self.free)
 
     @property
@@ -84,10 +86,10 @@ class DisplacementField:
     def map_blocks(self, function) -> list:
         """Call `function(rows, w)` with the displacement of every block of rows, in threads; return the results.
 
-        rows : slice; w : (rows.stop - rows.start, grid) float, m.
+        rows : slice, the rows of a block; w : (rows.stop - rows.start, grid) float, displacement of these rows, m.
         """
         if len(self.contact_radius):
-            # Evaluate these once, before several threads need them.
+            # Compute these properties once, before several threads need them.
             _ = self._smooth_half, self.free and self._images
         return on_cores(lambda rows: function(rows, self.rows(rows)), row_blocks(self.grid))
 
@@ -95,7 +97,7 @@ class DisplacementField:
         """Return the displacement (rows.stop - rows.start, grid) at the nodes of a range of rows, m."""
         if not len(self.contact_radius):
             return np.zeros((rows.stop - rows.start, self.grid))
-        # A grid that is too coarse for the Fourier series consists of some nodes of a finer one.
+        # If the grid is too coarse for the Fourier series, its nodes are selected from a finer grid.
         finer, half = self._smooth_half
         nodes = np.arange(rows.start, rows.stop) * finer
         w = scipy.fft.irfft(half[nodes], n=finer * self._nodes, axis=1, norm="forward", workers=1)[:, ::finer]
@@ -124,7 +126,7 @@ class DisplacementField:
 
     @cached_property
     def _groups(self):
-        """Groups of spots whose windows have the same width, which suits their radii; a list of `_Group`."""
+        """List of groups (`_Group`): spots of similar radius, which have windows of the same width."""
         count, widest = len(self.contact_radius), 0.5 * self._cell
         # This number of modes makes the Fourier series and the windows about equally costly.
         modes = min((2.0 * count * self._nodes**2) ** 0.25, (self._nodes - 1) // 2)
@@ -145,7 +147,7 @@ class DisplacementField:
 
     @cached_property
     def _smooth_half(self):
-        """Smooth half of all groups: factor by which its grid is finer, and Fourier series along x of all its rows."""
+        """Smooth half of all groups: refinement factor of its grid, and Fourier series along x of each refined row."""
         modes = on_cores(self._compute_modes, self._groups)
         highest = [each.shape[1] - 1 for each in modes]
         finer = -(-(2 * max(highest) + 1) // self._nodes)
@@ -169,8 +171,8 @@ class DisplacementField:
         strength, factor = np.zeros(q2.shape, dtype=complex), np.ones(q2.shape)
         for even, odd in group.moments.T.reshape(-1, 2, len(group.spots)):
             # Two moments are transformed together, as real and imaginary parts. In the spectrum c the part with
-            # c(-k) = conj c(k) belongs to the first. With one thread the order of summation, and with it every bit, is
-            # fixed.
+            # c(-k) = conj c(k) belongs to the first moment. With one thread the order of summation is fixed, and
+            # with it every bit of the result.
             c = finufft.nufft2d1(y, x, even + 1j * odd, (len(k), len(k)), eps=_NUFFT_TOLERANCE, isign=-1, nthreads=1)
             mirrored = np.conj(c[::-1, ::-1])[:, highest:]
             c = c[:, highest:]
@@ -197,12 +199,12 @@ class DisplacementField:
 
 @dataclass(frozen=True, eq=False)
 class _Group:
-    """Spots of similar size.
+    """Group of m spots of similar size.
 
     Attributes
     ----------
     spots : (m,) int, indices of the spots.
-    reach : half the width of their windows, m.
+    reach : half the width of the windows around the spots, m.
     alpha : parameter of the split, 1/m.
     moments : (m, 4) float, M_k alpha^(2k), N.
     """
@@ -216,7 +218,7 @@ class _Group:
 def smooth_half(y, moments):
     """Return the sum over k of moments[:, k] Lap^k (erf(x)/x) at y = x^2, (m, n), with the plane Laplacian Lap.
 
-    y : (m, n) float; moments : (m, 4) float.
+    y : (m, n) float, values of (alpha r)^2; moments : (m, 4) float, as in `_Group`.
     """
     coefficients = np.einsum("mk,kj->mj", moments, _SMOOTH_HALF)
     multipole, gauss, series = np.split(coefficients, [_MOMENTS, 3 * _MOMENTS - 2], axis=1)
@@ -237,7 +239,7 @@ def smooth_half(y, moments):
 
 
 def _horner(coefficients, x):
-    """Return the values of polynomials at x; their coefficients are along axis 1, lowest power first."""
+    """Return the values of polynomials at x; `coefficients` has the lowest power first along axis 1."""
     value = coefficients[:, -1] * x
     for k in range(coefficients.shape[1] - 2, 0, -1):
         value += coefficients[:, k]
@@ -250,7 +252,7 @@ def _smooth_half_table():
     """Return the coefficients of Lap^k (erf(x)/x), k = 0..3 (rows), in powers of y = x^2.
 
     The columns are the coefficients of (1) the factor of erf(x)/x, y^0 to y^-3, (2) the factor of exp(-y), y^-3 to y^2,
-    and (3) the power series of the whole, from y^0 on.
+    and (3) the power series of the whole function, from y^0.
 
     Lap^k (erf(x)/x) = (d_k y^-k) erf(x)/x - exp(-y) g_k(y) with Laurent polynomials g_k. In the plane
     Lap y^j = 4 j^2 y^(j-1); therefore d_(k+1) = (2k+1)^2 d_k. The derivative of erf, 2/sqrt(pi) exp(-y), gives the
@@ -282,14 +284,14 @@ _SMOOTH_HALF = _smooth_half_table()
 
 
 def windows(centres, reach: float, grid: int, period: float, rows: slice):
-    """Yield the nodes in squares of half width `reach`, m, around centres (m, 2), m, as far as they lie in some rows.
+    """Yield those nodes of some rows that lie in squares of half width `reach`, m, around centres (m, 2), m.
 
-    Some nodes are a little farther away; no node occurs twice for one centre.
+    A few of the nodes lie a little outside the square. No node occurs twice for the same centre.
 
     Yields
     ------
-    Parts of k rows with n nodes each: indices of their centres (k,); distances of the nodes from the centre along y
-    (k,) and along x (k, n), m; and indices of the nodes (k, n) in the flattened block of rows.
+    Four arrays for k parts of rows with n nodes each: indices of the centres (k,); distances of the nodes from the
+    centre along y (k,) and along x (k, n), m; and indices of the nodes (k, n) in the flattened block of rows.
     """
     spacing = period / grid
     ahead = int(reach / spacing) + 1

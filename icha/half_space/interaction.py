@@ -1,9 +1,9 @@
-"""Elastic interaction of contact spots: the displacement at each by all others and all images, the sum of eq. (4).
+"""Elastic interaction of contact spots: the displacement at each spot by all other spots, the sum in eq. (4).
 
-Within eight radii of a spot its exact displacement is used. Farther away, the moments of its axisymmetric pressure
+Within eight radii of a spot, its exact displacement is used. Farther away, the moments of its axisymmetric pressure
 represent the spot: force, second moment and fourth moment, whose fields fall as 1/r, 1/r^3 and 1/r^5. The fourth moment
-acts only in the near field of the Ewald sum. Most of the sum depends on the positions alone, and
-`icha.half_space.ewald` computes that part once. Only the exact displacements depend on the radii.
+acts only in the near field of the Ewald sum. Most of the sum depends only on the positions of the spots, and
+`icha.half_space.ewald` computes this part once. Only the exact displacements depend on the contact radii.
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ from scipy.spatial import cKDTree
 from icha.asperity.jkr import JKR
 from icha.half_space.ewald import NEIGHBOURS_ONCE, Ewald, PointHalfSpace
 
-# Distances, in radii of a spot: up to the first one its displacement is exact, beyond the second one force and second
-# moment suffice. The error is then below 1e-6 of the spot's displacement there, and below 1e-7 of its approach.
+# Distances from a spot, in contact radii. Up to the first distance, the exact displacement is used. Beyond the second
+# distance, force and second moment are enough: the error is below 1e-6 of the displacement, and 1e-7 of the approach.
 _WINDOW = 8.0
 _WINDOW_OF_MOMENTS = 16.0
 
 
 def _find_distant_pairs(tree, position, radius, ewald):
-    """Return target, source and distance of the pairs beyond the near field in which a large spot acts exactly.
+    """Return targets, sources and distances of the pairs beyond the near field that need an exact displacement.
 
     tree : search tree of the targets; position, radius : (m, 2) and (m,), centres and contact radii of the sources, m.
     """
@@ -55,11 +55,11 @@ class Interaction:
     ----------
     law : law of one spot.
     half_space : half-space with a point at every spot.
-    radius_of_curvature : (n,) float, m.
-    largest_radius : (n,) float, contact radii up to which the exact pairs suffice, m.
-    target, source : (k,) int, exact pairs: spots at which another one, the source, acts by its exact displacement.
+    radius_of_curvature : (n,) float, radii of curvature of the spots, m.
+    largest_radius : (n,) float, largest contact radii for which the list of exact pairs is complete, m.
+    target, source : (k,) int, exact pairs: at the spot `target`, the displacement by the spot `source` is exact.
     r : (k,) float, distances of these pairs, m.
-    by_moments : three (k,) arrays, displacement by unit moments of the source, which the exact one replaces.
+    by_moments : three (k,) arrays, displacement by unit moments of the source, replaced by the exact displacement.
     """
 
     law: JKR
@@ -73,7 +73,7 @@ class Interaction:
 
     @classmethod
     def between(cls, law: JKR, half_space: PointHalfSpace, radius_of_curvature, largest_radius) -> Interaction:
-        """Prepare the interaction for contact radii up to `largest_radius` (n,), m: find the exact pairs."""
+        """Return the interaction for contact radii up to `largest_radius` (n,), m, with its exact pairs."""
         ewald = half_space.ewald
         later, earlier, r = half_space.pairs
         window = _exact_window(largest_radius, ewald)
@@ -94,7 +94,7 @@ class Interaction:
         )
 
     def displacement(self, a):
-        """Return the displacement w (n,) at each spot by all others and all images, for contact radii a (n,), m."""
+        """Return the displacement w (n,) at each spot by all other spots and images for contact radii a (n,), m."""
         law, R, j = self.law, self.radius_of_curvature, self.source
         moments = law.force(a, R), law.second_moment(a, R), law.fourth_moment(a, R)
         exact = law.displacement(self.r, a[j], R[j])
@@ -105,8 +105,8 @@ class Interaction:
     def tangent(self, a) -> tuple[Callable, Callable]:
         """Linearise the displacement at contact radii a (n,), m; changes of spots of radius zero are ignored.
 
-        Return two functions that turn changes of the radii (n,), m, into changes of the displacement (n,), m. The first
-        one is exact; the second one is accurate to a thousandth and several times faster.
+        Return two functions that compute changes of the displacement (n,), m, from changes of the radii (n,), m. The
+        first function is exact. The second function has a relative error of about 1e-3 and is several times faster.
         """
         law, R, half_space = self.law, self.radius_of_curvature, self.half_space
         present = a > 0
@@ -138,17 +138,17 @@ def displacement_at(
 ) -> np.ndarray:
     """Return the displacement w (n,), m, of the half-space at n points by m spots, the sum of eq. (9).
 
-    It is periodic and has zero mean; on a free half-space it is the sum over the spots without images. At a point under
-    a spot it includes the displacement by this spot.
+    The displacement is periodic and has zero mean. On a free half-space there are no images, and the mean
+    is not zero. At a point under a spot, the displacement by this spot is included.
 
     Parameters
     ----------
     period : side of the square, m.
-    points : (n, 2) float, m.
+    points : (n, 2) float, positions of the points, m.
     position : (m, 2) float, centres of the spots, m.
-    a, R : (m,) float, contact radii and radii of curvature, m.
-    ewald : split of the sum, whose period and free are then used; None chooses one for the number of spots.
-    free : whether the square is single.
+    a, R : (m,) float, contact radii and radii of curvature of the spots, m.
+    ewald : split of the sum, whose `period` and `free` replace the arguments; None for a suitable split.
+    free : whether the square is on a free half-space, without periodic images.
     """
     if not len(points) or not len(a):
         return np.zeros(len(points))

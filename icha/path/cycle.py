@@ -1,8 +1,9 @@
 """Cycles of loading and unloading: all equilibria of a path that continues after the first loading.
 
 On unloading every spot follows its stable branch until it jumps off. Unloading ends at complete separation or at a
-turning point. It visits the separations of the first loading again, which are called stations, so that both curves can
-be compared. Where an event changes the pressure, steps become so short that the work lost in the event is known.
+turning point. Unloading visits the separations of the loading again, so that both curves can be compared. The visited
+separations are called stations. Close to an event that changes the pressure, the steps become so short that the energy
+lost in the event is known accurately.
 """
 
 from __future__ import annotations
@@ -30,21 +31,22 @@ from icha.path.stops import (
 )
 from icha.path.targets import LOADS, MEAN_SEPARATION, Path
 
-# Distance of the last station above first contact, in h_rms, without adhesion. At first contact itself the error of an
-# equilibrium may leave a spot in contact.
+# Distance of the last station above first contact, in h_rms, without adhesion. Exactly at first contact, a spot may
+# remain in contact because of the error of the equilibrium.
 _ABOVE_CONTACT = 1e-8
 
 
 def follow_cycle(
     contact: ContactModel, path: Path, longest: float, progress: PathProgress
 ) -> Generator[Waypoint, TargetFunction | None, None]:
-    """Yield all equilibria of a path that continues after the first loading; errors as of `icha.path.follow.follow`.
+    """Follow a path that continues after the first loading, and yield a waypoint for each equilibrium.
 
-    After a waypoint the caller may send one more target (`generator.send`). If this target comes before the others, the
-    path meets it too and yields its waypoint. The waypoints have no energy balances.
+    After each waypoint the caller may send one additional target for the next step (`generator.send`). If the step
+    meets this target first, the generator yields the waypoint at this target. The waypoints have no energy balances.
+    Raise the errors of `icha.path.follow.follow`.
 
     longest : longest step of the separation, m.
-    progress : record of the path.
+    progress : record of the path's progress, which counts and reports the targets.
     """
     start, targets = contact.untouched(), [TargetFunction(target, contact) for target in path.targets]
     # Targets at separations above first contact, where nothing touches.
@@ -67,7 +69,7 @@ def follow_cycle(
         target = TargetFunction(turn, contact)
         if (target.excess(cycle.state) > 0) != (leg % 2 == 1):
             cycle.leg, name = leg, "unloading" if leg % 2 else "loading"
-            reason = f"leg {leg} ({name}) starts already beyond the turning point {turn.describe()}"
+            reason = f"leg {leg} ({name}) already starts beyond its turning point {turn.describe()}"
             raise cycle.make_path_error(NotConverged(reason))
         yield from cycle.follow_leg(leg, [target])
         progress.report_position(f"turning point {turn.describe()}", cycle.state)
@@ -81,7 +83,7 @@ def follow_cycle(
 
 @dataclass(eq=False)
 class _Cycle:
-    """Contact on a cyclic path: its state, and what decides the length of its next step.
+    """State of a contact on a cyclic path, and the values that determine the length of the next step.
 
     Attributes
     ----------
@@ -91,10 +93,10 @@ class _Cycle:
     state : last equilibrium.
     leg : number of the leg, even on loading and odd on unloading.
     step_length : length of the next step, m.
-    event_at : end of the shortest step found so far that contains the next event, as direction times separation, m; inf
-        if no event is known. Only of models that do not predict steps.
-    ahead : equilibria at the ends of steps that were too long, the next one last; only of models that predict steps.
-    longest_part : longest step since there were no such equilibria, m.
+    event_at : end of the shortest trial step that contains the next event, as direction times separation, m; inf if no
+        event is known, and always for models that predict steps.
+    ahead : equilibria at the ends of trial steps that were too long, the next one last (models that predict steps).
+    longest_part : longest step so far of those into which the last trial step is divided, m.
     accuracy : sums over all steps so far, and the accuracy that further steps need.
     stations : separations visited on loading, which unloading will visit again, ascending, m.
     """
@@ -112,7 +114,7 @@ class _Cycle:
     stations: list[float] = field(default_factory=list)
 
     def __post_init__(self):
-        """Set the longest step as the default, and the sums to zero."""
+        """Start with the longest step, and with sums of zero."""
         self.step_length, self.accuracy = self.longest, StepAccuracy(self.contact, self.longest)
 
     @property
@@ -122,7 +124,7 @@ class _Cycle:
 
     @property
     def event_length(self) -> float:
-        """Length of a step at which an event counts as resolved, m."""
+        """Step length, m, up to which an event in the step counts as located."""
         return self.contact.path_accuracy.event * self.contact.rms_height
 
     @property
@@ -137,7 +139,7 @@ class _Cycle:
     def follow_leg(
         self, leg: int, targets: list[TargetFunction], until_apart: bool = False
     ) -> Generator[Waypoint, TargetFunction | None, None]:
-        """Yield the equilibria of a leg until all targets are met or, with `until_apart`, until nothing touches."""
+        """Follow one leg to all its targets or, with `until_apart`, to complete separation; yield all waypoints."""
         self.leg, self.event_at, self.longest_part = leg, np.inf, 0.0
         self.ahead.clear()
         pending, sent = sort_targets(targets, self.direction), None
@@ -194,7 +196,7 @@ class _Cycle:
             self.stations = sorted({*self.stations, *new})
 
     def _advance(self, step, state):
-        """Move on to the state at the end of a step, and return its waypoint without a target."""
+        """Make the end of a step the present state, and return its waypoint without a target."""
         self.accuracy.add(step, state)
         self.progress.record_equilibrium(state, self.loading)
         self.state = state
@@ -202,20 +204,21 @@ class _Cycle:
         return waypoint_without_target(state, self.leg, step)
 
     def _keep(self, state):
-        """Keep an equilibrium ahead of the path as the end of a later step, if the model predicts steps."""
+        """If the model predicts steps, keep an equilibrium in `ahead`, because it may be the end of a later step."""
         if self.contact.path_accuracy.predicts_steps:
             self.ahead.append(state)
 
     def _is_behind(self, state):
-        """Return whether a state lies behind the present one in the direction of the leg."""
+        """Return whether a state lies behind the present state in the direction of the leg."""
         return self.direction * (state.separation - self.state.separation) < 0
 
     def find_next_equilibrium(self, length: float) -> tuple[State, Step]:
-        """Find the next equilibrium by a step that is so short that its work is known; return it and the step.
+        """Find the next equilibrium by a step so short that its work is known; return the equilibrium and the step.
 
-        The step is halved until an equilibrium is found, and until its work is known or its length is at most
-        `event_length`. If the tension has a new maximum within the step, the step ends at the maximum. If the model
-        predicts steps, the ends of steps that were too long are tried again as ends of later steps.
+        The step is halved until the solver finds an equilibrium. Then the step is halved until its work and its largest
+        tension are known accurately enough, or until its length is at most `event_length`. If the tension has a new
+        maximum within the step, the step ends at the maximum. If the model predicts steps, the ends of steps that were
+        too long are tried again as ends of later steps.
 
         length : length of the first trial step, m.
         """
@@ -236,7 +239,7 @@ class _Cycle:
             sharp = length <= self.event_length or passed
             if sharp or (accuracy.is_work_known(state, step) and accuracy.is_tension_known(start, state, step)):
                 if ahead is not None and abs(step.loss) > accuracy.allowed_unknown_work(step):
-                    ahead = None  # a jump must be that of a front that starts from here
+                    ahead = None  # after a loss of energy, the equilibrium is found from the present state
                     continue
                 if step.has_jump:
                     self.event_at = np.inf
@@ -253,11 +256,12 @@ class _Cycle:
             self.step_length = min(self.step_length, length)
 
     def _find_equilibrium(self, separation, length, ahead=None):
-        """Find the equilibrium at the end of a step of this length, or take the one ahead; separation and length in m.
+        """Find the equilibrium at a separation, m, at the end of a step of a given length, m.
 
-        On unloading all spots may lose their equilibrium together before any of them has reached its own jump-off. Then
-        the spot closest to jump-off breaks contact. If there is still no equilibrium, the closest two, four, … spots
-        break contact.
+        If the state `ahead` is given, this state is the equilibrium, and only its events are found. On unloading the
+        spots together may lose their equilibrium before any single spot has reached its own jump-off. If this
+        happens in a very short step, the spot closest to jump-off breaks contact. If there is still no equilibrium, the
+        two, four, … spots closest to jump-off break contact.
         """
         contact, start = self.contact, self.state
         if ahead is not None:
@@ -277,7 +281,7 @@ class _Cycle:
         raise first
 
     def _halve_step(self, length, failure):
-        """Return half the length of a step whose solve failed, m; the next step is not longer either."""
+        """Return half the length, m, of a step without an equilibrium, and limit the next step to this length."""
         length = self.progress.halve_step(length, failure, self.state, self.loading)
         self.step_length = min(self.step_length, length)
         return length
@@ -285,9 +289,9 @@ class _Cycle:
     def _choose_next_length(self, step):
         """Return the length of the next step after a step, m.
 
-        If the model does not predict steps, a step is twice as long as the last one. Otherwise it is twice as long as
-        the longest of the steps into which the last trial step was divided. If the last trial step was not divided, the
-        next one is as long, or twice as long if its error would not be too large.
+        If the model does not predict steps, the next step is twice as long as the last step. Otherwise the next step is
+        twice as long as the longest of the steps into which the last trial step was divided. If the last trial step was
+        not divided, the next step is equally long, or twice as long if the error would be small enough.
         """
         longer = min(self.longest, 2 * self.step_length)
         if not self.contact.path_accuracy.predicts_steps:
@@ -302,16 +306,16 @@ class _Cycle:
         return min(self.longest, 2 * part)
 
     def _is_apart(self):
-        """Return whether there are no spots and the separation is at least that of first contact."""
+        """Return whether there are no spots and the separation is at least the separation of first contact."""
         if self.contact.spot_count(self.state):
             return False
         highest = self.contact.untouched().separation - SAME_SEPARATION * self.contact.rms_height
         return self.state.separation >= highest
 
     def _is_new_station(self, separation, last):
-        """Return whether a separation is so far from the last station that it is a new one.
+        """Return whether a separation, m, is far enough from the last station to be a new station.
 
-        So not all of the short steps around an event become stations.
+        Without this minimum distance, all the short steps around an event would become stations.
         """
         contact = self.contact
         between = self.longest / 64 if contact.adhesive else SAME_SEPARATION * contact.rms_height

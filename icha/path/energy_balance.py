@@ -1,7 +1,7 @@
 """Energy balance of a path: the work of every step, the stored energy, and the losses in jumps and unions.
 
 Between two events the stored energy changes by the work done. An event changes the stored energy at constant
-separation, and the energy that it releases is lost. Over a closed path the losses of all events add up to the area of
+separation, and the released energy is lost. Over a closed path the losses of all events add up to the area of
 the hysteresis loop in a diagram of pressure against separation.
 """
 
@@ -17,16 +17,16 @@ from icha.contact.model import COALESCENCE, JUMP_IN, JUMP_OFF, SPLIT, ContactMod
 from icha.path.targets import BETWEEN, Target
 
 # In these functions du and dp are the changes of the separation (m) and of the pressure (Pa) in a step; slope and
-# end_slope are dp/du at its ends, Pa/m.
+# end_slope are dp/du at the start and at the end of the step, Pa/m.
 
 
 def pressure_jump(du, dp, slope, end_slope):
-    """Return the change of pressure in a step minus that by the mean stiffness of its ends: the part by events, Pa."""
+    """Return the change of pressure by the events of a step, Pa: the total change minus that by the mean stiffness."""
     return dp - 0.5 * du * (slope + end_slope)
 
 
 def unresolved_work(du, pressure_jump):
-    """Return the largest error of the work of a step whose events may happen anywhere in it, J/m^2."""
+    """Return the largest error of the work of a step because its events may happen anywhere in the step, J/m^2."""
     return 0.5 * abs(du * pressure_jump)
 
 
@@ -35,15 +35,15 @@ def integration_error(du, slope, end_slope):
     return du**2 * abs(end_slope - slope) / 24
 
 
-# If the loss of a step exceeds this fraction of its work, a jump causes it, and not the error of the interaction.
+# If the loss of a step exceeds this fraction of the work, jumps cause the loss, and not the error of the interaction.
 _CERTAIN_LOSS = 0.1
 
 
 def _extrapolate_to_full_contact(du, p, q, slope, end_slope):
-    """Return finite pressures p, q and slopes at both ends of a step from or to full contact, and its work error.
+    """Return finite pressures and slopes at both ends of a step from or to full contact, and the error of the work.
 
-    Full contact is infinitely stiff: its pressure does no work, and jumps where contact closes or opens. At the end of
-    the step that is in full contact, the pressure is extrapolated along the tangent at the other end.
+    Full contact is infinitely stiff: its pressure does no work, and jumps when the last gap closes or the first gap
+    opens. The pressure in full contact is replaced by an extrapolation along the tangent at the other end of the step.
     """
     if np.isinf(slope) and np.isinf(end_slope):
         return p, q, 0.0, 0.0, 0.0
@@ -62,7 +62,7 @@ class Step:
     work : work done on the contact, -(integral of p du), J/m^2.
     stored : change of the stored energy, J/m^2.
     pressure_jump : change of the pressure that the stiffnesses at both ends do not explain, Pa.
-    integration_error : estimated error of the work without events, J/m^2.
+    integration_error : estimated error of the work by the numerical integration, without events, J/m^2.
     has_jump : whether there are events that may change the pressure.
     events : events of the step.
     """
@@ -79,8 +79,8 @@ class Step:
     def between(cls, contact: ContactModel, before: State, after: State) -> Step:
         """Return the step from one state to the next.
 
-        The work is the integral of the cubic with the pressures and stiffnesses of both ends. This is exact if jumps of
-        the pressure are in the middle of the step.
+        The work is the integral of the cubic polynomial that has the pressures and stiffnesses of both states. If the
+        pressure jumps in the middle of the step, this work is exact.
         """
         events = events_between(before, after)
         du = after.separation - before.separation
@@ -103,24 +103,24 @@ class Step:
 
     @property
     def has_union(self) -> bool:
-        """True if spots have coalesced or split."""
+        """True if spots have coalesced or unions have split in the step."""
         return self.events.count(COALESCENCE) + self.events.count(SPLIT) > 0
 
     @property
     def loss(self) -> float:
-        """Work that is not stored, J/m^2."""
+        """Energy that is lost in the step, J/m^2: work minus change of the stored energy."""
         return self.work - self.stored
 
     @property
     def unresolved(self) -> float:
-        """Largest error of the work because events may happen anywhere in the step, J/m^2."""
+        """Largest error of the work, J/m^2, because the events may happen anywhere in the step."""
         return unresolved_work(self.separation_change, self.pressure_jump) if self.has_jump else 0.0
 
     @property
     def unknown_work(self) -> float:
-        """Largest error of the work if the pressure may also jump anywhere without an event, J/m^2.
+        """Largest error of the work, J/m^2, if the pressure may jump anywhere in the step even without an event.
 
-        If nothing is lost, the work is the change of the stored energy, which is exact.
+        If no energy is lost, the work is the change of the stored energy, which is exact.
         """
         jump = unresolved_work(self.separation_change, self.pressure_jump)
         return min(max(jump, self.integration_error), abs(self.loss))
@@ -132,15 +132,15 @@ class Step:
 
 @dataclass(frozen=True)
 class EnergyBalance:
-    """Work done on a contact since first contact, and its losses by kind of event, all J/m^2.
+    """Work done on a contact since first contact, and the losses by each kind of event, all in J/m^2.
 
     Attributes
     ----------
     work : work done on the contact.
     jump_in, jump_off : losses by jumps into and out of contact.
-    coalescence : loss by unions of spots and by their splitting.
-    load_jump : loss by jumps at constant load, under load control.
-    unattributed : all other losses: errors of the integration, and errors because the interaction is not reciprocal.
+    coalescence : loss by the coalescence of spots and by the splitting of unions.
+    load_jump : loss by jumps at constant load, which happen only under load control.
+    unattributed : all other losses, due to errors of the integration, and to the interaction, which is not reciprocal.
     """
 
     work: float = 0.0
@@ -153,11 +153,12 @@ class EnergyBalance:
     def add_step(self, contact: ContactModel, step: Step) -> EnergyBalance:
         """Return the balance after one more step.
 
-        In a step without unions the whole loss is attributed to its jumps if it is within a factor of two of the energy
-        that the same spots would lose alone, or more than a tenth of the work. Jumps in and jumps off then share it in
-        proportion to the energy that they would lose alone. In all other steps, and if one kind of jump gains energy
-        and the other loses energy, each jump is attributed the energy that its spot would lose alone. The rest is a
-        loss by coalescence if spots have united or split, and otherwise unattributed.
+        Every jump has a reference loss: the energy that it would release if its spot were alone. If no spots have
+        united or split in the step, the whole loss is attributed to jumps in one of two cases: the loss is within a
+        factor of two of the sum of the reference losses, or the loss is more than a tenth of the work. Jumps in and
+        jumps off then share the loss in proportion to their reference losses. In all other steps, or if the reference
+        losses of both kinds of jump have different signs, each kind of jump has its reference loss. The rest is a loss
+        by coalescence if spots have united or split, and otherwise unattributed.
         """
         events, united = step.events, step.has_union
         jump_in, jump_off = (
@@ -179,7 +180,7 @@ class EnergyBalance:
         )
 
     def add_load_jump(self, contact: ContactModel, before: State, after: State, pressure: float) -> EnergyBalance:
-        """Return the balance after a jump at a constant pressure, Pa; this pressure does work."""
+        """Return the balance after a jump between two states at constant pressure, Pa; the pressure does work."""
         work = -pressure * (after.separation - before.separation)
         stored = contact.stored_energy(after) - contact.stored_energy(before)
         return replace(self, work=self.work + work, load_jump=self.load_jump + work - stored)
@@ -194,8 +195,8 @@ class Waypoint:
     target : target that the state meets; a target of kind BETWEEN for a state between two targets.
     state : state of the contact.
     leg : number of the leg of the path: 0 for the first loading, 1 for the first unloading, and so on.
-    step : step from the waypoint before, on a cyclic path.
-    balance : energy balance, on a cyclic path.
+    step : step from the last waypoint to this waypoint; only on a cyclic path.
+    balance : energy balance from first contact to this waypoint; only on a cyclic path.
     """
 
     target: Target
@@ -225,20 +226,20 @@ def summarise_loop(
     summit_pull_off_pressure: float,
     unattributed: float,
 ) -> dict[str, float]:
-    """Return pull-off, detachment and losses of a closed loop, by the names of their variables.
+    """Return pull-off, detachment and losses of a loop that ends without contact, as a dictionary by variable name.
 
     Parameters
     ----------
-    rows : equilibria of the path in order, each with pressure, separation, area and energies by their names.
+    rows : one row for each equilibrium of the path, in order: pressure, separation, area and energies by variable name.
     pull_off_row : index of the row with the largest tension of the last unloading.
     material : material of the contact.
-    summit_pull_off_pressure : tension if all summits pulled with their pull-off force at once, Pa.
-    unattributed : loss that belongs to no kind of event, J/m^2.
+    summit_pull_off_pressure : nominal tension if all summits had their pull-off force at the same time, Pa.
+    unattributed : loss that is not attributed to any kind of event, J/m^2.
     """
     last, adhesive = rows[-1], material.surface_energy > 0
     touching = rows[max((k for k, row in enumerate(rows) if row["spot_count"]), default=0)]
     tension = max(0.0, -rows[pull_off_row]["nominal_pressure"])
-    # No energy is stored at either end of the loop.
+    # No energy is stored at the start and at the end of the loop, so the whole work is lost.
     loss = last["work"]
     losses = {f"loss_{name}": last[f"dissipated_{name}"] for name in _LOSSES}
     return {

@@ -1,4 +1,4 @@
-"""Follow a path from first contact to its targets, which are met exactly, and through unloading."""
+"""Follow a path: find the equilibria from first contact through all targets, and through unloading if required."""
 
 from collections.abc import Callable, Generator, Iterator
 from dataclasses import replace
@@ -12,22 +12,24 @@ from icha.path.targets import BETWEEN, LOAD_CONTROL, REDUCED_PRESSURE, Path, Tar
 
 
 def follow(contact: ContactModel, path: Path, report: Callable[[str], None] | None = None) -> Iterator[Waypoint]:
-    """Follow a path and yield its waypoints in the order in which they are met.
+    """Follow a path with a contact, and yield the waypoints in the order of the path.
 
-    A path that ends with the first loading yields its targets; a cyclic path yields all its equilibria.
+    For a path that ends with the first loading, the waypoints are the equilibria at the targets. For a cyclic path, the
+    waypoints are all equilibria; under load control only the equilibria that load control visits. Targets are met
+    exactly.
 
     Parameters
     ----------
     contact : contact to follow.
     path : targets and turning points.
-    report : called with a line of text at every target.
+    report : function that is called with a line of text at every target; None for no reports.
 
     Raises
     ------
     NotConverged
-        If an equilibrium is not found even with short steps, if the model does not cover a state of the path, or if a
-        target lies inside a jump. On the first loading, this last error is raised after the other targets have been
-        met. The last unloading omits targets inside jumps without an error.
+        If an equilibrium is not found even with short steps, if the model is not valid in a state of the path, or if a
+        target lies inside a jump. On the first loading, the error for a target inside a jump is raised after the other
+        targets have been met. On the last unloading, targets inside jumps are left out without an error.
     """
     longest = path.max_step * contact.rms_height
     record = PathProgress(contact, len(path.targets), longest, report)
@@ -40,7 +42,7 @@ def follow(contact: ContactModel, path: Path, report: Callable[[str], None] | No
 
 
 def _add_balances(contact, waypoints):
-    """Yield the waypoints of a path under separation control, with the energy balance added to each."""
+    """Yield the waypoints of a path under separation control, each with its energy balance."""
     balance = EnergyBalance()
     for waypoint in waypoints:
         if waypoint.step is not None:
@@ -51,17 +53,18 @@ def _add_balances(contact, waypoints):
 def select_load_control(
     contact: ContactModel, cycle: Generator[Waypoint, TargetFunction | None, None]
 ) -> Iterator[Waypoint]:
-    """Select the states of a cycle under separation control that load control visits, with their energy balances.
+    """Yield only those waypoints of a cycle that load control visits, with their energy balances.
 
-    Where the pressure turns back, load control cannot follow the curve. The state then jumps at constant pressure to
-    the next state of the curve with the same pressure, or to the state without contact. The states between are left
-    out; their events belong to the state after the jump. To meet this state exactly, its pressure is sent to the cycle
-    as an additional target.
+    The cycle is under separation control. Where its pressure falls on loading or rises on unloading, load control
+    cannot follow the curve of pressure against separation. The state then jumps at constant pressure to the next state
+    of the curve with the same pressure, or to the state without contact. The states in between are left out, and their
+    events belong to the state after the jump. To find this state exactly, its pressure is sent to the cycle as an
+    additional target.
 
     Parameters
     ----------
     contact : contact of the cycle.
-    cycle : generator of waypoints under separation control, which takes a target to meet in addition to its own.
+    cycle : generator of the waypoints under separation control; it accepts additional targets (`generator.send`).
     """
     visited: State | None = None
     left_out: Waypoint | None = None
@@ -76,7 +79,7 @@ def select_load_control(
         state = waypoint.state
         pressure = contact.pressure(state)
         advances = pressure >= level if waypoint.loading else pressure <= level
-        # The second of two targets at the same load may have a slightly smaller load.
+        # If two targets have the same load, rounding may make the load of the second target slightly smaller.
         advances |= waypoint.target.kind != BETWEEN and abs(pressure - level) <= SAME_EXCESS * abs(level)
         landed = landing is not None and waypoint.target is landing.target
         # The first state is always visited, because a jump can only start from a visited state.

@@ -23,13 +23,14 @@ from icha.path.targets import Target
 
 # Shortest step after halvings, relative to the longest step.
 _SMALLEST_STEP = 2.0**-14
-# Largest number of equilibria within one longest step and without a target. A path with more makes no progress.
+# Largest number of equilibria without a target while the separation changes by less than the longest step. A path with
+# more equilibria makes no progress.
 _MOST_EQUILIBRIA = 2000
 
 
 @dataclass(eq=False)
 class PathProgress:
-    """Record of a path's progress, which makes the error of a path that cannot continue.
+    """Progress of a path: counts equilibria and targets, reports targets, and makes the exceptions of the path.
 
     Attributes
     ----------
@@ -39,8 +40,8 @@ class PathProgress:
     report : function that is called with a line of text at every target; None for no reports.
     reached : number of targets met so far.
     skipped : errors of the targets that lie inside jumps.
-    mark : separation that a path without progress does not leave by one longest step, m.
-    idle : number of equilibria since the last target or since `mark` was set.
+    mark : reference separation, m; a path makes progress when its distance from `mark` is at least one longest step.
+    idle : number of equilibria since the last target, or since `mark` was set.
     """
 
     contact: ContactModel
@@ -60,7 +61,7 @@ class PathProgress:
         if self.idle == _MOST_EQUILIBRIA:
             within = f"{self.longest / self.contact.rms_height:.3g} h_rms"
             raise self.make_path_error(
-                state, loading, NotConverged(f"no progress: {self.idle} equilibria within {within}")
+                state, loading, NotConverged(f"no progress: {self.idle} equilibria within {within} of separation")
             )
         self.idle += 1
 
@@ -83,10 +84,11 @@ class PathProgress:
     ) -> None:
         """Raise `NotConverged` if the model is not valid in the state after a step.
 
-        The mean planes must not meet between targets, unless the model is valid up to full contact. At a target they
-        may meet, because the range of targets is limited already.
+        Between targets the mean gap must be positive, unless the model is valid up to full contact. At a target the
+        mean gap may be negative, because the range of targets is already limited.
 
-        target : the target that the state meets, if there is one; pending : sorted targets that are not met yet.
+        target : target that the state after the step meets; None if there is no such target.
+        pending : targets that are not met yet, sorted.
         """
         contact = self.contact
         ahead = target or (pending[0] if pending else None)
@@ -100,16 +102,16 @@ class PathProgress:
             raise self.make_path_error(after, loading, NotConverged(reason))
 
     def halve_step(self, step: float, failure: NotConverged, state: State, loading: bool) -> float:
-        """Return half the length of a step, m, whose solve failed; raise the path's error if this is too short."""
+        """Return half the length, m, of a step without an equilibrium; raise `NotConverged` if that is too short."""
         if step / 2 < _SMALLEST_STEP * self.longest:
             raise self.make_path_error(state, loading, failure) from failure
         return step / 2
 
     def make_path_error(self, state: State, loading: bool, *failures: NotConverged) -> NotConverged:
-        """Return the exception for a path that cannot continue after a state; it states if the surface is sticky."""
+        """Return the exception for a path that cannot continue after a state; its message names sticky surfaces."""
         contact, failures = self.contact, (*self.skipped, *failures)
         sticky = ""
-        # Adhesion alone has spread the contact, or prevents the first equilibrium.
+        # A surface is sticky if adhesion alone has spread the contact, or has prevented the first equilibrium.
         no_equilibrium = contact.spot_count(state) == 0 and not any(isinstance(each, InsideJump) for each in failures)
         if contact.adhesive and loading and (contact.pressure(state) < 0 or no_equilibrium):
             reason = "no equilibrium exists after first contact" if no_equilibrium else "the load is still tensile"
@@ -132,10 +134,10 @@ _PATIENCE = 8
 def first_loading(
     contact: ContactModel, targets: list[TargetFunction], longest: float, progress: PathProgress
 ) -> Iterator[Waypoint]:
-    """Yield the waypoint at every target of a path that ends with the first loading; errors as of `follow`.
+    """Follow a path that ends with the first loading, and yield a waypoint for every target.
 
-    If a target is expected within the next step, the solver looks for it directly. Otherwise the separation decreases
-    by one step, m, which is at most `longest`.
+    If a target is expected within the next step, the solver looks directly for the state at this target. Otherwise the
+    separation decreases by one step, which is at most `longest`, m. Raise the errors of `icha.path.follow.follow`.
     """
     state = first_contact = contact.untouched()
     pending, step, failed_trials, successes = sort_targets(targets, -1), longest, 0, 0
@@ -182,7 +184,7 @@ def first_loading(
 
 
 def _solve_within_step(target, expected, pending, state, step) -> State | None:
-    """Return the state at a target; None if it is not within a step, m, or another pending target comes first."""
+    """Return the state at a target; None if this state is not within a step, m, or another target comes first."""
     try:
         found = target.solve(state, expected)
     except NotConverged:

@@ -1,4 +1,4 @@
-"""States of a path as a configuration names them."""
+"""Snapshots in a configuration: states of a path whose distributions are saved."""
 
 from pydantic import Field, model_validator
 
@@ -10,13 +10,13 @@ AreaFraction = number(QUANTITIES["area_fraction"].rule)
 
 
 class Snapshot(Section):
-    """A state whose spots and distributions of gap and pressure are saved: exactly one of the four keys."""
+    """A state whose spots and distributions of gap and pressure are saved. Give exactly one of the four keys."""
 
     reduced_pressure: ReducedPressure | None = Field(  # type: ignore[valid-type]
-        default=None, description="At this p/(E* h'rms)."
+        default=None, description="At this reduced pressure p/(E* h'rms)."
     )
     relative_load: Positive | None = Field(
-        default=None, description="At this p/E* = F/(E* A0), the same load for surfaces of different slope."
+        default=None, description="At this relative load p/E* = F/(E* A0), independent of the slope of the surface."
     )
     area_fraction: AreaFraction | None = Field(  # type: ignore[valid-type]
         default=None, description="At this contact area fraction A/A0."
@@ -27,6 +27,6 @@ class Snapshot(Section):
 
     @property
     def kind_and_value(self) -> tuple[str, float]:
-        """Kind and value (SI units) of the state."""
+        """Key and value (SI units) that define the state."""
         ((kind, value),) = self.model_dump(exclude_none=True).items()
         return kind, value

@@ -1,4 +1,4 @@
-"""Targets as functions of the contact state, and the equilibrium that meets a target between two states."""
+"""Targets as functions of the state of a contact, and the search for the equilibrium at a target."""
 
 from collections.abc import Iterable
 from contextlib import suppress
@@ -13,28 +13,28 @@ from icha.path.targets import LEAST_PRESSURE, MEAN_SEPARATION, Target
 SAME_EXCESS = 1e-9
 # Largest difference of two separations, in h_rms, that rounding can cause. A narrower bracket contains a jump.
 SAME_SEPARATION = 1e-10
-# Widest bracket, in h_rms, in which a failed solve means that there is a jump, because da/d(delta) is infinite there.
+# If the solver fails in a bracket narrower than this, in h_rms, the bracket contains a jump (da/d(delta) is infinite).
 CLOSE_TO_A_JUMP = 1e-4
 # Largest number of times that a bracket is halved.
 _MAX_HALVINGS = 80
 # The solver tries to meet the target before each of the first nine halvings, then only before the 17th, 33rd and 65th,
 # because a target that was missed so often usually lies inside a jump.
 _TRIALS = 8
-# Largest change of load or area between two states without a jump, over that by the slope at one of them.
+# Largest change of load or area between two states without a jump, over the change by the slope at one of the states.
 _LARGEST_BEND = 4.0
 
 
 @dataclass(frozen=True, eq=False)
 class TargetFunction:
-    """Target of a contact as a function of its state: the excess is zero at the target and increases on loading."""
+    """Target of a path with a contact; `excess` is a function of the state that is zero at the target."""
 
     target: Target
     contact: ContactModel
 
     def excess(self, state: State) -> float:
-        """Return by how much the state exceeds the target, relative to the target; negative before the target.
+        """Return by how much a state exceeds the target, relative to the target value; the excess rises on loading.
 
-        For a separation it is relative to h_rms, for a load of zero to LEAST_PRESSURE.
+        The excess over a mean separation is relative to h_rms, and over a load of zero to LEAST_PRESSURE.
         """
         quantity, value = self.target.quantity, self.target.value
         if quantity.controlled is None:
@@ -50,7 +50,7 @@ class TargetFunction:
         return self.target.quantity.control(self.contact, self.target.value)
 
     def predict_separation(self, state: State) -> float:
-        """Return the separation, m, at which an exponential extrapolation of load or area meets the target, or -inf."""
+        """Return the separation, m, at which load or area, extrapolated exponentially, meet the target; or -inf."""
         control = self.control
         if control is None:
             return self.target.value
@@ -63,21 +63,21 @@ class TargetFunction:
 
 
 def sort_targets(targets: Iterable[TargetFunction], direction: int) -> list[TargetFunction]:
-    """Sort targets so that those of each kind are in the order in which a path meets them.
+    """Return a list of targets in which targets of the same kind have the order in which a path meets them.
 
     direction : direction of the separation: -1 on loading, 1 on unloading.
     """
 
-    def place(function):
+    def sort_key(function):
         """Return a number that is smaller for targets that the path meets earlier."""
         value = function.target.value
         return direction * (value if function.target.kind == MEAN_SEPARATION else -value)
 
-    return sorted(targets, key=place)
+    return sorted(targets, key=sort_key)
 
 
 def next_of_each_kind(pending: Iterable[TargetFunction]) -> list[TargetFunction]:
-    """Return the first target of every kind from sorted targets, as a list."""
+    """Return a list of the first target of every kind in a sorted list of targets."""
     first: dict[str, TargetFunction] = {}
     for each in pending:
         first.setdefault(each.target.kind, each)
@@ -85,10 +85,10 @@ def next_of_each_kind(pending: Iterable[TargetFunction]) -> list[TargetFunction]
 
 
 class InsideJump(NotConverged):
-    """Error: the path jumps over the target, and no equilibrium meets it."""
+    """Error: the path jumps over the target, and no equilibrium has the value of the target."""
 
     def __init__(self, target: TargetFunction, before: State, after: State):
-        """Describe the jump over a target from the state before it to a state after it."""
+        """Write the message about a target that lies between the states before and after a jump."""
         contact = target.contact
         low, high = (contact.area_fraction(state) for state in (before, after))
         super().__init__(
@@ -103,10 +103,10 @@ class InsideJump(NotConverged):
 def find_target_state(target: TargetFunction, before: State, after: State) -> State:
     """Find the state at a target that lies between two states of the path, on loading or unloading.
 
-    The bracket of the two states is halved until the solver meets the target inside it. If an event changes the
-    quantity beyond its target, the bracket becomes very narrow. Then the solver looks for the target on the branch
-    after the event, where load control would continue. Raise `InsideJump` if no equilibrium on that branch meets the
-    target, and `NotConverged` if an equilibrium far from any jump is not found.
+    The interval between the two states is halved until the solver finds the state at the target inside the interval. If
+    an event changes the prescribed quantity beyond the target, the interval becomes very narrow. Then the solver looks
+    for the target on the branch after the event, where load control would continue. Raise `InsideJump` if there is no
+    such equilibrium. Raise `NotConverged` if an equilibrium far from any jump is not found.
     """
     contact = target.contact
     if target.control is None:
@@ -139,7 +139,7 @@ def find_target_state(target: TargetFunction, before: State, after: State) -> St
 
 
 def _is_near(target, before, after):
-    """Return whether the slope of load or area at one of two states leads to the target between them, or nearly so."""
+    """Return whether load or area may reach the target between two states without a jump, according to its slopes."""
     control, contact, width = target.control, target.contact, abs(after.separation - before.separation)
     value = contact.pressure if control.quantity == PRESSURE else contact.area_fraction
     return any(
@@ -159,7 +159,7 @@ def _solve_after_jump(target, before, after):
 def _guess_separation(target, before, after):
     """Return a guess of the separation at a target between two states, m.
 
-    It is extrapolated to a positive target on loading, and otherwise interpolated.
+    For a positive target on loading, the guess is extrapolated from the first state; otherwise it is interpolated.
     """
     if after.separation < before.separation and target.target.value > 0:
         return max(target.predict_separation(before), after.separation)

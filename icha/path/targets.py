@@ -11,13 +11,13 @@ from icha.contact.model import AREA_FRACTION as CONTROLLED_AREA
 from icha.contact.model import PRESSURE, ContactModel, Control, State
 from icha.support.rules import LENGTH, NUMBER, POSITIVE, FloatRange
 
-# Largest reduced pressure and area fraction of a target with the asperity model. Above them spots are not separate, and
-# the mean planes of a surface without adhesion soon meet.
+# Largest reduced pressure and area fraction of a target with the asperity model. At larger values the spots are not
+# separate, and without adhesion the mean gap soon becomes zero.
 MAX_REDUCED_PRESSURE = 0.15
 MAX_AREA_FRACTION = 0.25
-# Largest reduced pressure of any target. Rough surfaces are in full contact at about 1.
+# Largest reduced pressure of any target. Rough surfaces are in full contact at a reduced pressure of about 1.
 LARGEST_REDUCED_PRESSURE = 100.0
-# Smallest reduced pressure (other than zero) and area fraction. Smaller ones are below the error of an equilibrium.
+# Smallest reduced pressure (other than zero) and area fraction. Smaller values are below the error of an equilibrium.
 LEAST_PRESSURE, LEAST_AREA = 1e-12, 1e-9
 # Limits and default value of the longest step of the mean separation, in h_rms. With the smallest step a path has about
 # ten thousand equilibria.
@@ -32,14 +32,14 @@ STEP = FloatRange("h_rms", least=MIN_STEP, most=MAX_STEP)
 
 @dataclass(frozen=True)
 class TargetQuantity:
-    """A quantity that a target prescribes.
+    """Quantity that a target prescribes.
 
     Attributes
     ----------
     name : name in targets and in files; with an s at the end, the argument of `Path` for a list of such targets.
     rule : range of values that a target may have.
-    controlled : PRESSURE or AREA_FRACTION if the solver prescribes it; None if the quantity is the mean separation.
-    pressure_unit : name of the attribute of the contact by which a pressure is divided; empty for other quantities.
+    controlled : PRESSURE or AREA_FRACTION if the solver prescribes this quantity; None for the mean separation.
+    pressure_unit : attribute of the contact that is the unit of a pressure; empty for other quantities.
     """
 
     name: str
@@ -48,17 +48,17 @@ class TargetQuantity:
     pressure_unit: str = ""
 
     def scale(self, contact: ContactModel) -> float:
-        """Return the unit of the value of a target: a pressure, Pa, or 1."""
+        """Return the factor from the value of a target to SI units: a pressure, Pa, or 1."""
         return getattr(contact, self.pressure_unit) if self.pressure_unit else 1.0
 
     def evaluate(self, contact: ContactModel, state: State) -> float:
-        """Return the value of the quantity in a state, in the unit of targets."""
+        """Return the value of the quantity in a state, in the same unit as the value of a target."""
         if self.controlled == PRESSURE:
             return contact.pressure(state) / self.scale(contact)
         return state.separation if self.controlled is None else contact.area_fraction(state)
 
     def control(self, contact: ContactModel, value: float) -> Control | None:
-        """Return the load or area that the solver prescribes for a value of a target; None for a separation."""
+        """Return the load or area that the solver must prescribe for a target value; None for a separation."""
         return None if self.controlled is None else Control(self.controlled, value * self.scale(contact))
 
 
@@ -81,7 +81,7 @@ QUANTITIES = {
     )
 }
 LOADS = (REDUCED_PRESSURE, RELATIVE_LOAD)
-# Kind of the target of an equilibrium between two targets. Its value is the mean separation.
+# Kind of the target of an equilibrium between two targets. The value of this target is the mean separation.
 BETWEEN = "path"
 # Kinds whose values are in m; all others have no unit.
 IN_METRES = (MEAN_SEPARATION, BETWEEN)
@@ -120,20 +120,21 @@ class Path:
 
     Parameters
     ----------
-    reduced_pressures : p/(E* h'_rms), increasing, in [1e-12, 100]; with the asperity model up to 0.15.
-    area_fractions : A/A0, increasing, in [1e-9, 1]; with the asperity model up to 0.25.
-    mean_separations : u in m, decreasing, in [1e-24, 1e9]. Exactly one of these three lists is given.
+    reduced_pressures : values of p/(E* h'_rms), increasing, in [1e-12, 100]; with the asperity model at most 0.15.
+    area_fractions : values of A/A0, increasing, in [1e-9, 1]; with the asperity model at most 0.25.
+    mean_separations : values of u in m, decreasing, in [1e-24, 1e9]. Give exactly one of these three lists.
     snapshots : pairs (kind, value), in any order, of states whose distributions and spots are stored. The kind is
         "reduced_pressure", "relative_load" (F/(E* A0)), "area_fraction" or "mean_separation" (m). A snapshot is an
         additional target unless the list contains the same kind and value. Snapshots are in the dataset in the order
-        in which the path reaches them. None: the last target of the list.
+        in which the path reaches them. Default: the last target of the list.
     turning_points : pairs (kind, value) at which the path turns after its last target: the first one ends unloading,
-        the second one ends loading, and so on. Kinds as for snapshots; loads may be tensile (negative) or zero.
+        the second one ends loading, and so on. The kinds are those of snapshots. Loads that end unloading may be
+        tensile (negative) or zero.
     unload : whether the path ends with complete separation. Unloading meets the targets again, except those above
         first contact.
     control : "separation": the mean separation is prescribed. "load": the load is prescribed, and all targets and
-        turning points must be loads. The path follows the same curve of pressure against separation, but where the
-        pressure of this curve turns back, the state jumps at constant load.
+        turning points must be loads. The path then follows the same curve of pressure against separation, but jumps at
+        constant load where the pressure falls on loading or rises on unloading.
     max_step : longest change of the mean separation between two equilibria, in units of h_rms, in [1e-4, 0.5].
 
     Raises
@@ -188,7 +189,7 @@ class Path:
         )
 
     def within_asperity_range(self) -> Path:
-        """Return the path without the targets above the range of the asperity model."""
+        """Return a copy of the path without the targets outside the range of the asperity model."""
         path, ranges = copy.copy(self), ASPERITY_RANGES
         within = (t for t in self.targets if t.kind not in ranges or ranges[t.kind].contains(t.value))
         vars(path).update(targets=tuple(within))
@@ -201,7 +202,7 @@ class Path:
 
 
 def _validate_list(kind, values):
-    """Return the values of a list of targets as floats; raise `ValueError` if one is out of range or out of order."""
+    """Return the values of a list of targets as floats; raise `ValueError` if a value is out of range or order."""
     name, rule, falls = f"{kind}s", QUANTITIES[kind].rule, kind == MEAN_SEPARATION
     if isinstance(values, str | bytes) or not isinstance(values, Iterable):
         raise ValueError(f"{name}: expected a list of numbers, got {values!r}")
@@ -216,7 +217,7 @@ def _validate_list(kind, values):
 
 
 def _validate_snapshots(snapshots):
-    """Return kind and value of every snapshot as a list; raise `ValueError` if one is out of range or given twice."""
+    """Return a list of (kind, value) of all snapshots; raise `ValueError` if a value is out of range or repeated."""
     recorded = []
     for label, kind, value in _label_pairs("snapshots", snapshots):
         pair = kind, QUANTITIES[kind].rule.validate(label, value)
@@ -227,10 +228,11 @@ def _validate_snapshots(snapshots):
 
 
 def _validate_turning_points(turning_points, last):
-    """Return the turning points as targets; raise `ValueError` if one is out of range or cannot follow the one before.
+    """Return the turning points as targets; raise `ValueError` if a value is out of range or on the wrong side.
 
-    A turning point that ends unloading must have a smaller load or area than the one before, or a larger separation. A
-    turning point that ends loading is the reverse. Only those of the same kind are compared; `last` is the last target.
+    A turning point that ends unloading must have a smaller load or area than the last turning point, or a larger
+    separation. A turning point that ends loading must have a larger load or area, or a smaller separation. Only turning
+    points of the same kind are compared; the first one is compared with `last`, the last target.
     """
     turns = []
     for k, (label, kind, value) in enumerate(_label_pairs("turning_points", turning_points)):
@@ -246,7 +248,7 @@ def _validate_turning_points(turning_points, last):
         if kind == last.kind and not (value < last.value if falls else value > last.value):
             raise ValueError(
                 f"{label}: {value!r} cannot end {'unloading' if unloading else 'loading'} that begins at "
-                f"{last.value!r}; expected {'less' if falls else 'more'} than that"
+                f"{last.value!r}; expected {'less' if falls else 'more'} than {last.value!r}"
             )
         last = Target(kind, value)
         turns.append(last)
@@ -254,7 +256,7 @@ def _validate_turning_points(turning_points, last):
 
 
 def _label_pairs(name, pairs):
-    """Yield name in messages, kind and value of every pair of a list; raise `ValueError` if it is not a valid pair."""
+    """Yield the name in messages, the kind and the value of every pair; raise `ValueError` if a pair is invalid."""
     if not isinstance(pairs, list | tuple):
         raise ValueError(f"{name}: expected a list of pairs (kind, value), got {pairs!r}")
     for index, pair in enumerate(pairs):
@@ -269,7 +271,7 @@ def _label_pairs(name, pairs):
 
 
 def _require_loads(targets, continues):
-    """Raise `ValueError` if a path under load control has other targets than loads, or ends with the first loading."""
+    """Raise `ValueError` if a path under load control has targets that are not loads, or has no unloading."""
     for target in targets:
         if target.kind not in LOADS:
             raise ValueError(

@@ -1,1 +1,1 @@
-"""Files, time and memory of a campaign before it runs."""
+"""Plan a campaign before it runs: files, time, memory and expected validity."""

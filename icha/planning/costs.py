@@ -1,8 +1,9 @@
-"""Cost model: expected time, memory and disk of each job of a campaign.
+"""Cost model: expected time, memory and disk space of each job of a campaign.
 
-Times follow one power law for each kind of job. Powers and scales are a least-squares fit to the logarithms of measured
-times, mostly on one core of an AMD EPYC. Nine of ten measured times, in `tests/planning/measured_times.csv`, are within
-a factor of two. `correction` calibrates the times by completed jobs of the campaign on the present machine.
+The time of each kind of job is a power law. Powers and scales are a least-squares fit to the logarithms of measured
+times, mostly on one core of an AMD EPYC. Of the times in `tests/planning/measured_times.csv`, 90 % differ from the
+power law by less than a factor of two. `correction` adapts the times to the present machine with completed jobs of the
+campaign.
 """
 
 from __future__ import annotations
@@ -21,17 +22,16 @@ _DOUBLE = 8
 
 @dataclass(frozen=True)
 class Workflow:
-    """Time (s) and memory (bytes) that a campaign takes in addition to the work of its jobs.
+    """Time (s) and memory (bytes) that a campaign needs in addition to the computations in its jobs.
 
     Attributes
     ----------
-    start : time from the call to the first job: `icha run`, Snakemake, and the imports of the process that jobs are
-        forked from.
-    planned : further time for each file of the plan.
-    job : time of a job outside its work: scheduling, fork, log, checksums.
-    memory : memory of Snakemake, `icha run` and the process that jobs are forked from.
-    forked : memory of a job that is a fork, before its work.
-    program : memory of a job that is a process of its own, before its work.
+    start : time from the call to the first job: start of `icha run`, of Snakemake and of the parent process of jobs.
+    planned : additional start time for each file of the campaign.
+    job : time of a job in addition to its computation: scheduling, fork, log, checksums.
+    memory : memory of `icha run`, Snakemake and the parent process of jobs.
+    forked : memory of a job that is a fork of the parent process, before its computation.
+    program : memory of a job that is a separate process, before its computation.
     """
 
     start: float = 4.6
@@ -47,13 +47,13 @@ WORKFLOW = Workflow()
 
 @dataclass(frozen=True)
 class PowerLaw:
-    """Time of a kind of job.
+    """Power law of the time of one kind of job: base + scale * product of quantity^power.
 
     Attributes
     ----------
-    base : time of imports and files, s.
-    scale : time where all quantities are 1, s.
-    powers : power of each quantity, by its name.
+    base : time for imports and files, s.
+    scale : time of the computation if all quantities are 1, s.
+    powers : power of each quantity, by name.
     """
 
     base: float
@@ -61,13 +61,13 @@ class PowerLaw:
     powers: Mapping[str, float]
 
     def seconds(self, **quantities: float) -> float:
-        """Return the time of a job with these quantities, s; quantities without a power are ignored."""
+        """Return the expected time of a job with these quantities, s; quantities without a power have no effect."""
         return self.base + self.scale * math.prod(quantities[name] ** power for name, power in self.powers.items())
 
 
-# Laws of runs are named by the model, adhesion and unloading; others by the rule of Snakemake. Quantities are: `nodes`
-# of the grid of the surface or the solver, `spots` at the largest load, `stops` (targets of the path), `load`
-# p/(E* h'rms), `step` of the mean gap in h_rms, and `runs` of a campaign.
+# Names of power laws: for runs, the model with adhesion and cycle; for other jobs, the Snakemake rule. Quantities:
+# `nodes` of the grid, `spots` at the largest load, `stops` (targets of the path), `load` p/(E* h'rms), `step` of the
+# mean gap in h_rms, `runs` of the campaign.
 LAWS = {
     "surface": PowerLaw(0.015, 2.4e-7, {"nodes": 1}),
     "asperities": PowerLaw(0.14, 1.6e-3, {"spots": 1.06}),
@@ -94,20 +94,20 @@ LAWS = {
 
 
 def _law(solver: str, *, adhesive: bool, cycle: bool = False) -> PowerLaw:
-    """Return the power law of a solver, with or without adhesion, for loading alone or a cycle."""
+    """Return the power law of a solver with or without adhesion, for loading only or for a cycle."""
     return LAWS[", ".join([solver, *["adhesion"] * adhesive, *["cycle"] * cycle])]
 
 
 @dataclass(frozen=True)
 class Cost:
-    """Cost of a job.
+    """Expected cost of a job.
 
     Attributes
     ----------
-    seconds : time on the cores that it gets.
-    memory : largest memory of the job itself, bytes.
-    disk : size of its file, bytes.
-    values : part of `disk` that a run adds to the campaign dataset, bytes.
+    seconds : time on the job's number of cores, s.
+    memory : largest memory of the job, bytes.
+    disk : size of the job's file, bytes.
+    values : size of the values that a run adds to the campaign dataset, part of `disk`, bytes.
     """
 
     seconds: float
@@ -117,38 +117,38 @@ class Cost:
 
 
 def job_threads(grid: int) -> int:
-    """Return the number of cores of each job of a surface: two on large grids, where this saves time, otherwise one."""
+    """Return the number of cores for each job of a surface: two for large grids, where this saves time, else one."""
     return 2 if grid >= LARGE_GRID else 1
 
 
 def _memory_before(grid):
-    """Return the memory of a job before its work, bytes. Only jobs on one core are forks of a common process."""
+    """Return the memory of a job before its computation, bytes. Only jobs on one core are forks of a parent process."""
     return WORKFLOW.program if job_threads(grid) > 1 else WORKFLOW.forked
 
 
 def surface_cost(grid: int) -> Cost:
-    """Return the cost of a topography with `grid` nodes along a side."""
+    """Return the expected cost of generating a topography with `grid` nodes along a side."""
     heights = _DOUBLE * grid**2
     seconds = LAWS["surface"].seconds(nodes=grid**2)
     return Cost(seconds, _memory_before(grid) + 2.7 * heights, 18e3 + heights)
 
 
 def spots(summits: float, load: float) -> float:
-    """Estimate the number of spots at a reduced pressure, to a factor of two for 10 to 200 000 summits."""
+    """Estimate the number of contact spots at a reduced pressure, to a factor of two for 10 to 200 000 summits."""
     return max(1.0, summits * min(0.6, math.sqrt(load)))
 
 
 @dataclass(frozen=True)
 class RunSize:
-    """Memory, disk and time limit of the runs of a model.
+    """Memory, disk space and time limits of the runs with one contact model.
 
     Attributes
     ----------
-    arrays : number of arrays of the grid that a run holds at a time.
-    summit : memory of a run per summit, bytes.
-    maps : size of the maps in the file per cell and snapshot, compressed, bytes.
-    sticky : value of U_full/dgamma below which the time of a run is proportional to 1/(U_full/dgamma).
-    minutes : time limit of a loading, of a cycle, and of a run on several cores.
+    arrays : number of arrays of the size of the grid that are in memory at the same time.
+    summit : memory for each summit, bytes.
+    maps : size of the compressed maps in the file, for each grid cell and snapshot, bytes.
+    sticky : value of U_full/dgamma below which the time of a run is proportional to dgamma/U_full.
+    minutes : time limits of loading only, of a cycle, and of a run on several cores, minutes.
     """
 
     arrays: int
@@ -160,7 +160,7 @@ class RunSize:
 
 RUN_SIZES = {
     "asperities": RunSize(arrays=1, summit=9 * 1024),
-    # At U_full/dgamma = 1.8, 0.72 and 0.14 runs took 1.5, 4.3 and up to 21 times as long as at 7.
+    # Measured times at U_full/dgamma = 1.8, 0.72 and 0.14 were 1.5, 4.3 and up to 21 times the time at 7.
     "boundary_elements": RunSize(arrays=20, maps=1.5, sticky=3.0, minutes=(240, 960, 1440)),
 }
 
@@ -178,20 +178,20 @@ def run_cost(
     max_step: float = DEFAULT_STEP,
     energy_ratio: float = math.inf,
 ) -> Cost:
-    """Return the cost of a run of `icha.simulate`.
+    """Return the expected cost of one run of `icha.simulate`.
 
     Parameters
     ----------
     model : contact model.
     grid : nodes along a side of the surface.
-    summits : number of its summits.
+    summits : number of summits of the surface.
     load : largest reduced pressure p/(E* h'_rms) of the first loading.
     stops : number of targets of the first loading.
     snapshots : number of targets with a snapshot.
-    adhesive : whether the surface energy is not zero.
-    legs : number of legs after the first loading, such as 1 for unloading.
+    adhesive : True if the surface energy is not zero.
+    legs : number of unloadings and loadings after the first loading.
     max_step : longest step of the mean separation, in h_rms.
-    energy_ratio : elastic energy of full contact over the adhesion energy, U_full/dgamma.
+    energy_ratio : elastic energy of full contact per area, divided by the work of adhesion, U_full/dgamma.
     """
     most, nodes = spots(summits, load), grid**2
     law = _law(model, adhesive=adhesive, cycle=bool(legs))
@@ -200,7 +200,7 @@ def run_cost(
     seconds *= max(1.0, size.sticky / energy_ratio)
     steps: float = stops
     if legs:
-        # Every spot forms and detaches; with adhesion the path resolves each of its jumps.
+        # Every contact spot forms and detaches; with adhesion, the path resolves both jumps of each spot.
         further = DEFAULT_STEP / max_step
         steps = (1 + legs) / 2 * (120 * further + (40 if adhesive else 0.75) * most)
         seconds *= (1 + legs) / 2 * further
@@ -208,41 +208,41 @@ def run_cost(
     memory = _memory_before(grid) + 9 * MiB * (1 + bool(legs))
     memory += size.arrays * _DOUBLE * nodes + size.summit * summits
     values = 20e3 + 57 * most * max(snapshots, 1) + 160 * steps + 20e3 * bool(legs)
-    # The names and attributes of a file have 40 kB.
+    # Names and attributes in a file take 40 kB.
     return Cost(seconds, memory, 40e3 + values + size.maps * nodes * snapshots, values)
 
 
 def finite_range_cost(nodes: int, *, adhesive: bool, **quantity: float) -> Cost:
-    """Return the cost of boundary elements at a finite range, with `nodes` along a side of the grid.
+    """Return the expected cost of boundary elements at a finite range; the grid has `nodes` along a side.
 
-    `quantity` is the `load` of a single solution, or the `step` of the mean gap of a loop.
+    `quantity` is the reduced pressure `load` of one solution, or the `step` of the mean gap of a loop, in h_rms.
     """
     seconds = _law("finite range", adhesive=adhesive, cycle="step" in quantity).seconds(nodes=nodes**2, **quantity)
     return Cost(seconds, WORKFLOW.forked + 20 * _DOUBLE * nodes**2, 40e3 + 0.04 * nodes**2)
 
 
-# Memory of reading and using the campaign dataset, over the `values` of its runs. Arrays above
-# `icha.datasets.results.LEFT_IN_FILE` are not read as a whole, so no campaign needs more than the limit, bytes.
+# Memory for using the campaign dataset, divided by the `values` of its runs; and largest such memory, bytes. Arrays
+# above `icha.datasets.results.LEFT_IN_FILE` are not read as a whole, so the memory has a limit.
 _COPIES, _MOST_READ = 3.9, 1.9e9
-# Most memory of the values of runs in the job that writes the dataset block by block, bytes.
+# Largest memory for values of runs in the job that writes the campaign dataset block by block, bytes.
 _BLOCKS = 35 * MiB
-# Arrays of a topography that a contact map holds at a time, by the number of models that it shows.
+# Number of arrays of a topography in memory for a contact map, by the number of models in the map.
 MAP_ARRAYS = {1: 2, 2: 7}
-# Memory of the libraries and pages of a job, bytes.
+# Memory for libraries and pages, by the rule of the job, bytes.
 _LIBRARIES = {"figure": 85 * MiB, "report_page": 18 * MiB}
 
 
 def derived_cost(rule: str, runs: int, disk: float, values: float = 0.0, *, nodes: int = 0, models: int = 1) -> Cost:
-    """Return the cost of a file that is computed from a surface or from runs.
+    """Return the expected cost of a file that is computed from a surface or from runs.
 
     Parameters
     ----------
-    rule : the rule that makes it, which is the name of its law in `LAWS`.
-    runs : number of runs that it contains or shows.
+    rule : Snakemake rule of the file, which is also the name of the power law in `LAWS`.
+    runs : number of runs that the file contains or shows.
     disk : size of the file, bytes.
     values : sum of the `values` of all runs of the campaign, bytes.
-    nodes : nodes of the topography that a figure shows, 0 without one.
-    models : number of models whose contacts a figure shows.
+    nodes : number of nodes of the topography that a figure shows, or 0.
+    models : number of contact models that a figure shows.
     """
     seconds = LAWS[rule].seconds(runs=runs) + LAWS["map"].seconds(nodes=nodes)
     read = min(_COPIES * values, _BLOCKS if rule == "campaign_dataset" else _MOST_READ)
@@ -251,9 +251,9 @@ def derived_cost(rule: str, runs: int, disk: float, values: float = 0.0, *, node
 
 
 def correction(pairs: Sequence[tuple[float, float]]) -> float:
-    """Return the factor on the expected times of jobs, from pairs (expected, measured) of jobs of the same kind.
+    """Return the factor that corrects expected times, from pairs (expected, measured) of jobs of the same kind, s.
 
-    The factor is the median of measured over expected times. Few pairs move it towards 1; without pairs it is 1.
+    The factor is the median of measured/expected time. With few pairs the factor is closer to 1; without pairs it is 1.
     """
     if not pairs:
         return 1.0

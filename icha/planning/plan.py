@@ -1,4 +1,4 @@
-"""Plan of a campaign: every file that it computes, the state of the file, and the expected cost of its job."""
+"""Plan of a campaign: files to compute, states of the files, and expected costs of the jobs."""
 
 import json
 import math
@@ -23,26 +23,26 @@ from icha.support.checksums import is_whole
 from icha.support.input_files import text
 
 DONE, TO_DO, CHANGED, FAILED, DAMAGED = "done", "to do", "changed", "failed", "damaged"
-# Most jobs of a group whose measured times calibrate the expected ones.
+# Largest number of jobs of one kind whose measured times correct the expected times.
 _SAMPLE = 200
-# Reduced pressure assumed for targets that are separations.
+# Reduced pressure that is assumed for targets that are mean separations.
 _UNKNOWN_LOAD = 0.03
 
 
 @dataclass(frozen=True)
 class Item:
-    """One file of a campaign.
+    """One file of a campaign: state, job and expected cost.
 
     Attributes
     ----------
-    part : part of the campaign that it belongs to, as `icha describe` lists them.
-    rule : the rule of Snakemake that makes it.
-    path : in the folder of results.
-    state : DONE, TO_DO, CHANGED, FAILED or DAMAGED.
-    cost : of its job.
-    threads : number of cores that its job uses.
-    reason : reason why the run failed.
-    stage : jobs of a stage wait for those of earlier stages.
+    part : part of the campaign to which the file belongs, as in the output of `icha describe`.
+    rule : Snakemake rule that computes the file.
+    path : path in the folder of results.
+    state : state of the file: DONE, TO_DO, CHANGED, FAILED or DAMAGED.
+    cost : expected cost of the job.
+    threads : number of cores that the job uses.
+    reason : reason why the run failed; empty for other states.
+    stage : number of the stage; jobs of a stage start after all jobs of earlier stages.
     """
 
     part: str
@@ -56,31 +56,27 @@ class Item:
 
     @property
     def is_run(self) -> bool:
-        """Return whether the file is a run of a study."""
+        """True if the file is a run of a study."""
         return self.rule == "run"
 
     @property
     def to_do(self) -> bool:
-        """Return whether the file must be computed; False for a failed run, which would fail again."""
+        """True if the file must be computed; False for a failed run, which would fail again."""
         return self.state in (TO_DO, CHANGED, DAMAGED)
 
     @property
     def work(self) -> float:
-        """Return the expected work of the job, core-seconds."""
+        """Expected work of the job: time multiplied by the number of cores, core-seconds."""
         return self.cost.seconds * self.threads
 
 
 def plan(campaign: Campaign, results: Path) -> list[Item]:
-    """List all files of a campaign, except those of negligible cost, in the order in which they are made.
+    """List all files of a campaign, except files of negligible cost, in the order of their computation.
 
-    A run is done if its file exists and has the present settings (`config_sha256`); only Snakemake detects whether the
-    program has changed since. Another file is done if it and its inputs exist. A file that differs from its record
-    (`icha.support.checksums`) is damaged.
-
-    Parameters
-    ----------
-    campaign : the campaign.
-    results : its folder of results, whose benchmarks calibrate the expected times for this machine.
+    A run is done if its file exists and has the present settings (`config_sha256`). Only Snakemake detects changes of
+    the program. Any other file is done if the file and its inputs exist. A file is damaged if it differs from its
+    checksum (`icha.support.checksums`). Measured times in the folder `results` correct the expected times for this
+    machine.
     """
     items = _items(campaign, results)
     kinds: dict[tuple[str, str], list[Item]] = {}
@@ -92,14 +88,14 @@ def plan(campaign: Campaign, results: Path) -> list[Item]:
 
 
 def _correction(items: list[Item], results: Path) -> float:
-    """Return the factor on the expected times of jobs of one kind, from the measured times of completed ones."""
+    """Return the factor that corrects the expected times of one kind of job, from measured times of completed jobs."""
     done = [item for item in items if item.state in (DONE, FAILED)]
     measured = [(item.cost.seconds, _benchmark(results, item)) for item in done[:: max(1, len(done) // _SAMPLE)]]
     return costs.correction([(expected, seconds) for expected, seconds in measured if seconds])
 
 
 def _benchmark(results: Path, item: Item) -> float | None:
-    """Return the measured time of the last job of a file, s; None if it is unknown."""
+    """Return the measured time of the last job that computed a file, s; None if the time is unknown."""
     try:
         lines = (results / job_file(item.path, "benchmarks", ".jsonl")).read_text(encoding="utf-8").splitlines()
         return float(json.loads(lines[-1])["s"])
@@ -126,7 +122,7 @@ def _state(results, path):
 
 
 def _computed_files(campaign, results, files) -> Iterator[Item]:
-    """Yield surfaces, runs, theories and solutions at finite ranges."""
+    """Yield the files of surfaces, runs, theories and boundary-element solutions at a finite range."""
     summits, run_cost = cache(lambda surface: surface_facts(campaign, surface)["summits"]), cache(costs.run_cost)
     for path, (name, _) in files.surfaces.items():
         grid = campaign.grid(name)
@@ -154,7 +150,7 @@ def _computed_files(campaign, results, files) -> Iterator[Item]:
 
 
 def _finite_range(campaign, results, path, entry, case, quantity) -> Item:
-    """Return the file of a solution or a loop of boundary elements at a finite range."""
+    """Return the `Item` of a solution or loop of boundary elements at a finite range."""
     adhesive = campaign.materials[case.material].surface_energy > 0
     cost = costs.finite_range_cost(campaign.grid(case.surface) * entry.refinement, adhesive=adhesive, **quantity)
     part, rule = "boundary elements", "boundary_elements"
@@ -164,7 +160,7 @@ def _finite_range(campaign, results, path, entry, case, quantity) -> Item:
 
 
 def _derived_files(campaign, files: CampaignFiles, computed: list[Item]) -> Iterator[tuple]:
-    """Yield part, rule, path, stage, inputs and cost of the files that are derived from runs."""
+    """Yield part, rule, path, stage, inputs and cost of each file that is computed from runs."""
     runs, cost = len(files.runs), costs.derived_cost
     disk = sum(item.cost.disk for item in computed if item.is_run)
     values = sum(item.cost.values for item in computed)
@@ -196,9 +192,9 @@ def _derived_files(campaign, files: CampaignFiles, computed: list[Item]) -> Iter
 
 
 def _cost_parameters(settings, rms_slope) -> dict:
-    """Return the arguments of `run_cost` from the settings of a run."""
+    """Convert the settings of a run to arguments of `run_cost`."""
     path, snapshots = settings["path"], settings["path"]["snapshots"]
-    # Estimates of the reduced pressure: half of an area fraction; a guess for separations.
+    # Factors from targets to reduced pressures: about 1/2 for area fractions; `_UNKNOWN_LOAD` for separations.
     factors = {"reduced_pressure": 1, "relative_load": 1 / rms_slope, "area_fraction": 1 / 2, "mean_separation": 0}
     stops = {(kind, value) for kind in factors for value in path.get(f"{kind}s") or ()}
     stops |= {tuple(snapshot) for snapshot in snapshots or ()}
@@ -213,7 +209,7 @@ def _cost_parameters(settings, rms_slope) -> dict:
 
 
 def run_state(file: Path, sha256: str) -> tuple[str, str]:
-    """Return the state of the file of a run, and the reason if the run failed; `sha256`: checksum of its settings."""
+    """Return the state of a run's file, and the reason if the run failed; `sha256` is that of the present settings."""
     import h5py
 
     if not file.is_file():
@@ -223,7 +219,7 @@ def run_state(file: Path, sha256: str) -> tuple[str, str]:
             names = ("config_sha256", "incomplete", "failed_checks")
             attributes = {name: text(data.attrs[name]) for name in names if name in data.attrs}
     except OSError as error:
-        if error.errno is not None:  # such as missing permission, which does not depend on the content
+        if error.errno is not None:  # the file cannot be read, for example without permission
             raise
         return DAMAGED, ""  # not a valid netCDF-4 file
     if attributes.get("config_sha256") != sha256:
@@ -233,7 +229,7 @@ def run_state(file: Path, sha256: str) -> tuple[str, str]:
 
 
 def failed_runs(campaign: Campaign, results: Path) -> dict[str, str]:
-    """Return the paths of the runs that failed with the present settings, with their reasons."""
+    """Return path and reason of each run that failed with the present settings."""
     states = {
         case.path: run_state(results / path, run_sha256(campaign, case))
         for path, case in campaign_files(campaign).runs.items()
@@ -242,19 +238,19 @@ def failed_runs(campaign: Campaign, results: Path) -> dict[str, str]:
 
 
 def whole_cost(campaign: Campaign, results: Path) -> costs.Cost:
-    """Return the expected cost of a whole campaign: seconds on one core, memory of the largest job, disk.
+    """Return the expected cost of a whole campaign: time on one core, memory for one job at a time, disk space.
 
-    The cost is not calibrated by finished jobs, so every machine gives the same value.
+    Times are not corrected by completed jobs, so the cost is the same on every machine.
     """
     items = [replace(item, state=TO_DO) for item in _items(campaign, results)]
     return costs.Cost(time_on(items, 1), memory_on(items, 1), sum(item.cost.disk for item in items))
 
 
 def time_on(items: Iterable[Item], cores: int) -> float:
-    """Return the expected time from the call to the end on some cores, s; 0 if nothing is to be done.
+    """Return the expected time from the call to the end, s, on a number of cores; 0 if no file must be computed.
 
-    The work of a stage is divided among the cores. A stage takes at least the time of its longest job, and at least the
-    time of scheduling all its jobs one by one.
+    The cores share the work of a stage equally. A stage takes at least the time of its longest job, and at least the
+    time for scheduling all jobs one after the other.
     """
     items = list(items)
     seconds = start_up(items)
@@ -267,16 +263,16 @@ def time_on(items: Iterable[Item], cores: int) -> float:
 
 
 def start_up(items: Collection[Item]) -> float:
-    """Return the time until the first job, s: start of Snakemake, its plan, and imports of the jobs."""
+    """Return the time from the call to the first job, s: start and plan of Snakemake, imports."""
     if not any(item.to_do for item in items):
         return 0.0
     return WORKFLOW.start + WORKFLOW.planned * len(items)
 
 
 def memory_on(items: Iterable[Item], cores: int, most: float = math.inf) -> float:
-    """Return the memory of Snakemake and of the largest jobs that will run in parallel, bytes.
+    """Return the largest memory of Snakemake and parallel jobs together, bytes.
 
-    Parallel jobs take at most `most`, unless a single one needs more.
+    Parallel jobs together use at most `most` bytes, unless a single job needs more.
     """
     left = sorted((item for item in items if item.to_do), key=lambda item: -item.cost.memory)
     together, free = 0.0, cores

@@ -1,4 +1,4 @@
-"""Requirements of a campaign: memory, time and cores of its jobs, free disk space, and optional software."""
+"""Requirements of a campaign: memory, time limits and cores of jobs, free disk space, optional software."""
 
 import importlib.util
 import math
@@ -16,22 +16,22 @@ from icha.support import formatting
 from icha.support.formatting import format_count
 
 TAMAAS = "tamaas"
-# Sections of a campaign that Tamaas solves.
+# Sections of a configuration whose entries Tamaas solves.
 BY_TAMAAS = ("finite_range", "boundary_element_loops")
 
 
 def further_software(campaign: Campaign) -> tuple[str, ...]:
-    """Return optional packages that a campaign needs."""
+    """Return the names of the optional packages that a campaign needs."""
     return (TAMAAS,) if _sections(campaign) else ()
 
 
 def missing_software(campaign: Campaign) -> str | None:
-    """Describe the optional package that a campaign needs and that is not installed; None if it is installed."""
+    """Return a message if a campaign needs Tamaas and Tamaas is not installed; None otherwise."""
     if not further_software(campaign) or importlib.util.find_spec(TAMAAS):
         return None
     return (
-        f"{', '.join(_sections(campaign))}: solved by Tamaas, which is not installed; `make tamaas` installs it in a "
-        "clone, `pip install tamaas` elsewhere. It is an extra of the package because its licence is AGPL-3.0-or-later."
+        f"{', '.join(_sections(campaign))}: needs Tamaas, which is not installed; run `make tamaas` in a clone, or "
+        "`pip install tamaas` elsewhere. ICHA does not include Tamaas, because its licence is AGPL-3.0-or-later."
     )
 
 
@@ -40,39 +40,39 @@ def _sections(campaign):
 
 
 def surface_threads(campaign: Campaign, surface: str) -> int:
-    """Return the number of cores for a surface and for each of its runs: two on large grids, otherwise one."""
+    """Return the number of cores for each job of a surface: two for large grids, otherwise one."""
     return job_threads(campaign.grid(surface))
 
 
 def _megabytes(program: float, arrays: float, nodes: int) -> int:
-    """Return the memory of a job, MB: that of its program plus a number of arrays of nodes x nodes values."""
+    """Return the memory of a job, MB: `program` (MB) plus `arrays` arrays of nodes x nodes numbers."""
     return int(program + arrays * 8e-6 * nodes**2)
 
 
 def surface_memory(campaign: Campaign, surface: str) -> int:
-    """Return the memory for making a surface, MB."""
+    """Return the memory that Snakemake reserves for generating a surface, MB."""
     return _megabytes(600, 4, campaign.grid(surface))
 
 
 def run_memory(campaign: Campaign, case: RunLabels) -> int:
-    """Return the memory for a run, MB."""
+    """Return the memory that Snakemake reserves for a run, MB."""
     arrays = max(4, 1.25 * RUN_SIZES[case.model].arrays)
     return _megabytes(600, arrays, campaign.grid(case.surface))
 
 
 def solver_memory(campaign: Campaign, surface: str, entry: BesideStudy) -> int:
-    """Return the memory for boundary elements at a finite range, MB."""
+    """Return the memory that Snakemake reserves for boundary elements at a finite range, MB."""
     return _megabytes(400, 30, campaign.grid(surface) * entry.refinement)
 
 
 def figure_memory(campaign: Campaign, *, holds_topography: bool) -> int:
-    """Return the memory for a figure, MB. The figure may show the largest topography and the maps of both models."""
+    """Return the memory that Snakemake reserves for a figure, MB; `holds_topography`: the figure shows a topography."""
     largest = max(campaign.grid(surface) for study in campaign.studies.values() for surface in study.surfaces)
     return _megabytes(1000, max(MAP_ARRAYS.values()) * holds_topography, largest)
 
 
 def run_minutes(campaign: Campaign, case: RunLabels) -> int:
-    """Return the time limit of a run, minutes: many times the longest measured time of such runs."""
+    """Return the time limit of a run, minutes; the limit is many times the longest measured time of such runs."""
     loading, cycle, several_cores = RUN_SIZES[case.model].minutes
     if surface_threads(campaign, case.surface) > 1:
         return several_cores
@@ -81,27 +81,27 @@ def run_minutes(campaign: Campaign, case: RunLabels) -> int:
 
 
 def memory_of_machine() -> int:
-    """Return the memory of this machine, bytes."""
+    """Return the total memory of this machine, bytes."""
     return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
 
 
 def free_disk(folder: Path) -> int:
-    """Return the free disk space where a folder is or will be, bytes."""
+    """Return the free space on the disk of a folder, bytes; the folder may not exist yet."""
     existing = next(path for path in (folder, *folder.resolve().parents) if path.exists())
     return shutil.disk_usage(existing).free
 
 
 def find_shortages(items: Collection[Item], cores: int, results: Path, profile: Mapping) -> list[str]:
-    """Describe the memory or disk space that this machine lacks for the remaining jobs.
+    """Return messages if this machine has too little memory or free disk space for the remaining jobs.
 
-    `profile` contains the settings of a Snakemake profile: the executor, and the largest memory of all parallel jobs.
+    `profile` contains the settings of a Snakemake profile: the executor, and the memory limit of all parallel jobs.
     """
     shortages = []
     disk, free = sum(item.cost.disk for item in items if item.to_do), free_disk(results)
     if disk > free:
         shortages.append(
-            f"about {formatting.size(disk)} of disk are needed for {results}, and {formatting.size(free)} are free "
-            "there; free some space, or work in another folder: --directory FOLDER"
+            f"{results} needs about {formatting.size(disk)} of disk space, but only {formatting.size(free)} are "
+            "free; free some space, or use another folder: --directory FOLDER"
         )
     if profile.get("executor", "local") not in ("local", "icha"):
         return shortages
@@ -110,8 +110,8 @@ def find_shortages(items: Collection[Item], cores: int, results: Path, profile: 
     available = memory_of_machine()
     if (needed := memory_on(items, cores, most)) > available:
         message = (
-            f"about {formatting.size(needed)} of memory are needed on {format_count(cores, 'core')}, and this machine "
-            f"has {formatting.size(available)}"
+            f"jobs on {format_count(cores, 'core')} need about {formatting.size(needed)} of memory, but this "
+            f"machine has {formatting.size(available)}"
         )
         fewer = [number for number in range(1, cores) if memory_on(items, number, most) <= available]
         if fewer:

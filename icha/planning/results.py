@@ -1,4 +1,4 @@
-"""All files of a campaign, and what each of them holds."""
+"""List all files of a campaign, with the labels of their contents."""
 
 from dataclasses import dataclass
 
@@ -11,16 +11,16 @@ from icha.datasets.labels import ContactLabels, RunLabels, SolutionLabels
 
 @dataclass(frozen=True)
 class CampaignFiles:
-    """Paths of the files of a campaign, in the order of its configuration.
+    """Paths of all files of a campaign, in the order of the configuration.
 
     Attributes
     ----------
     surfaces : name and seed of each surface, by path.
     runs : labels of each run, by path.
-    theories : name of the surface, by path.
+    theories : name of the surface of each file of theories, by path.
     solutions, loops : labels of each solution at a finite range, by path.
-    compared : the boundary-element runs of studies with both models.
-    model_error : one path; empty without boundary elements to compare with.
+    compared : labels of boundary-element runs in studies with both models, by path.
+    model_error : path of the file of model errors; empty if there are no boundary-element results.
     """
 
     surfaces: dict[str, tuple[str, int]]
@@ -42,12 +42,12 @@ class CampaignFiles:
 
     @property
     def references(self) -> list[str]:
-        """Theories and solutions that runs are compared with."""
+        """Paths of theories and boundary-element solutions with which runs are compared."""
         return [*self.theories, *self.solutions, *self.loops]
 
     @property
     def computed(self) -> list[str]:
-        """All results except the configuration as used and the deposit."""
+        """Paths of all results except the copy of the configuration and the deposit."""
         return [
             *self.surfaces,
             *self.runs,
@@ -63,7 +63,7 @@ class CampaignFiles:
 
 
 def campaign_files(campaign: Campaign, folder: str = "") -> CampaignFiles:
-    """Return the files of a campaign, as paths in its folder of results, with `folder` before them."""
+    """Return the paths of all files of a campaign; each path begins with `folder`."""
     path = results.ResultFiles(campaign.name, folder).path
 
     def each(pattern, cases):

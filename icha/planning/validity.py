@@ -1,4 +1,4 @@
-"""Expected properties of the surfaces of a campaign before it runs, and expected validity of its models."""
+"""Expected properties of surfaces and expected validity of contact models, before a campaign runs."""
 
 import math
 from functools import cache
@@ -6,7 +6,9 @@ from functools import cache
 from icha.analysis.validity import (
     COMPLETE,
     RESOLVED,
+    RMS_HEIGHT,
     SPACING,
+    STICKY_HEIGHT,
     STRENGTH,
     THEORETICAL,
     Case,
@@ -17,7 +19,7 @@ from icha.analysis.validity import (
 )
 from icha.asperity.full_contact import gaussian_complete_pressure
 from icha.asperity.material import WU_HOLDS_FROM, Material
-from icha.asperity.stickiness import stickiness
+from icha.asperity.stickiness import stickiness, sticky_rms_height
 from icha.boundary_elements.front import Front
 from icha.configuration.campaign import Campaign
 from icha.configuration.cases import run_cases
@@ -35,20 +37,20 @@ from icha.surfaces.moments import (
     summit_density,
 )
 
-# Radius of the mean curvature of the summits of a Gaussian surface times its rms curvature (McCool 1986).
-# The module icha.references.summit_theories contains it, too, but takes long to import.
+# Radius of the mean summit of a Gaussian surface, multiplied by the rms curvature of the surface (McCool 1986).
+# icha.references.summit_theories also contains this number, but takes long to import.
 _SUMMIT_RADIUS = 3 * math.sqrt(math.pi) / 8
 
-# Tabor parameter of the 5 % of the first spots with the smallest one, over that of the mean curvature.
+# Tabor parameter that 5 % of the first contact spots do not reach, divided by the Tabor parameter of the mean summit.
 _SMALLEST_TABOR = 0.84
 
 
 def self_affine_moments(
     period: float, rolloff_wavelength: float, short_wavelength: float, hurst: float
 ) -> SpectralMoments:
-    """Return the moments of a self-affine surface with roll-off, up to a common factor; lengths in m.
+    """Return the spectral moments of a self-affine surface with roll-off, up to a common factor; lengths in m.
 
-    They are integrals over the plane of wave vectors: m0 = int C, m2 = 1/2 int q^2 C, m4 = 3/8 int q^4 C.
+    The moments are integrals over the plane of wave vectors: m0 = int C, m2 = 1/2 int q^2 C, m4 = 3/8 int q^4 C.
     """
     q_l, q_0, q_1 = (2 * math.pi / length for length in (period, rolloff_wavelength, short_wavelength))
     m0, m2, m4 = (self_affine_integral(order, q_l, q_1, q_0, hurst) for order in (1, 3, 5))
@@ -56,14 +58,16 @@ def self_affine_moments(
 
 
 def surface_facts(campaign: Campaign, name: str) -> dict[str, float]:
-    """Return properties of a surface at rms slope 1: those of `icha.analysis.validity.VALIDATED`, and three more.
+    """Return the properties of a surface at rms slope 1 that decide the validity of the contact models, by name.
 
-    A random surface is Gaussian and isotropic; the properties of a surface from a file are computed from its heights.
+    Random surfaces are assumed to be Gaussian and isotropic. Properties of surfaces from files are computed from
+    heights.
 
     Returns
     -------
-    The values by name. `summits` is the number of supported summits, `rms_curvature` that of the profiles (1/m), and
-    `complete_contact_pressure` the pressure over E* for complete contact, which is an estimate for a random surface.
+    Properties of `icha.analysis.validity.VALIDATED`, and three more: `summits` is the number of supported summits,
+    `rms_curvature` the rms curvature of profiles (1/m), and `complete_contact_pressure` the pressure for complete
+    contact divided by E*, which is estimated for random surfaces.
     """
     section = campaign.surfaces[name]
     if isinstance(section, SelfAffineSurface):
@@ -96,19 +100,24 @@ def surface_facts(campaign: Campaign, name: str) -> dict[str, float]:
 
 
 def expected_validity(campaign: Campaign) -> list[Statement]:
-    """State the expected validity, with the Tabor parameter of the mean summit of a Gaussian surface."""
+    """Return statements about the expected validity of the models; Tabor parameters are those of the mean summit."""
     facts_of = cache(lambda surface: surface_facts(campaign, surface))
     cases, tabor, sticky = [], {}, {}
     for case in run_cases(campaign):
         facts, by_summits = facts_of(case.surface), MODELS[case.model].by_summits
         material = Material(**campaign.materials[case.material].model_dump(exclude_none=True))
-        # Only the asperity model depends on how close a surface is to those of the validation.
+        # The similarity to the surfaces of the validation matters only for the asperity model.
         known = (facts if by_summits else {}) | {
             "full_contact_energy_ratio": energy_ratio(campaign, case),
             COMPLETE: facts[COMPLETE] * case.rms_slope * material.contact_modulus,
             STRENGTH: material.interface_strength,
             THEORETICAL: material.theoretical_strength,
         }
+        section = campaign.surfaces[case.surface]
+        if isinstance(section, SelfAffineSurface):
+            moments = self_affine_moments(*section.lengths_and_hurst)
+            known[RMS_HEIGHT] = case.rms_slope * math.sqrt(moments.m0 / (2 * moments.m2))
+            known[STICKY_HEIGHT] = sticky_rms_height(section.rolloff_wavelength, material)
         if MODELS[case.model].by_cells:
             spacing = campaign.period(case.surface) / campaign.grid(case.surface)
             tension = Front(material.adhesion_length / spacing).strength * material.contact_modulus
@@ -127,10 +136,10 @@ def expected_validity(campaign: Campaign) -> list[Statement]:
 
 
 def _describe_outside(tabor):
-    """Describe the cases with spots outside the range of Wu's formula; `tabor` are Tabor parameters by case."""
+    """Describe the cases with contact spots outside the range of Wu's formula; `tabor` has Tabor parameters by case."""
     cases = []
     for (material, surface), values in tabor.items():
         if _SMALLEST_TABOR * min(values) < WU_HOLDS_FROM:
             ends = dict.fromkeys(f"{float(f'{mu:.2g}'):g}" for mu in (min(values), max(values)))
             cases.append(f"{material} on {surface} (about {' to '.join(ends)})")
-    return f"some or all spots expected outside: {join_first(cases)}" if cases else ""
+    return f"some or all spots are expected outside this range: {join_first(cases)}" if cases else ""

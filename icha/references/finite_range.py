@@ -1,18 +1,18 @@
 """Contact at a finite range of attraction, solved by the boundary-element code Tamaas.
 
 Tamaas is installed with the extra `tamaas` and shares no code with ICHA; nothing outside `icha.references` needs it.
-The constant `REFERENCES` lists the publications of its methods.
+The constant `REFERENCES` lists the publications on the methods of Tamaas.
 
-Tamaas minimises the energy of an elastic half-space against the nodes of the topography. Without adhesion it minimises
-over the pressures at a given load (Polonsky & Keer). With adhesion it minimises over the gaps at a given mean gap (Rey
-et al.); the traction at a gap u is -(dgamma/rho) exp(-u/rho). With adhesion the load control of Tamaas converges to
-wrong states, so ICHA searches for the mean gap that carries a given load.
+Tamaas minimises the energy of an elastic half-space in contact with the nodes of the topography. Without adhesion the
+unknowns are the pressures at a given load (Polonsky & Keer). With adhesion the unknowns are the gaps at a given mean
+gap (Rey et al.); the traction at a gap u is -(dgamma/rho) exp(-u/rho). With adhesion the load control of Tamaas
+converges to wrong states, so ICHA searches for the mean gap at which the contact carries a given load.
 
 The gap is zero in contact, and attraction acts in a cohesive zone around the contact. In the law of Johnson, Kendall
-and Roberts a contact area A lowers the energy by dgamma A. At a finite range the energetic area has this property: the
-integral of exp(-u/rho) over the nominal area, which is minus the derivative of the energy with respect to dgamma at
-fixed mean gap. It is larger than the area of zero gap. As the range decreases, both areas tend to that of JKR, the
-energetic area much sooner.
+and Roberts (JKR) a contact area A lowers the energy by dgamma A. At a finite range the energetic area has the same
+effect. The energetic area is the integral of exp(-u/rho) over the nominal area, which is minus the derivative of the
+energy with respect to dgamma at fixed mean gap. The energetic area is larger than the area of zero gap. As the range
+decreases, both areas tend to the contact area of JKR, the energetic area at a much larger range.
 """
 
 import math
@@ -39,11 +39,11 @@ from icha.surfaces.surface import Surface
 
 # Relative error of the minimised energy at which Tamaas stops.
 DEFAULT_TOLERANCE = 1e-8
-# Largest relative error of the load after the search for its mean gap, and largest number of solutions of the search.
+# Search for the mean gap at a load: largest relative error of the load, and largest number of solutions.
 LOAD_TOLERANCE = 2e-4
 _MAX_SOLVES = 20
 _MAX_ITERATIONS = 100_000
-# Numbers of iterations between two checks of the gap: while it is open everywhere, and otherwise.
+# Numbers of iterations between two checks of the gap: while no node is in contact, and otherwise.
 _OPEN_ITERATIONS, _TOUCHING_ITERATIONS = 50, 1000
 # Distance over which the load on rough surfaces decreases by about a factor e, for the first step of a search; and
 # longest step of the search. Both are in h_rms.
@@ -59,7 +59,7 @@ REFERENCES = (
 
 
 class NotSolved(RuntimeError):
-    """Error: boundary elements at a finite range did not converge; the message names the state."""
+    """Error: boundary elements at a finite range did not converge; the message describes the last state."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,11 +69,11 @@ class NodalState:
     Attributes
     ----------
     surface : rough surface on the grid of the solution.
-    gap : (n, n), m.
-    traction : (n, n), Pa, positive in compression.
+    gap : (n, n) float, m.
+    traction : (n, n) float, Pa, positive in compression.
     contact : (n, n) bool, whether the gap is zero.
     residual : relative error that the solver reports.
-    solves : number of solutions that the state took.
+    solves : number of solutions by Tamaas until this state was found.
     """
 
     surface: Surface
@@ -90,12 +90,12 @@ class NodalState:
 
     @property
     def nominal_pressure(self) -> float:
-        """Mean traction over the nominal area, attraction included, Pa."""
+        """Mean traction over the nominal area, including the attraction, Pa."""
         return float(self.traction.mean())
 
     @property
     def outside_pressure(self) -> float:
-        """Nominal pressure of the traction outside the contact, zero or negative, Pa."""
+        """Force outside the contact over the nominal area, Pa; zero or negative."""
         return float(self.traction[~self.contact].sum()) / self.contact.size
 
     def energetic_area_fraction(self, material: Material) -> float:
@@ -106,7 +106,7 @@ class NodalState:
         return raw - self.outside_pressure * material.interaction_range / material.surface_energy
 
     def stored_energy(self, material: Material) -> float:
-        """Return the elastic energy minus the energy of adhesion, over the nominal area, J/m^2; 0 far apart.
+        """Return the elastic energy minus the energy of adhesion, over the nominal area, J/m^2; 0 without interaction.
 
         The elastic energy is half the mean of traction times displacement.
         """
@@ -126,29 +126,29 @@ def finite_range_solution(
     seed: int = -1,
     progress: Callable[[str], None] | None = None,
 ) -> xr.Dataset:
-    """Return the dataset of a rough surface that is pressed against a half-space with one load, solved by Tamaas.
+    """Solve the contact of a rough surface with a half-space under one load with Tamaas; return the dataset.
 
     Parameters
     ----------
-    surface, material : as for `icha.simulate`; with adhesion, traction decays over `material.interaction_range`.
+    surface, material : as for `icha.simulate`; with adhesion, rho is `material.interaction_range`.
     reduced_pressure : p/(E* h'_rms), positive.
-    refinement : nodes per node of the surface's grid, along a side.
+    refinement : number of nodes of the solver per node of the surface, along a side.
     tolerance : relative error at which the solver stops.
-    seed : recorded in the dataset.
-    progress : called with a line of text for every mean gap of the search.
+    seed : number that is recorded in the dataset.
+    progress : function that is called with a line of text for every mean gap of the search.
 
     Returns
     -------
     xarray.Dataset of one state (`icha.datasets.variables.boundary_elements.SOLUTION`). Densities refer to the nominal
-    area: the integral of `pressure_density` is the area fraction of the nodes in contact, and that of `gap_density` is
-    1 minus this fraction. The bins are those of `icha.simulate`.
+    area: the integral of `pressure_density` is the area fraction of the nodes in contact, and the integral of
+    `gap_density` is 1 minus this fraction. The bins are those of `icha.simulate`.
 
     Raises
     ------
     ValueError
         If an argument is out of range, or the grid does not resolve the attraction.
     NotSolved
-        If the solver does not reach its tolerance, or no mean gap carries the load.
+        If the solver does not reach its tolerance, or the contact carries the load at no mean gap.
     """
     state = contact_state(
         surface, material, reduced_pressure, refinement=refinement, tolerance=tolerance, progress=progress
@@ -176,7 +176,7 @@ def contact_state(
 
 
 def refine(surface: Surface, material: Material, refinement: int) -> Surface:
-    """Return the surface on a finer grid for the solver; raise `ValueError` if it does not resolve the attraction."""
+    """Return the surface on a finer grid for the solver; raise `ValueError` if this does not resolve the attraction."""
     surface.require_periodic("the solver for finite ranges")
     fine = surface.refined(REFINEMENT.validate("refinement", refinement))
     if problem := resolution_problem(material, fine.spacing):
@@ -227,11 +227,11 @@ def _solve_nonadhesive(fine, material, pressure, tolerance):
 
 
 class GapContact:
-    """Contact at given mean gaps; each solution starts from the gaps of the one before.
+    """Contact at given mean gaps; each solution starts from the gaps of the last solution.
 
-    Tamaas divides its error by the load of the contact, so its solver does not stop if no node is in contact. Therefore
-    ICHA interrupts the solver from time to time. If the gap is open everywhere, ICHA compares the traction with the
-    law of attraction.
+    Tamaas divides its error by the load of the contact, so the solver of Tamaas does not stop if no node is in contact.
+    Therefore ICHA interrupts the solver at regular intervals. If no node is in contact, ICHA computes the error
+    from the difference between traction and law of attraction.
     """
 
     def __init__(self, fine, material, tolerance, gap=None):
@@ -287,7 +287,7 @@ class GapContact:
         return np.min(self.solver.model["gap"]) > 0
 
     def _imbalance(self):
-        """Return the error if no node is in contact: largest difference of traction and attraction, over the strength.
+        """Return the error if no node is in contact: largest difference of traction and attraction over dgamma/rho.
 
         Each mode of the traction is E* q/2 times the same mode of the displacement; the mean traction is unknown.
         """
@@ -302,7 +302,7 @@ class GapContact:
 
 
 def _find_gap_at_load(contact, pressure, separation, progress):
-    """Return the state whose mean traction is `pressure`, Pa, by a search for its mean gap from a first guess, m."""
+    """Search for the mean gap at which the mean traction is `pressure`, Pa, from a first guess, m; return the state."""
     unit = contact.fine.rms_height
     tried: list[tuple[float, float]] = []
     mean_gap = separation / unit
@@ -316,9 +316,9 @@ def _find_gap_at_load(contact, pressure, separation, progress):
             return state
         mean_gap = _next_gap(tried)
     raise NotSolved(
-        f"no mean gap was found that carries the load: after {len(tried)} tries, the last at {tried[-1][0]:.8g} h_rms "
-        f"with {1 + tried[-1][1]:.6g} of it, the smallest relative error is {min(abs(e) for _, e in tried):.2g}; "
-        f"expected at most {LOAD_TOLERANCE:g}"
+        f"no mean gap was found at which the contact carries the load: after {len(tried)} attempts the smallest "
+        f"relative error of the load is {min(abs(e) for _, e in tried):.2g}; expected at most {LOAD_TOLERANCE:g}. The "
+        f"last mean gap was {tried[-1][0]:.8g} h_rms, with {1 + tried[-1][1]:.6g} times the load"
     )
 
 
@@ -343,10 +343,10 @@ def _next_gap(tried):
 
 
 def perimeter_correction(contact: np.ndarray) -> tuple[float, float]:
-    """Return the area fraction of a periodic contact map (n, n) without the error of its edges, and its perimeter.
+    """Return the area fraction of a periodic contact map (n, n), corrected for its edges, and the perimeter.
 
     Nodes along the edge overestimate the area by (pi - 1 + ln 2)/24 of the perimeter times the spacing (Yastrebov,
-    Anciaux & Molinari 2017, their eq. 9). The perimeter is in spacings.
+    Anciaux & Molinari 2017, eq. 9). The unit of the perimeter is the grid spacing.
     """
     edges = sum(int(np.count_nonzero(contact != np.roll(contact, 1, axis))) for axis in (0, 1))
     return (np.count_nonzero(contact) - BEYOND_EDGES * edges) / contact.size, float(edges)
@@ -401,7 +401,7 @@ def _dataset(surface, material, state, target, tolerance, seed):
 def describe_problem(
     surface: Surface, fine: Surface, material: Material, tolerance: float, seed: int
 ) -> dict[str, Any]:
-    """Return the values, by name, that describe a problem: surface, grid of the solver, material and settings."""
+    """Return the values that describe a problem, by variable name: surface, grid of the solver, material, settings."""
     adhesive = material.surface_energy > 0
     return {
         "tolerance": tolerance,

@@ -1,10 +1,10 @@
 """Loading and unloading at a finite range of attraction, with boundary elements, from no contact to no contact.
 
-The mean gap is prescribed, as in a stiff machine. Each solution starts from the one before and so stays on its branch
-until the branch ends. There the surfaces jump, and the energy that the jump releases is lost. The work done on the
-contact is minus the integral of the nominal pressure over the mean gap, by the trapezoidal rule. It differs from the
-change of the stored energy by the energy that jumps dissipate, and by the error of the trapezoidal rule. Steps with a
-difference are halved, at most five times; the position of a jump within the smallest step remains unknown.
+The mean gap is prescribed, as in a stiff testing machine. Each solution starts from the last solution and therefore
+stays on the same branch until the branch ends. At its end the surfaces jump, and the energy of the jump is lost.
+The work done on the contact is minus the integral of the nominal pressure over the mean gap, by the trapezoidal rule.
+The work differs from the change of the stored energy by the energy that jumps dissipate, and by the error of this rule.
+A step with too large a difference is halved, at most five times. Therefore the position of a jump remains uncertain.
 """
 
 import math
@@ -28,14 +28,14 @@ from icha.references.finite_range import (
 from icha.support.rules import POSITIVE, TOLERANCE
 from icha.surfaces.surface import Surface
 
-# Surfaces are apart if every gap exceeds this many ranges, where at most 0.7 % of the interface's strength acts.
+# Surfaces are apart if every gap exceeds this number of ranges. There the traction is at most 0.7 % of the strength.
 _APART = 5.0
 # Mean gap at the start of the loop minus the height of the highest summit, in ranges.
 _START = 6.0
 # Error of the work of a step, over the surface energy, above which the step is halved; and largest number of halvings.
 _WORK_TOLERANCE = 1e-4
 _MAX_HALVINGS = 5
-# Relative error of the largest load, unless it lies within a jump; and number of tries to reach it within one step.
+# Largest relative error of the largest load, unless it lies within a jump; and number of attempts to reach the load.
 _LOAD_TOLERANCE = 1e-3
 _MAX_LOAD_SEARCHES = 12
 # A loop that takes more solutions than this does not end.
@@ -53,26 +53,26 @@ def finite_range_loop(
     seed: int = -1,
     progress: Callable[[str], None] | None = None,
 ) -> xr.Dataset:
-    """Return the dataset of a loop, solved by Tamaas: from separated surfaces to a load, and until they separate again.
+    """Compute a loop with Tamaas: load separated surfaces, then unload them until they separate; return the dataset.
 
     Parameters
     ----------
     surface, material, refinement, tolerance, seed, progress : as for
         `icha.references.finite_range.finite_range_solution`.
-    largest_reduced_pressure : p/(E* h'_rms) at which unloading begins, positive. A jump may exceed it.
-    separation_step : largest step of the mean gap, in h_rms; steps with jumps are divided into up to 32 smaller ones.
+    largest_reduced_pressure : p/(E* h'_rms) at which unloading begins, positive. A jump may exceed this pressure.
+    separation_step : largest step of the mean gap, in h_rms; a step with a jump is divided into up to 32 smaller steps.
 
     Returns
     -------
-    xarray.Dataset of `icha.datasets.variables.boundary_elements.LOOP`. At the first and the last `step` the surfaces
-    are apart at the same mean gap; the work is zero at the first step.
+    xarray.Dataset of `icha.datasets.variables.boundary_elements.LOOP`. At the first and at the last `step`, the
+    surfaces are apart at the same mean gap. The work is zero at the first step.
 
     Raises
     ------
     ValueError
         If an argument is out of range, or the grid does not resolve the attraction.
     NotSolved
-        If the solver does not reach its tolerance, or the load is not reached; the message names the last state.
+        If the solver does not reach its tolerance, or the load is not reached; the message describes the last state.
     """
     target = POSITIVE.validate("largest_reduced_pressure", largest_reduced_pressure)
     step = POSITIVE.validate("separation_step", separation_step) * surface.rms_height
@@ -83,7 +83,7 @@ def finite_range_loop(
 
 
 class _LoopSolver:
-    """Solver of the states of a loop, each of which starts from the state before."""
+    """Solver of the states of a loop; each solution starts from the last state."""
 
     def __init__(self, fine, material, tolerance):
         self.fine, self.material, self.tolerance = fine, material, tolerance
@@ -97,18 +97,20 @@ class _LoopSolver:
         return self.solve(separation - self.fine.heights, separation)
 
     def is_apart(self, state):
-        """Return whether the attraction is negligible everywhere."""
+        """Return whether no node is in contact and the attraction is negligible everywhere."""
         return not state.contact.any() and state.gap.min() >= _APART * self.range
 
     def solve(self, gap, separation):
         """Return the state at a mean gap, m, starting from the gaps (n, n), m, of another state."""
         if self.contact.solves >= _MAX_SOLVES:
-            raise NotSolved(f"the loop has not ended after {self.contact.solves} solutions")
+            raise NotSolved(
+                f"the loop has not ended after {self.contact.solves} solutions; use a larger separation_step"
+            )
         self.contact.start_from(gap)
         return self.contact.solve(separation)
 
     def steps(self, state, separation, halvings=_MAX_HALVINGS):
-        """Yield states from one state to a mean gap, m, in steps that are halved until their work is known well."""
+        """Yield states from one state to a mean gap, m, in steps that are halved until their work is accurate."""
         after = self.solve(state.gap, separation)
         if halvings == 0 or self.work_error(state, after) <= self.work_tolerance:
             yield after
@@ -120,14 +122,14 @@ class _LoopSolver:
     def work_error(self, before, after):
         """Return the error of the work of a step, J/m^2: the smaller of two estimates.
 
-        On a branch the error is the work minus the change of the stored energy. In a step with a jump the error is at
-        most half the change of the pressure times the step.
+        In a step without a jump the error is the work minus the change of the stored energy. In a step with a jump the
+        error is at most half the change of the pressure times the step.
         """
         records = [self.record(before), self.record(after)]
         return min(abs(_dissipated(records)[0]), _jump_position_error(records)[0])
 
     def total_work_error(self, records):
-        """Return the error of the work of all steps, J/m^2: dissipation in steps without jumps, and errors of jumps."""
+        """Return the error of the work of all steps, J/m^2: dissipation in steps without jumps plus errors by jumps."""
         dissipated = _dissipated(records)
         jump = dissipated > self.work_tolerance
         return abs(dissipated[~jump].sum()) + _jump_position_error(records)[jump].sum()
@@ -162,7 +164,7 @@ def _load_and_unload(solver, step, target, progress):
                     area = f"contact area {leg[-1]['contact_area_fraction']:.4g} A0"
                     progress(f"{solver.describe(state)}, {area}, error {state.residual:.2g}")
                 last = state
-        # If contact breaks at a larger gap than that of the start, states from that gap on are added to loading.
+        # If contact breaks at a larger mean gap than `start`, loading states are added from this larger gap on.
         count = round((last.mean_separation - start) / step)
         farther = [solver.solve_from_undeformed(start + step * k) for k in range(count, 0, -1)]
         legs[0][:0] = map(solver.record, farther)
@@ -189,7 +191,7 @@ def _load(solver, _, start, step, target):
 
 
 def _search_load(solver, before, after, target):
-    """Yield states between two states, up to the load, Pa; if it lies within a jump, the last one is `after`."""
+    """Yield states between two states, up to the load, Pa; if the load lies in a jump, the last state is `after`."""
     for _ in range(_MAX_LOAD_SEARCHES):
         share = (target - before.nominal_pressure) / (after.nominal_pressure - before.nominal_pressure)
         separation = before.mean_separation + share * (after.mean_separation - before.mean_separation)
@@ -205,7 +207,7 @@ def _search_load(solver, before, after, target):
 
 
 def _unload(solver, state, start, step, target):
-    """Yield the states of unloading until the surfaces are apart, at the mean gaps of loading; as `_load`."""
+    """Yield the states of unloading, at the mean gaps of loading, until the surfaces are apart; see `_load`."""
     count = math.ceil((start - state.mean_separation) / step) - 1
     while count >= 0 or not solver.is_apart(state):
         for after in solver.steps(state, start - count * step):
@@ -215,7 +217,7 @@ def _unload(solver, state, start, step, target):
 
 
 def _column(records, name):
-    """Return one value of all records as an array."""
+    """Return the values of one variable in all records, as an array."""
     return np.array([record[name] for record in records])
 
 
@@ -231,7 +233,7 @@ def _dissipated(records):
 
 
 def _jump_position_error(records):
-    """Return the error of the work of each step if the pressure jumps at one of its ends, (n - 1,), J/m^2."""
+    """Return the error of the work of each step if the pressure jumps at one end of the step, (n - 1,), J/m^2."""
     return np.abs(np.diff(_column(records, "mean_separation")) * np.diff(_column(records, "nominal_pressure"))) / 2
 
 

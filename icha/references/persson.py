@@ -1,9 +1,10 @@
 """Persson's theory of the adhesionless contact of a nominally flat rough surface.
 
-Pressures are reduced, p* = p/(E* h'_rms). The constants below name the sources. The form of Persson's theory with the
-rms slope is in M. H. Muser et al., Tribol. Lett. 65 (2017) 118, doi:10.1007/s11249-017-0900-2. Equation and gamma of Xu
-et al. are from the programs of their public data, https://github.com/xylcsi/PerssonModelFudgeFactor. Stiffness in
-proportion to pressure: B. N. J. Persson, Phys. Rev. Lett. 99 (2007) 125502, doi:10.1103/PhysRevLett.99.125502.
+Pressures are reduced, p* = p/(E* h'_rms). The constants in this file name the sources. The form of Persson's theory
+with the rms slope is in M. H. Muser et al., Tribol. Lett. 65 (2017) 118, doi:10.1007/s11249-017-0900-2. Equation and
+gamma of Xu et al. are from the programs in their public data, https://github.com/xylcsi/PerssonModelFudgeFactor. Source
+for the stiffness in proportion to pressure: B. N. J. Persson, Phys. Rev. Lett. 99 (2007) 125502,
+doi:10.1103/PhysRevLett.99.125502.
 """
 
 import numpy as np
@@ -23,12 +24,12 @@ _POINTS = 401
 
 
 def persson_area(reduced_pressure):
-    """Return the contact area fraction erf(sqrt(2) p*) at reduced pressures, an array (Persson 2001)."""
+    """Return the contact area fraction erf(sqrt(2) p*) at an array of reduced pressures p* (Persson 2001)."""
     return erf(np.sqrt(2) * np.asarray(reduced_pressure, float))
 
 
 def corrected_persson_area(reduced_pressure):
-    r"""Return the contact area fraction at reduced pressures, an array, by Persson's theory as Xu et al. corrected it.
+    r"""Return the contact area fraction at an array of reduced pressures by Persson's theory, corrected by Xu et al.
 
     Partial contact has a smaller variance of the pressure than full contact, V = (gamma + (1 - gamma) A/A0) V_full with
     V_full = (E* h'_rms)^2/4, so that A/A0 = erf(p/sqrt(2 V)) is an equation for A/A0.
@@ -43,8 +44,8 @@ def corrected_persson_area(reduced_pressure):
 def persson_pressure_density(pressure, reduced_pressure):
     """Return P(p) over the nominal area at the pressures `pressure`, both in units of E* h'_rms (Persson 2001).
 
-    A Gaussian of standard deviation 1/2 around p*, minus the same one around -p*. The integral over p > 0 is
-    `persson_area`.
+    P(p) is a Gaussian of standard deviation 1/2 around p*, minus the same Gaussian around -p*. The integral of P(p)
+    over p > 0 is `persson_area`.
     """
     pressure = np.asarray(pressure, float)
     gauss = np.exp(-2 * (pressure - reduced_pressure) ** 2) - np.exp(-2 * (pressure + reduced_pressure) ** 2)
@@ -52,19 +53,19 @@ def persson_pressure_density(pressure, reduced_pressure):
 
 
 def persson_mean_separation(reduced_pressure, spectrum):
-    r"""Return the mean separation over h_rms at reduced pressures, an array, from the spectrum of the surface.
+    r"""Return the mean separation over h_rms at an array of reduced pressures, from the spectrum of the surface.
 
     Yang & Persson (2008): with w(q) = (pi int_{q_L}^q k^3 C(k) dk)^(-1/2) and P = erf(w p/E*),
 
         u(p) = sqrt(pi) int dq q^2 C(q) w(q) int_p^inf dp'/p' [gamma + 3 (1 - gamma) P^2] exp(-(w p'/E*)^2).
 
-    The mean separation follows from -p A0 du = dU_el, U_el = A0 E* (pi/2) int dq q^2 C P [gamma + (1 - gamma) P^2]. The
-    substitution t = w p'/E* leaves one function of t for all wave numbers.
+    The equation results from -p A0 du = dU_el, U_el = A0 E* (pi/2) int dq q^2 C P [gamma + (1 - gamma) P^2]. With the
+    substitution t = w p'/E* the inner integral is the same function of t for all wave numbers.
 
     Parameters
     ----------
     reduced_pressure : p*, positive.
-    spectrum : `icha.surfaces.spectrum.SelfAffineSpectrum`; its isotropic continuum is used, not its lattice.
+    spectrum : `icha.surfaces.spectrum.SelfAffineSpectrum`; the continuous spectrum is used, not the discrete modes.
     """
     return _over_wave_numbers(_stored_share, reduced_pressure, spectrum)
 
@@ -72,7 +73,7 @@ def persson_mean_separation(reduced_pressure, spectrum):
 def persson_stiffness(reduced_pressure, spectrum):
     r"""Return the contact stiffness -dp/du times h_rms/(E* h'_rms) at reduced pressures (Yang & Persson 2008).
 
-    It is a derivative of `persson_mean_separation`; only the integral over the wave numbers remains:
+    The stiffness is computed from the derivative of `persson_mean_separation`:
 
         -p du/dp = sqrt(pi) int dq q^2 C(q) w(q) [gamma + 3 (1 - gamma) P^2] exp(-(w p/E*)^2).
 

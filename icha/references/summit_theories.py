@@ -1,10 +1,10 @@
 r"""Theories of separate summits: spheres at given heights, each in contact with a plane as if it were alone.
 
 Pressures are reduced, p* = p/(E* h'_rms). Separations are distances between the plane and the mean plane of the rough
-surface over h_rms; they are mean separations, because only the summits deform in these theories. The constants below
-name the sources. Further ones: P. R. Nayak, J. Lubr. Technol. 93 (1971) 398, doi:10.1115/1.3451608, for the summits of
-a Gaussian surface; J. A. Greenwood, Tribol. Lett. 65 (2017) 159, doi:10.1007/s11249-017-0938-1, for Fuller & Tabor on
-loading.
+surface, over h_rms. In these theories only the summits deform, so these distances are mean separations. The constants
+in this file name the sources. Further sources: P. R. Nayak, J. Lubr. Technol. 93 (1971) 398, doi:10.1115/1.3451608, for
+the summits of a Gaussian surface; J. A. Greenwood, Tribol. Lett. 65 (2017) 159, doi:10.1007/s11249-017-0938-1, for
+Fuller & Tabor on loading.
 """
 
 import math
@@ -42,7 +42,7 @@ _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(400)
 
 
 def bush_gibson_thomas_area(reduced_pressure):
-    """Return A/A0 = sqrt(2 pi) p* at reduced pressures, an array: the limit of small areas of this theory."""
+    """Return A/A0 = sqrt(2 pi) p* at an array of reduced pressures: Bush, Gibson & Thomas for small areas."""
     return np.sqrt(2 * np.pi) * np.asarray(reduced_pressure, float)
 
 
@@ -64,16 +64,16 @@ class GaussianSummits(NamedTuple):
 
 
 def gaussian_summits(moments: SpectralMoments) -> GaussianSummits:
-    """Return the summits of an isotropic Gaussian surface with Nayak's mean values, as McCool (1986) uses them.
+    """Return the mean properties of the summits of an isotropic Gaussian surface by Nayak, as used by McCool (1986).
 
-    Density m4/(6 pi sqrt(3) m2), mean height 4 sqrt(m0/(pi alpha)), variance (1 - 0.8968/alpha) m0, and the radius of
-    their mean curvature, 3 sqrt(pi)/(8 sqrt(m4)). Raise `ValueError` if Nayak's parameter alpha is less than 3/2, the
-    smallest value of an isotropic surface.
+    The density is m4/(6 pi sqrt(3) m2), the mean height 4 sqrt(m0/(pi alpha)), the variance of the heights
+    (1 - 0.8968/alpha) m0, and the radius of the mean curvature 3 sqrt(pi)/(8 sqrt(m4)). Raise `ValueError` if Nayak's
+    parameter alpha is less than 3/2, the smallest value of an isotropic surface.
     """
     alpha = moments.nayak_parameter
     if alpha < 1.5 * (1 - 1e-9):
         raise ValueError(
-            f"spectral moments: Nayak's parameter is {alpha:.4g}; expected 1.5 or more, as of an isotropic surface"
+            f"spectral moments: Nayak's parameter is {alpha:.4g}; expected 1.5 or more for an isotropic surface"
         )
     return GaussianSummits(
         density=summit_density(moments.m2, moments.m4),
@@ -84,10 +84,10 @@ def gaussian_summits(moments: SpectralMoments) -> GaussianSummits:
 
 
 def greenwood_williamson_area(reduced_separation, moments: SpectralMoments):
-    """Return A/A0 = pi eta R sigma F_1(d/sigma) at reduced separations, an array.
+    """Return A/A0 = pi eta R sigma F_1(d/sigma) at an array of reduced separations (Greenwood & Williamson).
 
-    eta is the density of the summits, R their radius of curvature, sigma the standard deviation of their heights, and d
-    the height of the plane above their mean height.
+    eta is the density of the summits, R the radius of curvature of the summits, sigma the standard deviation of the
+    summit heights, and d the height of the plane above the mean summit height.
     """
     summits = gaussian_summits(moments)
     scale = np.pi * summits.density * summits.radius_of_curvature * summits.deviation
@@ -95,25 +95,25 @@ def greenwood_williamson_area(reduced_separation, moments: SpectralMoments):
 
 
 def greenwood_williamson_pressure(reduced_separation, moments: SpectralMoments):
-    """Return p* = 4/3 eta R^(1/2) sigma^(3/2) F_3/2(d/sigma)/h'_rms at reduced separations, an array."""
+    """Return p* = 4/3 eta R^(1/2) sigma^(3/2) F_3/2(d/sigma)/h'_rms at an array of reduced separations."""
     summits = gaussian_summits(moments)
     scale = 4 / 3 * summits.density * math.sqrt(summits.radius_of_curvature * summits.deviation**3) / moments.rms_slope
     return scale * _mean_power_above(_height_above_summits(reduced_separation, moments, summits), 1.5)
 
 
 def fuller_tabor_area(reduced_separation, moments: SpectralMoments, material: Material):
-    """Return A/A0 of Gaussian summits that follow the JKR law, on loading (Fuller & Tabor 1975).
+    """Return A/A0 on loading of Gaussian summits that follow the JKR law (Fuller & Tabor 1975).
 
-    Without attraction at a distance a summit makes contact at approach 0, where it jumps to the radius
-    (2 pi dgamma R^2/E*)^(1/3) and is in tension. `moments` are those of the surface at its own rms slope; the range of
-    attraction of the material is not used.
+    This theory has no attraction at a distance. A summit makes contact at approach 0, where the contact jumps to the
+    radius (2 pi dgamma R^2/E*)^(1/3) and is in tension. `moments` are the spectral moments of the surface at its actual
+    rms slope. The range of attraction of the material is not used.
     """
     law = JKR(material)
     return _sum_over_summits(lambda a, R: np.pi * a**2, law, reduced_separation, moments)
 
 
 def fuller_tabor_pressure(reduced_separation, moments: SpectralMoments, material: Material):
-    """Return p* of Gaussian summits that follow the JKR law, negative in tension; as `fuller_tabor_area`."""
+    """Return p* on loading of Gaussian summits with the JKR law, negative in tension; see `fuller_tabor_area`."""
     law = JKR(material)
     pressure = _sum_over_summits(law.force, law, reduced_separation, moments)
     return pressure / (material.contact_modulus * moments.rms_slope)
@@ -122,8 +122,8 @@ def fuller_tabor_pressure(reduced_separation, moments: SpectralMoments, material
 def separation_at(quantity: Callable, value, moments: SpectralMoments, *arguments):
     """Return the reduced separations at which quantity(separation, moments, *arguments) has the values `value`.
 
-    The quantity must decrease with the separation. Raise `ValueError` if a value is not positive, or not found within
-    10 standard deviations of the mean summit height.
+    The quantity must decrease with the separation. Raise `ValueError` if a value is not positive, or if its separation
+    is farther than 10 standard deviations from the mean summit height.
     """
     summits = gaussian_summits(moments)
     middle, reach = summits.mean_height / moments.rms_height, _FARTHEST_PLANE * summits.deviation / moments.rms_height
@@ -156,7 +156,7 @@ def _mean_power_above(t, n):
 def _sum_over_summits(of_summit, law, reduced_separation, moments):
     """Return the sum over the summits in contact, per area, of a function of contact radius and radius of curvature.
 
-    The variable of integration is the contact radius, which gives the approach of a summit and so its height.
+    The variable of integration is the contact radius. The contact radius gives the approach and the height of a summit.
     """
     summits = gaussian_summits(moments)
     plane = np.asarray(reduced_separation, float)[..., None] * moments.rms_height

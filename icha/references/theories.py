@@ -20,10 +20,10 @@ SUMMIT_AREAS = np.geomspace(1e-5, summit_theories.SEPARATE_SUMMITS_AREA_LIMIT, 8
 
 
 def literature(name: str) -> dict:
-    """Return one entry of `literature.json`: published numbers with title, description, citation, DOIs and units.
+    """Return one data set of `literature.json`: published numbers with title, description, citation, DOIs and units.
 
-    Entries are `gfmd_area`, `gfmd_gap`, `area_slope` and `contact_mechanics_challenge`. All lists of an entry have one
-    number per point.
+    The names are `gfmd_area`, `gfmd_gap`, `area_slope` and `contact_mechanics_challenge`. All lists of a data set have
+    one number for each published point.
     """
     return json.loads(files("icha.references").joinpath("literature.json").read_text(encoding="utf-8"))[name]
 
@@ -36,21 +36,21 @@ def reference_dataset(
     reduced_pressures=REDUCED_PRESSURES,
     attrs: Mapping[str, str] = {},
 ) -> xr.Dataset:
-    """Return a dataset of theories of a surface, and of published points of surfaces with the same spectrum.
+    """Return a dataset of theory curves for a surface, and of published points for surfaces with the same spectrum.
 
     Parameters
     ----------
-    spectrum : spectrum of the surface. None, as for a measured surface: Persson's theory gives the area only.
-    moments : spectral moments of the surface at any rms slope. None: there are no theories of separate summits.
-    adhesive : materials with adhesion, by rms slope and name; each has a curve of Fuller & Tabor.
-    reduced_pressures : p/(E* h'_rms), increasing and positive.
-    attrs : further global attributes.
+    spectrum : spectrum of the surface. If it is None, as for a measured surface, Persson's theory gives only the area.
+    moments : spectral moments of the surface at any rms slope. If None, theories of separate summits are left out.
+    adhesive : materials with adhesion, by rms slope and name; each material has a curve of Fuller & Tabor.
+    reduced_pressures : values of p/(E* h'_rms), increasing and positive.
+    attrs : additional global attributes.
 
     Returns
     -------
-    Dataset with Persson's theory along `reduced_pressure`; that of Bush, Gibson & Thomas along `linear_point`; those of
-    Greenwood & Williamson and of Fuller & Tabor along `summit_point`, at the areas `summit_area_fraction`; and
-    published points along `gfmd_point`.
+    Dataset with Persson's theory along the dimension `reduced_pressure`. The theory of Bush, Gibson & Thomas has the
+    dimension `linear_point`. The theories of Greenwood & Williamson and of Fuller & Tabor have the dimension
+    `summit_point`, at the areas `summit_area_fraction`. Published points have the dimension `gfmd_point`.
     """
     values = _mean_field_theories(np.asarray(reduced_pressures, float), spectrum) | _published_points(spectrum)
     if moments is not None:
@@ -68,7 +68,7 @@ def reference_dataset(
 
 
 def _sources():
-    """Return the sources of all variables that are theories or published points, by name."""
+    """Return the publications of all variables that are theories or published points, by variable name."""
     points, separation = literature("gfmd_area"), ("reduced_pressure", "reduced_separation")
     return {
         "persson_area_fraction": persson.PERSSON,
@@ -88,7 +88,7 @@ _TABLE = THEORIES | {
 
 
 def _mean_field_theories(pressure, spectrum):
-    """Return the values of Persson's theory and that of Bush, Gibson & Thomas at reduced pressures, by variable."""
+    """Return the theories of Persson and of Bush, Gibson & Thomas at reduced pressures, by variable name."""
     area = summit_theories.bush_gibson_thomas_area(pressure)
     separate = area <= summit_theories.SEPARATE_SUMMITS_AREA_LIMIT
     values = {
@@ -105,7 +105,7 @@ def _mean_field_theories(pressure, spectrum):
 
 
 def _summit_theories(moments, adhesive):
-    """Return the values of the theories of Greenwood & Williamson and of Fuller & Tabor, by variable."""
+    """Return the theories of Greenwood & Williamson and of Fuller & Tabor, by variable name."""
     separation = summit_theories.separation_at(summit_theories.greenwood_williamson_area, SUMMIT_AREAS, moments)
     values = {
         "nayak_parameter": moments.nayak_parameter,
@@ -131,7 +131,7 @@ def _summit_theories(moments, adhesive):
 
 
 def _published_points(spectrum):
-    """Return the points by Green's function molecular dynamics by variable, if they are of this spectrum."""
+    """Return published points by Green's function molecular dynamics, if they have this spectrum, by variable name."""
     gfmd = literature("gfmd_area")
     if spectrum is None:
         return {}

@@ -1,1 +1,1 @@
-"""General tools without contact mechanics: atomic files, checksums, units, rules for values, cores."""
+"""General tools without contact mechanics: safe writing of files, checksums, units, bounds of values, threads."""

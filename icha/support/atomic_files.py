@@ -1,8 +1,8 @@
-"""Atomic writes: a file is complete or does not exist, survives a power cut, and is written only by the owner.
+"""Write files atomically: a file is complete or does not exist, survives a power cut, and has one owner.
 
-The call of the program that started last owns a folder of results. Jobs of an earlier call may still run on another
-machine, but cannot complete a result: before a file is moved to its place, the owner is checked under a lock, which a
-new call needs as well.
+The latest call of the program owns a folder of results. Jobs of an earlier call may still run on another machine, but
+they cannot complete a result. Before a job moves a file to its final path, it locks the owner's file and checks the
+owner. A new call needs the same lock.
 """
 
 import fcntl
@@ -12,29 +12,29 @@ from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from pathlib import Path
 
-# Bytes that must fit on the disk; libraries write about as much at once.
+# Number of bytes in a test of free disk space; libraries write about as many bytes at once.
 _PROBE = 2**20
 _ENDING = ".part"
-# Environment variable for the programs that an owner starts: content of the owner's file, and its path.
+# Environment variable for programs that an owner starts. Its value is the content and the path of the owner's file.
 _OWNER_VARIABLE = "ICHA_OWNER"
 _moving: Callable[[], AbstractContextManager] = nullcontext
-_SUPERSEDED = "a later call of this campaign owns this result and computes it; nothing was written"
+_SUPERSEDED = "a later call of this campaign owns this result; this job wrote nothing"
 
 
 @contextmanager
 def whole_file(path: str | os.PathLike, *, lasting: bool = True) -> Iterator[Path]:
-    """Provide a temporary path beside `path`; move the file to `path` if the block succeeds, else remove it.
+    """Provide a temporary path; move the file to `path` if the block succeeds, else remove the temporary file.
 
-    The folder is created if it is missing. The temporary path is unique, so two programs may write the same file.
-    Unless `lasting` is False, the content is synchronised to the disk before the move, and the name after it.
+    The folder of `path` is created if it is missing. The temporary path is unique, so two programs may write the same
+    file. If `lasting` is true, the content is written to the disk before the move, and the new name after the move.
 
     Raises
     ------
     Superseded
         If this process is a job (`move_only_while_owned`), and a later call owns the results.
     OSError
-        If the folder cannot be written to. It replaces the errors of libraries for data files, which do not mention a
-        full disk.
+        If nothing can be written to the folder. Libraries for data files raise other errors, which do not mention a
+        full disk; OSError replaces these errors.
     """
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -57,28 +57,28 @@ def whole_file(path: str | os.PathLike, *, lasting: bool = True) -> Iterator[Pat
             raise OSError(reason.errno, reason.strerror, str(path.parent)) from error
         raise
     finally:
-        with suppress(OSError):  # it may be missing, as in a read-only folder
+        with suppress(OSError):  # the temporary file may be missing
             temporary.unlink()
 
 
 def move_only_while_owned() -> None:
-    """Make this process a job: it writes results only while the call that started it owns the results."""
+    """Make this process a job, which writes results only while the call that started the job owns the results."""
     global _moving
     _moving = while_owned
 
 
 def moving() -> AbstractContextManager:
-    """Return the context in which files are moved into place."""
+    """Return the context in which a file may be moved to its final path."""
     return _moving()
 
 
 def is_left_over(name: str) -> bool:
-    """Return whether a file name is that of a temporary file; a killed program leaves such files behind."""
+    """Return whether a file name belongs to a temporary file, which a killed program has left."""
     return name.startswith(".") and name.endswith(_ENDING)
 
 
 def sync_folder(folder: Path) -> None:
-    """Synchronise all files below a folder, and their names, to the disk."""
+    """Write all files of a folder and its subfolders, and the names of the files, from the cache to the disk."""
     for top, _, names in os.walk(folder):
         for name in names:
             _sync(Path(top, name))
@@ -87,7 +87,7 @@ def sync_folder(folder: Path) -> None:
 
 
 def probe_folder(folder: Path) -> OSError | None:
-    """Write some data to a folder and remove them; return the error if it cannot be written to."""
+    """Test whether data can be written to a folder; return the error, or None."""
     probe = folder / f".{os.getpid()}.probe{_ENDING}"
     try:
         probe.write_bytes(bytes(_PROBE))
@@ -100,7 +100,7 @@ def probe_folder(folder: Path) -> OSError | None:
 
 
 def _sync(path: Path) -> None:
-    """Synchronise the content of a file, or the names in a folder, to the disk; macOS may still buffer it."""
+    """Write the content of a file, or the names in a folder, from the cache to the disk; macOS may delay this."""
     descriptor = os.open(path, os.O_RDONLY)
     try:
         os.fsync(descriptor)
@@ -109,11 +109,11 @@ def _sync(path: Path) -> None:
 
 
 class Superseded(ValueError):
-    """A later call owns the results."""
+    """Error: a later call of the program owns the results."""
 
 
 def take_over(file: str | os.PathLike) -> None:
-    """Make this process and those that it starts the owner of the results of `file`; raise OSError if it cannot."""
+    """Make this process, and all processes that it starts, owner of results; `file` records the owner."""
     os.environ.pop(_OWNER_VARIABLE, None)
     word = secrets.token_hex(8)
     Path(file).parent.mkdir(parents=True, exist_ok=True)
@@ -128,7 +128,7 @@ def take_over(file: str | os.PathLike) -> None:
 
 @contextmanager
 def while_owned() -> Iterator[None]:
-    """Keep other calls from taking over the results; raise `Superseded` if one has done so."""
+    """Prevent other calls from becoming owner during a block; raise `Superseded` if another call is owner already."""
     word, _, file = os.environ.get(_OWNER_VARIABLE, "").partition(" ")
     if not word:
         yield
@@ -145,6 +145,6 @@ def while_owned() -> Iterator[None]:
 
 
 def _lock(file, kind):
-    """Lock a file until it is closed."""
-    with suppress(OSError):  # on a file system without locks a short race remains
+    """Lock a file until the file is closed."""
+    with suppress(OSError):  # without locks in the file system, two calls may conflict for a short time
         fcntl.flock(file, kind)

@@ -1,12 +1,13 @@
-"""Checksum sidecars of results. A sidecar shows whether its result is whole, and from which files it was made.
+"""Sidecars: small files that record checksum, settings and inputs of each result.
 
-The sidecar of `results/<campaign>/<path>` is `results/<campaign>/checksums/<path>.json`. It contains the SHA-256, size
-and modification time of the file or folder. A file with the same size and time is trusted; any other file is hashed.
-Errors of the storage change neither; a `thorough` check, which hashes every file, finds them.
+The sidecar of `results/<campaign>/<path>` is `results/<campaign>/checksums/<path>.json`. A sidecar contains the
+SHA-256, size and modification time of the result, which is a file or folder. A result with the same size and time
+counts as unchanged; otherwise its SHA-256 is computed. Errors of the storage change neither size nor time. A `thorough`
+check computes the SHA-256 of every file and so finds these errors.
 
-The sidecar also contains a checksum of the parameters of the job, and the checksums of the results that the job read,
-because a whole result may belong to other settings, another program version, or other input data. A sidecar without its
-result means that the result must be made again.
+A sidecar also contains a checksum of the parameters of the job, and the checksums of the job's inputs. An unchanged
+result may still belong to other settings, another program version, or other inputs. If a sidecar exists but its result
+does not, the result must be computed again.
 """
 
 import contextlib
@@ -21,19 +22,19 @@ from typing import NamedTuple
 from icha.support.atomic_files import whole_file
 
 FOLDER = "checksums"
-# Reason that Snakemake also finds if its own record of the result is valid.
+# Reason for a stale result. Snakemake also detects this reason if Snakemake's own record of the result is valid.
 OTHER_SETTINGS = "it was made with other settings, or by another version of the program"
 
 
 class Checksum(NamedTuple):
-    """Record of a result as it was written.
+    """Content of a sidecar: record of a result at the time when it was written.
 
     Attributes
     ----------
-    sha256 : checksum of the content.
-    size, mtime_ns : size and modification time; for a folder, the sum of the sizes and the latest time of its files.
-    asked : checksum of the parameters of its job (`hash_parameters`).
-    inputs : checksums of the results that its job read, by path.
+    sha256 : SHA-256 of the content.
+    size, mtime_ns : size (bytes) and modification time (ns); for a folder, sum of sizes and latest time of its files.
+    asked : checksum of the parameters of the job (`hash_parameters`).
+    inputs : SHA-256 of each result that the job read, by path.
     """
 
     sha256: str
@@ -44,34 +45,34 @@ class Checksum(NamedTuple):
 
 
 def hash_parameters(parameters: Iterable[str]) -> str:
-    """Return the checksum of the parameters of a job; `parameters` are their Python representations in any order."""
+    """Return the checksum of the parameters of a job, from their Python representations in any order."""
     return hashlib.sha256("\n".join(sorted(parameters)).encode()).hexdigest()
 
 
 def write_checksum(results: str | os.PathLike, path: str, *, asked: str = "", inputs: Mapping[str, str] = {}) -> None:
-    """Write the sidecar of the result `path` in the campaign's folder `results`; see `Checksum` for the others."""
+    """Write the sidecar of a result; `path` is in the folder `results`, see `Checksum` for `asked` and `inputs`."""
     file = Path(results, path)
     size, mtime_ns = _size_and_time(file)
     _write(results, path, Checksum(sha256_of(file), size, mtime_ns, asked, inputs))
 
 
 def begin(results: str | os.PathLike, path: str) -> None:
-    """Record that a job starts to write a result; until its checksum is written, it counts as stale, not damaged."""
+    """Record that a job starts to write a result, so that an unfinished result counts as stale, not damaged."""
     _write(results, path, _BEGUN, lasting=False)
 
 
 def distrust(results: str | os.PathLike, path: str) -> None:
-    """Let the next check compute the checksum of a result, even if its size and time are unchanged."""
+    """Mark a result so that the next check computes its SHA-256, even if size and time are unchanged."""
     written = _read(results, path)
     if written not in (None, _BEGUN):
         _write(results, path, written._replace(mtime_ns=0))
 
 
 def is_whole(results: str | os.PathLike, path: str, *, thorough: bool = False) -> bool:
-    """Return whether the result `path` in the campaign's folder `results` equals its checksum, or has no sidecar.
+    """Return whether a result agrees with the checksum in its sidecar; True without a sidecar.
 
-    Unless `thorough`, a file of the same size and time counts as whole. If only the time differs, the new time is
-    written to the sidecar. A result whose sidecar cannot be read does not count as whole.
+    Unless `thorough` is true, a result with the same size and time counts as whole. If only the time differs, the
+    sidecar receives the new time. The function returns False if the sidecar cannot be read.
     """
     file = Path(results, path)
     try:
@@ -97,26 +98,25 @@ def is_whole(results: str | os.PathLike, path: str, *, thorough: bool = False) -
 
 
 def damaged(results: str | os.PathLike, *, thorough: bool = False) -> list[str]:
-    """Return the paths of all existing results of a campaign that differ from their checksums, sorted."""
+    """Return the sorted paths of all damaged results: files that differ from the checksums in their sidecars."""
     return [path for path in with_sidecar(results) if not is_whole(results, path, thorough=thorough)]
 
 
 def stale(
     results: str | os.PathLike, paths: Iterable[str], asked: Callable[[str], str] | None = None
 ) -> Iterator[tuple[str, str]]:
-    """Yield the existing results that were made with other settings or inputs, and the reason.
+    """Yield path and reason for each existing result that was computed with other settings or inputs.
 
     Parameters
     ----------
-    results, paths : the results.
-    asked : returns the present checksum of the parameters of a result (`hash_parameters`); by default only inputs are
-        checked.
+    results, paths : folder of results of the campaign, and paths in this folder.
+    asked : function from a path to the present checksum of the job's parameters; by default only inputs are checked.
     """
     known = cache(lambda path: _known(results, path))
 
     @cache
     def content(path):
-        """Return the SHA-256 of an input, or empty text if the file does not exist."""
+        """Return the SHA-256 of an input; empty if the file does not exist."""
         with contextlib.suppress(FileNotFoundError):
             return known(path).sha256 or sha256_of(Path(results, path))
         return ""
@@ -136,12 +136,12 @@ def stale(
 
 
 def recorded_hash(results: str | os.PathLike, path: str) -> str:
-    """Return the checksum of the parameters of the job that made a result, from its sidecar; empty if unknown."""
+    """Return the checksum of the job's parameters from the sidecar of a result; empty if unknown."""
     return _known(results, path).asked
 
 
 def sha256_as_written(results: str | os.PathLike, path: str) -> str:
-    """Return the SHA-256 of a result from its sidecar, or of its content if it has no sidecar."""
+    """Return the SHA-256 of a result from its sidecar; without a sidecar, compute the SHA-256 from the content."""
     return _known(results, path).sha256 or sha256_of(Path(results, path))
 
 
@@ -152,7 +152,7 @@ def _known(results, path) -> Checksum:
 
 
 def with_sidecar(results: str | os.PathLike) -> Iterator[str]:
-    """Yield the paths of all results that have a sidecar, sorted; the results may be missing."""
+    """Yield the sorted paths of all results with a sidecar, even if the result is missing."""
     top = os.path.join(results, FOLDER)
     for folder, folders, names in os.walk(top):
         folders.sort()
@@ -162,13 +162,13 @@ def with_sidecar(results: str | os.PathLike) -> Iterator[str]:
 
 
 def set_aside(results: str | os.PathLike, path: str) -> Path:
-    """Rename a result to `<name>.damaged`, `.damaged2` and so on, so that it is made again; return the new path."""
+    """Rename a damaged result to `<name>.damaged`, `.damaged2` …, so that it is computed again; return the new path."""
     file = Path(results, path)
     names = (file.with_name(f"{file.name}.damaged{number}") for number in ("", *range(2, 10**6)))
     return file.rename(next(name for name in names if not name.exists()))
 
 
-# Record of a result that a job has started to write; no file has an empty digest.
+# Record of a result that a job has started to write. Its SHA-256 is empty, unlike that of any file.
 _BEGUN = Checksum("", 0, 0)
 
 
@@ -177,7 +177,7 @@ def _sidecar(results, path) -> str:
 
 
 def _read(results, path) -> Checksum | None:
-    """Read the sidecar of a result, None without one; raise ValueError if it is not valid."""
+    """Read the sidecar of a result; None if there is no sidecar; raise ValueError if the sidecar is not valid."""
     try:
         with open(_sidecar(results, path), "rb") as file:
             return Checksum(**json.loads(file.read()))
@@ -201,7 +201,7 @@ def _size_and_time(file) -> tuple[int, int]:
 
 
 def sha256_of(file: Path) -> str:
-    """Return the SHA-256 of a file, hexadecimal; for a folder, that of its files and their paths."""
+    """Return the SHA-256 of a file, in hexadecimal form; for a folder, the SHA-256 of all paths and contents."""
     if not file.is_dir():
         with file.open("rb") as content:
             return hashlib.file_digest(content, "sha256").hexdigest()
@@ -212,5 +212,5 @@ def sha256_of(file: Path) -> str:
 
 
 def _files_in(folder: Path) -> list[Path]:
-    """Return all files below a folder, sorted, without the timestamp files of Snakemake."""
+    """Return all files in a folder and its subfolders, sorted, without the timestamp files of Snakemake."""
     return sorted(each for each in folder.rglob("*") if each.is_file() and each.name != ".snakemake_timestamp")

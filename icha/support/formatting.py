@@ -1,8 +1,8 @@
-r"""Formatting of numbers, bytes, times and lengths, and of untrusted text for a terminal, a log or a page.
+r"""Format numbers, bytes, times and lengths, and make untrusted text safe for a terminal, a log or a page.
 
-In untrusted text, control characters could clear a screen, move the cursor and change colours; overrides of the writing
-direction could show `exe.txt` for `txt.exe`; line breaks could forge lines. They are printed as Python escapes, such as
-`\x1b` and `\u202e`.
+In untrusted text, control characters could clear a screen, move the cursor and change colours. Characters that change
+the writing direction could show `exe.txt` instead of `txt.exe`. Line breaks could add false lines to a log. The
+functions replace such characters by Python escapes, such as `\x1b` and `\u202e`.
 """
 
 import math
@@ -10,8 +10,8 @@ import re
 
 _PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 _CONTROLS = r"\x00-\x08\x0b-\x1f\x7f-\x9f"
-# Invisible marks, overrides and isolates of direction, separators of lines, surrogates, and tags. The joiners U+200C
-# and U+200D are not among them, because Persian, Indian languages and emoji need them.
+# Invisible marks, characters that change the writing direction, line separators, surrogates and tags. The joiners
+# U+200C and U+200D are allowed, because Persian, Indian languages and emoji need these characters.
 _UNSEEN = (
     "\xad\u061c\u180e\u200b\u200e\u200f\u2028-\u202e\u2060-\u206f\ud800-\udfff\ufeff\ufff9-\ufffb\U000e0000-\U000e007f"
 )
@@ -20,17 +20,17 @@ _IN_A_LINE = re.compile(f"[\t\n{_CONTROLS}{_UNSEEN}]")
 
 
 def format_count(number: int, thing: str) -> str:
-    """Format a number of things, such as `1 run` or `3 runs`."""
+    """Format a number with a noun in singular or plural, such as `1 run` or `3 runs`."""
     return f"{number} {thing}{'' if number == 1 else 's'}"
 
 
 def share(count: int, total: int) -> str:
-    """Format a share as a percentage to two digits, such as `31 %` or `0.024 %`."""
+    """Format the ratio count/total as a percentage with two digits, such as `31 %` or `0.024 %`."""
     return f"{_digits(100 * count / total, 2)} %"
 
 
 def size(count: float) -> str:
-    """Format bytes to three digits, such as `15 B`, `70.2 kB` or `1.5 GB`."""
+    """Format a number of bytes with three digits, such as `15 B`, `70.2 kB` or `1.5 GB`."""
     for factor, unit in ((1e12, "TB"), (1e9, "GB"), (1e6, "MB"), (1e3, "kB")):
         if count >= factor:
             return f"{_digits(count / factor, 3)} {unit}"
@@ -38,20 +38,20 @@ def size(count: float) -> str:
 
 
 def choose_unit(value: float, unit: str) -> tuple[float, str]:
-    """Return factor and name of the prefixed unit in which `value` (SI) lies between 1 and 1000."""
+    """Choose the unit prefix with which `value` (SI) is between 1 and 1000; return the factor and the prefixed unit."""
     exponent = 0 if value == 0 else math.floor(math.log10(abs(value)) / 3 + 1e-9) * 3
     exponent = min(max(exponent, min(_PREFIXES)), max(_PREFIXES))
     return 10.0**-exponent, f"{_PREFIXES[exponent]}{unit}"
 
 
 def format_quantity(value: float, unit: str) -> str:
-    """Return a value with a prefixed unit, such as `25 MPa`."""
+    """Format a value (SI) with a prefixed unit, such as `25 MPa`."""
     factor, name = choose_unit(value, unit)
     return f"{value * factor:.4g} {name}"
 
 
 def duration(seconds: float) -> str:
-    """Format seconds to two digits, such as `4.2 s`, `3.3 min`, `14 h` or `5.2 days`."""
+    """Format a time in seconds with two digits, such as `4.2 s`, `3.3 min`, `14 h` or `5.2 days`."""
     for factor, unit, least in ((86400, "days", 100 * 3600), (3600, "h", 3600), (60, "min", 60)):
         if seconds >= least:
             return f"{_digits(seconds / factor, 2)} {unit}"
@@ -59,23 +59,23 @@ def duration(seconds: float) -> str:
 
 
 def _digits(value: float, digits: int) -> str:
-    """Format a number to some digits, in full if it has more before its point."""
+    """Format a number with `digits` significant digits, or as an integer if it has more digits before the point."""
     return f"{value:.0f}" if value >= 10.0**digits - 0.5 else f"{value:.{digits}g}"
 
 
 def length(metres: float) -> str:
-    """Format metres with a unit as in configurations, such as `2.5 um`."""
+    """Format a length in metres with a prefixed unit as in configurations, such as `2.5 um`."""
     factor, unit = choose_unit(metres, "m")
     return f"{metres * factor:.6g} {unit.replace('µ', 'u')}"
 
 
 def printable(text: object) -> str:
-    """Escape a text so that it is one line and has no effect on a terminal or on the text around it."""
+    """Escape control characters and line breaks of a text, so that the text is one harmless line."""
     return _IN_A_LINE.sub(_escaped, str(text))
 
 
 def printable_lines(text: object) -> str:
-    """Escape a text as `printable` does, but for line breaks and tabs."""
+    """Escape control characters of a text as `printable` does, but keep line breaks and tabs."""
     return _IN_LINES.sub(_escaped, str(text))
 
 

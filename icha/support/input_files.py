@@ -1,6 +1,6 @@
-"""Checks of input files from unknown sources: kind of file, memory limit of reading, dangerous HDF5 files; CSV tables.
+"""Check input files from unknown sources: kind of file, memory for reading, dangerous HDF5 files; read CSV tables.
 
-A small file can declare a very large array, or unpack to one. Readers compare declared sizes with the limit
+A small file can declare a very large array, or contain a compressed one. Readers compare the declared size with a limit
 (`require_room`), and limit the memory of the libraries that read the file (`bounded_memory`).
 """
 
@@ -16,25 +16,25 @@ from pathlib import Path
 from icha.support import formatting
 from icha.support.rules import POSITIVE
 
-# Environment variable with the memory limit in MB, and the limit without it.
+# Environment variable with the memory limit in MB, and the default limit.
 VARIABLE = "ICHA_INPUT_MB"
 _DEFAULT_MB = 2000
-# Largest memory for reading a large file, in multiples of its size.
+# Largest memory for reading a large file, divided by the size of the file.
 _COPIES = 3
-# Most names in an HDF5 file, and most nested groups; visiting more takes minutes.
+# Largest numbers of names and of nested groups in an HDF5 file; visiting more names takes minutes.
 _MOST_NAMES, _DEEPEST = 100_000, 50
-_WHOLE = "expected a file that holds all of its data"
+_WHOLE = "expected a file that contains all of its data"
 
 
 class RefusedFile(ValueError):
-    """A file that is not read because it might do harm; the message gives the reason and what is expected."""
+    """Error: a file is not read because it might do harm. The message contains the reason and what is expected."""
 
 
 class TooLarge(RefusedFile):
-    """A file that would take more memory than the limit; the message explains how to raise the limit."""
+    """Error: reading a file needs more memory than the limit. The message explains how to raise the limit."""
 
     def __init__(self, needed: str, most: int):
-        """Describe the memory `needed`, the limit of `most` bytes, and how to raise it."""
+        """Create the message from the needed memory (text) and the limit `most` (bytes)."""
         super().__init__(
             f"needs {needed} of memory; expected at most {formatting.size(most)}. Set the environment variable "
             f"{VARIABLE} to allow more, in MB"
@@ -42,7 +42,7 @@ class TooLarge(RefusedFile):
 
 
 def problem_with_path(path: str | os.PathLike) -> str | None:
-    """Describe why a path cannot be opened as a file; None if it can. Reading a pipe or device might never end."""
+    """Describe why a path is not a readable file; None if it is one. Reading a pipe or device might never end."""
     try:
         mode = os.stat(path).st_mode
     except (FileNotFoundError, NotADirectoryError, ValueError):  # ValueError for zero bytes in a path
@@ -55,13 +55,13 @@ def problem_with_path(path: str | os.PathLike) -> str | None:
 
 
 def most_memory(file: str | os.PathLike | None = None) -> int:
-    """Return the memory limit of reading, bytes. Without the environment variable it grows with the size of `file`.
+    """Return the memory limit for reading a file, bytes; the default limit grows with the size of `file`.
 
     Raises RefusedFile if the environment variable is not a number.
     """
     limit = os.environ.get(VARIABLE)
     if limit is None:
-        # Only what a sparse file has on the disk counts; st_blocks has units of 512 bytes everywhere.
+        # Only the occupied part of a sparse file counts; the unit of st_blocks is 512 bytes on all systems.
         needed = 0 if file is None else _COPIES * 512 * os.stat(file).st_blocks
         return max(_DEFAULT_MB * 10**6, needed)
     if not re.fullmatch(r"[0-9]{1,9}", limit):
@@ -70,7 +70,7 @@ def most_memory(file: str | os.PathLike | None = None) -> int:
 
 
 def require_room(needed: float, most: int | None = None) -> None:
-    """Raise `TooLarge` if reading needs more memory than `most` bytes, by default `most_memory`."""
+    """Raise `TooLarge` if more memory is `needed` than `most`, both in bytes; `most_memory` is the default."""
     most = most_memory() if most is None else most
     if needed > most:
         raise TooLarge(f"about {formatting.size(needed)}", most)
@@ -78,10 +78,10 @@ def require_room(needed: float, most: int | None = None) -> None:
 
 @contextmanager
 def bounded_memory(most: int | None = None) -> Iterator[None]:
-    """Limit the memory that a block and its libraries allocate to `most` bytes, by default `most_memory`.
+    """Limit the memory that a block of code and its libraries allocate to `most` bytes, by default `most_memory`.
 
-    Beyond the limit the block raises `TooLarge`; libraries in C may raise their own errors instead. Only Linux supports
-    the limit; on other systems only declared sizes are checked.
+    If the block needs more memory, it raises `TooLarge`; libraries in C may raise their own errors instead. Only Linux
+    supports the limit. On other systems, `require_room` is the only check.
     """
     most = most_memory() if most is None else most
     if sys.platform != "linux":
@@ -104,22 +104,22 @@ def bounded_memory(most: int | None = None) -> Iterator[None]:
 
 
 def text(attribute: bytes | str | Iterable[bytes | str]) -> str:
-    """Convert a text attribute to str; netCDF stores non-ASCII texts as bytes or as an array with one text."""
+    """Convert a text attribute of a netCDF file to str; files store non-ASCII text as bytes or as an array."""
     if not isinstance(attribute, bytes | str):
         (attribute,) = attribute
     return attribute.decode() if isinstance(attribute, bytes) else str(attribute)
 
 
 def refuse_traps(path: str | os.PathLike) -> None:
-    """Refuse an HDF5 file with links or data in other files, with cyclic groups, or with too many names.
+    """Raise RefusedFile for an HDF5 file with links to or data in other files, cyclic groups, or too many names.
 
     Links to other files could reach any file of this machine. A group with two names may contain itself, which crashes
-    the netCDF library. Links to data in the same file are accepted, and so are files of other formats.
+    the netCDF library. Links to data in the same file are accepted. Files of other formats are not checked.
 
     Raises
     ------
     RefusedFile
-        Naming the link, group or dataset.
+        If the file is dangerous; the message contains the name of the link, group or dataset.
     OSError
         If the file is damaged.
     """
@@ -131,7 +131,7 @@ def refuse_traps(path: str | os.PathLike) -> None:
         groups, count = {h5py.h5o.get_info(file.id).addr}, 0
 
         def trap(name, link):
-            """Return a reason to refuse the file, or None; h5py stops visiting links at the first reason."""
+            """Return a reason to refuse the file, or None; h5py stops at the first reason."""
             nonlocal count
             count, shown = count + 1, name.decode("utf-8", "replace")
             if count > _MOST_NAMES or name.count(b"/") >= _DEEPEST:
@@ -140,7 +140,7 @@ def refuse_traps(path: str | os.PathLike) -> None:
                 return f"{shown!r} is a link to another file; {_WHOLE}"
             try:
                 node = h5py.h5o.open(file.id, name)
-            except (KeyError, RuntimeError, SystemError):  # a link to nothing, or to itself
+            except (KeyError, RuntimeError, SystemError):  # the link has no target, or is its own target
                 return None
             if isinstance(node, h5py.h5d.DatasetID):
                 properties = node.get_create_plist()
@@ -159,12 +159,12 @@ def refuse_traps(path: str | os.PathLike) -> None:
 
 
 def read_columns(path: str | Path, columns: dict[str, float]) -> list:
-    """Read columns of a CSV file with a line of headings, each as an array in the order of the file.
+    """Read columns of positive numbers from a CSV file with a line of headings; return one array for each column.
 
     Parameters
     ----------
-    path : the file.
-    columns : headings of the columns, and the factors that their numbers are multiplied by.
+    path : path of the file.
+    columns : headings of the columns, and for each heading the factor by which the numbers are multiplied.
 
     Raises
     ------
@@ -182,7 +182,7 @@ def read_columns(path: str | Path, columns: dict[str, float]) -> list:
         reason = getattr(error, "strerror", None) or error
         raise ValueError(f"cannot be read ({reason}); expected a CSV file") from None
     if not rows:
-        raise ValueError("holds no values; expected a CSV file with a line of headings and at least one of numbers")
+        raise ValueError("contains no values; expected a CSV file with a line of headings and lines of numbers")
     found = {heading: [] for heading in columns}
     for heading, numbers in found.items():
         if heading not in rows[0]:

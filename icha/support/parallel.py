@@ -1,15 +1,15 @@
-"""Parallel work on the cores of the process, with results that do not depend on their number."""
+"""Run work in parallel threads; the results do not depend on the number of threads."""
 
 import os
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 
-# Nodes along a side of a grid above which several threads save time.
+# Smallest number of nodes along a side of a grid at which several threads save time.
 LARGE_GRID = 2048
 
 
 def cores() -> int:
-    """Return the number of threads: OMP_NUM_THREADS if it is set, otherwise that of the processors for this process.
+    """Return the number of threads: OMP_NUM_THREADS if it is set, otherwise the number of available processors.
 
     Snakemake sets OMP_NUM_THREADS to the `threads` of a rule.
     """
@@ -20,10 +20,10 @@ def cores() -> int:
 
 
 def on_cores(function: Callable, items: Iterable) -> list:
-    """Apply `function` to every item in threads; return the results in the order of the items.
+    """Apply a function to every item in parallel threads; return the results in the order of the items.
 
-    The results have the same bits on any number of cores if the items do not depend on it. Threads help if the function
-    spends its time in NumPy, SciPy or finufft.
+    The results are bitwise the same for any number of cores if the items do not depend on this number. Threads save
+    time if the function mainly runs code of NumPy, SciPy or finufft.
     """
     items = list(items)
     count = min(cores(), len(items))
@@ -32,7 +32,7 @@ def on_cores(function: Callable, items: Iterable) -> list:
     results, waiting = [None] * len(items), enumerate(items)
 
     def work():
-        # Each thread takes the next item by itself, because distributing many short ones would take as long as they do.
+        # Each thread takes the next item itself, because the distribution of many short items would take too long.
         for number, item in waiting:
             results[number] = function(item)
 
@@ -43,5 +43,5 @@ def on_cores(function: Callable, items: Iterable) -> list:
 
 
 def blocks(length: int, size: int) -> list[slice]:
-    """Return slices of at most `size` that cover range(length)."""
+    """Divide range(length) into slices of at most `size` items."""
     return [slice(first, min(first + size, length)) for first in range(0, length, size)]

@@ -1,6 +1,6 @@
-"""The program on this machine: the folder of its workflow, in a clone or installed, and its processes.
+"""Find the folder of the workflow, in a clone or an installation, and identify processes of the program.
 
-`python -m icha.support.program` prints the folder of the workflow; shipped campaigns and examples are in its config/.
+`python -m icha.support.program` prints the folder of the workflow; its subfolder config/ contains campaigns.
 """
 
 import ctypes
@@ -8,25 +8,25 @@ import os
 import signal
 from pathlib import Path
 
-# Folder beside the installed package, which the wheel contains (tool.hatch.build.targets.wheel.hooks).
+# Folder of the workflow beside the installed package; the wheel contains it (tool.hatch.build.targets.wheel.hooks).
 INSTALLED = "icha_workflow"
 _PACKAGE = Path(__file__).resolve().parent.parent
 _PR_SET_PDEATHSIG = 1  # of prctl(2)
 
 
 def own_workflow() -> Path:
-    """Return the folder with the Snakefile: the repository of an editable installation, else the installed folder."""
+    """Return the folder with the Snakefile: the repository for an editable installation, else the installed folder."""
     beside = _PACKAGE.parent
     return beside if (beside / "Snakefile").is_file() else beside / INSTALLED
 
 
 def is_installed(workflow: Path) -> bool:
-    """Return whether the folder of a workflow is an installed one, not a clone of the repository."""
+    """Return whether the folder of a workflow comes from an installation, not from a clone of the repository."""
     return workflow.name == INSTALLED and not (workflow / "icha").is_dir()
 
 
 def package_of(workflow: Path) -> Path:
-    """Return the folder of the package `icha`: in the clone, or beside the folder of an installed workflow."""
+    """Return the folder of the package `icha`: inside a clone, or beside the folder of an installed workflow."""
     return (workflow.parent if is_installed(workflow) else workflow) / "icha"
 
 
@@ -35,7 +35,7 @@ if __name__ == "__main__":
 
 
 def beginning_of(process: int) -> str:
-    """Return the start time of a process in system ticks. The number and the start time identify a process.
+    """Return the start time of a process, in ticks of the system clock. Number and start time identify a process.
 
     Raises FileNotFoundError or ProcessLookupError if the process does not exist.
     """
@@ -45,7 +45,7 @@ def beginning_of(process: int) -> str:
 
 
 def end_with_parent(parent: int) -> None:
-    """Let the system kill this process when its parent, the process `parent`, ends for any reason."""
+    """Let the operating system kill this process when its parent process (number `parent`) ends for any reason."""
     ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
     if os.getppid() != parent:
         os._exit(1)

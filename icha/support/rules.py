@@ -1,7 +1,7 @@
-"""Units and bounds of arguments and configuration keys.
+"""Units and bounds for the values of arguments and configuration keys.
 
-Functions and classes check an argument with `validate`. `icha.support.values` makes the types of configuration keys
-from the same rules. The rules for targets of a path are in `icha.path.targets`.
+Functions and classes check arguments with `validate`. `icha.support.values` checks configuration keys with the same
+bounds. `icha.path.targets` contains the bounds for targets of a path.
 """
 
 import numbers
@@ -11,14 +11,14 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class FloatRange:
-    """A finite real number within bounds.
+    """Bounds and unit of a finite real number.
 
     Parameters
     ----------
-    unit : of the number.
-    above : the number must be greater than this.
+    unit : unit of the number.
+    above : exclusive lower bound; the number must be greater.
     least, most : the number must be in [least, most].
-    model_ends : whether `most` is where the asperity model ends.
+    model_ends : True if `most` is the largest value to which the asperity model applies.
     """
 
     unit: str = "1"
@@ -28,7 +28,7 @@ class FloatRange:
     model_ends: bool = False
 
     def contains(self, value: float) -> bool:
-        """Return whether a number is within the bounds."""
+        """Return whether a number is within all bounds."""
         return (
             (self.above is None or value > self.above)
             and (self.least is None or value >= self.least)
@@ -43,7 +43,7 @@ class FloatRange:
 
     @property
     def expected(self) -> str:
-        """Description of the valid values, which follows "expected" in messages."""
+        """Description of the valid values, for use after "expected" in messages."""
         if self.above is None and self.least is None:
             return "a number" if self.most is None else f"a number of at most {_short(self.most)}"
         if self.most is None:
@@ -51,11 +51,11 @@ class FloatRange:
         return f"a number in {self.interval}" + (", where the asperity model holds" if self.model_ends else "")
 
     def validate(self, name: str, value) -> float:
-        """Return the value of argument `name` as a float; raise ValueError with the name if it breaks the rule."""
+        """Return a value as a float; raise ValueError, which names the argument, if it is not a number in bounds."""
         unit = "" if self.unit == "1" else f" (in {self.unit})"
         if isinstance(value, bool) or not isinstance(value, numbers.Real):
             raise ValueError(f"{name}: {value!r} is not a number{unit}")
-        if not abs(value) <= sys.float_info.max:  # infinite, not a number, or an integer that no float holds
+        if not abs(value) <= sys.float_info.max:  # infinite, not a number, or an integer too large for a float
             raise ValueError(f"{name}: {value!r} is not finite{unit}")
         number = float(value)
         if not self.contains(number):
@@ -71,7 +71,7 @@ def _short(bound: float) -> str:
 
 @dataclass(frozen=True)
 class IntegerRange:
-    """An integer from `least` to `most`."""
+    """Bounds of an integer: from `least` to `most`."""
 
     least: int
     most: int = 2**31 - 1
@@ -81,7 +81,7 @@ class IntegerRange:
         return not isinstance(value, bool) and isinstance(value, numbers.Integral) and self.least <= value <= self.most
 
     def validate(self, name: str, value) -> int:
-        """Return the value of argument `name` as an int; raise ValueError with the name if it breaks the rule."""
+        """Return a value as an int; raise ValueError, which names the argument, if it is not an integer in bounds."""
         if isinstance(value, bool) or not isinstance(value, numbers.Integral):
             raise ValueError(f"{name}: {value!r} is not an integer")
         if not self.contains(value):
@@ -92,7 +92,7 @@ class IntegerRange:
 
 NUMBER = FloatRange()
 POSITIVE = FloatRange(above=0)
-# Bounds far wider than anything physical, within which no product of powers overflows or vanishes.
+# Bounds far beyond physical lengths; within the bounds, products of powers neither overflow nor vanish.
 LENGTH = FloatRange("m", least=1e-24, most=1e9)
 
 # Surfaces.
@@ -104,7 +104,7 @@ SEED = IntegerRange(0)
 # Materials.
 CONTACT_MODULUS = FloatRange("Pa", least=1e-9, most=1e15)
 SURFACE_ENERGY = FloatRange("J/m^2", least=0, most=1e24)
-# Surface energy over contact modulus, where there is adhesion.
+# Surface energy divided by contact modulus, of materials with adhesion.
 ADHESION_LENGTH = FloatRange("m", least=1e-40, most=1e9)
 
 # Boundary elements.

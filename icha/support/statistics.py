@@ -1,17 +1,18 @@
-"""Means over an ensemble of surfaces of the same statistics, and their confidence intervals."""
+"""Means over an ensemble of surfaces with the same statistics, and confidence intervals of the means."""
 
 from typing import NamedTuple
 
 import numpy as np
 
-# Probability that a confidence interval contains the mean of infinitely many surfaces.
+# Probability that the confidence interval contains the mean of infinitely many surfaces.
 CONFIDENCE = 0.95
-# With fewer members the confidence interval is wider than their scatter, so figures show them one by one.
+# Fewest members for which figures show means. With fewer members, the confidence interval is wider than the scatter of
+# the members, so figures show every member.
 ENOUGH = 5
 
 
 class Ensemble(NamedTuple):
-    """Statistics over the members of an ensemble, arrays of one shape; NaN where there are too few members.
+    """Statistics over the members of an ensemble. All arrays have the same shape, with NaN where members are too few.
 
     Attributes
     ----------
@@ -27,11 +28,11 @@ class Ensemble(NamedTuple):
     count: np.ndarray
 
     def band(self, *, positive: bool = False) -> tuple[np.ndarray, np.ndarray]:
-        """Return the confidence interval of the mean m: m ± c, or m exp(± c/m) for a `positive` quantity.
+        """Return the bounds of the confidence interval: m ± c, or m exp(± c/m) for a `positive` quantity of mean m.
 
-        The second interval is that of the logarithm of the mean. The standard error of the logarithm is, to first
-        order, the standard error of the mean divided by the mean (delta method). The second interval stays above zero,
-        and tends to the first one as c vanishes. If the mean is not positive, the first interval is used.
+        The second form is the confidence interval of ln(m). To first order, the standard error of ln(m) is the standard
+        error of m divided by m (delta method). The bounds are then positive, and tend to m ± c for small c/m. If m is
+        not positive, the bounds are m ± c.
         """
         above = (self.mean > 0) & positive
         factor = np.exp(np.divide(self.confidence, self.mean, out=np.zeros_like(self.mean), where=above))
@@ -40,16 +41,16 @@ class Ensemble(NamedTuple):
 
 
 def ensemble(samples, axis: int = 0) -> Ensemble:
-    """Compute the mean over an axis and its confidence interval by Student's t, for normally distributed members.
+    """Compute mean, deviation and confidence interval over an axis, for normally distributed members.
 
     Parameters
     ----------
-    samples : values of the members along `axis`; NaN where a member has none.
+    samples : values of the members along `axis`; NaN where a member has no value.
 
     Notes
     -----
-    The interval of n members of standard deviation s is mean ± t s/√n, where t is the 97.5 % quantile of Student's
-    distribution of n - 1 degrees of freedom (Student, Biometrika 6 (1908) 1).
+    The confidence interval of n members with standard deviation s is mean ± t s/√n. Here t is the 97.5 % quantile of
+    Student's distribution with n - 1 degrees of freedom (Student, Biometrika 6 (1908) 1).
     """
     from scipy.special import stdtrit  # imported here because declarations of figures do not need it
 

@@ -1,4 +1,4 @@
-"""Types of values in a configuration, such as `25 MPa`, which is kept as a float in SI units."""
+"""Types of values in a configuration. A value with a unit, such as `25 MPa`, becomes a float in SI units."""
 
 import contextlib
 import math
@@ -20,14 +20,14 @@ _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _QUANTITY = re.compile(rf"\s*({_NUMBER})\s*(.*?)\s*", re.DOTALL)
 _UNIT = re.compile(r"[A-Za-zµμÅ°%²³⁻·][\w\s*/^().µμÅ°%²³⁻·-]*")
 
-# Largest number of letters of a number or a unit, because patterns and pint are slow on long texts.
+# Largest number of characters of a number or unit, because patterns and pint are slow for long texts.
 _LONGEST = 100
 
-# Quantities of a configuration, by their SI unit.
+# Names of quantities, by SI unit.
 PHYSICAL_NAMES = {"m": "length", "Pa": "pressure", "J/m^2": "energy per area", "1": "ratio"}
 
-# The commonest units of pressure and energy per area. With them pint, which takes long to load, is not needed;
-# tests/support/test_units.py compares the factors with those of pint.
+# The commonest units of pressure and energy per area. These units do not need pint, which takes long to load.
+# tests/support/test_units.py compares the factors with the factors of pint.
 USUAL = {
     ("Pa", "Pa"): "1",
     ("kPa", "Pa"): "1e3",
@@ -37,7 +37,8 @@ USUAL = {
     ("mJ/m^2", "J/m^2"): "1e-3",
 }
 
-# Units of length of scans. Pint also accepts px, pt, au and hand, which mean something else in a file of heights.
+# Units of length. Pint is not used, because it also accepts px, pt, au and hand, which have other meanings in files of
+# heights.
 _PREFIXES = {"deci": "1e-1", "centi": "1e-2", "milli": "1e-3", "micro": "1e-6", "nano": "1e-9", "pico": "1e-12"}
 _SYMBOLS = {"km": "1e3", "m": "1", "dm": "1e-1", "cm": "1e-2", "mm": "1e-3", "um": "1e-6", "\u03bcm": "1e-6"}
 _SYMBOLS |= {"nm": "1e-9", "pm": "1e-12", "\u00c5": "1e-10", "in": "0.0254", "mil": "2.54e-5", "thou": "2.54e-5"}
@@ -50,20 +51,20 @@ _LONG_NAMES |= {
 _LONG_NAMES |= {f"{name}s": factor for name, factor in _LONG_NAMES.items()} | {"inches": "0.0254"}
 
 PATTERN = rf"^\s*{_NUMBER}\s*[A-Za-zµμÅ].*$"
-# Names become folders and files; commands would read one that begins with a hyphen as an option.
+# Names become names of folders and files. Commands would read a name that begins with a hyphen as an option.
 NAME_PATTERN = r"^[a-z0-9_][a-z0-9_-]*$"
-# Largest number of letters of a name, and of a name with varied values. A file name may have 255.
+# Largest number of characters of a name, and of a name with varied values. A file name may have 255 characters.
 _LONGEST_NAME, LONGEST_LABEL = 80, 200
 # Relative tolerance of a quotient of two lengths, such as the number of cells per wave.
 ROUNDING = 1e-9
 # Largest number of names in a message.
 _MOST_LISTED = 30
-# Location in a configuration, value, and what is wrong with it and what is expected.
+# A problem: location (keys) in a configuration, value, and message with problem and expected value.
 Problem = tuple[tuple, Any, str]
-# Value of a problem whose key is missing.
+# Placeholder for the value of a problem if the key is missing.
 NOTHING = object()
 Name = Annotated[str, Field(strict=True, pattern=NAME_PATTERN, max_length=_LONGEST_NAME)]
-# A name, or the name of a variant that `vary` of a study makes.
+# A name, or the name of a variant from the key `vary` of a study.
 Label = Annotated[str, Field(strict=True, pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.+-]*$", max_length=LONGEST_LABEL)]
 _RANGE = re.compile(r"\s*(\d{1,10})\s*\.\.\s*(\d{1,10})\s*")
 # Largest number of seeds.
@@ -80,9 +81,9 @@ def _registry():
 
 @lru_cache(maxsize=1024)
 def conversion_factor(unit: str, si_unit: str) -> Decimal:
-    """Return the exact factor from `unit` to `si_unit`; raise ValueError if `unit` is unknown or unsuitable."""
+    """Return the exact factor from `unit` to `si_unit`; raise ValueError for an unknown unit or another quantity."""
     if len(unit) > _LONGEST:
-        raise ValueError(f"a text of {len(unit)} letters is not a unit")
+        raise ValueError(f"a text of {len(unit)} characters is not a unit")
     if unit == si_unit == "1":
         return Decimal(1)
     if (unit, si_unit) in USUAL:
@@ -91,7 +92,7 @@ def conversion_factor(unit: str, si_unit: str) -> Decimal:
 
 
 def _length(unit):
-    """Return the exact factor from a unit of length to metres; accept both signs for micro and both for angstrom."""
+    """Return the exact factor from a unit of length to metres; both Unicode signs for micro and angstrom are valid."""
     name = unicodedata.normalize("NFKC", unit.strip())
     factor = _SYMBOLS.get(name) or _LONG_NAMES.get(name.lower())
     if factor is None:
@@ -100,7 +101,7 @@ def _length(unit):
 
 
 def _by_pint(unit, si_unit):
-    """Return the exact factor by pint, which raises a dozen types of errors for text that is not a unit."""
+    """Return the exact factor from `unit` to `si_unit` with pint; raise ValueError for other texts."""
     factor = math.nan
     if _UNIT.fullmatch(unit):
         with contextlib.suppress(Exception):
@@ -112,7 +113,7 @@ def _by_pint(unit, si_unit):
 
 
 def to_si(value, si_unit: str) -> float:
-    """Read a quantity with its unit, such as `25 MPa`, as a float in `si_unit`; raise ValueError if it is not one."""
+    """Convert text such as `25 MPa` to a float in `si_unit`; raise ValueError for other values."""
     if isinstance(value, int | float) and not isinstance(value, bool):
         raise ValueError("the unit is missing")
     match = _QUANTITY.fullmatch(value) if isinstance(value, str) and len(value) <= _LONGEST else None
@@ -123,17 +124,17 @@ def to_si(value, si_unit: str) -> float:
         raise ValueError("the unit is missing")
     try:
         return finite(Decimal(magnitude) * conversion_factor(unit, si_unit))
-    except ArithmeticError:  # larger than a Decimal, such as 1e999999 MPa
+    except ArithmeticError:  # too large for a Decimal, such as 1e999999 MPa
         raise ValueError("is not finite") from None
 
 
 def to_number(value) -> float:
-    """Read a finite number without a unit, also as text such as `1e-3`, which YAML does not read as a number."""
+    """Convert a number, or text such as `1e-3`, to a finite float; raise ValueError for other values."""
     if isinstance(value, str):
         if len(value) > _LONGEST:
             raise ValueError("is not a number")
         if not re.fullmatch(rf"\s*{_NUMBER}\s*", value):
-            what = "is a pure number and takes no unit" if _QUANTITY.fullmatch(value) else "is not a number"
+            what = "must be a number without a unit" if _QUANTITY.fullmatch(value) else "is not a number"
             raise ValueError(what)
         return finite(value)
     if isinstance(value, bool) or not isinstance(value, int | float):
@@ -142,7 +143,7 @@ def to_number(value) -> float:
 
 
 def finite(value) -> float:
-    """Return `value`, a number or the text of one, as a float; raise ValueError unless it is finite."""
+    """Convert a number or its text to a float; raise ValueError if the result is not finite."""
     try:
         value = float(value)
     except OverflowError:
@@ -153,7 +154,7 @@ def finite(value) -> float:
 
 
 def quantity(rule: FloatRange, example: str):
-    """Return the type of a value with its unit; the value becomes a float in the unit of `rule`."""
+    """Return the type of a value with a unit; the value becomes a float in the unit of `rule`."""
     bounds = f"in {rule.interval} {rule.unit}" if rule.most is not None else "0 or greater"
     expected = f"{PHYSICAL_NAMES[rule.unit]} with its unit, {bounds}, such as {example!r}"
     schema = {"type": "string", "pattern": PATTERN, "examples": [example]}
@@ -161,14 +162,14 @@ def quantity(rule: FloatRange, example: str):
 
 
 def number(rule: FloatRange):
-    """Return the type of a number without a unit."""
+    """Return the type of a number without a unit, within the bounds of `rule`."""
     bounds = {"exclusiveMinimum": rule.above, "minimum": rule.least, "maximum": rule.most}
     schema = {"type": "number"} | {key: bound for key, bound in bounds.items() if bound is not None}
     return _float(to_number, rule, rule.expected, schema)
 
 
 def _float(convert, rule, expected, schema, *metadata):
-    """Return the type of a float that `convert` reads and a rule checks; its message states what is expected."""
+    """Return the type of a float: `convert` reads the value, `rule` checks the bounds, messages contain `expected`."""
 
     def read(value: Any) -> float:
         try:
@@ -183,7 +184,7 @@ def _float(convert, rule, expected, schema, *metadata):
 
 
 def integer(rule: IntegerRange):
-    """Return the type of an integer."""
+    """Return the type of an integer within the bounds of `rule`."""
     least, most = rule.least, rule.most
 
     def read(value: Any) -> int:
@@ -196,7 +197,7 @@ def integer(rule: IntegerRange):
 
 
 def distinct(values):
-    """Refuse a list with an entry that is given twice."""
+    """Return a list; raise ValueError if an entry occurs twice."""
     seen = set()
     for value in values:
         if value in seen:
@@ -206,7 +207,7 @@ def distinct(values):
 
 
 def _ordered(follows, order: str, unit: str = ""):
-    """Return a validator that refuses a list of numbers in another order."""
+    """Return a validator that refuses a list of numbers that is not in the given order."""
 
     def check(values):
         for before, after in pairwise(values):
@@ -222,32 +223,32 @@ decreasing = _ordered(operator.lt, "decreasing", " m")
 
 
 def exactly_one(section):
-    """Refuse a section with no key or more than one."""
+    """Return a section; raise ValueError unless exactly one of its keys is given."""
     given = sorted(name for name in section.model_fields_set if getattr(section, name) is not None)
     if len(given) != 1:
         names = ", ".join(type(section).model_fields)
-        raise ValueError(f"{' and '.join(given) or 'nothing'} is given; expected exactly one of {names}")
+        raise ValueError(f"given: {', '.join(given) or 'none'}; expected exactly one of {names}")
     return section
 
 
 def list_names(names: Iterable) -> str:
-    """List names for a message: `a, b, c`, or the first ones and the number of the others."""
+    """Join names for a message; of a long list, only the first names and the number of further names appear."""
     names = list(names)
     more = f", … ({len(names) - _MOST_LISTED} more)" if len(names) > _MOST_LISTED else ""
     return ", ".join(map(str, names[:_MOST_LISTED])) + more
 
 
 def unknown(location: tuple, name: str, names: Iterable[str]) -> Iterator[Problem]:
-    """Yield the problem of a name that is not one of `names`."""
+    """Yield a problem if a name is not one of the defined `names`."""
     if name not in names:
         yield location, name, f"is not defined; expected {list_names(names) or 'no name, because none is defined'}"
 
 
 def _without_controls(value: str) -> str:
-    """Refuse control characters and surrogates, which a YAML file can contain only as escapes."""
+    """Return a text; raise ValueError for control characters and surrogates, which YAML can contain as escapes."""
     for char in value:
         if unicodedata.category(char) in ("Cc", "Cs") and char not in "\n\t":
-            raise ValueError(f"holds the control character {char!r}; expected text without it")
+            raise ValueError(f"contains the control character {char!r}; expected text without control characters")
     return value
 
 
@@ -255,9 +256,9 @@ Text = Annotated[str, Field(strict=True, min_length=1), AfterValidator(_without_
 
 
 def _file(value: str) -> str:
-    """Refuse paths with braces, which Snakemake would read as patterns."""
+    """Return a path; raise ValueError for braces, which Snakemake would read as patterns."""
     if re.search(r"[{}]", value):
-        raise ValueError("has braces; expected the path of a file without { and } in it")
+        raise ValueError("contains braces; expected the path of a file without { and }")
     return value
 
 
@@ -270,24 +271,24 @@ Seed = integer(SEED)
 
 
 def stops(kind, in_order):
-    """Return the type of a list of at least one value; `in_order` checks the order of the values."""
+    """Return the type of a list of at least one value of type `kind`; `in_order` checks the order of the values."""
     return Annotated[list[kind], Field(min_length=1), AfterValidator(in_order)]
 
 
 def list_of_names(kind=Name):
-    """Return the type of a list of at least one name, in which each name is given once."""
+    """Return the type of a list of at least one name; each name may occur once."""
     return Annotated[list[kind], Field(min_length=1), AfterValidator(distinct)]
 
 
 class Section(BaseModel):
-    """A section of the configuration: immutable, without unknown keys."""
+    """Base class of the sections of a configuration: immutable, without unknown keys."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, use_attribute_docstrings=True)
 
 
 def _seeds(value: Any) -> Any:
-    """Expand seeds: a range such as `1..50`, or a list of integers and ranges."""
-    expected = "expected integers from 0 and ranges of them, such as 1..50 or [1..5, 9]"
+    """Convert a range of seeds such as `1..50`, or a list of integers and ranges, to a list of integers."""
+    expected = "expected integers from 0 or ranges, such as 1..50 or [1..5, 9]"
     found = []
     for entry in value if isinstance(value, list) else [value]:
         if not isinstance(entry, str):
@@ -299,9 +300,9 @@ def _seeds(value: Any) -> Any:
             raise ValueError(f"{shown}is not a range of seeds; {expected}")
         first, last = map(int, match.groups())
         if last < first:
-            raise ValueError(f"{shown}ends before it begins; {expected}")
+            raise ValueError(f"{shown}has an end below its begin; {expected}")
         if len(found) + last - first >= _MOST_SEEDS:
-            raise ValueError(f"{shown}makes more than {_MOST_SEEDS} seeds; {expected}")
+            raise ValueError(f"{shown}gives more than {_MOST_SEEDS} seeds; {expected}")
         found += range(first, last + 1)
     return found if isinstance(value, list | str) else value
 

@@ -1,7 +1,7 @@
-"""Spectral moments, which statistical theories use to describe a rough surface, and its radial power spectrum.
+"""Spectral moments of rough surfaces, for statistical theories, and radial power spectra.
 
-Moments are averages over profiles in all directions, as for the isotropic surfaces of P. R. Nayak, J. Lubr. Technol. 93
-(1971) 398-407, doi:10.1115/1.3451608.
+Moments are averages over profiles in all directions, as P. R. Nayak defined them for isotropic surfaces, J. Lubr.
+Technol. 93 (1971) 398-407, doi:10.1115/1.3451608.
 """
 
 from __future__ import annotations
@@ -13,35 +13,35 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 if TYPE_CHECKING:
-    # This module imports SciPy, which takes time; commands that only need moments should not wait for it.
+    # `icha.surfaces.surface` imports SciPy, which takes time; commands that only need moments should not wait for it.
     from icha.surfaces.surface import Surface
 
 
-# Cells per wavelength that resolve the summits of a wave.
+# Number of cells per wavelength at which a grid resolves the summits of a wave.
 RESOLVED_CELLS = 8
-# Cells per summit of a surface with RESOLVED_CELLS / 2 cells per shortest wave. Isotropic surfaces have about 0.2
-# summits in a square with the side of the shortest wavelength.
+# Number of cells per summit on a surface with RESOLVED_CELLS / 2 cells per shortest wave. Isotropic surfaces have about
+# 0.2 summits in a square with the side of the shortest wavelength.
 LEAST_CELLS_OF_SUMMIT = 80
-# Fewest cells per shortest wave on which boundary elements represent the surface.
+# Fewest cells per shortest wave with which boundary elements represent the surface.
 LEAST_CELLS_PER_WAVE = 1.5
-# Ratio of the mean square slopes along two directions below which the smaller slope is rounding.
+# Smallest ratio of the mean square slopes along two directions at which the smaller slope is not a rounding error.
 _NO_SLOPE = 1e-12
-# Wave number, in 2 pi/L, above which an integral replaces the sum over the waves.
+# Wave number, in units of 2 pi/L, above which an integral replaces the sum over the waves.
 _DENSE = 64
 
 
 def cells_per_short_wave(grid: int, summits: float) -> float:
-    """Estimate the number of nodes per shortest wavelength from the nodes a side and the number of summits."""
+    """Estimate the number of nodes per shortest wavelength from the nodes along a side and the number of summits."""
     return RESOLVED_CELLS / 2 * math.sqrt(grid**2 / max(summits, 1) / LEAST_CELLS_OF_SUMMIT)
 
 
 def error_of_cells(cells_per_short_wave: float) -> str:
-    """Describe the error of the contact area of boundary elements at a number of cells per shortest wave; "" if small.
+    """Describe the error of the contact area of boundary elements due to the grid; "" if the error is small.
 
-    Measured against grids four times as fine, on random surfaces at p* = 1e-3 and 1e-2: up to 93 % at 1.1 cells (white
-    noise), 23 % at 2, 15 % at 3, 11 % at 5.
+    Areas were compared with those on grids four times as fine, on random surfaces at p* = 1e-3 and 1e-2. The largest
+    errors were 93 % at 1.1 cells per shortest wave (white noise), 23 % at 2, 15 % at 3 and 11 % at 5 cells.
     """
-    if cells_per_short_wave >= 0.9 * RESOLVED_CELLS:  # the number of summits determines it to a tenth
+    if cells_per_short_wave >= 0.9 * RESOLVED_CELLS:  # estimates from summits have an error of 10 %
         return ""
     if cells_per_short_wave >= 4:
         return "a few per cent"
@@ -49,12 +49,12 @@ def error_of_cells(cells_per_short_wave: float) -> str:
 
 
 def summit_density(m2: float, m4: float) -> float:
-    """Compute the summits of an isotropic Gaussian surface per area, m4/(6 sqrt(3) pi m2), m^-2 (Nayak 1971)."""
+    """Compute the summits per area of an isotropic Gaussian surface, m4/(6 sqrt(3) pi m2), m^-2 (Nayak 1971)."""
     return m4 / (6 * math.sqrt(3) * math.pi * m2)
 
 
 def self_affine_integral(order: int, start: float, end: float, roll: float, hurst: float) -> float:
-    """Integrate k^order C(k)/C0 from `start` to `end`, where C = C0 up to `roll`, then falls as k^(-2 - 2 hurst)."""
+    """Integrate k^order C(k)/C0 from `start` to `end`; C is C0 up to `roll`, and falls as k^(-2 - 2 hurst) above."""
 
     def up_to(end):
         flat = min(end, roll) ** (order + 1) / (order + 1)
@@ -70,13 +70,13 @@ def self_affine_integral(order: int, start: float, end: float, roll: float, hurs
 def self_affine_full_contact_energy(
     period: float, rolloff_wavelength: float, short_wavelength: float, hurst: float
 ) -> float:
-    """Compute the elastic energy of full contact per area over E* (m), for a self-affine surface of rms slope 1.
+    """Compute the elastic energy of full contact per area over E* (m) for a self-affine surface of rms slope 1.
 
-    Lengths are in m. The value equals `Surface.full_contact_energy` of the realisations of a `SelfAffineSpectrum`, but
-    needs no realisation: the function sums over the long waves and integrates the spectrum of the others.
+    Lengths are in m. The result equals `Surface.full_contact_energy` of surfaces with the same `SelfAffineSpectrum`,
+    but the function needs no heights. It sums over the long waves and integrates the spectrum of the short waves.
     """
     roll, last = period / rolloff_wavelength, period / short_wavelength
-    # The cut-off itself is not part of the spectrum, even if the quotient is rounded up.
+    # The wave at the cut-off does not belong to the spectrum, even if `last` is rounded up.
     dense = min(_DENSE, last * (1 - 1e-9))
     k = np.arange(-math.ceil(dense), math.ceil(dense) + 1)
     k = np.hypot(k[:, None], k).ravel()
@@ -90,7 +90,7 @@ def self_affine_full_contact_energy(
 
 
 class SpectralMoments(NamedTuple):
-    """Variances of a profile's height (m0, m^2), slope (m2, 1) and curvature (m4, m^-2)."""
+    """Spectral moments: variances of height (m0, m^2), slope (m2, 1) and curvature (m4, m^-2) of profiles."""
 
     m0: float
     m2: float
@@ -98,7 +98,7 @@ class SpectralMoments(NamedTuple):
 
     @property
     def nayak_parameter(self) -> float:
-        """Nayak's alpha = m0 m4/m2^2, the breadth of the spectrum; at least 3/2 for an isotropic surface."""
+        """Nayak's parameter m0 m4/m2^2, the width of the spectrum; isotropic surfaces have at least 3/2."""
         return self.m0 * self.m4 / self.m2**2
 
     @property
@@ -108,41 +108,41 @@ class SpectralMoments(NamedTuple):
 
     @property
     def rms_slope(self) -> float:
-        """Root mean square of |grad h|, whose square is twice that of a profile's slope."""
+        """Root mean square of |grad h|, sqrt(2) times the rms slope of profiles."""
         return (2 * self.m2) ** 0.5
 
     @property
     def rms_laplacian(self) -> float:
-        """Root mean square of the Laplacian of h, 1/m, whose square is 8/3 of that of a profile's curvature."""
+        """Root mean square of the Laplacian of h, 1/m, sqrt(8/3) times the rms curvature of profiles."""
         return (8 / 3 * self.m4) ** 0.5
 
     def scaled_to_rms_slope(self, rms_slope: float) -> SpectralMoments:
-        """Return the moments of the topography with its heights multiplied so that the rms slope is `rms_slope`."""
+        """Return the moments after all heights are multiplied by the factor that makes the rms slope `rms_slope`."""
         factor = (rms_slope / self.rms_slope) ** 2
         return SpectralMoments(*(moment * factor for moment in self))
 
 
 def spectral_moments(surface: Surface) -> SpectralMoments:
-    """Compute the moments of a profile of the surface, averaged over its directions."""
+    """Compute the spectral moments of the profiles of a surface, averaged over all directions."""
     height, slope, laplacian = surface.spectral_moments
     return SpectralMoments(height, slope / 2, 3 / 8 * laplacian)
 
 
 def height_statistics(surface: Surface) -> tuple[float, float]:
-    """Compute skewness and kurtosis of the heights; 0 and 3 for a Gaussian surface."""
+    """Compute skewness and kurtosis of the heights; a Gaussian surface has 0 and 3."""
     z = surface.heights
     variance = np.mean(z**2)
     return float(np.mean(z**3) / variance**1.5), float(np.mean(z**4) / variance**2)
 
 
 def slope_anisotropy(surface: Surface) -> float:
-    """Compute the ratio of the largest to the smallest rms slope of profiles over all directions.
+    """Compute the largest rms slope of profiles in any direction, divided by the smallest.
 
-    The ratio is 1 for isotropic surfaces and infinite for straight grooves. The two directions are the principal axes
-    of the slope tensor, whose slopes are those of the cells between four nodes.
+    The ratio is 1 for isotropic surfaces and infinite for straight grooves. Both slopes come from the principal values
+    of the slope tensor; each cell between four nodes contributes one slope.
     """
     z = surface.heights if surface.free else np.pad(surface.heights, ((0, 1), (0, 1)), mode="wrap")
-    # Slopes between opposite corners are along axes turned by 45 degrees; the principal values stay the same.
+    # Slopes between opposite corners are along axes at 45 degrees; the principal values are the same.
     one, other = z[1:, 1:] - z[:-1, :-1], z[1:, :-1] - z[:-1, 1:]
     tensor = [[np.mean(one**2), np.mean(one * other)], [np.mean(one * other), np.mean(other**2)]]
     least, most = np.linalg.eigvalsh(tensor)
@@ -150,16 +150,16 @@ def slope_anisotropy(surface: Surface) -> float:
 
 
 def radial_power_spectrum(surface: Surface) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Compute the isotropic power spectrum, the mean over the wave vectors of a ring.
+    """Compute the radial power spectrum: mean power C of the wave vectors in each ring of similar length.
 
-    The integral of C over the plane of wave vectors is the mean square height. Rings are one wave number 2 pi/L wide,
-    from the tenth on a tenth of their wave number; the last ring ends at the largest circle in the grid of wave
-    vectors. A free square is multiplied by Hann's window first, because the step from one edge to the other would add
-    waves; C is then divided by the mean square of the window.
+    The integral of C over the plane of wave vectors is the mean square height. The first ten rings are 2 pi/L wide; the
+    width of the others is a tenth of their wave number. The last ring ends at the largest circle in the grid of wave
+    vectors. The heights of a free square are first multiplied by Hann's window, because a step between opposite edges
+    would add waves. C is then divided by the mean square of the window.
 
     Returns
     -------
-    mean wave numbers q of the rings (rad/m), C(q) (m^4), and the wave numbers at the edges of the rings.
+    mean wave numbers q of the rings (rad/m), C(q) (m^4), and wave numbers at the edges of the rings (rad/m).
     """
     last, edges = (surface.grid - 1) // 2, [0.5]
     while edges[-1] < last:

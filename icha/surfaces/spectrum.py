@@ -1,8 +1,8 @@
-"""Self-affine spectra with roll-off and their realisations (Violano & Afferrante, eq. PSD).
+"""Self-affine spectra with roll-off, and random surfaces with such a spectrum (Violano & Afferrante, eq. PSD).
 
-C(q) = C0 for q_L <= q < q_0, C0 (q/q_0)^(-2(1+H)) for q_0 <= q < q_1, and 0 elsewhere; q_L = 2 pi / L. The
-convention is that the integral of C over the wave-vector plane is h_rms^2, so one mode of the periodic cell
-carries |h_q|^2 = C(q) (2 pi/L)^2.
+C(q) = C0 for q_L <= q < q_0, C0 (q/q_0)^(-2(1+H)) for q_0 <= q < q_1, and 0 elsewhere; q_L = 2 pi / L. By convention,
+the integral of C over the plane of wave vectors is h_rms^2. So each mode of the periodic cell has the power |h_q|^2 =
+C(q) (2 pi/L)^2.
 """
 
 import math
@@ -17,7 +17,7 @@ from icha.support.parallel import blocks, on_cores
 from icha.support.rules import GRID, HURST, LENGTH, SEED, SLOPE
 from icha.surfaces.surface import Surface
 
-# Relative rounding of wave numbers in units of 2 pi / L. So a band that ends at L/lambda_s = 64 excludes |k| = 64.
+# Relative rounding error of wave numbers in units of 2 pi / L. A band that ends at L/lambda_s = 64 excludes |k| = 64.
 _ROUNDING = 1e-9
 
 # Rows or columns to transform at a time.
@@ -26,15 +26,15 @@ _LINES = 64
 
 @dataclass(frozen=True)
 class SelfAffineSpectrum:
-    """Power spectral density of a self-affine surface, normalised by its rms slope.
+    """Power spectral density of a self-affine surface with a given rms slope.
 
     Parameters
     ----------
-    period : L, side of the periodic cell, m; lengths are in [1e-24, 1e9] m.
+    period : L, side of the periodic cell, m; all three lengths must be in [1e-24, 1e9] m.
     rolloff_wavelength : 2 pi / q_0, m; at most the period.
     short_wavelength : 2 pi / q_1, the short cut-off, m; less than the roll-off wavelength.
     hurst : H, in (0, 1].
-    rms_slope : h'_rms, in [1e-9, 1e6]; its square is exactly the sum of q^2 |h_q|^2 over the wave vectors of the cell.
+    rms_slope : h'_rms, in [1e-9, 1e6]; h'_rms^2 is exactly the sum of q^2 |h_q|^2 over the wave vectors of the cell.
 
     Raises
     ------
@@ -65,7 +65,7 @@ class SelfAffineSpectrum:
             )
         if not len(self._band[0]):
             raise ValueError(
-                f"short_wavelength: {self.short_wavelength!r} m leaves no wave that fits the period {self.period!r} m"
+                f"short_wavelength: no wave longer than {self.short_wavelength!r} m fits the period {self.period!r} m"
             )
 
     def psd(self, q: np.ndarray | float) -> np.ndarray:
@@ -82,10 +82,10 @@ class SelfAffineSpectrum:
 
     @cached_property
     def _band(self):
-        """Wave vectors (kx, ky) of one half of the band, and |k|, in units of 2 pi / L.
+        """Wave vectors (kx, ky) of one half of the band, and their lengths |k|, in units of 2 pi / L.
 
-        The wave vectors are in the order of max(|kx|, |ky|). So a mode receives the same random number on every grid
-        and with every short cut-off: a finer surface of the same seed only adds shorter waves.
+        The wave vectors are sorted by max(|kx|, |ky|). So each mode receives the same random number on every grid and
+        with every short cut-off. A finer surface of the same seed only has additional short waves.
         """
         m = math.ceil(self.period / self.short_wavelength)
         kx, ky = np.meshgrid(np.arange(m + 1), np.arange(-m, m + 1))
@@ -100,7 +100,7 @@ class SelfAffineSpectrum:
 
     @cached_property
     def plateau(self) -> float:
-        """C0 in m^4; with this value the modes of the periodic cell have exactly the rms slope."""
+        """Plateau C0 of the spectrum, m^4, with which the modes of the periodic cell have exactly the rms slope."""
         _, _, k, _ = self._band
         q = 2 * np.pi / self.period
         slope2 = 2 * float(np.sum(self._shape(k) * k**2)) * q**4
@@ -108,23 +108,24 @@ class SelfAffineSpectrum:
 
     @property
     def rms_height(self) -> float:
-        """Root mean square height of the periodic cell's modes, m."""
+        """Root mean square height of a periodic cell with this spectrum, m."""
         _, _, k, _ = self._band
         q = 2 * np.pi / self.period
         return math.sqrt(2 * self.plateau * float(np.sum(self._shape(k))) * q**2)
 
     def realise(self, grid: int, seed: int, amplitudes: str = "fixed") -> Surface:
-        """Draw a periodic surface by spectral synthesis with random phases.
+        """Generate a random periodic surface with this spectrum by spectral synthesis with random phases.
 
         Parameters
         ----------
-        grid : nodes along a side. At least 2 per shortest wavelength (fewer are an error, fewer than 4 a warning).
+        grid : nodes along a side; fewer than 2 per shortest wavelength raise an error, fewer than 4 cause a warning.
         seed : seed of the random phases, a non-negative integer.
-        amplitudes : "fixed" by the spectrum (height and slope are then the same for every seed), or "gaussian".
+        amplitudes : "fixed" (every seed has the rms height and slope of the spectrum), or "gaussian" (random
+            amplitudes).
 
         Returns
         -------
-        Surface of zero mean.
+        Surface of zero mean height.
 
         Raises
         ------
@@ -152,7 +153,7 @@ class SelfAffineSpectrum:
         if amplitudes == "gaussian":
             size = size * np.sqrt(-np.log1p(-random[:, 1]))
         modes = size * np.exp(2j * np.pi * random[:, 0])
-        # Columns of shorter waves are empty and need no transform along y.
+        # Columns of waves shorter than the cut-off are zero and need no transform along y.
         half = np.zeros((grid, kx.max() + 1), dtype=complex)
         half[ky % grid, kx] = modes
         on_axis = kx == 0

@@ -1,4 +1,4 @@
-"""Summits of a surface, located between its nodes, and measures of how well they represent its highest places."""
+"""Locate the summits of a surface between its nodes, and check whether asperities represent its highest regions."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from icha.support.parallel import blocks, on_cores
 from icha.surfaces.square import cell_of
 from icha.surfaces.surface import Surface
 
-# Degree of the spline. A quintic spline reproduces a parabola exactly; the influence of a node falls by 0.43 per cell.
-# At eight cells per wavelength, the second derivatives of a sine have an error of 4e-4.
+# Degree of the spline. A quintic spline reproduces a parabola exactly; the influence of a node falls by a factor of
+# 0.43 per cell. At eight cells per wavelength, the second derivatives of a sine have an error of 4e-4.
 _DEGREE = 5
 # Weights of the coefficients of five nodes in value, slope and curvature of the quintic spline at the middle node.
 _VALUE = np.array([1.0, 26.0, 66.0, 26.0, 1.0]) / 120
@@ -40,43 +40,42 @@ _BASIS_SLOPE = _BASIS[:, 1:] * np.arange(1, 6)
 _BASIS_CURVATURE = _BASIS_SLOPE[:, 1:] * np.arange(1, 5)
 
 _MAX_NEWTON_STEPS = 30
-# In cells: last step of a converged search, largest distance of a summit from its node, and largest distance at which
-# two summits count as one.
+# Lengths in cells: last step of a converged search; largest distance of a summit from its node; largest distance at
+# which two summits count as one.
 _CONVERGED = 1e-9
 _FARTHEST = 1.5
 _SAME_SUMMIT = 1e-3
-# Largest rise of a supported summit above the nodes around it, in units of that of a parabola with their second
-# differences. Of summits of smooth random surfaces (H 0.8, six seeds of 128 x 128 nodes) 99.5 % stay below 0.91 with
-# 12 nodes per shortest wave, 1.09 with 8, 1.16 with 6 and 1.69 with 5, 98 % below 1.78 with 4.
+# Largest rise of a supported summit above the nodes around it, divided by the rise of a parabola with their second
+# differences. On smooth random surfaces (H 0.8, six seeds of 128 x 128 nodes) 99.5 % of the summits have a ratio below
+# 0.91 with 12 nodes per shortest wave, 1.09 with 8, 1.16 with 6 and 1.69 with 5; 98 % are below 1.78 with 4 nodes.
 _MAX_RISE = 1.8
-# Rounding of a rise, in units of the range of heights.
+# Rounding error of a rise, divided by the range of heights.
 _ROUNDING = 1e-9
-# Curvature, relative to the mean of the surface, below which it is only rounding, as on a plateau.
+# Curvature, divided by the mean curvature of the surface, below which a node is flat, as on a plateau.
 _FLAT = 1e-6
 # Nodes added beyond the edges of a free square; nodes farther away have an influence of 0.43^32 = 2e-12.
 _MARGIN = 32
-# Rows or columns of the grid, and points between them, in memory at a time.
+# Number of rows or columns of the grid, and number of points between nodes, in memory at a time.
 _LINES = 16
 _POINTS = 4096
-# Largest share of the load on places without a summit, and largest share of summits without support, with which
-# asperities represent a surface. Smooth random surfaces with at least 5 nodes per shortest wave stay below 0.1
-# (`tests/surfaces`).
+# Asperities represent a surface if at most this share of the load is on peaks without a summit, and if the nodes do not
+# support at most this share of the summits. Smooth random surfaces with at least 5 nodes per shortest wave stay below
+# 0.1 (`tests/surfaces`).
 MAX_SHARE = 0.1
 
 
 @dataclass(frozen=True, eq=False)
 class Asperities:
-    """The summits of a surface.
+    """Positions, heights and curvatures of the summits of a surface, which the asperity model uses as asperities.
 
     Attributes
     ----------
-    position : (n, 2) array, (x, y) in [0, period), m.
-    height : (n,) array, above the mean plane, m.
+    position : (n, 2) array, positions (x, y) of the summits in [0, period), m.
+    height : (n,) array, heights of the summits above the mean plane, m.
     radius_of_curvature : (n,) array, 1/sqrt(kappa1 kappa2), the geometric mean of the principal radii of curvature, m.
     period : side of the square, m.
-    free : whether the square is single, on a free half-space; else it repeats.
-    unsupported_height : (m,) array, m, heights of the maxima of the spline that the nodes around them do not support.
-        These maxima are not asperities.
+    free : True for a single square on a half-space, False for one cell of a periodic surface.
+    unsupported_height : (m,) array, m, heights of the unsupported maxima of the spline, which are not asperities.
     """
 
     position: np.ndarray
@@ -88,7 +87,7 @@ class Asperities:
 
     @property
     def cell(self) -> float:
-        """Period of positions, m; for a single square twice its side, so that no difference of positions is wrapped."""
+        """Period of the positions, m; twice the side for a single square, so that no difference is wrapped."""
         return cell_of(self.period, self.free)
 
     def __len__(self) -> int:
@@ -97,41 +96,42 @@ class Asperities:
 
 
 def find_summits(surface: Surface) -> Asperities:
-    """Find the summits of a surface, at least one, as `locate_summits` does.
+    """Find the summits of a surface with `locate_summits`; raise ValueError if there are none.
 
     Raises
     ------
     ValueError
-        If the surface has no summit with negative-definite curvature, or none that its nodes support.
+        If the surface has no summit with negative-definite curvature, or if its nodes support none of its summits.
     """
     found = locate_summits(surface)
     if len(found):
         return found
     if unsupported := len(found.unsupported_height):
         raise ValueError(
-            f"heights: the nodes support none of the {unsupported} summits of the surface, as at steps of heights; "
+            f"heights: the nodes support none of the {unsupported} summits, as on a surface with steps; "
             "expected smooth summits. Use a cutoff, or the model boundary_elements"
         )
     raise ValueError("heights: the surface has no summit with negative-definite curvature")
 
 
 def locate_summits(surface: Surface) -> Asperities:
-    """Locate the summits of a surface: the maxima, with negative-definite curvature, of a quintic spline.
+    """Locate the summits of a surface: maxima of a quintic spline, where the curvature is negative-definite.
 
-    A comparison of every node with its neighbours would miss and misplace elongated summits: on a crest oblique to the
-    grid, the highest node can lie cells away from the summit, or no node is a maximum. The contact area then depends on
-    the grid by some per cent. Instead, Newton's method starts from every node whose parabola has its top within a cell.
-    Only starts that converge nearby count, because some steps are very long where a principal curvature is nearly zero.
+    A comparison of every node with its neighbours would miss or misplace elongated summits. On a crest oblique to the
+    grid, the highest node can lie several cells away from the summit, or no node is a maximum. Errors of this kind
+    would change the contact area by some per cent from grid to grid. Instead, Newton's method starts from every node
+    whose parabola has its top at a distance of at most one cell. A start counts only if Newton's method converges near
+    its node, because some steps are very long where a principal curvature is nearly zero.
 
-    Edges of a free square have no maxima, because a crest that crosses an edge has its top outside. Heights continue
-    by point reflection at the edges, and summits between the outermost nodes count.
+    The edges of a free square have no maxima, because a crest that crosses an edge has its top outside. The spline
+    continues the heights by point reflection at the edges, and only summits between the outermost nodes count.
 
-    Near steps, pits, single pixels and plateaus the spline rises above the surface. A maximum is a summit only if the
+    The spline rises above the surface near steps, pits, single pixels and plateaus. A maximum is a summit only if the
     nodes around it support its height (`_is_supported`).
 
     Returns
     -------
-    Asperities, ordered as the nodes from which they were found; possibly none.
+    Asperities, in the order of the nodes from which they were found; possibly none.
     """
     spacing, margin = surface.spacing, _MARGIN if surface.free else 0
     heights = surface.heights
@@ -142,7 +142,7 @@ def locate_summits(surface: Surface) -> Asperities:
     node, flat = _nodes_near_summits(coefficients)
     climbs = on_cores(lambda block: _climb(coefficients, node[block], flat), blocks(len(node), _POINTS))
     summit = np.concatenate([np.empty((0, 2)), *climbs])
-    # Several nodes may lead to one summit; keep the first.
+    # Newton's method may find one summit from several nodes; keep the first result.
     pairs = np.sort(cKDTree(summit, boxsize=grid).query_pairs(_SAME_SUMMIT, output_type="ndarray"), axis=1)
     summit = np.delete(summit, pairs[:, 1], axis=0)
     if surface.free:
@@ -163,12 +163,12 @@ def locate_summits(surface: Surface) -> Asperities:
 
 
 def _is_supported(heights, summit, height):
-    """Return whether the nodes around summits at points (k, 2), in cells, support the heights (k,) of the summits.
+    """Return whether the nodes around each summit at `summit` (k, 2), in cells, support its height, (k,) bool.
 
     Along each axis, a parabola through nodes with second difference -d rises at most d/8 above the higher of two
-    neighbours. Of the second differences at the two nodes beside the summit the smaller counts, because only one of
-    them is large at the edge of a plateau (the limiter `minmod` of A. Suresh and H. T. Huynh, J. Comput. Phys. 136
-    (1997) 83-99, doi:10.1006/jcph.1997.5745).
+    neighbours. The function uses the smaller of the second differences at the two nodes beside the summit, because only
+    one of them is large at the edge of a plateau. Source: the limiter `minmod` of A. Suresh and H. T. Huynh, J. Comput.
+    Phys. 136 (1997) 83-99, doi:10.1006/jcph.1997.5745.
     """
     grid = len(heights)
     (row, column), (y, x) = np.floor(summit).astype(int).T, np.mod(np.rint(summit).astype(int), grid).T
@@ -198,7 +198,7 @@ def _spline_coefficients(heights):
 
 
 def _climb(coefficients, node, flat):
-    """Return the summits (k, 2), in cells, to which Newton's method converges from the nodes (m, 2)."""
+    """Return the positions (k, 2), in cells, of the summits that Newton's method finds from the nodes (m, 2)."""
     grid = len(coefficients)
     at, converged = node.copy(), np.zeros(len(node), dtype=bool)
     moving = np.arange(len(node))
@@ -218,9 +218,9 @@ def _climb(coefficients, node, flat):
 
 
 def _nodes_near_summits(coefficients):
-    """Return the nodes (k, 2) from which Newton's step to a maximum is at most a cell long, and the limit of flatness.
+    """Return the nodes (k, 2) whose Newton step to a maximum is at most one cell, and the least curvature of a summit.
 
-    The limit is the curvature below which a node counts as flat, in metres per squared cell.
+    A node with a smaller curvature counts as flat. The unit of the curvature is metres per squared cell.
     """
     grid = len(coefficients)
 
@@ -247,7 +247,7 @@ def _nodes_near_summits(coefficients):
 
 
 def _spline(coefficients, at):
-    """Return the spline's value and its derivatives y, x, yy, yx, xx at points (k, 2) in cells, each (k,)."""
+    """Return the spline and its derivatives by y, x, yy, yx and xx at points (k, 2) in cells, each (k,)."""
     grid = len(coefficients)
     floor = np.floor(at).astype(int).T
     (ty, tx), nodes = at.T - floor, np.arange(-2, 4)[:, None]
@@ -260,7 +260,7 @@ def _spline(coefficients, at):
 
 
 def _basis(t):
-    """Return value, slope and curvature (6, k) of the six quintic B-splines around points at t in [0, 1), (k,)."""
+    """Return value, slope and curvature, each (6, k), of the six quintic B-splines around points t (k,) in [0, 1)."""
     powers = np.cumprod(np.vstack([np.ones_like(t), np.broadcast_to(t, (_DEGREE, len(t)))]), axis=0)
     return [
         np.einsum("ij,jk->ik", polynomial, powers[: polynomial.shape[1]])
@@ -269,7 +269,7 @@ def _basis(t):
 
 
 def _newton_step(gy, gx, hyy, hyx, hxx, flat):
-    """Return whether the Hessian is negative definite, its determinant, and Newton's step (..., 2) or else zero."""
+    """Return whether the Hessian is negative definite, its determinant, and Newton's step (..., 2), otherwise zero."""
     determinant = hyy * hxx - hyx**2
     concave = (determinant > flat**2) & (hyy + hxx < 0)
     safe = np.where(concave, -determinant, 1.0)
@@ -278,22 +278,22 @@ def _newton_step(gy, gx, hyy, hyx, hxx, flat):
     return concave, determinant, step
 
 
-# Largest departure from paraboloids, weighted by the area of the spots, with which asperities represent a surface.
-# Random surfaces of 5 to 12 nodes per shortest wave stay below 0.25 at p* = 1e-3 to 0.1, with areas within 25 % of
-# those of boundary elements; worn, conical and pyramidal tops, with areas up to 3 times too small, have 0.31 to 0.9.
+# Largest value of `paraboloid_departure` with which asperities represent a surface. Random surfaces of 5 to 12 nodes
+# per shortest wave stay below 0.25 at p* = 1e-3 to 0.1, and their contact areas differ from those of boundary elements
+# by less than 25 %. Worn, conical and pyramidal tops have values of 0.31 to 0.9 and areas up to 3 times too small.
 LARGEST_DEPARTURE = 0.3
 # Directions around a summit in which the surface is compared with its paraboloid.
 _DIRECTIONS = 16
 # Radius of a spot, in cells, below which the interpolated surface equals its paraboloid.
 _SMALLEST_SPOT = 0.25
-# Smallest ratio of the depth around a summit to that of its paraboloid; smaller ratios are replaced by it.
+# Smallest ratio of the depth around a summit to the depth of its paraboloid; it replaces all smaller ratios.
 _LEAST_DROP = 1e-2
 
 
 def paraboloid_departure(
     surface: Surface, position: np.ndarray, contact_radius: np.ndarray, radius_of_curvature: np.ndarray
 ) -> float:
-    """Measure how far the surface departs from the paraboloids of its summits at the edges of the contact spots.
+    """Measure how much the surface differs from the paraboloids of its summits at the edges of the contact spots.
 
     Parameters
     ----------
@@ -304,10 +304,10 @@ def paraboloid_departure(
 
     Returns
     -------
-    float, the mean of abs(ln(d / (a^2 / 2R))) over the spots, weighted by area. Here d is the mean depth, below the
-    summit, of the circle of radius a around the summit. At small a, elongated summits follow another paraboloid, whose
-    curvature is the arithmetic mean of the principal curvatures; the smaller of the two values is returned. The value
-    is 0 if no spot is wider than half a cell.
+    float, the mean of abs(ln(d / (a^2 / 2R))) over the spots, weighted by their areas. Here d is the mean depth of the
+    surface below the summit on the circle of radius a. Near the top of an elongated summit, d follows the arithmetic
+    mean of the principal curvatures, not 1/R. The function computes the value with both curvatures and returns the
+    smaller one; 0 if no spot is wider than half a cell.
     """
     mode = "mirror" if surface.free else "grid-wrap"
     spline = scipy.ndimage.spline_filter(surface.heights, order=3, mode=mode)
@@ -337,15 +337,15 @@ def paraboloid_departure(
 
 @dataclass(frozen=True, eq=False)
 class SummitCoverage:
-    """The highest places of a surface, and the summits that may represent them.
+    """The peaks of a surface (locally highest nodes), and the summits that may represent these peaks.
 
     Attributes
     ----------
     peak_height : (k,) array, m, heights of the peaks: nodes that are not lower than any of their eight neighbours.
-        Every node of a plateau is one.
-    covered : (k,) array, whether a summit lies within two rows and two columns of the peak.
+        Every node of a plateau is a peak.
+    covered : (k,) bool, True if a summit lies at most two rows and two columns from the peak.
     summit_height : (n,) array, heights of the summits, m.
-    unsupported_height : (m,) array, m, heights of the maxima of the spline that the nodes around them do not support.
+    unsupported_height : (m,) array, m, heights of the unsupported maxima of the spline.
     """
 
     peak_height: np.ndarray
@@ -355,7 +355,7 @@ class SummitCoverage:
 
     @classmethod
     def of(cls, surface: Surface, asperities: Asperities) -> SummitCoverage:
-        """Find the peaks of a surface and the summits near them; the edges of a free square have no peaks."""
+        """Find the peaks of a surface and the summits near the peaks; the edges of a free square have no peaks."""
         heights, grid = surface.heights, surface.grid
 
         def examine(rows):
@@ -375,10 +375,10 @@ class SummitCoverage:
         return cls(heights[row, column], occupied[row, column], asperities.height, asperities.unsupported_height)
 
     def uncovered_share(self, separation: float) -> float:
-        """Return the share of the load, at a mean separation (m), on peaks without a summit.
+        """Return the share (0 to 1) of the load that acts on peaks without a summit, at a mean separation (m).
 
-        The load on a peak is estimated as its height above the plane of separation to the power 3/2 (Hertz). If no
-        peak is above this plane, only the highest peak counts.
+        The load on a peak is estimated by Hertz: proportional to (peak height - separation)^(3/2). If no peak is higher
+        than the separation, only the highest peak counts.
         """
         load = np.maximum(self.peak_height - separation, 0.0) ** 1.5
         if not load.any():
@@ -386,7 +386,7 @@ class SummitCoverage:
         return float(np.sum(load[~self.covered]) / np.sum(load))
 
     def unsupported_share(self, separation: float) -> float:
-        """Return the share of the summits above the plane of separation (m) that their nodes do not support."""
+        """Return the share (0 to 1) of unsupported summits among the summits higher than the mean separation (m)."""
         unsupported = int(np.count_nonzero(self.unsupported_height > separation))
         return unsupported / max(unsupported + int(np.count_nonzero(self.summit_height > separation)), 1)
 
@@ -396,7 +396,7 @@ class SummitCoverage:
         uncovered = max(map(self.uncovered_share, separations), default=0.0)
         unsupported = max(map(self.unsupported_share, separations), default=0.0)
         shares = {
-            "no summit stands for {:.0f} % of the highest places, by their share of the load": uncovered,
-            "{:.0f} % of the summits within reach are not supported by the nodes around them": unsupported,
+            "{:.0f} % of the load would be on peaks of the surface that have no summit": uncovered,
+            "the nodes do not support {:.0f} % of the summits that would touch": unsupported,
         }
         return [reason.format(100 * share) for reason, share in shares.items() if share > MAX_SHARE]

@@ -19,30 +19,30 @@ from icha.support.parallel import blocks, on_cores
 from icha.support.rules import LENGTH, SLOPE, FloatRange, IntegerRange
 from icha.surfaces.square import problem_with_heights
 
-# Values of `boundary`: a square that repeats, or a single square on a half-space.
+# Values of `boundary`: one cell of a periodic surface, or a single square on a half-space.
 PERIODIC, FREE = "periodic", "free"
 
 # Bounds of the range of heights divided by the period.
 _STEEPNESS = FloatRange(least=1e-24, most=1e9)
 # Rows or columns that are transformed at a time.
 _LINES = 64
-# Largest number of lines inside a cell whose steps are compared with the step between cells.
+# Largest number of lines inside a cell at which `edges_fit` compares steps with the step between cells.
 _COMPARED_LINES = 256
-# Smallest ratio of the misfit between cells to the largest misfit inside a cell at which edges do not fit. The misfit
-# is a step less the mean of the two steps beside it, rms along a line. Measured on periodic surfaces: up to 1.3, and
-# 2.4 on white noise of 8 x 8 nodes; on halves of them with 4 nodes per shortest wave: 3.2 and more.
+# Largest misfit between cells, divided by the largest misfit inside a cell, at which edges fit. The misfit is a step
+# minus the mean of the two steps beside it, rms along a line. Measured ratios are up to 1.3 on periodic surfaces, up to
+# 2.4 on white noise of 8 x 8 nodes, and at least 3.2 on halves of periodic surfaces with 4 nodes per shortest wave.
 _MISFIT = 3.0
-# Smallest such ratio of the steps themselves, rms along a line. It is 1.03 between the halves of a symmetric dome,
-# which meet in an edge without a step.
+# Largest step between cells, divided by the largest step inside a cell, at which edges fit; steps are rms along a line.
+# The ratio is 1.03 for a symmetric dome, whose opposite edges meet without a step.
 _STEP = 1.1
 MISFIT_OF_EDGES = (
-    f"boundary: {PERIODIC!r}, but opposite edges differ by much more than neighbouring nodes, so there is a step at "
-    f"the edges; use boundary={FREE!r}, or icha.read_scan for a measured surface"
+    f"boundary: {PERIODIC!r}, but heights differ by much more between opposite edges than between neighbouring nodes; "
+    f"there is a step at the edges; use boundary={FREE!r}, or icha.read_scan for a measured surface"
 )
 
 
 class EdgeWarning(UserWarning):
-    """Opposite edges of a periodic surface differ by a step."""
+    """Warning: the heights at opposite edges of a periodic surface differ by a step."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,15 +51,15 @@ class Surface:
 
     Parameters
     ----------
-    heights : (n, n) array, metres. Its mean is removed; the array is copied and made read-only.
-    period : side of the square, which is the period of a periodic surface, metres, in [1e-24, 1e9].
-    boundary : "periodic" in both directions, or "free": one square on a half-space that extends beyond it.
+    heights : (n, n) array, metres. The mean height is removed; the array is copied and made read-only.
+    period : side of the square, metres, in [1e-24, 1e9]; a periodic surface repeats after this length.
+    boundary : "periodic" (in both directions), or "free" (a single square; the half-space is larger than the square).
 
     Raises
     ------
     ValueError
-        If the heights are not a square array of at least 8 x 8 finite numbers, or are all the same; if their range
-        divided by the period is not in [1e-24, 1e9]; or if the period or the boundary is not one of those above.
+        If the heights are not a square array of at least 8 x 8 finite numbers, or are all the same; if the range of
+        heights divided by the period is not in [1e-24, 1e9]; or if the period or the boundary is invalid.
     """
 
     heights: np.ndarray
@@ -67,7 +67,7 @@ class Surface:
     boundary: str = PERIODIC
 
     def __post_init__(self):
-        """Check the values and freeze them."""
+        """Check the arguments, remove the mean height, and make the heights read-only."""
         try:
             given = np.asarray(self.heights)
             if given.dtype.kind not in "fiu":
@@ -87,7 +87,7 @@ class Surface:
         object.__setattr__(self, "heights", heights)
         if self.boundary not in (PERIODIC, FREE):
             raise ValueError(f"boundary: {self.boundary!r} must be one of {PERIODIC}, {FREE}")
-        # For surfaces that this package makes, `icha describe` reports the step.
+        # `icha describe` reports the step for surfaces that this package makes.
         caller = sys._getframe(2).f_globals.get("__name__", "")
         if not self.free and not caller.startswith(("icha.", "dataclasses")) and not edges_fit(heights):
             warnings.warn(MISFIT_OF_EDGES, EdgeWarning, stacklevel=3)
@@ -108,15 +108,16 @@ class Surface:
         return self.boundary == FREE
 
     def require_periodic(self, purpose: str) -> None:
-        """Raise ValueError if the surface is a free square; the message names the purpose."""
+        """Raise ValueError if the surface is a free square; the message contains `purpose`, a computation."""
         if self.free:
             raise ValueError(f"boundary: {FREE!r}; {purpose} needs a surface of boundary {PERIODIC!r}")
 
     def by_wave_vector(self, function) -> list:
-        """Return results of `function(k2, count, power)` for blocks of all wave vectors 2 pi/L (kx, ky) but zero.
+        """Return the results of `function(k2, count, power)`, called for blocks of all wave vectors except zero.
 
-        k2 = kx^2 + ky^2; power: |h_q|^2, m^2, both (n, m); count (m,): 2 where the power is that of two opposite wave
-        vectors together, else 1. The heights count as one period of a periodic surface, even for a free square.
+        Wave vectors are 2 pi/L (kx, ky) with integers kx and ky. k2 = kx^2 + ky^2, (n, m). power: |h_q|^2, m^2, (n, m).
+        count: (m,), 2 in columns whose power is the sum over two opposite wave vectors, else 1. A free square is
+        treated as one cell of a periodic surface.
         """
         n = self.grid
         half = np.empty((n, n // 2 + 1), dtype=complex)
@@ -129,7 +130,8 @@ class Surface:
         def along_y(columns):
             modes = scipy.fft.fft(half[:, columns], axis=0, norm="forward", workers=1)
             power = modes.real**2 + modes.imag**2
-            # The half spectrum omits the opposites of all columns but the first (and, on even grids, the last).
+            # The half spectrum contains one of two opposite wave vectors, except in the first column and, on even
+            # grids, the last.
             kx = np.arange(columns.start, columns.stop)
             count = np.where((kx > 0) & (2 * kx < n), 2.0, 1.0)
             power *= count
@@ -142,10 +144,10 @@ class Surface:
 
     @cached_property
     def spectral_moments(self) -> tuple[float, float, float]:
-        """Sums of |h_q|^2, q^2 |h_q|^2 and q^4 |h_q|^2 over all wave vectors: m^2, 1, m^-2.
+        """Sums of |h_q|^2, q^2 |h_q|^2 and q^4 |h_q|^2 over all wave vectors, in m^2, 1 and m^-2.
 
-        They are the variance of height, the squared rms slope |grad h| and the squared rms of the Laplacian. A free
-        square has no spectrum; its moments are means over the nodes, of derivatives of a quintic spline.
+        The sums equal the mean squares of height, of slope |grad h| and of the Laplacian. A free square has no
+        spectrum; its mean squares are computed at the nodes of a quintic spline.
         """
         if self.free:
             return _mean_squares(self.heights, self.spacing)
@@ -162,44 +164,45 @@ class Surface:
 
     @property
     def rms_slope(self) -> float:
-        """Root mean square of |grad h|, by the spectral moments (not by finite differences)."""
+        """Root mean square of |grad h|, computed from the spectral moments, not by finite differences."""
         return self.spectral_moments[1] ** 0.5
 
     @property
     def rms_curvature(self) -> float:
-        """Root mean square curvature of a profile, sqrt(3/8 sum q^4 |h_q|^2) for an isotropic surface, 1/m.
+        """Root mean square curvature of profiles, sqrt(3/8 sum q^4 |h_q|^2) for an isotropic surface, 1/m.
 
-        Its inverse is the radius R_c in the Tabor parameter of the Contact Mechanics Challenge (60.1 nm there).
+        In the Contact Mechanics Challenge, the inverse of this curvature is the radius R_c of the Tabor parameter, 60.1
+        nm.
         """
         return (3 / 8 * self.spectral_moments[2]) ** 0.5
 
     @property
     def full_contact_energy(self) -> float:
-        """Elastic energy of full contact per nominal area over E*, U_full/E* = 1/4 sum q |h_q|^2, m.
+        """Elastic energy of full contact per nominal area, divided by E*: U_full/E* = 1/4 sum q |h_q|^2, m.
 
-        In full contact the pressure q E* h_q/2 flattens a wave of amplitude h_q. A free square counts as a quarter of
-        the periodic surface that it forms with its mirror images, which has no steps at the edges.
+        In full contact the pressure q E* h_q/2 flattens a wave of amplitude h_q. A free square counts as a quarter of a
+        periodic surface: the square and its mirror images, without steps at the edges.
         """
         if not self.free:
             sums = self.by_wave_vector(lambda k2, _, power: float(np.sum(np.sqrt(k2) * power)))
             return math.pi / (2 * self.period) * sum(sums)
-        # The cosine series of period 2 L; with orthonormal coefficients the mean square height is their sum of squares
-        # over the number of nodes (Parseval).
+        # Cosine series of period 2 L. The coefficients are orthonormal, so the sum of their squares, divided by the
+        # number of nodes, is the mean square height (Parseval).
         power = scipy.fft.dctn(self.heights, norm="ortho", workers=1) ** 2
         k2 = np.arange(self.grid) ** 2.0
         return math.pi / (4 * self.period) * float(np.sum(np.sqrt(k2[:, None] + k2) * power)) / power.size
 
     @property
     def complete_contact_pressure(self) -> float:
-        """Nominal pressure over E* at which contact is complete without adhesion.
+        """Nominal pressure, divided by E*, at which a surface without adhesion is in complete contact.
 
-        It is the largest tension in full contact at zero load. A free square is part of the periodic surface that it
-        forms with its mirror images.
+        This pressure equals the largest tension in full contact at zero load. A free square counts as a quarter of a
+        periodic surface: the square and its mirror images.
         """
         return -float(full_contact_pressure(self.heights, self.period, free=self.free).min())
 
     def scaled_to_rms_slope(self, rms_slope: float) -> Surface:
-        """Return the same topography with its heights multiplied so that the spectral rms slope is `rms_slope`."""
+        """Return the surface with all heights multiplied by the factor that makes its rms slope `rms_slope`."""
         rms_slope = SLOPE.validate("rms_slope", rms_slope)
         factor = rms_slope / self.rms_slope
         scaled = replace(self, heights=self.heights * factor)
@@ -208,7 +211,7 @@ class Surface:
         return scaled
 
     def refined(self, factor: int) -> Surface:
-        """Return the trigonometric interpolant on a grid `factor` times as fine; old nodes keep their heights.
+        """Interpolate the heights by Fourier series on a grid `factor` times as fine; old nodes keep their heights.
 
         Raises ValueError if the factor is not an integer of at least 1, or the surface is a free square.
         """
@@ -225,13 +228,13 @@ class Surface:
 
 
 def full_contact_pressure(heights: np.ndarray, period: float, *, free: bool = False) -> np.ndarray:
-    """Return the pressure over E* of full contact at zero load, (n, n): p(q) = q E* h(q)/2.
+    """Return the pressure in full contact at zero load, divided by E*, (n, n). In Fourier space p(q) = q E* h(q)/2.
 
     Parameters
     ----------
     heights : (n, n), m.
     period : side of the square, m.
-    free : whether the heights continue by their mirror images instead of periodically.
+    free : True if mirror images continue the heights at the edges; False for a periodic surface.
     """
     n = len(heights)
     if free:
@@ -244,7 +247,7 @@ def full_contact_pressure(heights: np.ndarray, period: float, *, free: bool = Fa
 
 
 def edges_fit(heights: np.ndarray) -> bool:
-    """Return whether heights (n, n) are one cell of a periodic surface without a step between cells."""
+    """Return whether opposite edges of the heights (n, n) meet without a step if the surface is periodic."""
     n = len(heights)
     compared = np.unique(np.linspace(1, n - 3, min(n, _COMPARED_LINES)).astype(int))
     for lines in (heights, heights.T):
@@ -257,7 +260,7 @@ def edges_fit(heights: np.ndarray) -> bool:
 
 
 def _mean_squares(heights, spacing):
-    """Compute the mean squares of height, slope and Laplacian over the nodes, with quintic splines along both axes."""
+    """Compute the mean squares of height, slope and Laplacian at the nodes, with quintic splines along both axes."""
     # Slow to import, and rarely needed.
     from scipy.interpolate import make_interp_spline
 

@@ -5,9 +5,12 @@ import math
 import numpy as np
 import pytest
 import scipy.fft
+from scipy.special import ndtr
 
 import icha
 from icha.asperity.full_contact import full_contact_energy_ratio, gaussian_complete_pressure
+from icha.asperity.material import Material
+from icha.asperity.stickiness import sticky_rms_height
 from icha.datasets.campaign import campaign_tree, select_run
 from icha.datasets.files import read_run, write_dataset
 from icha.datasets.format import RUN, problems_with_file
@@ -127,3 +130,18 @@ def test_a_flaw_lowers_the_strength_to_that_of_a_penny_shaped_crack():
     assert icha.Material(modulus, energy, 2e-9, 1e-11).interface_strength == flawless
     with pytest.raises(ValueError, match="flaw_radius"):
         icha.Material(modulus, energy, 2e-9, -1e-6)
+
+
+def test_attraction_exceeds_repulsion_below_the_height_of_the_bearing_area_model():
+    """The bearing area within a small range, under the tension dgamma/range, pulls against Persson's repulsion."""
+    material, wavelength = Material(2e6, 0.05, 1e-11), 10e-6
+    limit = sticky_rms_height(wavelength, material)
+
+    def excess(height):
+        u = np.linspace(0.5, 4, 20_000) * height
+        area = ndtr(-(u - material.interaction_range) / height) - ndtr(-u / height)
+        pull = area * material.surface_energy / material.interaction_range
+        push = 0.75 * 2 * np.pi / wavelength * height * material.contact_modulus * np.exp(-2 * u / height)
+        return np.max(pull / push)
+
+    assert excess(limit * 0.999) > 1 > excess(limit * 1.001)

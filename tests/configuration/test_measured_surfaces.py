@@ -42,7 +42,9 @@ def test_slopes_that_no_surface_has_are_to_be_confirmed(load, refused):
     changes = {"surfaces.rough": measured_surface(height_unit="um"), "studies.one.rms_slopes": "measured"}
     key = "surfaces.rough.height_unit"
     refused(
-        "", changes, f"{key}: 'rms slope 146' is unusual (it depends on units, size and numbers for missing points); "
+        "",
+        changes,
+        f"{key}: 'rms slope 146' is unusual (the slope depends on units, size and numbers for missing points); ",
     )
     (warning,) = load(changes | {"confirmed": [key]}).warnings
     assert f"{key}: 'rms slope 146' is unusual" in warning and "but confirmed; expected 1e-4 to 5" in warning

@@ -30,7 +30,7 @@ def test_measurements(load, tmp_path):
 @pytest.mark.parametrize(
     ("table", "changes", "message"),
     [
-        ("p,a\n", {}, "holds no values"),
+        ("p,a\n", {}, "contains no values"),
         ("p,b\n1,2\n", {}, "has no column 'a'; expected one of p, b"),
         ("p,a\n1,2\n3,x\n", {}, "column 'a', row 2: 'x'"),
         ("p,a\n1,nan\n", {}, "number greater than 0"),

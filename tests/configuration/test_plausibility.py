@@ -31,7 +31,7 @@ def key_of(place):
 def test_unusual_values_are_refused_until_they_are_confirmed(place, value, load, refused, tmp_path):
     key = key_of(place)
     refused(place, value, f": {value!r} is unusual; expected ")
-    refused(place, value, f"Correct it, or add `confirmed: [{key}]` at the top level if it is intended")
+    refused(place, value, f"Correct the value, or add `confirmed: [{key}]` at the top level if you intend this value")
     configuration = load({**ANY_STICKINESS, place: value, "confirmed": [key]})
     (warning,) = configuration.warnings
     assert warning.startswith(f"{tmp_path}/campaign.yaml: {key}") and f"{value!r} is unusual, but confirmed" in warning
@@ -67,7 +67,8 @@ STICKY = {"materials.soft.contact_modulus": "50 kPa"}
 def test_sticky_runs_of_asperities_are_refused_until_they_are_confirmed(load, refused):
     message = (
         "studies.one.models: 'asperities with U_full/dgamma = 0.0275' is unusual for soft on rough at rms slope 0.2; "
-        "expected 1 to inf (below, full contact has the lower energy and the asperity model is not applicable: "
+        "expected 1 to inf (for smaller values full contact has the lower energy, and the asperity model does not "
+        "apply; "
     )
     refused("", STICKY, message)
     refused("", STICKY, "or add `confirmed: [studies.one.models]` at the top level")

@@ -111,7 +111,7 @@ WRONG = {
             "studies.one.seeds": "1..30000",
         },
         None,
-        "studies: asks for 6000000 runs; expected at most 100000",
+        "studies: defines 6000000 runs; expected at most 100000",
     ),
     "stops of all runs": (
         {
@@ -119,7 +119,7 @@ WRONG = {
             "studies.one.targets": {"reduced_pressures": [1e-3 + 1e-6 * i for i in range(1000)]},
         },
         None,
-        "studies: asks for 40040000 targets of all runs; expected at most 5000000",
+        "studies: defines 40040000 targets of all runs; expected at most 5000000",
     ),
     "solutions": (
         {
@@ -127,7 +127,7 @@ WRONG = {
             "finite_range": {f"b{i}": {"study": "one", "reduced_pressures": [0.01, 0.02]} for i in range(3)},
         },
         None,
-        "finite_range: asks for 120000 solutions; expected at most 100000",
+        "finite_range: defines 120000 solutions; expected at most 100000",
     ),
     "entries beside a study": (
         "finite_range",

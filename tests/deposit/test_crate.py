@@ -117,6 +117,19 @@ def test_every_job_has_an_action_with_its_files_and_settings(entities):
     assert found == {(job.script, tuple(sorted(job.inputs)), job.outputs, job.parameters) for job in JOBS}
 
 
+def test_steps_stand_in_the_order_of_the_data(entities):
+    workflow = entities["source/Snakefile"]
+    steps = sorted((entities[name] for name in references(workflow["step"])), key=lambda step: int(step["position"]))
+    assert [step["name"] for step in steps] == ["surface", "run", "gather", "figure"]
+    assert {step["workExample"]["@id"] for step in steps} == set(references(workflow["hasPart"]))
+    (organised,) = of_type(entities, "OrganizeAction")
+    controls = [entities[name] for name in references(organised["object"])]
+    assert len(controls) == len(JOBS)
+    for control in controls:
+        step, action = entities[control["instrument"]["@id"]], entities[control["object"]["@id"]]
+        assert step["workExample"] == action["instrument"]
+
+
 def test_authors_licence_and_paper_of_the_model(entities):
     root = entities["./"]
     people = [entities[name] for name in references(root["author"])]
@@ -137,19 +150,20 @@ def test_the_same_deposit_has_the_same_bytes_whatever_the_order_of_jobs(deposit,
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", PUBLICATIONS)
-def test_it_is_a_workflow_run_crate_and_can_be_read(name, deposit, tmp_path):
+def test_it_is_a_provenance_run_crate_and_can_be_read(name, deposit, tmp_path):
     folder = tmp_path / "tiny"
     if name == "all":
         shutil.copytree(deposit, folder)
     else:
         written(folder, PUBLICATIONS[name])
-    done = validated(sealed(folder), "roc-validator")
+    done = validated(sealed(folder), "roc-validator", "runcrate")
     assert done.returncode == 0, done.stdout + done.stderr
-    assert re.search(r"^roc-validator: passed; \d{2,} checks of workflow-run-crate-0.5, 0 problems", done.stdout)
+    assert re.search(r"^roc-validator: passed; \d{2,} checks of provenance-run-crate-0.5, 0 problems", done.stdout)
+    assert f"runcrate: passed; {len(JOBS) + 1} actions" in done.stdout
     content = json.loads((folder / CRATE).read_bytes())
-    content["@graph"] = [entity for entity in content["@graph"] if entity["@id"] != "#configuration"]
+    content["@graph"] = [entity for entity in content["@graph"] if entity["@id"] != "source/Snakefile#run"]
     (folder / CRATE).write_text(json.dumps(content))
     (folder / "dataset/mine.nc").unlink()
     done = validated(sealed(folder), "roc-validator")
-    assert done.returncode == 1
+    assert done.returncode == 1 and "A ControlAction must reference a HowToStep instance" in done.stdout
     assert "dataset/mine.nc" in done.stdout

@@ -1,5 +1,6 @@
 """Deposits: what is in them, what is not, that they are whole, and that they are the same wherever they are made."""
 
+import csv
 import getpass
 import json
 import os
@@ -8,8 +9,10 @@ import shutil
 import subprocess
 import time
 import zipfile
+from collections import Counter
 from pathlib import Path
 
+import netCDF4
 import numpy as np
 import pytest
 import small_campaign as small
@@ -29,6 +32,7 @@ from icha.datasets.campaign_file import write_campaign
 from icha.datasets.files import write_dataset
 from icha.deposit import make
 from icha.deposit.crate import Job
+from icha.deposit.dictionary import file_pattern
 from icha.deposit.make import make_deposit, refuse_mixed
 from icha.deposit.program import Source
 from icha.deposit.verify import COMPUTED
@@ -108,9 +112,9 @@ def files_of(folder):
 def test_a_deposit_has_everything_and_nothing_else(project, published):
     present = files_of(published)
     assert {path.split("/")[0] for path in present} == {
-        *("README.md", "LICENSE.txt", "CITATION.cff", ".zenodo.json", "ro-crate-metadata.json", "SHA256SUMS"),
-        *("config.used.yaml", "inputs", "dataset", "aggregated", "runs", "surfaces", "references", "figures"),
-        *("report.html", "checks.json", "verdict.txt", "source"),
+        *("README.md", "LICENSE.txt", "CITATION.cff", ".zenodo.json", "datacite.json", "ro-crate-metadata.json"),
+        *("data_dictionary.csv", "SHA256SUMS", "config.used.yaml", "inputs", "dataset", "aggregated", "runs"),
+        *("surfaces", "references", "figures", "report.html", "checks.json", "verdict.txt", "source"),
     }
     assert f"runs/{RUN}.nc" in present and "figures/fig5_multi_slope.pdf" in present
     listed = subprocess.run(["git", "ls-files", "-z"], cwd=project, capture_output=True).stdout.decode()
@@ -138,6 +142,26 @@ def test_folder_and_zip_have_their_checksums(published, tmp_path):
     }
     assert {entry.external_attr >> 16 for entry in entries} <= {0o100644, 0o100755}
     assert subprocess.run(command, cwd=tmp_path / "tiny-1.0.0").returncode == 0
+
+
+@pytest.mark.slow
+def test_the_dictionary_has_every_variable_and_no_other(published):
+    with open(published / "data_dictionary.csv", encoding="utf-8", newline="") as file:
+        rows = {(row["file"], row["group"], row["variable"]): row for row in csv.DictReader(file)}
+    counts = Counter()
+    for path in files_of(published):
+        if path.endswith(".nc"):
+            with netCDF4.Dataset(published / path) as data:
+                for group in (data, *data.groups.values()):
+                    counts.update((file_pattern(path), group.path, name) for name in group.variables)
+    assert {key: int(row["files"]) for key, row in rows.items()} == counts
+    assert all(row["units"] and row["long_name"] for row in rows.values())
+    run = file_pattern(f"runs/{RUN}.nc"), "/"
+    row = rows[*run, "contact_area_fraction"]
+    assert (row["dimensions"], row["type"]) == ("step", "float64")
+    assert rows["dataset/tiny.nc", "/load", "status"]["flags"].startswith("0: complete, 1: incomplete")
+    row = rows[*run, "step_kind"]
+    assert (row["type"], row["dimensions"]) == ("text", "step")
 
 
 @pytest.mark.slow
@@ -315,7 +339,7 @@ def test_failures_are_published_only_with_a_reason(campaign, tmp_path):
 def test_names_that_verify_would_refuse_are_not_published(name, campaign, tmp_path):
     (campaign[1] / "inputs").mkdir()
     (campaign[1] / "inputs" / name).touch()
-    with pytest.raises(ValueError, match="not published, because some systems refuse these names"):
+    with pytest.raises(ValueError, match="not published, because some systems refuse these file names"):
         published_as(tmp_path / "out/small-1.0.0", *campaign)
     assert files_of(tmp_path / "out") == {}
 
@@ -325,7 +349,7 @@ def test_results_that_do_not_belong_together_are_refused(campaign):
     files = campaign_files(campaign)
     recorded = dict.fromkeys([*files.runs, files.dataset], ASKED)
     refuse_mixed(results, campaign, recorded)
-    with pytest.raises(ValueError, match=r"dataset/tiny.nc: the workflow has recorded another job for this file"):
+    with pytest.raises(ValueError, match=r"dataset/tiny.nc: was made by another job than the workflow has recorded"):
         refuse_mixed(results, campaign, recorded | {files.dataset: hash_parameters(["1"])})
     # A run of an older program, with the right settings.
     path, case = next(iter(files.runs.items()))
@@ -334,7 +358,7 @@ def test_results_that_do_not_belong_together_are_refused(campaign):
     with pytest.raises(ValueError, match=f"dataset/tiny.nc: it was made from another version of {path}"):
         refuse_mixed(results, campaign, recorded)
     write(results, path, run.assign_attrs(config_sha256="a" * 64))
-    with pytest.raises(ValueError, match=f"{path}: this file was not computed with the settings of the campaign"):
+    with pytest.raises(ValueError, match=f"{path}: was not computed with the settings of the campaign"):
         refuse_mixed(results, campaign, recorded)
 
 

@@ -113,7 +113,7 @@ def test_a_project_may_be_a_folder_of_a_shallow_clone(repository, tmp_path, monk
 def test_folders_without_a_commit_and_links_are_refused(repository, tmp_path, monkeypatch):
     plain = shutil.copytree(repository, tmp_path / "plain", ignore=shutil.ignore_patterns(".git"))
     for _ in range(2):
-        with pytest.raises(ValueError, match=r"not under git, or nothing is committed yet(.|\n)*git init"):
+        with pytest.raises(ValueError, match=r"not a git repository or has no commit(.|\n)*git init"):
             program_source(plain)
         git(plain, "init", "--quiet")
     (repository / "link").symlink_to("Snakefile")
@@ -167,7 +167,7 @@ def test_source_is_what_was_installed_in_its_places_in_the_repository(place):
         (lambda p: (p / "icha/physics.py").write_text("ONE = 2\n"), "changed: icha/physics.py"),
         (lambda p: (p / "icha_workflow/Snakefile").unlink(), "changed: icha_workflow/Snakefile"),
         (lambda p: (p / "icha/more.py").write_text(""), "not of the installed version: icha/more.py"),
-        (lambda p: (p / "icha-7.1.dist-info").rename(p / "other"), "no distribution `icha` is installed here"),
+        (lambda p: (p / "icha-7.1.dist-info").rename(p / "other"), "the package `icha` is not installed here"),
     ],
 )
 def test_another_program_than_what_was_installed_is_refused(place, spoil, message):

@@ -125,10 +125,10 @@ def test_the_page_lists_failures_that_a_rerun_repeats(small_readme):
     completed = cells[cells.index("completed") :][:5]
     assert completed == ["completed", "6", "-1", "0", "0 if the run reached the end of its path, else 1"]
     assert "-0" not in cells
-    assert "One of them did not reach the end of its path" in page and "complete.\n" not in page
+    assert "One run did not reach the end of its path" in page and "all runs are complete" not in page
     assert "The check `completed` fails for the run that is listed under *Design*" in page
-    assert "What failed here fails again" in page
-    assert "The results take 2.34 MB of disk, 200 MB of memory" in page
+    assert "Runs that failed here fail again" in page
+    assert "The computation needs 2.34 MB of\ndisk, 200 MB of memory" in page
 
 
 def test_the_page_counts_runs_that_end_at_the_limit_of_their_model():
@@ -137,7 +137,10 @@ def test_the_page_counts_runs_that_end_at_the_limit_of_their_model():
     runs[first] = runs[first].assign_attrs(beyond_model="the path ends before its last target")
     tree = small.campaign_tree(runs.items(), attrs={"campaign": "small"})
     page = page_of(tree, check_campaign(tree), load_configuration(REPOSITORY / "config/campaigns/smoke.yaml").campaign)
-    assert "The path of 1 of them leads beyond the range of the model" in page and "and complete.\n" not in page
+    assert (
+        "For 1 of the runs, the path leads beyond the range of the model" in page
+        and "all runs are complete" not in page
+    )
 
 
 def test_the_example_selects_a_run_of_surfaces_with_slopes_of_their_own(tmp_path, monkeypatch):

@@ -175,8 +175,8 @@ def test_a_folder_continues_its_own_rerun_only(deposit, reproduce, computed, tmp
     (tmp_path / "other/file").write_text("mine")
     for folder, message in (
         (tmp_path / "again", "belongs to another deposit"),
-        (tmp_path / "other", "has other files in it"),
-        (packed / "again", "is in the deposit"),
+        (tmp_path / "other", "contains other files"),
+        (packed / "again", "is inside the deposit"),
     ):
         status, output = reproduce(packed, "--folder", folder)
         assert status == 2 and message in output, output
@@ -188,10 +188,10 @@ def test_a_folder_continues_its_own_rerun_only(deposit, reproduce, computed, tmp
     [
         ({"source/pyproject.toml": '[project]\nversion = "99.0"\n'}, "is installed, 99.0 made the deposit"),
         ({"source/uv.lock": lock("0.1")}, "is installed, 0.1 is locked"),
-        ({"source/pyproject.toml": "project = 3"}, "expected the version of the program"),
-        ({"source/pyproject.toml": b"\xff"}, "expected the version of the program"),
-        ({"source/uv.lock": "package = [1]"}, "and a lock file of uv"),
-        ({"source/uv.lock": "x = " + 10_000 * "["}, "and a lock file of uv"),
+        ({"source/pyproject.toml": "project = 3"}, "expected a file with the program's version"),
+        ({"source/pyproject.toml": b"\xff"}, "expected a file with the program's version"),
+        ({"source/uv.lock": "package = [1]"}, "and a uv lock file"),
+        ({"source/uv.lock": "x = " + 10_000 * "["}, "and a uv lock file"),
         ({"source/uv.lock": None}, "has no source/uv.lock"),
         ({"config.used.yaml": "name: [a, b]"}, "name: ['a', 'b'] is not the name"),
         ({"config.used.yaml": "name: ../../tmp"}, "name: '../../tmp' is not the name"),
@@ -199,8 +199,8 @@ def test_a_folder_continues_its_own_rerun_only(deposit, reproduce, computed, tmp
         ({"config.used.yaml": "name: !!python/object/apply:os.getcwd []"}, "config.used.yaml"),
         ({"config.used.yaml": b"\xff\xfe\x00"}, "deposit"),
         ({"config.used.yaml": "name: tiny\ntitle: 3\n"}, "the configuration of the deposit cannot be run"),
-        ({"config.used.yaml": CAMPAIGN.format(path="/etc/passwd")}, "files beside it"),
-        ({"config.used.yaml": CAMPAIGN.format(path="../../../secret.npy")}, "files beside it"),
+        ({"config.used.yaml": CAMPAIGN.format(path="/etc/passwd")}, "expected files in this folder"),
+        ({"config.used.yaml": CAMPAIGN.format(path="../../../secret.npy")}, "expected files in this folder"),
     ],
 )
 def test_the_content_of_a_deposit_is_checked(changes, message, deposit, reproduce, computed):
@@ -222,7 +222,11 @@ def test_what_is_called_a_run_and_is_none_is_not_followed(content, deposit, repr
             file["step"] = h5py.ExternalLink(str(tmp_path / "other.nc"), "/step")
         content = (tmp_path / "run.nc").read_bytes()
     status, output = reproduce(deposit(**dict.fromkeys(RUNS, content)), "--only=smallest")
-    assert status == 2 and re.search("soft.nc: is not a run|hard.nc: is not a run", output) and not computed, output
+    assert (
+        status == 2
+        and re.search("soft.nc: is not the file of a run|hard.nc: is not the file of a run", output)
+        and not computed
+    ), output
 
 
 def test_a_deposit_that_does_not_fit_leaves_nothing_behind(deposit, reproduce, monkeypatch, tmp_path):

@@ -188,7 +188,7 @@ def test_another_call_continues_a_draft_and_sends_nothing_twice(server, deposit)
     assert set(server.files) == SENT | {"photo.jpg"}
     server.published = True
     status, output = upload(deposit, "--url", server.address, "--draft", "77", "--yes")
-    assert status == 1 and "77 is published already" in output
+    assert status == 1 and "77 is already published" in output
 
 
 def test_nothing_is_sent_without_consent(server, deposit, monkeypatch):
@@ -213,7 +213,7 @@ def test_what_cannot_be_sent_is_refused_before_anything_is_asked(server, deposit
     assert "is not a token" in refused(deposit, *url, token="two words")
     assert "no such file" in refused(tmp_path / "none.zip", *url)
     refused(deposit, "--draft", "mine", *url)
-    assert "over http" in refused(deposit, "--url", "http://zenodo.org")
+    assert "with http" in refused(deposit, "--url", "http://zenodo.org")
     (tmp_path / "reserved").mkdir()
     reserved = make_deposit(tmp_path / "reserved", doi="10.5281/zenodo.5")
     assert "use --draft 5" in refused(reserved, *url)
@@ -252,16 +252,16 @@ POST, PUT, ZIP = ("POST", "depositions"), ("PUT", "depositions"), ("PUT", ".zip"
         (POST, refuse(403, {"message": f"no, {TOKEN}"}), "deposit:write and deposit:actions"),
         (POST, refuse(302, Location=ELSEWHERE), f"redirects to {ELSEWHERE}"),
         (POST, refuse(200, {"id": 1, "links": {"bucket": ELSEWHERE}}), "another server"),
-        (POST, refuse(200, [1]), "does not answer as Zenodo does"),
-        (POST, refuse(200, {"id": 1, "links": None}), "does not answer as Zenodo does"),
-        (POST, refuse(200, {"id": 1, "links": {"bucket": 3}}), "does not answer as Zenodo does"),
+        (POST, refuse(200, [1]), "does not answer like Zenodo"),
+        (POST, refuse(200, {"id": 1, "links": None}), "does not answer like Zenodo"),
+        (POST, refuse(200, {"id": 1, "links": {"bucket": 3}}), "does not answer like Zenodo"),
         (POST, refuse(400, {"errors": 1}), "(400)"),
         (POST, refuse(503, {"message": "busy"}), "try again in a while"),
-        (POST, break_off, "ended the connection"),
-        (PUT, refuse(200, "done"), "does not answer as Zenodo does"),
+        (POST, break_off, "closed the connection"),
+        (PUT, refuse(200, "done"), "does not answer like Zenodo"),
         (PUT, refuse(400, VALIDATION), "Missing data for required field."),
         (ZIP, refuse(413), "too large"),
-        (ZIP, refuse(201, {"checksum": "md5:" + 32 * "0"}), "did not arrive as it was sent"),
+        (ZIP, refuse(201, {"checksum": "md5:" + 32 * "0"}), "was damaged on its way"),
     ],
 )
 def test_refusals_of_a_server_are_shown_with_advice(server, deposit, request_, action, message):

@@ -3,6 +3,7 @@
 import re
 import socket
 import subprocess
+import zipfile
 
 import h5py
 import netCDF4
@@ -11,7 +12,7 @@ from outside_validators import REPOSITORY, python_of_validators, sealed, validat
 
 pytestmark = pytest.mark.slow
 
-NAMES = ("compliance-checker",)
+NAMES = ("sha256sum", "compliance-checker")
 
 
 def deposit(folder, unit="Pa", where="study"):
@@ -35,8 +36,14 @@ def failed(done):
     return re.findall(r"^([\w-]+): failed", done.stdout, re.MULTILINE)
 
 
-def test_a_good_file_passes(tmp_path):
+@pytest.mark.parametrize("kind", ["folder", "zip"])
+def test_a_good_file_passes_in_a_folder_and_in_an_archive(kind, tmp_path):
     folder = deposit(tmp_path / "mine-1.0")
+    if kind == "zip":
+        with zipfile.ZipFile(tmp_path / "mine-1.0.zip", "w") as archive:
+            for file in folder.iterdir():
+                archive.write(file, f"mine-1.0/{file.name}")
+        folder = tmp_path / "mine-1.0.zip"
     done = validated(folder, *NAMES)
     assert done.returncode == 0, done.stdout + done.stderr
     assert not failed(done)
@@ -95,5 +102,5 @@ def test_what_is_no_deposit_is_refused(tmp_path):
     done = validated(tmp_path)
     assert done.returncode == 1 and "is not a deposit" in done.stderr
     (tmp_path / "ro-crate-metadata.json").write_text("{}")
-    done = validated(sealed(tmp_path), "cffconvert")
+    done = validated(sealed(tmp_path), "cffconvert", "sha256sum")
     assert done.returncode == 1 and "CITATION.cff is missing" in done.stdout

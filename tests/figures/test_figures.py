@@ -134,6 +134,18 @@ def test_fig3_points_keep_the_probability():
     assert fig3_distributions.pressure_densities([(small.run(material="hertz"), 0)])[0].min() > 0
 
 
+def test_the_singular_tail_is_that_of_jkr_spots():
+    """The JKR pressure at the edge of a spot tends to that of its stress intensity, along its circumference."""
+    run = small.run()
+    unit = float(run["contact_modulus"]) * float(run["rms_slope"])
+    run = run.assign(spot_perimeter=2 * np.pi * run["spot_radius"], resolved_tension=100 * unit)
+    p, tail = fig3_distributions.singular_tail([(run, 0)], -1e4)
+    edges = run["pressure_bin_edges"].values / unit
+    middle, far = -np.sqrt(np.abs(edges[1:] * edges[:-1])), (edges[:-1] > -1e4) & (edges[1:] < -100)
+    expected = np.exp(np.interp(np.log(-middle[far]), np.log(-p), np.log(tail)))
+    np.testing.assert_allclose(run["pressure_density"].values[0][far] * unit, expected, rtol=0.02)
+
+
 def test_fig4_draws_means_of_large_topographies():
     n = 3000
     heights = np.add.outer(np.arange(n) ** 2.0, np.arange(n) * 10.0)
@@ -375,7 +387,7 @@ def test_errors_of_runs_that_all_failed_are_nothing_to_draw():
         f"/{name}": (node.to_dataset().drop_vars("applicability") * np.nan).assign_attrs(node.attrs)
         for name, node in compared.errors().children.items()
     }
-    with pytest.raises(NothingToDraw, match="study one: no run beside boundary elements is complete"):
+    with pytest.raises(NothingToDraw, match="study one: no run that was compared with boundary elements is complete"):
         fig11_distribution_error.figure(compared.tree(), xr.DataTree.from_dict(empty), study="one")
 
 

@@ -87,7 +87,9 @@ def test_model_is_the_first_dimension_of_every_study(runs, tmp_path):
     # Maps stay in the files of the runs; what asperities do not have is missing.
     assert not {"contact_map", "contact_pressure", "row", "column"} & {*study.variables, *study.dims}
     front = study["front_residual"]
-    assert np.isnan(front.sel(model=DEFAULT_MODEL)).all() and front.attrs["missing"] == "of runs by asperities"
+    assert (
+        np.isnan(front.sel(model=DEFAULT_MODEL)).all() and front.attrs["missing"] == "in runs with the model asperities"
+    )
     expected = runs[labels(REFERENCE_MODEL)]["front_residual"]
     np.testing.assert_array_equal(front.sel(model=REFERENCE_MODEL, material="soft").values.ravel(), expected)
     assert set(np.unique(study["spot_model"])) == {0, 1}
@@ -148,7 +150,7 @@ def test_asperities_end_at_the_limit_of_their_range_beside_boundary_elements(tmp
     # The loops of the report are those of the runs that were unloaded.
     write_report(tmp_path / "report.html", campaign=tree, figures=[], checks=check_campaign(tree))
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
-    assert "<b>1</b> of them up to the limit of its model" in page and "Failed runs" not in page
+    assert "<b>1</b> of the complete runs ends at the limit of the model" in page and "Failed runs" not in page
 
 
 def test_fronts_are_checked(runs):

@@ -100,7 +100,7 @@ def test_a_lack_of_memory_is_reported_with_a_sufficient_number_of_cores(monkeypa
     monkeypatch.setattr(requirements, "free_disk", lambda folder: 100 * GB)
     (said,) = requirements.find_shortages(jobs, 2, tmp_path, {})
     assert said.startswith(
-        "about 40.3 GB of memory are needed on 2 cores, and this machine has 24 GB; --cores 1 needs 20"
+        "jobs on 2 cores need about 40.3 GB of memory, but this machine has 24 GB; --cores 1 needs 20"
     )
     assert requirements.find_shortages(jobs, 1, tmp_path, {}) == []
     # Snakemake limits the memory of parallel jobs.
@@ -108,13 +108,13 @@ def test_a_lack_of_memory_is_reported_with_a_sufficient_number_of_cores(monkeypa
     # On a cluster the memory of this machine does not matter.
     assert requirements.find_shortages(jobs, 2, tmp_path, {"executor": "slurm-batches"}) == []
     (said,) = requirements.find_shortages([item("a", memory=30 * GB)], 2, tmp_path, {"resources": ["mem_mb=14000"]})
-    assert said.startswith("about 30.3 GB of memory") and "--cores" not in said
+    assert said.startswith("jobs on 2 cores need about 30.3 GB of memory") and "--cores" not in said
 
 
 def test_a_lack_of_disk_space_is_reported_with_the_free_space(monkeypatch, tmp_path):
     monkeypatch.setattr(requirements, "free_disk", lambda folder: 9 * GB)
     (said,) = requirements.find_shortages([item("a"), item("b")], 2, tmp_path, {})
-    assert said.startswith(f"about 10 GB of disk are needed for {tmp_path}, and 9 GB are free there")
+    assert said.startswith(f"{tmp_path} needs about 10 GB of disk space, but only 9 GB are free")
     assert requirements.find_shortages([item("a"), item("b", state=DONE)], 2, tmp_path, {}) == []
 
 

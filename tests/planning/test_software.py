@@ -34,7 +34,7 @@ def test_sections_of_tamaas_need_it(section, tmp_path, monkeypatch):
     campaign = without(section, tmp_path)
     assert further_software(campaign) == ("tamaas",)
     monkeypatch.setitem(sys.modules, "tamaas", None)
-    assert re.match(rf"{section}: solved by Tamaas, which is not installed; `make tamaas` ", missing_software(campaign))
+    assert re.match(rf"{section}: needs Tamaas, which is not installed; run `make tamaas` ", missing_software(campaign))
 
 
 def test_campaigns_without_them_do_not(tmp_path, monkeypatch):
@@ -50,6 +50,6 @@ def test_a_campaign_that_needs_it_is_refused_before_anything_is_computed(tmp_pat
     environment["PYTHONPATH"] = os.pathsep.join([str(tmp_path), str(REPOSITORY)])
     done = subprocess.run(command, cwd=REPOSITORY, env=environment, capture_output=True, text=True)
     assert done.returncode != 0
-    assert "boundary_element_loops: solved by Tamaas, which is not installed" in done.stderr
+    assert "boundary_element_loops: needs Tamaas, which is not installed" in done.stderr
     assert "`make tamaas` installs it" in done.stderr and "Nothing was computed." in done.stderr
     assert not list((tmp_path / "results").rglob("*.nc"))

@@ -59,7 +59,7 @@ def test_curvatures_are_those_of_the_surfaces(campaign):
 def test_materials_and_surfaces_outside_are_named_before_the_run(campaign):
     found = {each.about: each for each in expected_validity(campaign)}
     assert not found["jump-in"].good
-    assert "expected outside: below on rough (about 0.63)" in found["jump-in"].text
+    assert "expected outside this range: below on rough (about 0.63)" in found["jump-in"].text
     assert "bare" not in found["jump-in"].text and "inside on" not in found["jump-in"].text
     assert "the accuracy of this campaign is unknown (rough: nodes per shortest wave" in found["accuracy"].text
     assert ". scan: " in found["accuracy"].text

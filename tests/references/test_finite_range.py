@@ -163,7 +163,7 @@ def test_wrong_arguments_are_named(name, value):
     ("limit", "most", "material", "message"),
     [
         ("_MAX_ITERATIONS", 3, "hertz", r"did not converge: error .*, tolerance 1e-08"),
-        ("_MAX_SOLVES", 1, "adhesive", "no mean gap was found that carries the load: after 1 tries"),
+        ("_MAX_SOLVES", 1, "adhesive", "no mean gap was found at which the contact carries the load: after 1 attempts"),
     ],
 )
 def test_states_that_are_not_found_are_errors(limit, most, material, message, monkeypatch):

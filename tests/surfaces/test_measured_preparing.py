@@ -197,7 +197,7 @@ def test_the_cutoff_is_that_of_iso_16610(prepared, boundary):
 @pytest.mark.parametrize("cutoff", [3.9, 65.1])
 def test_a_cutoff_that_the_scan_does_not_hold_is_refused(prepared, cutoff):
     heights = np.random.default_rng(1).normal(size=(65, 65))
-    with refused("cutoff", "expected from 4 pixels, 4 m, to the side of the square, 65 m"):
+    with refused("cutoff", r"expected at least 4 pixels \(4 m\), at most the side of the square \(65 m\)"):
         prepared(heights, boundary="window", taper=0.1, size=(65.0, 65.0), cutoff=cutoff)
 
 
@@ -223,7 +223,7 @@ def test_fine_roughness_on_a_high_step_is_none_of_rounding(prepared):
         (np.empty((0, 0)), "path", "of shape"),
         (np.empty((0, 12)), "path", "of shape"),
         (np.empty((12, 0)), "path", "of shape"),
-        (np.ones((1, 1)), "path", "leaves 1 x 1 points"),
+        (np.ones((1, 1)), "path", "a square of 1 x 1 points"),
         (np.arange(12.0)[None], "path", "is a line scan, one profile of 12 points"),
         (np.arange(12.0)[:, None], "path", "is a line scan"),
         (np.arange(24.0).reshape(12, 2), "path", "is a line scan"),
@@ -243,7 +243,7 @@ def test_messages_have_units_of_people(prepared):
     crop = {"x": 7 * UM, "y": 0.0, "side": 2.5 * UM}
     with pytest.raises(UnfitTopography, match=r"ends at x = 9.5 um, y = 2.5 um, .* at most x = 4 um, y = 3 um"):
         prepared(np.eye(12, 16), size=(4e-6, 3e-6), crop=crop)
-    with pytest.raises(UnfitTopography, match=r"needs the whole scan to be a square, and it is 4 um x 3 um"):
+    with pytest.raises(UnfitTopography, match=r"requires a square scan .* 4 um x 3 um"):
         prepared(np.eye(12, 16), size=(4e-6, 3e-6), boundary="periodic")
 
 

@@ -325,7 +325,7 @@ def test_an_empty_file_is_refused(tmp_path, name):
 @pytest.mark.parametrize("kind", ["matrix", "xyz", "fourier"])
 def test_a_heading_alone_is_refused(tmp_path, kind):
     (tmp_path / "scan.txt").write_text("# width 90 um\n\n  # heights\n")
-    with refused("path", "holds no numbers"):
+    with refused("path", "has no numbers"):
         scan(tmp_path / "scan.txt", format=kind, height_unit=NM, size=SIZE)
 
 

@@ -16,6 +16,7 @@ import io
 import json
 import logging
 import re
+import subprocess
 import sys
 import tempfile
 import traceback
@@ -30,7 +31,7 @@ from typing import NamedTuple
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 CRATE = "ro-crate-metadata.json"
-PROFILE = "workflow-run-crate-0.5"
+PROFILE = "provenance-run-crate-0.5"
 CONVENTIONS = "cf:1.11"
 # Attributes by which a variable names others (CF 1.11, appendix A).
 NAMING = "ancillary_variables bounds cell_measures climatology coordinates formula_terms grid_mapping".split()
@@ -55,8 +56,20 @@ class Outcome(NamedTuple):
     remarks: tuple[str, ...] | list[str] = ()
 
 
+def check_checksums(folder: Path) -> Outcome:
+    """`sha256sum --check`: the files are those that the list names."""
+    listed = (folder / "SHA256SUMS").read_text(encoding="utf-8").splitlines()
+    done = subprocess.run(
+        ["sha256sum", "--check", "--strict", "--quiet", "SHA256SUMS"], cwd=folder, capture_output=True, text=True
+    )
+    problems = (done.stdout + done.stderr).splitlines()
+    if done.returncode and not problems:
+        problems = [f"status {done.returncode}"]
+    return Outcome(f"{len(listed)} files", problems)
+
+
 def check_crate(folder: Path) -> Outcome:
-    """roc-validator: the crate is a Workflow Run Crate; what is only recommended is a remark."""
+    """roc-validator: the crate is a Provenance Run Crate; what is only recommended is a remark."""
     from rocrate_validator import services
     from rocrate_validator.models import Severity
 
@@ -101,6 +114,24 @@ def _cache_contexts(path: Path) -> None:
         session.get("https://w3id.org/ro/crate/1.1/context").raise_for_status()
 
 
+def check_actions(folder: Path) -> Outcome:
+    """runcrate: another reader of such crates can list what was run."""
+    from runcrate.report import dump_crate_actions
+
+    crate = folder / CRATE
+    expected = sum("CreateAction" in _types(entity) for entity in json.loads(crate.read_bytes())["@graph"])
+    text = io.StringIO()
+    dump_crate_actions(folder, text)
+    listed = sum(line.startswith("action: ") for line in text.getvalue().splitlines())
+    problems = [] if listed == expected > 0 else [f"{listed} of {expected} actions are listed"]
+    return Outcome(f"{listed} actions", problems)
+
+
+def _types(entity: dict) -> list[str]:
+    types = entity["@type"]
+    return types if isinstance(types, list) else [types]
+
+
 def check_citation(folder: Path) -> Outcome:
     """cffconvert: CITATION.cff is valid."""
     from cffconvert import Citation
@@ -111,6 +142,17 @@ def check_citation(folder: Path) -> Outcome:
     except Exception as error:
         return Outcome("CITATION.cff", [str(error).strip().splitlines()[0]])
     return Outcome(f"CITATION.cff {citation.cffversion}", [])
+
+
+def check_datacite(folder: Path) -> Outcome:
+    """The schema of DataCite 4.5, and its XML can be made from it."""
+    from datacite import schema45
+
+    metadata = json.loads((folder / "datacite.json").read_bytes())
+    problems = _violations(schema45.validator, metadata)
+    if not problems:
+        schema45.tostring(metadata)
+    return Outcome(f"{len(metadata)} properties", problems)
 
 
 def check_zenodo(folder: Path) -> Outcome:
@@ -250,8 +292,11 @@ def stay_off_the_network() -> None:
 
 
 VALIDATORS: dict[str, Callable[[Path], Outcome]] = {
+    "sha256sum": check_checksums,
     "roc-validator": check_crate,
+    "runcrate": check_actions,
     "cffconvert": check_citation,
+    "datacite": check_datacite,
     "zenodo": check_zenodo,
     "compliance-checker": check_conventions,
 }

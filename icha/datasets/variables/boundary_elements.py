@@ -1,4 +1,4 @@
-"""Variables of boundary-element solutions at a finite range: one state, and a loop."""
+"""Variables of boundary-element solutions at a finite range, and of loops of loading and unloading."""
 
 from icha.datasets.variables.terms import TERMS, read_tables
 

@@ -1,4 +1,4 @@
-"""Variables that the campaign dataset has besides those of its runs, and the labels with which those vary."""
+"""Variables that only the campaign dataset has, and the labels on which variables of the runs depend."""
 
 import numpy as np
 
@@ -7,11 +7,11 @@ from icha.datasets.variables.terms import Variable, bin_table, read_tables
 # Complete runs are results. A run with failed checks has all its values, but they must not be used.
 COMPLETE, INCOMPLETE, MISSING, NOT_IN_DESIGN, FAILED_CHECKS, BEYOND_MODEL = range(6)
 STATUS_MEANINGS = ("complete", "incomplete", "missing", "not_in_design", "failed_checks", "beyond_the_model")
-# Attribute of a run that gives the reason of its status.
+# Attribute of a run that gives the reason for the status.
 STATUS_ATTRIBUTES = {INCOMPLETE: "incomplete", BEYOND_MODEL: "beyond_model", FAILED_CHECKS: "failed_checks"}
 # Status of runs that have a file.
 COMPUTED_RUNS = (COMPLETE, INCOMPLETE, FAILED_CHECKS, BEYOND_MODEL)
-# Status of runs whose first loading is a result. A run beyond its model has the loading up to there.
+# Status of runs whose first loading is a result. A run that left the range of its model has the loading up to there.
 LOADED_RUNS = (COMPLETE, BEYOND_MODEL)
 
 _ATTRIBUTES = {
@@ -21,25 +21,25 @@ _ATTRIBUTES = {
         "comment": "values that a run, or all runs of its model, do not have are filled with _FillValue",
     },
     "step_count": {
-        "comment": "from this position on along step, numbers are filled with _FillValue and texts are empty"
+        "comment": "from position step_count on along step, numbers are filled with _FillValue and texts are empty"
     },
 }
 CAMPAIGN = read_tables("campaign.txt", attributes=_ATTRIBUTES)[""]
 STATUS = CAMPAIGN["status"]
 
-# Dimensions whose length differs from run to run: in the campaign the runs' values stand one after the other.
+# Dimensions whose length differs between runs. In the campaign dataset, the values of runs follow one after the other.
 RAGGED = ("spot", "event")
 
 
 def index_variable(dim: str, label: str) -> Variable:
-    """Describe `<dim>_<label>`, the position along a label of the run to which a value along `dim` belongs."""
+    """Describe `<dim>_<label>`, which gives the position along `label` of the run of each spot or event."""
     long_name = f"position of the {dim}'s run along {label}, from 0"
     return Variable((dim,), "1", long_name, np.int32, {"instance_dimension": label})
 
 
 _TOPOGRAPHY = ("surface", "seed", "rms_slope")
-# The labels on which a variable of the runs depends; a variable that is not listed depends on all five. Targets of
-# snapshots belong to the path of the study. Bins are fixed in units of h_rms (gap) and of E* h'_rms (pressure).
+# Labels on which variables of the runs depend. Variables that are not listed depend on all five labels. Targets of
+# snapshots are the same for all runs of a study. Bins are fixed in units of h_rms (gap) and of E* h'_rms (pressure).
 VARIES_WITH = {
     **dict.fromkeys(("contact_modulus", "surface_energy", "interaction_range", "flaw_radius"), ("material",)),
     **dict.fromkeys(("theoretical_strength", "interface_strength"), ("material",)),

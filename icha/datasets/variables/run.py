@@ -1,4 +1,4 @@
-"""Variables of the dataset of a run."""
+"""Descriptions of the variables in the dataset of a run."""
 
 import numpy as np
 
@@ -7,15 +7,15 @@ from icha.contact.model import EVENT_KINDS
 from icha.contact.models import MODELS
 from icha.datasets.variables.terms import INFINITE, TERMS, Variable, read_tables
 
-# The cells of the surface's grid: rows along y, columns along x.
+# Dimensions of the cells of the surface's grid: rows along y, columns along x.
 CELLS = ("row", "column")
 
 
 def _index_of(dim: str) -> dict[str, str]:
-    """Return the attributes of an index of CF's indexed ragged arrays (CF 1.11, section 9.3.4).
+    """Return the attributes of an index variable of an indexed ragged array (CF 1.11, section 9.3.4).
 
-    Spots and events follow each other; the index gives the snapshot or step of each. The attribute `featureType` of CF
-    is left out, because it requires times and places on earth.
+    The index variable gives the snapshot of each spot, or the step of each event. The CF attribute `featureType` is
+    left out, because it requires times and places on earth.
     """
     return {
         "instance_dimension": dim,
@@ -23,7 +23,9 @@ def _index_of(dim: str) -> dict[str, str]:
     }
 
 
-_SUM = {"comment": "where uphill_jump_in_count is not 0, only the sum with the other kind of jump has a meaning"}
+_SUM = {
+    "comment": "where uphill_jump_in_count is not 0, only the sum of loss_by_jump_in and loss_by_jump_off has a meaning"
+}
 _ATTRIBUTES = {
     "spot_snapshot": _index_of("snapshot"),
     "full_contact_energy_ratio": {INFINITE: "without adhesion"},
@@ -37,9 +39,9 @@ _ATTRIBUTES = {
     "loss_by_jump_in": _SUM,
     "loss_by_jump_off": _SUM,
 }
-# Variables of every run, of those whose path continues after the first loading, and of those that end in separation.
+# Variables of every run, of runs whose path continues after the first loading, and of runs that end in separation.
 RUN, CYCLE, LOOP = read_tables("run.txt", TERMS, _ATTRIBUTES, meaning=MEANING).values()
-# Further variables of the runs of a model.
+# Variables that only runs with a certain model have, by name of the model.
 FURTHER = {
     name: {key: Variable(*facts, np.dtype(dtype).type) for key, (*facts, dtype) in model.variables.items()}
     for name, model in MODELS.items()

@@ -1,10 +1,10 @@
-"""Variables of the file of a surface."""
+"""Descriptions of the variables in the file of a surface."""
 
 from icha.datasets.variables.terms import TERMS, read_tables
 
 _ATTRIBUTES = {
-    "psd_wavevector": {"bounds": "psd_wavevector_bounds", "comment": "mean over the ring's wave vectors"},
+    "psd_wavevector": {"bounds": "psd_wavevector_bounds", "comment": "mean magnitude of the wave vectors in the ring"},
 }
-# Variables of every surface, of random ones, and of measured ones.
+# Variables of every surface, of random surfaces, and of measured surfaces.
 TABLES = list(read_tables("surface.txt", TERMS, _ATTRIBUTES).values())
 SURFACE = TABLES[0] | TABLES[1] | TABLES[2]

@@ -1,4 +1,4 @@
-"""Descriptions of variables, read from text tables, and the terms that several kinds of files have in common."""
+"""Read descriptions of variables from text tables; `TERMS` are variables that several kinds of files have in common."""
 
 import re
 from collections.abc import Mapping
@@ -13,11 +13,11 @@ class Variable(NamedTuple):
 
     Attributes
     ----------
-    dims : names of its dimensions.
-    units : as CF has them, "1" for numbers without a unit.
-    long_name : its meaning.
-    dtype : of numpy; `str` for texts.
-    further : attributes besides units and long name.
+    dims : names of the dimensions.
+    units : unit in the notation of CF; "1" for numbers without a unit.
+    long_name : meaning of the variable.
+    dtype : numpy type of the values; `str` for texts.
+    further : attributes of the variable besides units and long name.
     coordinate : True for a coordinate of CF.
     """
 
@@ -30,11 +30,11 @@ class Variable(NamedTuple):
 
     @property
     def attributes(self) -> dict[str, Any]:
-        """Attributes of the variable in a file."""
+        """All attributes of the variable in a file."""
         return {"units": self.units, "long_name": self.long_name, **self.further}
 
 
-# Attribute of a variable that may be infinite (inf is a value like any other); its text is the condition.
+# Attribute of a variable that may have infinite values; the text of the attribute is the condition.
 INFINITE = "infinite"
 MATERIAL = ("contact_modulus", "surface_energy", "interaction_range")
 ROUGHNESS = ("rms_slope", "rms_height", "rms_curvature")
@@ -46,14 +46,14 @@ _TYPES = {"int": int, "int8": np.int8, "int32": np.int32, "text": str}
 def read_tables(
     name: str, known: Mapping[str, Variable] = {}, attributes: Mapping[str, Mapping[str, Any]] = {}, **texts: str
 ) -> dict[str, Table]:
-    """Return the tables of a text file of this folder by heading; `terms.txt` describes the format.
+    """Return the tables of a text file in this folder, by heading; `terms.txt` describes the format.
 
     Parameters
     ----------
-    name : the file.
-    known : descriptions to which lines without a long name refer; later tables also refer to earlier ones.
-    attributes : further attributes of variables, by name.
-    texts : replacements for names in braces in long names.
+    name : name of the text file.
+    known : descriptions to which lines without a long name refer. Lines also refer to earlier tables of the file.
+    attributes : further attributes of variables, by name of the variable.
+    texts : texts that replace names in braces in long names.
     """
     tables: dict[str, Table] = {}
     table: Table = {}
@@ -81,17 +81,17 @@ def read_tables(
 
 
 def bin_table(quantity: str, units: str, over: str = "") -> Table:
-    """Describe the variables of the bins of a quantity.
+    """Describe the variables for the bins of a quantity: edges, centres and bounds.
 
-    `<quantity>_bin_edges` are the edges; `<quantity>_bin_centre`, a coordinate, has `<quantity>_bin_bounds` as its
-    bounds (CF 1.11, section 7.1), with its units and its long name. In Pa it must not be a coordinate variable (a
-    variable along a dimension of its own name), because CF would read it as a height.
+    `<quantity>_bin_bounds` are the CF bounds (CF 1.11, section 7.1) of the coordinate `<quantity>_bin_centre`. Both
+    have the same units and long name. The coordinate must not have the name of its dimension, because CF would read
+    a coordinate variable in Pa as a height.
 
     Parameters
     ----------
-    quantity : the binned quantity.
-    units : of the edges.
-    over : the unit of reference of the quantity, if it is divided by one.
+    quantity : name of the quantity.
+    units : unit of the edges.
+    over : name of the reference by which the quantity is divided; "" if it is not divided.
     """
     over = f" over {over}" if over else ""
     bins, inside = f"{quantity}_bin", f"{quantity} in the bin{over}"
@@ -99,7 +99,7 @@ def bin_table(quantity: str, units: str, over: str = "") -> Table:
     return {
         f"{bins}_edges": Variable((f"{quantity}_edge",), units, f"edges of the {quantity} bins{over}"),
         f"{bins}_centre": Variable((bins,), units, inside, further=middle, coordinate=True),
-        # Lower and upper edge of a bin, as CF has bounds.
+        # Lower and upper edge of each bin.
         f"{bins}_bounds": Variable((bins, "bound"), units, inside),
     }
 

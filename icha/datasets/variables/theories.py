@@ -1,4 +1,4 @@
-"""Variables of theories of rough contact for one surface, and of published points."""
+"""Variables of theories of rough contact for one surface, and of published results."""
 
 from icha.datasets.variables.terms import TERMS, read_tables
 

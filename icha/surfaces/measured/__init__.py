@@ -1,1 +1,1 @@
-"""Measured topographies: reading what instruments and people write, and preparing it for the model."""
+"""Measured topographies: read files of heights, and prepare surfaces for contact models."""

@@ -1,4 +1,4 @@
-"""Readers of arrays: npy, netCDF, HDF5, and the formats of instruments that SurfaceTopography reads."""
+"""Read arrays of heights from npy, netCDF and HDF5 files, and from formats that SurfaceTopography supports."""
 
 import math
 from collections.abc import Mapping
@@ -21,12 +21,12 @@ from icha.surfaces.measured.settings import (
 
 # Number of copies of an array, as floats, in memory while the array is read.
 _COPIES = 3
-# Formats without a signature: every file of certain lengths fits, so the ending of the name must identify them.
+# Formats without a signature: any file of a certain length fits, so the ending of the file name must identify them.
 _WITHOUT_SIGNATURE = ("hgt", "nms")
 # Formats that do not identify an instrument. SurfaceTopography reads any text with numbers as `asc`, and then drops
 # fields that are not numbers.
 _OF_ANY_TEXT = ("asc", *_WITHOUT_SIGNATURE)
-# Formats of arrays without a default one.
+# Formats with several arrays, none of which is the default.
 _ARRAYS = ("mat", "npz")
 _UNKNOWN = (
     "cannot be read as instrument: the file is damaged, or its format is not known here; expected another `format`, or "
@@ -35,7 +35,7 @@ _UNKNOWN = (
 
 
 def read_npy(file, settings: Preparation) -> FileContent:
-    """Read a NumPy array, which has no names or units."""
+    """Read heights from a NumPy file, which contains one array without name and unit."""
     # A mapped array cannot be larger than its file. NumPy warns of an overflow before it refuses the array.
     with np.errstate(over="ignore"):
         array = np.lib.format.open_memmap(file.path, mode="r")
@@ -50,12 +50,12 @@ def _read_variable(variable) -> np.ndarray:
 
 
 def _require_room(declared):
-    """Refuse an array by its declared shape, before it is read."""
+    """Refuse an array that is too large according to its declared shape, before it is read."""
     require_room(_COPIES * 8 * math.prod(declared.shape))
 
 
 def read_netcdf(source, settings: Preparation) -> FileContent:
-    """Read the variable `data`, `height`, `heights`, `z` or the only one of two dimensions, with its units and axes."""
+    """Read heights, unit and size from a netCDF variable: `data`, else `height`, `heights`, `z` or the only map."""
     import netCDF4
 
     with netCDF4.Dataset(source.path) as file:
@@ -65,7 +65,8 @@ def read_netcdf(source, settings: Preparation) -> FileContent:
         chosen = file[name]
         if not _is_map(chosen.shape):
             raise UnfitTopography(
-                "data", f"has {chosen.ndim} dimensions; expected two, as {', '.join(maps) or 'no variable has'}"
+                "data",
+                f"has {chosen.ndim} dimensions; expected two, as in {', '.join(maps) or 'no variable of this file'}",
             )
         heights = _read_variable(chosen)
         heights = heights.reshape(heights.shape[-2:])
@@ -82,7 +83,7 @@ def read_netcdf(source, settings: Preparation) -> FileContent:
 
 
 def _side(coordinate, count):
-    """Return the length of a side in m (None if the file does not contain it) and whether its coordinate decreases."""
+    """Return the length of a side, m (None if unknown), and whether the coordinate along this side decreases."""
     if coordinate is None or coordinate.ndim != 1:
         return None, False
     unit, values = _unit_of(coordinate.__dict__), _read_variable(coordinate)
@@ -92,12 +93,12 @@ def _side(coordinate, count):
         return None, False
     _, lines, step = grid_indices(values, coordinate.name)
     if lines != count:
-        raise UnfitTopography("path", f"has unequal distances along {coordinate.name}; expected equal distances")
+        raise UnfitTopography("path", f"has coordinates {coordinate.name} with unequal steps; expected equal steps")
     return (count * step * unit if unit is not None else None), values[0] > values[-1]
 
 
 def read_hdf5(source, settings: Preparation) -> FileContent:
-    """Read the dataset `data`, or the only one of two dimensions; attributes have the same meaning as in netCDF.
+    """Read heights and unit from an HDF5 dataset: `data`, or the only map; attributes are read as in netCDF.
 
     MATLAB (from version 7.3) stores arrays column by column, so the HDF5 file contains their transpose.
     """
@@ -125,7 +126,7 @@ def read_hdf5(source, settings: Preparation) -> FileContent:
 
 
 def _unpack(dataset):
-    """Read a dataset and unpack its numbers as its attributes define, as in netCDF; nan where numbers are missing."""
+    """Read a dataset; apply its scale, offset and fill value as in netCDF; nan where numbers are missing."""
     stored, attributes = dataset[...], dataset.attrs
     fills = [each for name in ("_FillValue", "missing_value") for each in np.ravel(attributes.get(name, []))]
     # The fill value 0 is the default of HDF5, so zeros are heights.
@@ -138,7 +139,7 @@ def _unpack(dataset):
 
 
 def format_of_hdf5(path: Path) -> str | None:
-    """Return the format of an HDF5 file, including netCDF-4 and Zygo's files; None for other files."""
+    """Return the format of an HDF5 file: netCDF-4, instrument (Zygo) or hdf5; None for other files."""
     import h5py
 
     if not h5py.is_hdf5(path):
@@ -150,21 +151,22 @@ def format_of_hdf5(path: Path) -> str | None:
 
 
 def _is_map(shape):
-    """Return whether an array has two dimensions, besides leading ones of length 1."""
+    """Return whether an array has two dimensions; further leading dimensions of length 1 are allowed."""
     return len(shape) >= 2 and all(count == 1 for count in shape[:-2])
 
 
 def find_maps(shapes: Mapping[Any, tuple[int, ...]]) -> list:
     """Return the names of the arrays that can be maps of heights.
 
-    MATLAB stores lines and single numbers as two-dimensional arrays, too. They count only if the file has no others.
+    MATLAB also stores lines and single numbers as two-dimensional arrays. Such arrays count only if the file has no
+    other two-dimensional arrays.
     """
     maps = [name for name, shape in shapes.items() if _is_map(shape)]
     return [name for name in maps if min(shapes[name][-2:]) > 2] or maps
 
 
 def _unit_of(attributes):
-    """Return the unit in the attributes of a variable, in metres; None without a unit of length."""
+    """Return the unit of a variable in metres, from its attributes; None without a unit of length."""
     text = attributes.get("units", attributes.get("unit"))
     if isinstance(text, bytes):
         text = text.decode("utf-8", "replace")
@@ -183,15 +185,15 @@ def open_instrument(path: Path):
 
 
 def is_instrument_text(file) -> bool:
-    """Return whether SurfaceTopography recognises a text file as that of a certain instrument."""
+    """Return whether SurfaceTopography recognises the instrument that wrote a text file."""
     try:
         return file.instrument is not None and file.instrument.format() not in _OF_ANY_TEXT
-    except Exception:  # a damaged file of a known format, which the reader refuses
+    except Exception:  # the file has a known format but is damaged; the reader refuses it later
         return True
 
 
 def read_instrument(file, settings: Preparation) -> FileContent:
-    """Read a file with SurfaceTopography, whose arrays have x as first axis."""
+    """Read heights, unit and size from the file of an instrument with SurfaceTopography."""
     opened = file.instrument
     if opened is None or (
         opened.format() in _WITHOUT_SIGNATURE and file.path.suffix.lower()[1:] not in opened.file_extensions()
@@ -210,14 +212,14 @@ def read_instrument(file, settings: Preparation) -> FileContent:
 
 
 def _choose_channel(opened, settings):
-    """Return the channel that the settings name, else the default channel, and its name; "" if it is the only map."""
+    """Return the channel `data` of the settings, else the default channel, and its name ("" if it is the only map)."""
     channels = opened.channels
     names = [channel.name for channel in channels]
     maps = find_maps({k: tuple(channel.nb_grid_pts) for k, channel in enumerate(channels)})
     if settings.data is not None:
         channel = channels[names.index(choose_name(settings.data, names, (), "channel"))]
     elif opened.format() in _ARRAYS and maps:
-        # Files of several arrays have no default; the first array could be anything.
+        # Files with several arrays have no default array; the first array may not contain heights.
         channel = channels[names.index(choose_name(None, [names[k] for k in maps], (), "array"))]
     else:
         channel = opened.default_channel

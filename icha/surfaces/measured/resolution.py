@@ -1,4 +1,4 @@
-"""Resolution of a scan: its summits, the noise of the instrument in its spectrum, and recommended settings."""
+"""Check whether the grid resolves a measured surface: summits, noise of the instrument, recommended settings."""
 
 import math
 import os
@@ -19,24 +19,24 @@ from icha.surfaces.moments import (
 from icha.surfaces.summits import Asperities, SummitCoverage, locate_summits
 from icha.surfaces.surface import FREE, PERIODIC, Surface, edges_fit
 
-# Exponent of the steepest power law q^x of a noise floor, and smallest ratio of its last and first wave number. The
-# spectrum of a self-affine surface falls at least as q^-2; the spectrum of uncorrelated noise is flat.
+# Exponent x of the steepest power law q^x of a noise floor, and smallest ratio of its last to its first wave number.
+# The spectrum of a self-affine surface falls at least as q^-2; the spectrum of uncorrelated noise is flat.
 _FLOOR_FALLS, _FLOOR_SPANS = -1.0, 1.3
-# Power of a floor, relative to the largest power, below which the floor is rounding.
+# Power of a noise floor, divided by the largest power, below which the floor is a rounding error.
 _ROUNDING = 1e-20
-# A coarser grid is recommended if the ratio of its nodes a side to those of the present grid is at most this.
+# A coarser grid is recommended if it has at most this fraction of the nodes along a side.
 _WORTH = 0.75
 
 
 @dataclass(frozen=True)
 class NoiseFloor:
-    """Noise floor in which the spectrum of a scan ends at short waves.
+    """Noise floor: flat part of the spectrum of a scan at short wavelengths.
 
     Attributes
     ----------
     wavelength : wavelength at which surface and noise have equal power, m; shorter waves are mostly noise.
     rms : rms height of the noise, m.
-    slope_share : share of the shorter waves in the mean square slope.
+    slope_share : share (0 to 1) of the waves shorter than `wavelength` in the mean square slope.
     """
 
     wavelength: float
@@ -50,8 +50,8 @@ class ScanResolution(PreparedTopography):
 
     Attributes
     ----------
-    measured : the scan as a square, without filter, edges and changes of its grid.
-    cutoff : nesting index of the filter, m; None without one.
+    measured : the square of the scan before the filter, the treatment of edges and the change of grid.
+    cutoff : nesting index of the filter, m; None without a filter.
     """
 
     measured: Surface
@@ -59,7 +59,7 @@ class ScanResolution(PreparedTopography):
 
     @property
     def edges_fit(self) -> bool:
-        """True if the prepared surface is free, or periodic without a step between cells."""
+        """True if the prepared surface is a free square, or a periodic surface without a step between cells."""
         return self.surface.free or edges_fit(self.surface.heights)
 
     @cached_property
@@ -80,22 +80,22 @@ class ScanResolution(PreparedTopography):
 
     @property
     def cells_per_summit(self) -> float:
-        """Nodes of the prepared surface per summit."""
+        """Number of nodes of the prepared surface per summit."""
         return self.surface.grid**2 / max(self.summits, 1)
 
     @property
     def cells_per_short_wave(self) -> float:
-        """Nodes of the prepared surface along its shortest waves, estimated from the number of its summits."""
+        """Nodes per shortest wavelength of the prepared surface, estimated from the number of summits."""
         return cells_per_short_wave(self.surface.grid, self.summits)
 
     @cached_property
     def noise(self) -> NoiseFloor | None:
-        """Noise floor of the spectrum of the scan; None if it has none."""
+        """Noise floor of the spectrum of the scan; None if the spectrum has no noise floor."""
         return noise_floor(self.measured)
 
     @property
     def advice(self) -> dict[str, float | int]:
-        """Recommended values (SI units) of keys that make the surface resolved; empty if it is resolved already."""
+        """Recommended `cutoff` (m) and `grid` that let the grid resolve the surface; empty if it is resolved."""
         found = {}
         cutoff, pixel = self.cutoff or 0.0, self.measured.spacing
         if self.noise is not None and cutoff < self.noise.wavelength * (1 - 1e-9):
@@ -111,7 +111,7 @@ class ScanResolution(PreparedTopography):
 
 
 def filtered_slope_share(surface: Surface, cutoff: float) -> float:
-    """Estimate the fraction of the rms slope that remains after the Gaussian filter with a nesting index (m)."""
+    """Estimate the fraction of the rms slope that remains after a Gaussian filter with nesting index `cutoff` (m)."""
     q, power, edges = radial_power_spectrum(surface)
     slopes = power * q**2 * np.diff(edges**2)
     transmission = 2.0 ** -((cutoff * q / (2 * np.pi)) ** 2)
@@ -119,7 +119,7 @@ def filtered_slope_share(surface: Surface, cutoff: float) -> float:
 
 
 def examine_scan(path: str | os.PathLike, preparation: Mapping) -> ScanResolution:
-    """Prepare a scan with and without its filter; arguments and errors as those of `prepared_topography`."""
+    """Prepare a scan with and without its filter; arguments and errors are those of `prepared_topography`."""
     raw = {key: preparation[key] for key in preparation if key not in ("cutoff", "taper")}
     if preparation["boundary"] != PERIODIC:
         raw |= {"boundary": FREE, "grid": None}
@@ -130,10 +130,10 @@ def examine_scan(path: str | os.PathLike, preparation: Mapping) -> ScanResolutio
 
 
 def noise_floor(surface: Surface) -> NoiseFloor | None:
-    """Find the noise floor in which the radial power spectrum of a surface ends; None if the spectrum has no floor.
+    """Find the noise floor at the end of the radial power spectrum of a surface; None if the spectrum has no floor.
 
     The floor is the longest tail of the spectrum whose best power law falls less steeply than 1/q. The power of the
-    floor is the geometric mean over its half with the shorter waves.
+    floor is the geometric mean of the half of the tail with the shorter waves.
     """
     q, power, edges = radial_power_spectrum(surface)
     log_q, log_power = np.log(q), np.log(np.maximum(power, np.finfo(float).tiny))
@@ -145,7 +145,8 @@ def noise_floor(surface: Surface) -> NoiseFloor | None:
     if floor < _ROUNDING * power.max():
         return None
     above = np.flatnonzero(power > 2 * floor)
-    # Interpolate the logarithms between this ring and the next; take the longest wave if there is only noise.
+    # Interpolate the logarithms of the power between ring k and the next ring; if there is only noise, take the longest
+    # wave.
     k = above[-1] if len(above) else 0
     limit = q[k]
     if len(above) and k + 1 < len(q):
@@ -161,6 +162,6 @@ def noise_floor(surface: Surface) -> NoiseFloor | None:
 
 
 def _rounded_up(length: float) -> float:
-    """Round up to two digits."""
+    """Round a length up to two digits."""
     digit = 10.0 ** (math.floor(math.log10(length)) - 1)
     return float(f"{math.ceil(length / digit * (1 - 1e-9)) * digit:.2g}")

@@ -1,4 +1,4 @@
-"""A scan in metres, read from a file of any format, with its size."""
+"""Read a scan from a file of any supported format: heights and size in metres."""
 
 import importlib
 from dataclasses import dataclass, replace
@@ -24,21 +24,21 @@ READERS = {
     "fourier": read_fourier,
     "instrument": read_instrument,
 }
-# Libraries of the readers. They are imported before memory is bounded, so that their own memory does not count.
+# Libraries of the readers. They are imported before the memory is limited, so that the libraries do not count.
 _LIBRARIES = {"netcdf": "netCDF4", "hdf5": "h5py", "instrument": "SurfaceTopography"}
 
 
 @dataclass(frozen=True, eq=False)
 class Scan:
-    """A scan in metres.
+    """Heights and size of a scan, m, and the steps of its preparation.
 
     Attributes
     ----------
-    heights : (ny, nx), m, nan where missing, first axis y.
-    size : (x, y) of the whole scan, m.
-    steps : descriptions of the reading and of the steps since then.
-    coordinate_unit : m, if the size follows from coordinates whose unit the file does not contain.
-    format : format as which the file was read.
+    heights : (ny, nx) array, m, nan where missing; the first axis is y.
+    size : sides (x, y) of the whole scan, m.
+    steps : descriptions of how the file was read and of the later steps.
+    coordinate_unit : unit that is assumed for coordinates, m; None if the file contains the unit or the size.
+    format : format with which the file was read.
     data : name of the array or channel that was read; empty if the file has only one.
     """
 
@@ -51,37 +51,42 @@ class Scan:
 
     @property
     def pixel(self) -> tuple[float, float]:
-        """Distance of neighbouring nodes along x and along y, m."""
+        """Distances (x, y) between neighbouring nodes, m."""
         rows, columns = self.heights.shape
         return self.size[0] / columns, self.size[1] / rows
 
     def after(self, heights: np.ndarray, *steps: str, size: tuple[float, float] | None = None) -> "Scan":
-        """Return the scan after a step, with its new heights, the description of the step, and a new size if given."""
+        """Return the scan after a step: new heights, added descriptions `steps`, and the new size (m) if given."""
         return replace(self, heights=heights, size=size or self.size, steps=(*self.steps, *steps))
 
     @property
     def remark_on_unit(self) -> str:
-        """Remark on the unit of coordinates, for messages about a length of the scan."""
+        """Remark for messages about lengths of the scan: the assumed unit of coordinates; "" if the unit is known."""
         if self.coordinate_unit is None:
             return ""
         unit = formatting.length(self.coordinate_unit)
-        return f"; the coordinates are taken to be in units of {unit}, see `lateral_unit`"
+        return f"; the coordinates are assumed to be in units of {unit}, see `lateral_unit`"
 
 
 def load_scan(path: Path, settings: Preparation) -> Scan:
-    """Read a file of any format; raises errors as `icha.surfaces.measured.topography.prepared_topography`."""
+    """Read the scan in a file of any supported format; raises UnfitTopography if the file or a setting does not fit."""
     if problem := problem_with_path(path) or ("" if path.stat().st_size else "is empty"):
         raise UnfitTopography("path", f"{problem}; expected a file of heights")
     name, found = _read(path, settings)
     unit = settings.height_unit or found.unit
     if unit is None:
-        raise UnfitTopography("height_unit", "is missing, and the file does not give it; expected a unit such as 'um'")
+        raise UnfitTopography(
+            "height_unit",
+            "is missing, and the file does not contain the unit of the heights; expected one such as 'um'",
+        )
     size, coordinate_unit = settings.size or found.size, None
     if size is None and found.coordinates is not None:
         coordinate_unit = settings.lateral_unit or unit
         size = tuple(each * coordinate_unit for each in found.coordinates)
     if size is None:
-        raise UnfitTopography("size", "is missing, and the file does not give it; expected a length, such as '90 um'")
+        raise UnfitTopography(
+            "size", "is missing, and the file does not contain the size of the scan; expected a length such as '90 um'"
+        )
     replaced = []
     if settings.size and found.size and not np.allclose(settings.size, found.size, rtol=1e-3, atol=0):
         replaced.append(f"its size {' x '.join(map(formatting.length, found.size))}")
@@ -108,12 +113,12 @@ def load_scan(path: Path, settings: Preparation) -> Scan:
 
 
 def read_height_map(path: str | Path, metres_per_unit: float) -> np.ndarray:
-    """Read the heights of a surface of kind `file`, (ny, nx) in m; raise UnfitTopography if the file has no heights.
+    """Read the heights (ny, nx), m, of a surface of kind `file`; raise UnfitTopography if the file has no heights.
 
     Parameters
     ----------
-    path : `.npy`, or netCDF with a variable `height`.
-    metres_per_unit : the unit of the heights in the file.
+    path : a `.npy` file, or a netCDF file with a variable `height`.
+    metres_per_unit : unit of the heights in the file, m.
     """
     path = Path(path)
     kind, data = ("netcdf", "height") if path.suffix == ".nc" else ("npy", None)
@@ -122,7 +127,7 @@ def read_height_map(path: str | Path, metres_per_unit: float) -> np.ndarray:
 
 
 def _read(path, settings):
-    """Return the format of a file and its content, after checking that the content are heights."""
+    """Return the format of a file and its content; raise UnfitTopography if the file has no heights."""
     file, name = SourceFile(path), settings.format
     try:
         with bounded_memory():
@@ -153,21 +158,21 @@ def _read(path, settings):
         ) from None
     if settings.data is not None and name not in _LIBRARIES:
         raise UnfitTopography(
-            "data", f"is given, but a file that is read as {name} has one array without a name. Remove the key"
+            "data", f"is given, but a file of format {name} has one array without a name. Remove the key"
         )
     heights = found.heights
     if heights.dtype.kind not in "iuf":
-        raise UnfitTopography("path", f"holds {heights.dtype}, not real numbers; expected heights")
+        raise UnfitTopography("path", f"contains {heights.dtype}, not real numbers; expected heights")
     if heights.ndim == 1 or (heights.ndim == 2 and 0 < min(heights.shape) <= 2 < max(heights.shape)):
-        # Two columns are x and z of a profile.
+        # An array of two columns contains x and z of a profile.
         raise UnfitTopography("path", LINE_SCAN.format(max(heights.shape)))
     if heights.ndim != 2 or not heights.size:
-        raise UnfitTopography("path", f"holds an array of shape {heights.shape}; expected rows and columns of heights")
+        raise UnfitTopography("path", f"has an array of shape {heights.shape}; expected rows and columns of heights")
     return name, found
 
 
 def _guess_format(path: Path) -> str:
-    """Guess the format of a file by its name or, for HDF5, by its content; "text" stands for any other format."""
+    """Guess the format of a file by its name or, for HDF5, by its content; return "text" for other files."""
     suffix = Path(path.name.lower().removesuffix(".gz")).suffix
     known = {".npy": "npy", ".nc": "netcdf", ".nc4": "netcdf", ".h5": "hdf5", ".hdf5": "hdf5", ".xyz": "xyz"}
     if suffix in known:

@@ -1,4 +1,4 @@
-"""Readers of text files with a row of heights, x y z, or a wave in every line, and of their headings."""
+"""Read text files with a row of heights, a point x y z, or a wave in every line; interpret the heading of the file."""
 
 import itertools
 import math
@@ -24,16 +24,16 @@ from icha.surfaces.measured.settings import (
 from icha.surfaces.measured.text_lines import AMBIGUOUS_COMMA, strip_remark
 from icha.surfaces.measured.text_tables import SourceFile, drop_coordinates
 
-# Fewest columns of a table of heights.
+# Fewest columns of a table with a row of heights in every line.
 _FEWEST_COLUMNS = 8
 # Title of a column: its name and, in brackets, its unit.
 _TITLE = re.compile(r"([a-z]+)\s*(?:[\[(]\s*([^\])]+?)\s*[\])])?", re.IGNORECASE)
 _NAMES_OF_Z = ("z", "h", "height")
-# Relative error of numbers that are written with seven digits, or that were of single precision.
+# Relative error of numbers with seven digits, or of single precision.
 _FEW_DIGITS = 1e-6
-# The spectrum, its conjugate, their difference, the heights, and the masks of waves.
+# Bytes per node of spectrum, conjugate spectrum, their difference, heights and masks of waves.
 _BYTES_OF_NODE = 64
-# Largest difference of conjugate amplitudes, relative to the largest amplitude.
+# Largest difference of amplitudes that should be conjugate, divided by the largest amplitude.
 _CONJUGATE = 1e-4
 # First word of the line with the width of an image that Gwyddion exported, in the languages of its menus. The next line
 # contains the height of the image.
@@ -52,20 +52,20 @@ _COUNTS = {
     "columns": ("ncols", "cols", "columns", "samples", "number of columns"),
 }
 _MISSING = ("nodata value", "nodata", "no data value", "missing value", "bad value", "missing data value")
-# Missing height in grids of ESRI whose headings do not give one.
+# Number for a missing height in ESRI grids, if the heading does not define another number.
 _ESRI_MISSING = "-9999"
 
 
 @dataclass(frozen=True)
 class _Heading:
-    """Facts that a heading contains; an attribute is None if the heading does not contain the fact.
+    """Units, size and missing heights from the heading of a text file; None for each value that is not in the heading.
 
     Attributes
     ----------
-    height_unit, lateral_unit : m.
-    size : (x, y) of the scan, m.
-    coordinates : (x, y) of the scan in a unit that the heading does not contain.
-    missing : numbers that stand for a missing height.
+    height_unit, lateral_unit : units of heights and of coordinates, m.
+    size : sides (x, y) of the scan, m.
+    coordinates : sides (x, y) of the scan in an unknown unit.
+    missing : numbers that mark a missing height.
     """
 
     height_unit: float | None
@@ -76,18 +76,18 @@ class _Heading:
 
 
 def format_of_text(file: SourceFile) -> str:
-    """Find the format of a text by its columns; "instrument" if it is that of an instrument, or has no numbers."""
+    """Find the format of a text file by its columns; "instrument" if it is from an instrument or has no numbers."""
     layout = file.layout
     if layout is not None and _titles(layout):
         return "xyz"
-    # Headings of instruments have lines that are not remarks.
+    # Headings from instruments contain lines that are not remarks.
     if layout is None or (any(map(strip_remark, layout.heading)) and is_instrument_text(file)):
         return "instrument"
     return "xyz" if 3 <= layout.columns < _FEWEST_COLUMNS and not _image_sides(layout.heading) else "matrix"
 
 
 def read_matrix(file: SourceFile, settings: Preparation) -> FileContent:
-    """Read a row of heights in every line, and units, size and missing heights from a heading."""
+    """Read a text file with a row of heights in every line; units, size and missing heights come from its heading."""
     values, layout = file.values, file.table_layout
     file.refuse_blocks()
     heights, steps, remark = drop_coordinates(values)
@@ -106,7 +106,7 @@ def read_matrix(file: SourceFile, settings: Preparation) -> FileContent:
 
 
 def _as_instrument_file(file, settings):
-    """Read the file with SurfaceTopography; None if the heights have no unit or are not the numbers in the file."""
+    """Read a text with SurfaceTopography; None without a unit, or if heights differ from the numbers in the file."""
     try:
         found = read_instrument(file, settings)
     except Exception:  # SurfaceTopography raises many types of errors for texts of other formats
@@ -119,7 +119,7 @@ def _as_instrument_file(file, settings):
 
 
 def read_xyz(file: SourceFile, settings: Preparation) -> FileContent:
-    """Read x y z in every line, in any order; points may be missing. A heading may give the units."""
+    """Read a text file with a point x y z in every line; points may be in any order or missing."""
     layout = file.table_layout
     titles = _titles(layout)
     columns = _find_columns(file.values.shape[1], settings, [name for name, _ in titles])
@@ -132,7 +132,7 @@ def read_xyz(file: SourceFile, settings: Preparation) -> FileContent:
     repeated = np.flatnonzero(np.diff(node[order]) == 0)
     if len(repeated):
         x, y = points[order[repeated[0]], :2]
-        raise UnfitTopography("path", f"has the point x = {x:g}, y = {y:g} twice; expected every point once")
+        raise UnfitTopography("path", f"contains the point x = {x:g}, y = {y:g} twice; expected every point once")
     require_room(2 * 8 * nx * ny)
     heading = _read_heading(layout.heading, points.shape, layout.notation.decimal_comma, settings)
     heights = np.full(nx * ny, np.nan)
@@ -150,11 +150,11 @@ def read_xyz(file: SourceFile, settings: Preparation) -> FileContent:
 
 
 def _titles(layout):
-    """Read the titles of the columns, in the last line above the numbers.
+    """Read the titles of the columns from the last line above the numbers.
 
     Returns
     -------
-    Name and unit of every column, m or None; an empty list unless exactly one column is x, one y, and one z.
+    Name and unit (m, or None) of every column. The list is empty unless exactly one column is x, one is y and one is z.
     """
     if not layout.heading:
         return []
@@ -169,10 +169,10 @@ def _titles(layout):
 
 
 def _find_columns(count, settings, names):
-    """Return the numbers, from 1, of the columns x, y and z in a table of `count` columns with these names."""
+    """Return the numbers (from 1) of the columns x, y and z in a table with `count` columns."""
     if settings.columns is not None:
         if max(settings.columns) > count:
-            raise UnfitTopography("columns", f"exceeds the {count} numbers of a line; expected 1 to {count}")
+            raise UnfitTopography("columns", f"is larger than the number of columns; expected 1 to {count}")
         return list(settings.columns)
     if names:
         return [names.index(axis) + 1 for axis in "xyz"]
@@ -180,22 +180,22 @@ def _find_columns(count, settings, names):
         waves = ". For wave vectors and amplitudes use `format: fourier`" if count == 4 else ""
         raise UnfitTopography(
             "columns",
-            f"is missing, and a line has {count} numbers; expected the columns x, y and z, such as [1, 2, 3]{waves}",
+            f"is missing, and lines have {count} numbers; expected the columns x, y and z, such as [1, 2, 3]{waves}",
         )
     return [1, 2, 3]
 
 
 def _mark_missing(heights, heading):
-    """Replace the numbers that stand for missing heights, according to the heading, by nan."""
+    """Replace numbers by nan if the heading defines them as missing heights."""
     for number in heading.missing:
         heights = np.where(np.isclose(heights, number, rtol=_FEW_DIGITS, atol=0), np.nan, heights)
     return heights
 
 
 def _read_heading(lines: Sequence[str], shape: tuple[int, int], decimal_comma: bool, settings: Preparation) -> _Heading:
-    """Read the heading of a table of a shape (rows, columns), whose numbers have decimal commas or not.
+    """Read units, size and missing heights from the heading of a table of this shape (rows, columns).
 
-    Raises UnfitTopography if a comma in the size may be decimal or separate thousands, and the settings have no size.
+    Raises UnfitTopography if the settings have no size, and a comma in the size may be decimal or separate thousands.
     """
     entries, sides = _entries(lines), _image_sides(lines)
     if {"ncols", "nrows", "cellsize"} <= entries.keys():
@@ -209,7 +209,7 @@ def _read_heading(lines: Sequence[str], shape: tuple[int, int], decimal_comma: b
     if commas and not decimal_comma and settings.size is None:
         raise UnfitTopography(
             "size",
-            f"is {commas[0]!r} in the file; the comma may be decimal or separate thousands; expected the size here",
+            f"is {commas[0]!r} in the file, where the comma may be a decimal or thousands sign; expected the size here",
         )
     size, coordinates = _size([*([" x ".join(sides)] if sides else []), *sizes], pixels, shape)
     return _Heading(
@@ -222,7 +222,7 @@ def _read_heading(lines: Sequence[str], shape: tuple[int, int], decimal_comma: b
 
 
 def _image_sides(lines: Sequence[str]) -> list[str]:
-    """Return the texts of width and height of an image that Gwyddion exported; an empty list for other headings."""
+    """Return width and height, as text, from the heading of an image that Gwyddion exported; else an empty list."""
     for line, following in itertools.pairwise(lines):
         if (found := _WIDTH.match(line)) and ":" in following:
             return [found[2].strip(), following.partition(":")[2].strip()]
@@ -230,20 +230,20 @@ def _image_sides(lines: Sequence[str]) -> list[str]:
 
 
 def _check_counts(lines: Sequence[str], shapes: Sequence[tuple[int, int]]) -> None:
-    """Raise UnfitTopography unless one of the shapes has as many rows and columns as the heading states."""
+    """Raise UnfitTopography unless one of the shapes has the numbers of rows and columns in the heading."""
     entries = _entries(lines)
     for axis, (what, names) in enumerate(_COUNTS.items()):
         counts = [int(entries[name]) for name in names if entries.get(name, "").isdecimal()]
         if counts and counts[0] not in [shape[axis] for shape in shapes]:
             raise UnfitTopography(
                 "path",
-                f"has {shapes[-1][axis]} {what} of numbers, but {counts[0]} according to its heading; expected a whole "
-                "table. Export it again, or correct the heading",
+                f"has {shapes[-1][axis]} {what} of numbers, but its heading states {counts[0]}; expected a whole "
+                "table. Export the table again, or correct the heading",
             )
 
 
 def _entries(lines):
-    """Return the values in the lines of a heading, by their names in small letters."""
+    """Return the names (in small letters) and the values that a heading contains."""
     entries = {}
     for line in lines:
         if found := _ENTRY.match(line):
@@ -252,7 +252,7 @@ def _entries(lines):
 
 
 def _size(sizes, pixels, shape):
-    """Return the size (x, y) in m, and the size in an unknown unit; each is None if the heading does not contain it."""
+    """Return the sides (x, y) in m, and the sides in an unknown unit; the unavailable ones are None."""
     rows, columns = shape
     for texts, (nx, ny) in ((sizes, (1, 1)), (pixels, (columns, rows))):
         for x, y, in_metres in filter(None, map(_lengths, texts)):
@@ -264,7 +264,7 @@ def _size(sizes, pixels, shape):
 
 
 def _lengths(text):
-    """Return the lengths x and y in a text, and whether they are in m or in an unknown unit; None for other text."""
+    """Return the lengths x and y in a text, and True if they are in m, False if their unit is unknown; else None."""
     if not (found := _LENGTHS.match(text)):
         return None
     x, y, units = _number(found[1]), _number(found[3] or found[1]), (found[2] or found[4], found[4] or found[2])
@@ -279,7 +279,10 @@ def _number(text):
 
 
 def read_fourier(file: SourceFile, settings: Preparation) -> FileContent:
-    """Sum h = sum h_q exp(i q.r) over all waves; a wave without its opposite stands for both of them."""
+    """Read a text file with a wave in every line, and sum the waves: h = sum h_q exp(i q.r).
+
+    If the wave -q is missing, its amplitude is the conjugate of the amplitude of q.
+    """
     table = file.values
     if table.shape[1] != 4 or not np.all(np.isfinite(table)):
         raise _not_waves("expected four numbers in each line: qx qy Re Im")
@@ -293,8 +296,8 @@ def read_fourier(file: SourceFile, settings: Preparation) -> FileContent:
     if 2 * highest >= n:
         raise UnfitTopography(
             "grid",
-            f"is too coarse for waves {highest} times as short as the period; expected at least {2 * highest + 2}, "
-            f"better {4 * highest} or more",
+            f"is too coarse for the shortest wave, period/{highest}; expected at least {2 * highest + 2}, better "
+            f"{4 * highest} or more",
         )
     require_room(_BYTES_OF_NODE * n**2)
     spectrum, present = np.zeros((n, n), dtype=complex), np.zeros((n, n), dtype=bool)
@@ -315,23 +318,24 @@ def _not_waves(problem):
 
 
 def _wave_numbers(q, settings):
-    """Return the wave vectors (n, 2) as multiples of 2 pi over the period; integers are such multiples already."""
+    """Return the wave vectors (n, 2) as integer multiples of 2 pi/period; integers in the file are such multiples."""
     largest = np.max(np.abs(q))
     if settings.size is not None and settings.size[0] != settings.size[1]:
-        raise UnfitTopography("size", "has two sides that differ, for a Fourier series; expected one length")
+        raise UnfitTopography("size", "has two different sides, but a Fourier series needs one; expected one length")
     if np.all(q == np.rint(q)):
         if settings.size is None:
             raise UnfitTopography(
                 "size",
-                "is missing, and the wave vectors are integers, multiples of 2 pi/L; expected L, such as '0.1 mm'",
+                "is missing, but integer wave vectors are multiples of 2 pi/L; expected the period L, such as '0.1 mm'",
             )
         k = q
     else:
         unit = np.min(np.abs(q)[np.abs(q) > 1e-9 * largest])
-        # The longest wave fixes the unit only to the digits that it is written with; the shortest is more accurate.
+        # The unit from the longest wave has only the digits in the file; the unit from the shortest wave is more
+        # accurate.
         k = np.rint(q * (np.max(np.abs(np.rint(q / unit))) / largest))
         if np.max(np.abs(q * (np.max(np.abs(k)) / largest) - k)) > 0.01:
             raise _not_waves("expected wave vectors that are multiples of the smallest one")
     if not 0 < np.max(np.abs(k)) <= GRID.most / 2:
-        raise _not_waves(f"expected waves up to {GRID.most // 2} times as short as the period")
+        raise _not_waves(f"expected no wave shorter than the period/{GRID.most // 2}")
     return k.astype(int)

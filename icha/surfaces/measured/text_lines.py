@@ -1,4 +1,4 @@
-"""Lines of text files: encoding and compression, remarks, the fields of a line, and the number in each field."""
+"""Read lines of text files: encoding and compression, remarks, fields of a line, numbers in fields."""
 
 import csv
 import gzip
@@ -10,7 +10,7 @@ from typing import TextIO
 
 import numpy as np
 
-# Words, in small letters, that stand for a missing height.
+# Words, in small letters, that mark a missing height.
 _MISSING = frozenset(
     "- -- --- * ** *** **** ? nan na n/a #n/a #na bad none null nil nodata no_data missing masked invalid void "
     "undefined undef #value! #num! #div/0! #null! #ref!".split()
@@ -22,15 +22,15 @@ _NAN = re.compile(r"[-+]?(1\.#(ind|qnan|snan)\d*|nan\(.*\))|\*+", re.IGNORECASE)
 # An exponent of double precision in Fortran, such as 1.5D-3.
 _FORTRAN = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)[dD][-+]?\d+")
 _DECIMAL_COMMA = re.compile(r"[-+]?\d+,\d+([eE][-+]?\d+)?$")
-# A number with three digits after its comma, which may be decimal or separate thousands.
+# A number with three digits after a comma, where the comma may be decimal or separate thousands.
 AMBIGUOUS_COMMA = re.compile(r"[-+]?[1-9]\d{0,2},\d{3}")
 _QUOTED = re.compile(r"\"[^\"]*\"")
-# The beginning of a number, whatever separates its thousands.
+# A number, with any separator of thousands.
 LIKE_A_NUMBER = re.compile(r"[-+]?\d[\d.,' ]*$")
 
 
 def open_text(path: Path) -> TextIO:
-    """Open a text file, which may be compressed by gzip, in its encoding."""
+    """Open a text file with the right encoding; the file may be compressed by gzip."""
     with path.open("rb") as file:
         compressed = file.read(2) == b"\x1f\x8b"
     opener = gzip.open if compressed else open
@@ -52,19 +52,19 @@ def _guess_encoding(start: bytes) -> str:
 
 
 def strip_remark(line: str) -> str:
-    """Return a line without its remark (#) and the blanks around it; tabs remain, because they may separate fields."""
+    """Return a line without remark (#) and outer blanks; tabs remain, because they may separate fields."""
     text = _REMARK.split(line, maxsplit=1)[0] if "#" in line else line
     return "" if text.isspace() else text.strip(" \r\n\x1a")
 
 
 @dataclass(frozen=True)
 class Notation:
-    """Notation of the numbers in a line: how they are separated and written.
+    """Notation of the numbers in a line: delimiter between numbers and decimal sign.
 
     Attributes
     ----------
-    delimiter : tab, semicolon, comma or None for blanks.
-    decimal_comma : whether numbers have decimal commas.
+    delimiter : tab, semicolon or comma; None for blanks.
+    decimal_comma : True if numbers have decimal commas.
     """
 
     delimiter: str | None
@@ -72,13 +72,13 @@ class Notation:
 
     @classmethod
     def of_line(cls, text: str) -> "Notation":
-        """Guess the notation of a single line."""
+        """Guess the notation of the numbers in a single line."""
         unquoted = _QUOTED.sub("q", text).strip()
         notation = cls(next((each for each in "\t;," if each in unquoted), None))
         return cls(notation.delimiter, has_decimal_commas(notation.fields(text)))
 
     def fields(self, text: str) -> list[str]:
-        """Split a line into its fields, without blanks and quotes around them, and with an ASCII minus sign."""
+        """Split a line into fields; remove blanks and quotes around fields, and write minus signs in ASCII."""
         text = text.replace("−", "-")
         if self.delimiter is None:
             fields = _NO_DATA.sub("nan", text).split()
@@ -89,7 +89,7 @@ class Notation:
         return [field.strip().strip("\"'").strip() for field in fields]
 
     def number(self, field: str) -> float | None:
-        """Read the number in a field: nan if the field stands for a missing height, None if it is any other text."""
+        """Read the number in a field; nan if the field marks a missing height, None for other text."""
         text = field.replace(",", ".") if self.decimal_comma else field
         try:
             return float(text.replace("_", "?"))  # Python would read 1_000 as a thousand
@@ -99,7 +99,7 @@ class Notation:
             return np.nan if field.lower() in _MISSING or _NAN.fullmatch(field) else None
 
     def numbers(self, text: str) -> list[float | None]:
-        """Read the numbers in the fields of a line, as `number` does, but faster if all fields are plain numbers."""
+        """Read the numbers in the fields of a line; faster than `number` if all fields are plain numbers."""
         try:
             return [*map(float, text.replace("_", "?").split(self.delimiter))]
         except ValueError:
@@ -107,21 +107,21 @@ class Notation:
 
 
 def has_decimal_commas(fields: Iterable[str]) -> bool:
-    """Return whether some fields have decimal commas and none has a decimal point."""
+    """Return whether at least one field has a decimal comma and no field has a decimal point."""
     return any(map(_DECIMAL_COMMA.match, fields)) and not any("." in field for field in fields)
 
 
 def are_decimal_between_blanks(text: str) -> bool:
-    """Return whether a line has several numbers with decimal commas, separated by blanks or by commas and blanks."""
+    """Return whether a line has several numbers with decimal commas, with blanks (and perhaps commas) between them."""
     fields = re.split(r",?\s+", text.strip())
     return len(fields) > 1 and all(map(_DECIMAL_COMMA.match, fields))
 
 
 def are_halves_of_decimals(rows: list[list[str]]) -> bool:
-    """Return whether the columns contain, in turn, the digits before and the digits after decimal commas.
+    """Return whether columns with digits before decimal commas alternate with columns with digits after them.
 
-    Digits after a comma have no sign, and in every row of a column there are equally many. Columns of integers differ
-    from this: they have no leading zeros, and their numbers are not all of one length.
+    Digits after a comma have no sign, and their number is the same in all rows of a column. Columns of integers have no
+    leading zeros, and their numbers have different lengths.
     """
     # A row is shorter if its last field is empty.
     width = max(map(len, rows))

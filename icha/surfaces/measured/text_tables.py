@@ -1,4 +1,4 @@
-"""Tables of numbers in text files: where they begin, how numbers are written, their values, rows of coordinates."""
+"""Read tables of numbers from text files: first line of numbers, notation, values, rows of coordinates."""
 
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -19,31 +19,31 @@ from icha.surfaces.measured.text_lines import (
     strip_remark,
 )
 
-# Characters and lines at the beginning of a file in which the first line of numbers must be.
+# Number of characters and of lines at the beginning of a file that must contain the first line of numbers.
 _BEGINNING, _LONGEST_HEADING = 2**20, 1000
-# Fewest fields of a line that counts as a damaged row if most of its fields are numbers, not as titles of columns.
+# A line with at least this number of fields, most of them numbers, counts as a damaged row, not as titles of columns.
 _FEWEST_FIELDS = 8
-# Largest difference of two steps that count as equal, as a fraction of a step, if digits do not limit it.
+# Largest relative difference of steps that count as equal, if rounding does not cause a larger difference.
 _EQUAL_STEPS = 1e-2
-# Smallest range of coordinates in units of their last digit.
+# Smallest range of coordinates, in units of the last digit.
 _FEWEST_UNITS = 4
-# Limits with which a first line of heights resembles the second and the third line. The first and second line differ by
-# at most `_DIFFERENCE` times the difference of second and third. Besides, the fraction `_SAME_SIGN` of the steps in the
-# first and second line has the same sign, or second and third differ by at most `_SMOOTH` times their heights.
+# Limits in `_resembles` for the first three lines of a table. The first two lines differ by at most `_DIFFERENCE` times
+# the difference of the second and third. In addition, at least the fraction `_SAME_SIGN` of the steps has the same sign
+# in the first and second line, or the second and third differ by at most `_SMOOTH` times their heights.
 _DIFFERENCE, _SAME_SIGN, _SMOOTH = 3, 0.8, 0.2
-# Fewest numbers of a line that can be coordinates.
+# Fewest numbers in a row or column of coordinates.
 _FEWEST_COORDINATES = 8
 
 
 @dataclass(frozen=True, eq=False)
 class Layout:
-    """How to read the lines of a text file.
+    """Heading, notation and number of columns of a text file with a table.
 
     Attributes
     ----------
     heading : lines above the numbers, including remarks.
     notation : delimiter and decimal sign.
-    columns : numbers in the first line of numbers.
+    columns : number of columns, counted in the first line of numbers.
     """
 
     heading: tuple[str, ...]
@@ -53,34 +53,29 @@ class Layout:
 
 @dataclass(eq=False)
 class SourceFile:
-    """The file of a scan; each attribute is read from the file once, at its first use.
-
-    Attributes
-    ----------
-    path : the file.
-    """
+    """Text file or instrument file of a scan. Each attribute is read from the file once, at its first use."""
 
     path: Path
 
     @cached_property
     def layout(self) -> Layout | None:
-        """How to read the lines of the file; None if it is not a text with numbers."""
+        """Heading, notation and number of columns of the file; None if it is not a text with numbers."""
         return _find_layout(self.path)
 
     @property
     def table_layout(self) -> Layout:
-        """The layout; raises UnfitTopography if the file has no numbers."""
+        """Heading, notation and number of columns; raises UnfitTopography if the file has no numbers."""
         if self.layout is None:
             raise UnfitTopography(
                 "path",
-                "cannot be read as a table, because it holds no numbers; expected a row of heights, or x y z, in every "
-                "line",
+                "cannot be read as a table, because it has no numbers; expected a row of heights, or x y z, in "
+                "every line",
             )
         return self.layout
 
     @property
     def values(self) -> np.ndarray:
-        """Numbers (rows, columns) of a text, nan where one is missing.
+        """Numbers in the file, (rows, columns), nan where a number is missing.
 
         Raises UnfitTopography if the file has no numbers, a field that is not a number, or rows of different lengths.
         """
@@ -88,7 +83,7 @@ class SourceFile:
 
     @cached_property
     def _table(self):
-        """Numbers (rows, columns), and the line in the file, from 1, of each row."""
+        """Numbers in the file, (rows, columns), and the line number (from 1) of each row."""
         notation, columns = self.table_layout.notation, self.table_layout.columns
         rows, lines = [], []
         with open_text(self.path) as file:
@@ -101,7 +96,7 @@ class SourceFile:
                 rows.append(np.array(row))
                 lines.append(line)
         usual = int(np.bincount([len(row) for row in rows]).argmax())
-        # A delimiter after the last number of every row does not begin a column.
+        # A delimiter after the last number of every row does not add a column.
         if usual == columns + 1 and all(np.isnan(row[-1]) for row in rows if len(row) == usual):
             rows = [row[:columns] if len(row) == usual else row for row in rows]
             usual = columns
@@ -109,28 +104,29 @@ class SourceFile:
             if len(row) != usual:
                 raise UnfitTopography(
                     "path",
-                    f"has {len(row)} numbers in line {line} and {usual} in most lines; expected rows of one length. "
-                    "Complete or remove the line; missing points may be NaN",
+                    f"has {len(row)} numbers in line {line} but {usual} in most lines; expected rows of one "
+                    "length. Complete or remove the line; missing heights may be NaN",
                 )
         return np.array(rows), np.array(lines)
 
     def refuse_blocks(self) -> None:
-        """Raise UnfitTopography if empty lines or remarks divide the rows into blocks, as in files of several images.
+        """Raise UnfitTopography if empty lines or remarks divide the rows into blocks, as in files with several images.
 
-        Empty lines or remarks between all rows are accepted.
+        A file with empty lines or remarks between all rows is accepted.
         """
         values, lines = self._table
         begins = np.flatnonzero(np.diff(lines) > 1) + 1
         if len(begins) and min(np.diff([0, *begins, len(values)])) > 1:
             raise UnfitTopography(
                 "path",
-                f"has {len(begins) + 1} blocks of rows, the second from line {lines[begins[0]]}; expected one image. "
-                "Remove the other blocks or, if all are one image, the empty lines and remarks between them",
+                f"has {len(begins) + 1} blocks of rows, the second from line {lines[begins[0]]}; expected one "
+                "image. Remove all blocks but one. If the blocks form one image, remove the lines between the "
+                "blocks instead",
             )
 
     @cached_property
     def instrument(self):
-        """The file, opened with SurfaceTopography; None if SurfaceTopography does not know its format."""
+        """The file, opened with SurfaceTopography; None if SurfaceTopography does not support the format."""
         return open_instrument(self.path)
 
 
@@ -143,21 +139,21 @@ def _not_a_number(fields, index, line):
 
 
 def _first_lines(path):
-    """Read the lines at the beginning of a text; an empty list if the file is not text."""
+    """Read the lines at the beginning of a text file; return an empty list if the file is not text."""
     with open_text(path) as file:
         start = file.read(_BEGINNING)
     return [] if "\0" in start else start.splitlines()[:_LONGEST_HEADING]
 
 
 def _count_columns(fields):
-    """Count fields, without an empty one after a delimiter at the end."""
+    """Count the fields of a line, without an empty last field after a delimiter."""
     return len(fields) - (len(fields) > 1 and fields[-1] == "")
 
 
 def _find_layout(path: Path) -> Layout | None:
-    """Find the first line of numbers and how numbers are written; None if the file is not a text with numbers.
+    """Find the first line of numbers and the notation of the numbers; None if the file is not a text with numbers.
 
-    Raises UnfitTopography if commas may or may not be decimal, or if the line above the numbers is a damaged row.
+    Raises UnfitTopography if commas may be decimal or delimiters, or if the line above the numbers is a damaged row.
     """
     lines = _first_lines(path)
     for number, line in enumerate(lines):
@@ -167,8 +163,8 @@ def _find_layout(path: Path) -> Layout | None:
         if notation.delimiter == "," and are_decimal_between_blanks(text):
             raise UnfitTopography(
                 "path",
-                f"has commas in {text[:40]!r} that may be decimal or stand between numbers; expected decimal "
-                "points. Replace the commas",
+                f"has commas in {text[:40]!r} that may be decimal signs or delimiters; expected decimal points. "
+                "Replace the commas",
             )
         fields = notation.fields(text)
         numbers = [notation.number(field) for field in fields]
@@ -181,7 +177,7 @@ def _find_layout(path: Path) -> Layout | None:
 
 
 def _find_damage(text, number, notation):
-    """Return the error for a line that resembles a row of numbers but has other fields, too; None for other lines."""
+    """Return the error for a damaged row, where most but not all fields are numbers; None for other lines."""
     fields = notation.fields(text)
     wrong = [k for k, field in enumerate(fields) if notation.number(field) is None]
     words = [k for k in wrong if not LIKE_A_NUMBER.match(fields[k])]
@@ -191,9 +187,9 @@ def _find_damage(text, number, notation):
 
 
 def _decide_on_commas(notation, lines, count):
-    """Return the notation after deciding, from all lines with `count` fields, whether their commas are decimal.
+    """Decide from all lines with `count` fields whether commas are decimal; return the completed notation.
 
-    Raises UnfitTopography if this is not clear.
+    Raises UnfitTopography if the commas may have either meaning.
     """
     rows = [notation.fields(text) for line in lines if (text := strip_remark(line))]
     rows = [row[: _count_columns(row)] for row in rows if len(row) == count]
@@ -208,32 +204,32 @@ def _decide_on_commas(notation, lines, count):
     if notation.delimiter == "," and not with_comma and are_halves_of_decimals(rows):
         raise UnfitTopography(
             "path",
-            f"has commas between numbers and others that seem to be decimal, as in {','.join(rows[0][:4])}; "
-            "expected semicolons between numbers with decimal commas, quotes around these, or decimal points",
+            f"has both decimal commas and commas as delimiters, as in {','.join(rows[0][:4])}; expected decimal "
+            "points, semicolons as delimiters, or quotes around numbers with decimal commas",
         )
     return replace(notation, decimal_comma=notation.decimal_comma or has_decimal_commas(fields))
 
 
 def first_damaged_line(path: Path) -> UnfitTopography | None:
-    """Return the error for the first line that resembles a row of numbers but has other fields, too, or None."""
+    """Return the error for the first damaged row, where most but not all fields are numbers; None if there is none."""
     texts = map(strip_remark, _first_lines(path))
     damages = (_find_damage(text, number, Notation.of_line(text)) for number, text in enumerate(texts, 1))
     return next(filter(None, damages), None)
 
 
-# Rows and columns of coordinates or of numbers of points. Heights of a rough surface do not rise in equal steps along a
-# row or column. If they do so in all rows, the surface is a plane.
+# The next functions find rows and columns of coordinates or of point numbers. Heights of a rough surface do not rise in
+# equal steps along a row or column. If heights rise in equal steps in all rows, the surface is a plane.
 
 
 def drop_coordinates(values: np.ndarray) -> tuple[np.ndarray, tuple[float, float] | None, str]:
-    """Remove a first row and a first column that contain coordinates or numbers of points.
+    """Remove the first row or column of a table if it contains coordinates or point numbers instead of heights.
 
     Returns
     -------
-    heights, steps of the coordinates along x and y (None unless both are given), and a remark on the removed parts.
+    heights, steps of the coordinates along x and y (None unless both are in the table), and a remark on removed parts.
 
-    Raises UnfitTopography if the first row or column seems to contain coordinates in unequal steps, or the last one
-    coordinates in equal steps.
+    Raises UnfitTopography if the first row or column seems to contain coordinates in unequal steps, or the last row or
+    column coordinates in equal steps.
     """
     heights, steps = values, {}
     for name in ("row", "column"):
@@ -244,8 +240,8 @@ def drop_coordinates(values: np.ndarray) -> tuple[np.ndarray, tuple[float, float
             raise UnfitTopography(
                 "path",
                 f"has a {'first' if uneven else 'last'} {name} of numbers that rise or fall as coordinates do; "
-                f"expected heights in equal distances. Remove the {name}, or interpolate the heights. If all numbers "
-                "are heights, give them as .npy",
+                f"expected heights on a regular grid. Remove the {name}, or interpolate the heights. If all numbers "
+                "are heights, save them as a .npy file",
             )
         if first is not None:
             steps[name] = first
@@ -255,7 +251,7 @@ def drop_coordinates(values: np.ndarray) -> tuple[np.ndarray, tuple[float, float
 
 
 def _coordinate_step(table):
-    """Return the step of coordinates in the first line of a table: nan if it varies, None if the line has heights."""
+    """Return the step of coordinates in the first line of a table; nan if steps differ, None if it has heights."""
     line, others = table[0], table[1:3]
     if len(table) < 3 or len(line) < _FEWEST_COORDINATES or any(_equal_step(each) is not None for each in others):
         return None
@@ -269,7 +265,7 @@ def _coordinate_step(table):
 
 
 def _resembles(line, others):
-    """Return whether the heights in a line resemble those of the next two lines."""
+    """Return whether the heights in a line are similar to the heights in the next two lines."""
     known = np.isfinite(line) & np.all(np.isfinite(others), axis=0)
     if np.count_nonzero(known) < 3:
         return False
@@ -281,9 +277,9 @@ def _resembles(line, others):
 
 
 def _equal_step(line: np.ndarray, *, rounded: bool = True) -> float | None:
-    """Return the step from number to number in a line; None if the steps are not equal. The first number may be any.
+    """Return the step from number to number in a line; None if the steps differ. The first number may be arbitrary.
 
-    rounded : whether steps may differ because the file has few digits.
+    rounded : True if steps may differ because numbers are rounded to few digits.
     """
     for numbers in (line, line[1:]):
         steps = np.diff(numbers)
@@ -303,7 +299,7 @@ def _equal_step(line: np.ndarray, *, rounded: bool = True) -> float | None:
 
 
 def _last_digit(numbers):
-    """Return the unit of the last digit with which the largest number was probably written."""
+    """Return the probable unit of the last digit of the largest number, such as 0.01 for 3.25."""
     largest = np.max(np.abs(numbers))
     digits = max(len(f"{abs(number):.14e}".partition("e")[0].replace(".", "").rstrip("0")) for number in numbers)
     return 10.0 ** (np.floor(np.log10(largest)) + 1 - digits) if largest else 0.0

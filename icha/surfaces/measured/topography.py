@@ -1,11 +1,11 @@
-"""Measured topographies: from a file to a surface.
+"""Prepare a surface from the file of a measured topography.
 
-A measurement becomes a surface in this order: read heights and lengths in metres (`scan`), turn the side that touches
-first upwards, cut out a square, remove the trend, fill missing points, make pixels square, filter short waves, treat
-the edges as the boundary requires, change the grid.
+The steps are: read heights and lengths in metres (`scan`); make heights positive on the side that touches first; cut
+out a square; remove the trend; fill missing points; make pixels square; filter short waves; treat the edges as
+`boundary` requires; change the grid.
 
-SurfaceTopography reads the files of instruments. It could also remove trends and fill holes, but its import takes
-seconds, which every command with a measured surface would need.
+SurfaceTopography reads the files of instruments. SurfaceTopography could also remove trends and fill holes. ICHA does
+these steps itself, because the import of SurfaceTopography takes seconds.
 """
 
 import math
@@ -27,33 +27,34 @@ from icha.surfaces.measured.settings import MIRROR, WINDOW, Preparation, UnfitTo
 from icha.surfaces.square import problem_with_heights
 from icha.surfaces.surface import FREE, PERIODIC, Surface
 
-# Relative rounding of the quotient of two lengths.
+# Relative rounding error of the quotient of two lengths.
 _ROUNDING = 1e-9
-# Range of heights without their trend, relative to the largest height, below which the heights are rounding.
+# Range of the heights after removal of the trend, divided by the largest height, below which the surface is flat.
 _FLAT = 1e-13
 # Largest relative difference of the two sides of a square pixel.
 SQUARE = 1e-3
-# Standard deviation of the weights over the nesting index: alpha/sqrt(2 pi), alpha = sqrt(ln 2/pi) (ISO 16610-61).
+# Standard deviation of the filter's weights, divided by the nesting index: alpha/sqrt(2 pi), alpha = sqrt(ln 2/pi) (ISO
+# 16610-61).
 DEVIATION = math.sqrt(math.log(2) / 2) / math.pi
 # Smallest nesting index, in pixels, at which the filter has the transmission of the standard.
 LEAST_PIXELS = 4
-# Standard deviations at which the weights end; this omits 2e-9 of them.
+# Distance, in standard deviations, at which the weights of the filter are cut off; the omitted share is 2e-9.
 _REACH = 6
 
 
 @dataclass(frozen=True, eq=False)
 class PreparedTopography:
-    """A surface at its own heights, and the record of its preparation from a file.
+    """A surface with its measured heights, and a record of how it was prepared from a file.
 
     Attributes
     ----------
-    source_file, source_sha256 : name and checksum of the file.
-    description : all steps from the file to the surface, for readers.
-    format : format as which the file was read.
+    source_file, source_sha256 : name of the file and SHA-256 of its content.
+    description : all steps from the file to the surface, as text for users.
+    format : format with which the file was read.
     data : name of the array or channel that was read; empty if the file has only one.
-    reading : points, pixels and units of the file, and parts of the file that were left out, for readers.
-    filled : number of points that had no height.
-    points : number of points that were used.
+    reading : points, pixels, units and omitted parts of the file, as text for users.
+    filled : number of missing points that were filled.
+    points : number of points of the square, before resampling.
     """
 
     surface: Surface
@@ -68,17 +69,18 @@ class PreparedTopography:
 
 
 def prepared_topography(path: str | os.PathLike, preparation: Mapping) -> PreparedTopography:
-    """Read a topography and prepare the surface that the settings describe.
+    """Read a topography from a file and prepare a surface with the given settings.
 
     Parameters
     ----------
-    path : the file.
-    preparation : arguments of `Preparation`, as `MeasuredSurface.preparation` gives them.
+    path : path of the file.
+    preparation : arguments of `Preparation`, which `MeasuredSurface.preparation` returns.
 
     Raises
     ------
     UnfitTopography
-        A ValueError with the setting that does not fit the file (attribute `key`), the reason, and what is expected.
+        If the file or a setting does not fit. The attribute `key` is the setting; the message gives reason and
+        expectation.
     """
     file, settings = Path(path), Preparation(**preparation)
     scan = load_scan(file, settings)
@@ -103,7 +105,7 @@ def prepared_topography(path: str | os.PathLike, preparation: Mapping) -> Prepar
 
 
 def crop_square(scan: Scan, settings: Preparation) -> Scan:
-    """Cut out a square of whole pixels. If pixels are not square, its sides may differ by less than a pixel."""
+    """Cut out a square of whole pixels. If the pixels are not square, the sides may differ by less than a pixel."""
     rows, columns = scan.heights.shape
     dx, dy = scan.pixel
     width, height = map(formatting.length, scan.size)
@@ -120,18 +122,18 @@ def crop_square(scan: Scan, settings: Preparation) -> Scan:
         if first_x + nx > columns or first_y + ny > rows:
             raise UnfitTopography(
                 "crop",
-                f"ends at x = {formatting.length(x + side)}, y = {formatting.length(y + side)}, outside of the scan"
-                f"{scan.remark_on_unit}; expected at most x = {width}, y = {height}",
+                f"ends at x = {formatting.length(x + side)}, y = {formatting.length(y + side)}, outside the "
+                f"scan{scan.remark_on_unit}; expected at most x = {width}, y = {height}",
             )
     if nx < 8 or ny < 8:
         raise UnfitTopography(
             "crop" if settings.crop else "path",
-            f"leaves {nx} x {ny} points{scan.remark_on_unit}; expected at least 8 x 8",
+            f"gives a square of {nx} x {ny} points{scan.remark_on_unit}; expected at least 8 x 8",
         )
     if settings.boundary == PERIODIC and ((nx, ny) != (columns, rows) or abs(nx * dx / (ny * dy) - 1) > SQUARE):
         raise UnfitTopography(
             "boundary",
-            f"needs the whole scan to be a square, and it is {width} x {height}; expected another boundary, or no crop",
+            f"requires a square scan that is not cropped; the scan is {width} x {height}; expected another boundary",
         )
     square = scan.heights[first_y : first_y + ny, first_x : first_x + nx]
     step = [] if square.shape == scan.heights.shape else [f"cut to {nx} x {ny} points from ({first_x}, {first_y})"]
@@ -142,14 +144,14 @@ def remove_trend(scan: Scan, settings: Preparation) -> Scan:
     """Remove the plane or the paraboloid that fits the known heights best."""
     known = np.isfinite(scan.heights)
     if not known.any():
-        raise UnfitTopography("path", "holds no height within the square that is used; expected another crop or file")
+        raise UnfitTopography("path", "has no height within the square that is used; expected another crop or file")
     degree = {"none": 0, "tilt": 1, "curvature": 2}[settings.detrend]
     if degree == 0:
         return scan
     rows, columns = scan.heights.shape
     powers = [(i, j) for i in range(degree + 1) for j in range(degree + 1 - i)]
     y, x = (np.vander(np.linspace(-1, 1, n), 2 * degree + 1, increasing=True) for n in (rows, columns))
-    # Sum all products of powers over the known points, without a table of all points.
+    # Sum the products of powers over the known points by matrix products, which need little memory.
     moments = y.T @ known.astype(float) @ x
     weighted = y.T @ np.where(known, scan.heights, 0.0) @ x
     matrix = np.array([[moments[i + k, j + m] for k, m in powers] for i, j in powers])
@@ -165,11 +167,11 @@ def refuse_flat(prepared: Scan, square: Scan, settings: Preparation) -> None:
     known = np.isfinite(square.heights)
     if np.ptp(prepared.heights) <= _FLAT * np.nanmax(np.abs(square.heights), where=known, initial=0.0):
         apart = "" if settings.detrend == "none" else ", apart from the trend that is removed"
-        raise UnfitTopography("path", f"holds heights that are all the same{apart}; expected a rough surface")
+        raise UnfitTopography("path", f"contains heights that are all the same{apart}; expected a rough surface")
 
 
 def fill_missing_points(scan: Scan, settings: Preparation) -> Scan:
-    """Fill missing points with the solution of Laplace's equation, if the settings allow this."""
+    """Fill missing points with the solution of Laplace's equation; raise UnfitTopography if `missing` is "refuse"."""
     missing = ~np.isfinite(scan.heights)
     count = int(np.count_nonzero(missing))
     if not count:
@@ -177,7 +179,8 @@ def fill_missing_points(scan: Scan, settings: Preparation) -> Scan:
     if settings.missing == "refuse":
         raise UnfitTopography(
             "missing",
-            f"does not allow {count} of {missing.size} points without a height; expected fill, or a crop without them",
+            f"does not allow {count} of {missing.size} points without a height; expected fill, or a crop without such "
+            "points",
         )
     if 2 * count > missing.size:
         raise UnfitTopography("missing", f"cannot fill {count} of {missing.size} points; expected at most half")
@@ -187,7 +190,7 @@ def fill_missing_points(scan: Scan, settings: Preparation) -> Scan:
 
 
 def _harmonic(heights, missing, *, periodic):
-    """Solve Laplace's equation: each missing height (count,) is the mean of its neighbours, four or at edges fewer."""
+    """Solve Laplace's equation: each missing height is the mean of its neighbours; return the missing heights, (k,)."""
     row, column = np.nonzero(missing)
     count, pairs = len(row), []
     index = np.full(missing.shape, -1)
@@ -209,11 +212,11 @@ def _harmonic(heights, missing, *, periodic):
 
 
 def resample_to_square_pixels(scan: Scan, settings: Preparation) -> Scan:
-    """Resample to square cells as large as the shorter side of a pixel.
+    """Resample a scan to square pixels, whose side is the shorter side of the original pixels.
 
-    Heights along the longer side of the pixels are interpolated by their cosine series. This series is band-limited: it
-    keeps all measured waves and their rms slope, and adds no wave shorter than two pixels. Periodic scans are resampled
-    by their Fourier series in `treat_edges`.
+    Heights along the longer side of the pixels are interpolated by a cosine series. The series keeps all measured waves
+    and their rms slope, and adds no wave shorter than two pixels. `treat_edges` resamples periodic scans by their
+    Fourier series.
     """
     dx, dy = scan.pixel
     if settings.boundary == PERIODIC or abs(dx / dy - 1) <= SQUARE:
@@ -228,7 +231,7 @@ def resample_to_square_pixels(scan: Scan, settings: Preparation) -> Scan:
 
 
 def _by_cosine_series(heights, axis, step, count):
-    """Evaluate the cosine series along an axis, in the middle of `count` new cells that are `step` old cells wide."""
+    """Evaluate the cosine series along an axis at the centres of `count` new pixels of a width of `step` old pixels."""
     # Slow to import, and rarely needed.
     from scipy.signal import czt
 
@@ -241,10 +244,10 @@ def _by_cosine_series(heights, axis, step, count):
 
 
 def filter_short_waves(scan: Scan, settings: Preparation) -> Scan:
-    """Apply the areal Gaussian filter of ISO 16610-61, whose nesting index is the cut-off.
+    """Apply the areal Gaussian filter of ISO 16610-61; its nesting index is the setting `cutoff`.
 
-    The filter multiplies a wave of length l by 2^-(cutoff/l)^2. Beyond the edges heights continue by reflection (ISO
-    16610-28), or periodically if the scan is periodic.
+    The filter multiplies a wave of length l by 2^-(cutoff/l)^2. The filter continues the heights at the edges by
+    reflection (ISO 16610-28), or periodically if the scan is periodic.
     """
     if settings.cutoff is None:
         return scan
@@ -255,8 +258,9 @@ def filter_short_waves(scan: Scan, settings: Preparation) -> Scan:
     if not least * (1 - 1e-9) <= settings.cutoff <= most:
         raise UnfitTopography(
             "cutoff",
-            f"is {settings.cutoff / max(scan.pixel):.3g} pixels{scan.remark_on_unit}; expected from {LEAST_PIXELS} "
-            f"pixels, {formatting.length(least)}, to the side of the square, {formatting.length(most)}",
+            f"is {settings.cutoff / max(scan.pixel):.3g} pixels{scan.remark_on_unit}; expected at least "
+            f"{LEAST_PIXELS} pixels ({formatting.length(least)}), at most the side of the square "
+            f"({formatting.length(most)})",
         )
     dx, dy = scan.pixel
     sigma = DEVIATION * settings.cutoff
@@ -266,7 +270,7 @@ def filter_short_waves(scan: Scan, settings: Preparation) -> Scan:
 
 
 def treat_edges(scan: Scan, settings: Preparation) -> tuple[Surface, list[str]]:
-    """Treat the edges as the boundary requires, and change the grid; return the surface and all steps."""
+    """Treat the edges as `boundary` requires, and change the grid; return the surface and descriptions of all steps."""
     nodes = settings.grid or (2 if settings.boundary == MIRROR else 1) * max(scan.heights.shape)
     try:
         # Resampling copies the heights.
@@ -276,7 +280,7 @@ def treat_edges(scan: Scan, settings: Preparation) -> tuple[Surface, list[str]]:
     heights, side, free = scan.heights - np.mean(scan.heights), scan.size[0], settings.boundary == FREE
     steps = list(scan.steps)
     if settings.boundary == WINDOW:
-        # Tukey's window, cell by cell: half a cosine wave at either edge and one in between.
+        # Tukey's window at the centres of the pixels: half a cosine wave at each edge, and the value 1 between them.
         centres = [(np.arange(n) + 0.5) / n for n in heights.shape]
         edges = [np.minimum(np.minimum(x, 1 - x) / settings.taper, 1.0) for x in centres]
         across, along = (np.sin(0.5 * np.pi * edge) ** 2 for edge in edges)
@@ -285,24 +289,24 @@ def treat_edges(scan: Scan, settings: Preparation) -> tuple[Surface, list[str]]:
     if settings.boundary == MIRROR:
         heights, side = np.pad(heights, [(0, n) for n in heights.shape], mode="symmetric"), 2 * side
         steps.append("joined by its mirror images")
-    # Pixels of periodic scans may still not be square.
+    # Periodic scans may still have pixels that are not square.
     grid = settings.grid or max(heights.shape)
     if heights.shape != (grid, grid):
         heights = _resampled(heights, grid, free=free)
         steps.append(f"resampled to {grid} x {grid} points")
     if problem := problem_with_heights(heights):
-        raise UnfitTopography("path", f"holds {problem}")
+        raise UnfitTopography("path", f"contains {problem}")
     steps.append("one square on a free half-space" if free else f"repeats after {side:.6g} m")
     try:
         return Surface(heights, side, FREE if free else PERIODIC), steps
-    except ValueError as error:  # the range of heights over the side is out of bounds
+    except ValueError as error:  # the range of heights, divided by the side, is out of bounds
         raise UnfitTopography(
-            "height_unit", f"gives a surface that cannot be pressed ({error}); expected another unit"
+            "height_unit", f"gives heights that contact models do not accept ({error}); expected another unit"
         ) from None
 
 
 def _resampled(heights, grid, *, free):
-    """Resample to grid x grid points by the Fourier series, or a free square by the cosine series."""
+    """Resample heights to grid x grid points by Fourier series, or by cosine series for a free square."""
     # Slow to import, and rarely needed.
     from scipy.signal import resample
 

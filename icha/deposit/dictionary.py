@@ -1,0 +1,65 @@
+"""The data dictionary of a deposit: all variables of its netCDF files, with their meanings and units."""
+
+import csv
+import io
+import re
+from collections import Counter
+from collections.abc import Iterable
+from pathlib import Path
+
+import netCDF4
+import numpy as np
+
+from icha.datasets.results import LOOP, RUN, SOLUTION, SURFACE, THEORIES
+
+_COLUMNS = "file group variable dimensions type units long_name flags missing comment files".split()
+# Placeholders for the parts of a path in which files of one kind differ.
+_PLACEHOLDERS = {name: f"<{name}>" for name in ("study", "entry", "surface", "material")}
+_PLACEHOLDERS |= {"seed": "<k>", "slope": "<g>", "pressure": "<load>"}
+_KINDS = [
+    pattern.format(**_PLACEHOLDERS, model_folder=folder)
+    for pattern in (SURFACE, RUN, SOLUTION, LOOP, THEORIES)
+    for folder in ("", "<model>/")
+]
+
+
+def data_dictionary(folder: Path, files: Iterable[str]) -> str:
+    """Write `data_dictionary.csv`: a row for each variable of each kind of file, with the number of files that have it.
+
+    Parameters
+    ----------
+    folder : the folder of the files.
+    files : paths of the files in that folder; files that are not netCDF are left out.
+    """
+    found: Counter[tuple[str, ...]] = Counter()
+    for name in sorted(files):
+        if name.endswith(".nc"):
+            with netCDF4.Dataset(folder / name) as file:
+                for group in (file, *file.groups.values()):
+                    for variable in group.variables.values():
+                        found[file_pattern(name), group.path, *_described(variable)] += 1
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerows([_COLUMNS, *((*row, count) for row, count in found.items())])
+    return text.getvalue()
+
+
+def file_pattern(path: str) -> str:
+    """Return the path pattern of a kind of file, such as `surfaces/<surface>/seed<k>.nc`."""
+    return next((kind for kind in _KINDS if re.fullmatch(re.sub("<.*?>", "[^/]+", kind), path)), path)
+
+
+def _described(variable: netCDF4.Variable) -> tuple[str, ...]:
+    """Return the columns of a variable, from its name to its comment."""
+    attributes = {name: str(variable.getncattr(name)) for name in variable.ncattrs()}
+    units, long_name, meanings, missing, comment = (
+        attributes.get(name, "") for name in ("units", "long_name", "flag_meanings", "missing", "comment")
+    )
+    # Texts are stored as characters along a last dimension.
+    is_text = variable.dtype == "S1"
+    dimensions = variable.dimensions[:-1] if is_text else variable.dimensions
+    values = np.atleast_1d(getattr(variable, "flag_values", []))
+    flags = ", ".join(f"{value}: {meaning}" for value, meaning in zip(values, meanings.split(), strict=True))
+    if "_FillValue" in attributes:
+        missing = f"{attributes['_FillValue']}: {missing or 'no value, see status and step_count'}"
+    kind = "text" if is_text else variable.dtype.name
+    return variable.name, " ".join(dimensions), kind, units, long_name, flags, missing, comment
