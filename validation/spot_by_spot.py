@@ -10,6 +10,7 @@ from scipy.sparse.csgraph import connected_components
 from icha.equilibrium.interacting_asperities import InteractingAsperities
 from icha.equilibrium.sites import ContactState
 from icha.references.finite_range import NodalState, perimeter_correction
+from validation.paraboloids import fourth_order_terms
 
 
 class Patches(NamedTuple):
@@ -97,4 +98,6 @@ def compare_single_spots(
         "pair_patch_force": patches.force[patch],
         "pair_patch_nodes": patches.nodes[patch],
         "pair_curvature_radius": spots.radius_of_curvature[single],
+        # The centre of a single spot is its summit.
+        "pair_fourth_order": fourth_order_terms(truth.surface, spots.position[single]),
     }
