@@ -75,19 +75,13 @@ class State(NamedTuple):
     separation: float
 
 
-def error_sources(
-    surface: Surface,
-    material: Material,
-    reduced_pressures,
-    seed: int = -1,
-) -> xr.Dataset:
+def error_sources(surface: Surface, material: Material, reduced_pressures) -> xr.Dataset:
     """Solve all variants for one surface; without adhesion also compare single spots with their patches.
 
     Parameters
     ----------
     surface, material : as for `icha.simulate`; the surface's own grid must resolve the range of attraction.
     reduced_pressures : p/(E* h'_rms) with the rms slope of the surface itself, increasing, (n,).
-    seed : recorded in the dataset.
 
     Returns
     -------
@@ -125,7 +119,7 @@ def error_sources(
         keep("boundary_elements", map(_state_at_nodes, truth))
         if not contact.adhesive:
             singles = [compare_single_spots(contact, state, true) for state, true in zip(model, truth, strict=True)]
-    return _dataset(surface, material, pressures, states, singles).assign(seed=seed, refinement=_REFINEMENT)
+    return _dataset(surface, material, pressures, states, singles)
 
 
 def _model(surface, material, path):
@@ -228,7 +222,7 @@ def main() -> None:
             file.parent.mkdir(parents=True, exist_ok=True)
             print(f"{name}, seed {seed}", flush=True)
             surface = SPECTRUM.realise(512, seed)
-            error_sources(surface, material, reduced_pressures, seed=seed).to_netcdf(file, engine="h5netcdf")
+            error_sources(surface, material, reduced_pressures).to_netcdf(file, engine="h5netcdf")
         return xr.load_dataset(file, engine="h5netcdf")
 
     loads = [1e-4, 1e-3, 3.16e-3, 1e-2, 3.16e-2]
