@@ -1,5 +1,5 @@
 # ICHA: adhesive rough contact with interacting and coalescing asperities.
-# One configuration file is one campaign: config/config.yaml, or the file of --configfile. See config/README.md.
+# One configuration file describes one campaign: config/config.yaml, or the file of --configfile. See config/README.md.
 
 import os
 import sys
@@ -46,7 +46,7 @@ onstart:
     campaign.begin(None if installs else missing_software(CAMPAIGN))
 
 
-# Temporary files of jobs that were killed during this call; the next call may have no jobs.
+# Remove temporary files of jobs that were killed during this call. The next call may have no jobs.
 onsuccess:
     campaign.remove_left_over()
 
@@ -76,7 +76,7 @@ localrules:
     deposit,
 
 
-# Targets name all results that they depend on, so that lost and renamed ones are computed again.
+# Targets name all results that they depend on, so that lost or renamed results are computed again.
 rule all:
     default_target: True
     input:

@@ -37,7 +37,7 @@ def prepare_process() -> None:
 
 
 def end_with_caller() -> None:
-    """End with the `icha run` that started this process, even if it is killed."""
+    """End this process when the `icha run` that started it ends, even if `icha run` is killed."""
     if caller := os.environ.get("ICHA_CALLER"):
         end_with_parent(int(caller))
 
@@ -54,7 +54,7 @@ def refuse_superseded() -> None:
 def plan_without_collecting() -> None:
     """Disable garbage collection until the first job starts, and again when the process ends.
 
-    Almost nothing in the growing plan is garbage. Collection takes a third of the time for a plan of ten thousand runs.
+    Snakemake's plan contains almost no garbage. For ten thousand runs, collection would take a third of planning time.
     """
     gc.disable()
     atexit.register(gc.freeze)
@@ -63,8 +63,8 @@ def plan_without_collecting() -> None:
 def start_jobs_freely(workflow) -> None:
     """Enable garbage collection, except for the plan; remove Snakemake's limit of jobs started per second.
 
-    With this limit every finished local job wakes the scheduler once a second from then on, which uses most of a core
-    after a thousand short jobs. Snakemake has no option to disable it.
+    With Snakemake's limit, each finished local job wakes the scheduler once a second until all jobs are done. After a
+    thousand short jobs, the scheduler uses most of a core. Snakemake has no option to disable the limit.
     """
     gc.collect()
     gc.freeze()
@@ -74,10 +74,10 @@ def start_jobs_freely(workflow) -> None:
 
 
 class CampaignResults:
-    """A campaign in the working directory before its jobs, with its lock.
+    """Results of a campaign in the working directory, which are inspected and locked before jobs start.
 
-    Snakemake reads the Snakefile also for calls that only report or clean up. The lock does not stop these, only calls
-    that start jobs (`begin`).
+    Snakemake also reads the Snakefile for calls that only report or clean up. The lock stops only calls that start jobs
+    (`begin`).
     """
 
     def __init__(self, results: str, name: str, file: str, workflow: str, *, dry_run: bool):
@@ -85,9 +85,9 @@ class CampaignResults:
 
         Parameters
         ----------
-        results : folder of the results, relative to the working directory; refused if it belongs to another file.
+        results : folder of the results, relative to the working directory; it must not belong to another configuration.
         name : name of the campaign.
-        file : its configuration file.
+        file : configuration file of the campaign.
         workflow : folder of the workflow.
         dry_run : whether this call is a dry run.
         """
@@ -120,8 +120,8 @@ class CampaignResults:
     def have_stale_made_again(self, paths: Iterable[str], rules: Iterable) -> None:
         """Mark results that do not match the present settings as incomplete, unless Snakemake itself detects them.
 
-        Snakemake compares the settings with its own records. These may be missing, or describe another file, after a
-        result was restored from a backup. Of inputs it compares times, not contents.
+        Snakemake compares the settings with its own records. After a result was restored from a backup, the records may
+        be missing or may describe another file. For inputs, Snakemake compares time stamps, not contents.
 
         Parameters
         ----------
@@ -154,7 +154,7 @@ class CampaignResults:
             return False
 
     def _set_aside(self, path: str, why: str) -> None:
-        """Rename an untrusted result, so that it is computed again, and print a warning."""
+        """Rename a result that may be damaged, so that the result is computed again; print a warning."""
         file = f"{self.results}/{path}"
         aside = ""
         if not self.dry_run:
@@ -165,8 +165,8 @@ class CampaignResults:
     def begin(self, missing: str | None = None) -> None:
         """Make this call the owner of the results before its first job starts.
 
-        From then on, jobs of an earlier call cannot change the results. The results are inspected again, because such
-        a job may have changed them since the first inspection. A call that only reports does not call this method.
+        Afterwards, jobs of an earlier call cannot change the results. The results are inspected again, because such a
+        job may have changed results since the first inspection. Calls that only report do not use this method.
 
         Parameters
         ----------
@@ -235,7 +235,7 @@ class _Wildcards(dict):
 
 
 def _present_settings(rules, path: str) -> str:
-    """Return the checksum of the present parameters of the job of a result."""
+    """Return the checksum of the parameters that the job of a result has in the present configuration."""
     rule = next(rule for rule in rules if any(output.match(path) for output in rule.output))
     wildcards = _Wildcards(rule.get_wildcards(path))
     values = (value(wildcards) if callable(value) else value for value in rule.params)
@@ -244,7 +244,7 @@ def _present_settings(rules, path: str) -> str:
 
 @contextlib.contextmanager
 def _writing(folder: str):
-    """End the program with a message if a folder cannot be written to."""
+    """Context manager: end the program with a message if a folder cannot be written to."""
     try:
         yield
     except OSError as error:
@@ -262,10 +262,10 @@ def _warn(text: str) -> None:
 
 
 def _damaged_records(results: str) -> Iterator[tuple[str, Path]]:
-    """Return results whose record of Snakemake is damaged, for example after the disk was full.
+    """Yield results whose Snakemake record is damaged, and the record, for example after the disk was full.
 
-    Snakemake stops at such a record, or considers the result up to date. Snakemake has no public interface that lists
-    damaged records.
+    At a damaged record, Snakemake stops or considers the result up to date. Snakemake has no public interface that
+    lists damaged records.
     """
     for folder, _, names in os.walk(METADATA):
         for record in (Path(folder, name) for name in names):
@@ -286,16 +286,17 @@ locks = []
 
 
 def hold_lock(path: str) -> str | None:
-    """Hold a lock until this process ends; return the number of another process that holds it.
+    """Lock a file until this process ends; if another process has locked the file, return its process number.
 
-    Snakemake's own lock is a file. A killed program leaves this file behind, and later calls then require `--unlock`.
+    Snakemake's own lock is the existence of a file. A killed program leaves this file behind, and later calls then
+    require `--unlock`.
     """
     try:
         Path(path).parent.mkdir(parents=True, exist_ok=True)
-        # Jobs do not inherit this file, since processes that they leave behind would keep the lock.
+        # Jobs do not inherit this file, because processes that they leave behind would keep the lock.
         file = open(path, "a+", encoding="ascii")
     except OSError:
-        return None  # in a folder without write permission nothing can be computed
+        return None  # without write permission in this folder, nothing can be computed
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:

@@ -1,4 +1,4 @@
-"""The configuration that a call of Snakemake selects."""
+"""Read the configuration that is selected by the options of Snakemake."""
 
 from pathlib import Path
 
@@ -12,21 +12,21 @@ DEFAULT = "config/config.yaml"
 
 
 def campaign_configuration(workflow, root: str) -> Configuration:
-    """Read the file of `--configfile`, or the default one below `root`, with the values of `--config`.
+    """Read the file of `--configfile`, or the default file in the folder `root`, with the values of `--config`.
 
-    Snakemake's own `config` is not used, since it would merge two files, and accept duplicate keys.
+    Snakemake's own `config` is not used, because it would merge two files and accept duplicate keys.
 
     Raises
     ------
     SystemExit
-        With the message of a wrong configuration.
+        If the configuration has errors; the message lists them.
     """
     settings = workflow.config_settings
     files = [_shortened(path) for path in settings.configfiles]
     try:
         if len(files) > 1:
             names = ", ".join(map(str, files))
-            raise ConfigurationError(f"--configfile: {names}; expected one file, since a campaign is one file")
+            raise ConfigurationError(f"--configfile: {names}; expected one file, because a campaign is one file")
         file = files[0] if files else _shortened(Path(root, DEFAULT))
         configuration = load_configuration(file, dict(settings.config))
     except ConfigurationError as error:
@@ -37,6 +37,6 @@ def campaign_configuration(workflow, root: str) -> Configuration:
 
 
 def _shortened(path: str | Path) -> Path:
-    """Return a path in the working directory as a relative one, which remains valid in a copy of the directory."""
+    """Return a path in the working directory as a relative path, which remains valid in a copy of the directory."""
     path = Path(path)
     return path.relative_to(Path.cwd()) if path.is_relative_to(Path.cwd()) else path

@@ -1,10 +1,10 @@
 """Fingerprints of code: the result of a job depends on its script and on the modules that the script imports.
 
-Snakemake's own trigger compares only the time stamp of the script. A fingerprint is computed from syntax trees. So
-comments, docstrings, formatting, touched files and new clones change nothing, and an edit of a module affects exactly
-the jobs that use it.
+Snakemake itself compares only the time stamp of the script. A fingerprint is computed from syntax trees. So comments,
+docstrings, formatting and time stamps do not change a fingerprint. An edit of a module changes the fingerprints of
+exactly the jobs that use this module.
 
-(`grimp` also follows imports, but only inside a package: not those of scripts, and no data files.)
+(The library `grimp` also follows imports, but only inside a package. `grimp` ignores scripts and data files.)
 """
 
 import ast
@@ -25,7 +25,10 @@ JOB_MODULE = "job.py"
 
 
 def code_fingerprint(script: str | Path, *modules: str) -> str:
-    """Return the fingerprint of a script and of what it imports (`files_of`)."""
+    """Return the fingerprint of a script with all modules that it imports (`files_of`), and with their data files.
+
+    A data file counts if it is beside a module that contains the name of the file.
+    """
     files = files_of(script, *modules)
     digest = hashlib.sha256("".join(files).encode())
     for file in files.values():
@@ -38,13 +41,13 @@ def code_fingerprint(script: str | Path, *modules: str) -> str:
 def files_of(script: str | Path, *modules: str) -> dict[str, Path]:
     """Return a script and all modules that it imports from the package or from its folder, sorted by name.
 
-    The packages that contain a module are not included, nor is `JOB_MODULE` with what only that imports. Data files are
-    included if they are beside a module that contains their name.
+    The import of a module does not include the `__init__.py` of its package. `JOB_MODULE` is not included either, nor
+    are modules that only `JOB_MODULE` imports.
 
     Parameters
     ----------
     script : path of the script.
-    modules : names of further modules, which the script imports by a name that it gets as a parameter.
+    modules : names of further modules, which the script imports although their names are not in its text.
     """
     job_module = Path(script).with_name(JOB_MODULE)
     files: set[Path] = set()
@@ -105,7 +108,7 @@ def _module_file(name: str, missing_ok: bool = False) -> Path | None:
 
 @cache
 def _data_files(file: Path) -> list[Path]:
-    """Return the data files beside a module whose path, or the path of whose folder, is a text in the module."""
+    """Return the data files beside a module that are named in the module, directly or by the name of their folder."""
     files = set()
     for name in _syntax_of(file).names:
         path = file.parent / name
@@ -119,13 +122,13 @@ def _data_files(file: Path) -> list[Path]:
 
 
 class _Syntax(NamedTuple):
-    """Content of a module.
+    """Content of a module that determines fingerprints.
 
     Attributes
     ----------
-    digest : checksum of its syntax tree, without what changes no result.
-    imports : level (0 for absolute ones), module, and imported name (None for `import module`).
-    names : texts that may be names of files.
+    digest : checksum of the syntax tree of the module, without parts that change no result.
+    imports : for each import, its level (0 if absolute), its module, and the imported name (None for `import module`).
+    names : texts in the module that may be names of files.
     """
 
     digest: str
@@ -155,7 +158,7 @@ def _syntax_of(file: Path) -> _Syntax:
 
 
 def save_cache() -> None:
-    """Save the content of the modules for the next process, if the folder can be written to."""
+    """Save the syntax of the modules for the next process, if the folder can be written to."""
     # `whole_file` would check the owner of the results; this file is not a result.
     temporary = _CACHE.with_suffix(f".{os.getpid()}.tmp")
     with contextlib.suppress(OSError):

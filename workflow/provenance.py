@@ -1,4 +1,4 @@
-"""The job that made each result, from Snakemake's own records."""
+"""Find the job that made each result, from Snakemake's own records."""
 
 import ast
 import json
@@ -23,8 +23,8 @@ def recorded_jobs(
     Parameters
     ----------
     records : Snakemake's records, `.snakemake/metadata`.
-    made : path of each result in the deposit, by its name in Snakemake (`results/<campaign>/…`).
-    given : the same for files that no job made: the configuration as used, topographies, measurements.
+    made : path in the deposit of each result, by the name of the result in Snakemake (`results/<campaign>/…`).
+    given : path in the deposit of each file that no job made: the configuration as used, topographies, measurements.
     scripts : folder of the scripts, whose docstrings describe the jobs.
 
     Raises
@@ -37,7 +37,7 @@ def recorded_jobs(
     record_of_job: dict[str, dict[str, Any]] = {}
     for name in sorted(made):
         record = _record(records, name)
-        # The outputs of a job share a log, and no two jobs do.
+        # The outputs of one job have the same log, and outputs of two jobs have different logs.
         log = record["log"][0]
         record_of_job[log] = record
         outputs.setdefault(log, []).append(name)
@@ -64,7 +64,7 @@ def recorded_jobs(
 
 
 def recorded_parameters(records: Path, name: str) -> list[str]:
-    """Return the parameters of the job that made a file, as represented by Python; errors as in `recorded_jobs`."""
+    """Return the parameters of the job that made a file, as `repr` writes them; errors as in `recorded_jobs`."""
     return _record(records, name)["params"]
 
 
@@ -87,10 +87,10 @@ def _record(records: Path, name: str) -> dict[str, Any]:
 
 
 def _settings(params: list[str]) -> tuple[tuple[str, str], ...]:
-    """Return names and values of the settings of a job.
+    """Return names and values of the settings of a job, from its recorded parameters.
 
-    Snakemake records values without names. Only mappings contain names; other values are omitted. Attributes of
-    datasets, which contain the campaign, and paths of this machine are omitted, too.
+    Snakemake records parameters without their names. So only parameters that are mappings, with names in them, are
+    included. The attributes of datasets, and paths of this machine, are omitted.
     """
     settings: dict[str, str] = {}
     for text in params:

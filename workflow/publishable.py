@@ -1,4 +1,4 @@
-"""Check whether a campaign can be published, before any of it is computed."""
+"""Check whether a campaign can be published, before its results are computed."""
 
 from pathlib import Path
 
@@ -9,13 +9,13 @@ from icha.deposit.program import Source, program_source, refuse_other_environmen
 
 
 def publishable_source(configuration: Configuration, project: str, results: str) -> Source:
-    """Return the source that a deposit will contain.
+    """Return the source code that a deposit will contain.
 
     Raises
     ------
     SystemExit
-        If metadata are missing, the source is not committed, or packages do not have the locked versions, now or when
-        any of the results was made.
+        If metadata are missing, if the source code is not committed, or if packages do not have the locked versions,
+        now or when a result was made.
     """
     campaign = configuration.campaign
     problems = [f"{configuration.origin}: {line}" for line in missing_metadata(campaign.deposit_metadata())]

@@ -1,8 +1,8 @@
-"""Location of Snakemake's records of results, for which it has no public interface.
+"""Location of Snakemake's records of results; Snakemake has no public interface for these records.
 
-`.snakemake/metadata` has a record of each file that Snakemake made, `.snakemake/incomplete` one of each file whose job
-started but did not succeed. The name of a record is that of the file in base64. A name that is too long for the file
-system is split, and its first parts are folders.
+`.snakemake/metadata` contains a record of each file that Snakemake made. `.snakemake/incomplete` contains a record of
+each file whose job started but did not succeed. The name of a record is the name of the file in base64. A name that is
+too long for the file system is split, and the first parts of the name are folders.
 """
 
 import json
@@ -15,7 +15,7 @@ INCOMPLETE = Path(".snakemake/incomplete")
 
 
 def record_of(name: str, records: Path) -> Path:
-    """Return the path of the record of a file."""
+    """Return the path of Snakemake's record of a file, in the folder `records`."""
     code = urlsafe_b64encode(name.encode()).decode()
     longest = os.pathconf(records, "PC_NAME_MAX") - 1
     parts = [code[start : start + longest] for start in range(0, len(code), longest)]
@@ -23,7 +23,7 @@ def record_of(name: str, records: Path) -> Path:
 
 
 def file_of(record: Path, records: Path) -> str | None:
-    """Return the name of the file of a record; None if it is not a record."""
+    """Return the name of the file that a record describes; None if `record` is not a record of Snakemake."""
     try:
         return urlsafe_b64decode("".join(part.removeprefix("@") for part in record.relative_to(records).parts)).decode()
     except ValueError:

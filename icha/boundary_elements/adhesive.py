@@ -12,8 +12,8 @@ from icha.boundary_elements.front_solver import FrontProblem, relax_front
 from icha.boundary_elements.local_relaxation import relax_in_windows
 from icha.contact.model import NotConverged
 
-# While the front has the first residual, contact forms only where the gap is smaller than the reach of the attraction
-# by the given distance (in critical openings). At the second residual contact forms at any smaller gap.
+# At the first residual of the front, contact forms where the gap is below the reach of the attraction by at least this
+# distance (in critical openings). At the second residual, contact forms wherever the gap is below the reach.
 _CLEAR_RESIDUAL, _CLEAR_DISTANCE, _CERTAIN_RESIDUAL = 3e-2, 0.02, 1e-3
 # Largest error of displacements in a round of new contact, in units of the critical opening.
 _ROUND_ACCURACY = 1e-2
@@ -39,7 +39,7 @@ class Summits:
     radius: np.ndarray
 
     def contacts(self, chosen: np.ndarray, grid: int) -> np.ndarray:
-        """Return the cells, ascending, that close when the chosen summits, (k,) bool, jump into contact."""
+        """Return the cells, ascending, that close when the chosen summits, (k,) bool, jump in: discs around them."""
         touched = np.zeros((grid, grid), bool)
         # A larger disc would cover the surface with its periodic images.
         for cell, radius in zip(self.cell[chosen], np.minimum(self.radius[chosen], 0.75 * grid), strict=True):
@@ -50,7 +50,7 @@ class Summits:
         return np.flatnonzero(touched)
 
     def find_within_reach(self, state: AdhesiveContact, margin: float) -> tuple[np.ndarray, np.ndarray]:
-        """Find open summits with a gap below reach - margin, (k,) bool, and open cells that overlap by more."""
+        """Find open summits with gap < reach - margin, (k,) bool, and cells away from contact with gap < -margin."""
         gap, touched = state.gap.ravel(), mask_of(state.cells, state.gap.shape).ravel()
         within = (gap[self.cell] - self.above - self.reach < -margin) & ~touched[self.cell]
         # The surfaces also touch where they overlap without a summit. Neighbours of contact belong to the front solver.
@@ -76,7 +76,7 @@ def solve_adhesive_contact(
 ) -> tuple[AdhesiveContact, int]:
     """Solve the adhesive contact at a separation: relax the fronts and close cells within reach of the attraction.
 
-    A summit or cell that loses its new contact again stays open.
+    A summit or cell that closes and then loses contact again stays open.
 
     Parameters
     ----------
@@ -130,7 +130,7 @@ def solve_adhesive_contact(
 
 
 def _form_contact(problem, contact, formed):
-    """Close cells `formed`, (m,); if windows save time, also relax the fronts around them and solve the contact."""
+    """Close the cells `formed`, (m,); if windows save time, also relax fronts near these cells, solve the contact."""
     closed = contact.close_cells(formed)
     relaxed = relax_in_windows(problem.space, problem.front, problem.separation, closed, contact.gap, formed)
     if relaxed is None:

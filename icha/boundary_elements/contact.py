@@ -119,7 +119,7 @@ class BoundaryElements(FullContactProblem):
         return PatchObservables(self, surface)
 
     def relax_region(self, region: np.ndarray, separation: float) -> CellState:
-        """Find the equilibrium at a separation (m) to which a contact in a given region, (n, n) bool, relaxes."""
+        """Find the equilibrium at a separation (m), starting from contact in a given region, (n, n) bool."""
         cells, nothing = np.flatnonzero(region), np.zeros(np.count_nonzero(region))
         return self.equilibrium(CellState(separation, cells, nothing + 1, nothing, nothing), separation)
 
@@ -171,7 +171,7 @@ class BoundaryElements(FullContactProblem):
         return False
 
     def _predict(self, state, separation):
-        """Predict the contact at a separation (m) from the rates of a state; far from it, return its own contact."""
+        """Predict the contact at a separation (m) from the rates of a state; if that is too far, do not change it."""
         contact = Contact(state.cells, state.fraction, state.pressure / self.contact_modulus)
         if state.rates is None:
             return contact

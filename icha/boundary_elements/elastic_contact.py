@@ -1,9 +1,9 @@
 """Elastic contact of bonded cells, solved with an active set of cells and conjugate gradients for their pressures.
 
 The cells of the initial contact stay in contact, under pressure or tension. Other cells join the active set where the
-surfaces overlap, and leave it when they are in tension. This is a Newton method for the complementarity of pressure and
-gap (Hintermueller, Ito & Kunisch, SIAM J. Optim. 13 (2003) 865). A bond transmits only tension, so that a partial cell
-under pressure closes.
+surfaces overlap, and leave the set when they are in tension. The iteration is a Newton method for the complementarity
+of pressure and gap (Hintermueller, Ito & Kunisch, SIAM J. Optim. 13 (2003) 865). A bond transmits only tension, so that
+a partial cell under pressure closes.
 """
 
 from __future__ import annotations
@@ -22,8 +22,7 @@ from icha.support.parallel import blocks, on_cores
 ROUNDING, NO_CONTACT = 5e-7, 1e-9
 # Largest error after a correction, divided by the error before it; above, the iteration has stagnated.
 LARGEST_REMAINDER = 0.5
-# Error after one correction, divided by the error before it: while the active set changes, and the smallest possible in
-# single precision.
+# Error after one correction divided by the error before: while the active set changes; smallest in single precision.
 _COARSE_PART, _FINE_PART = 0.1, 1e-4
 # Smallest compliance of the half-space, 2/q at the shortest wave, in h/E*.
 _SMALLEST_COMPLIANCE = np.sqrt(2) / np.pi
@@ -89,7 +88,7 @@ class Topography:
     def gap(self, displacement: np.ndarray, separation: float, contact: Contact) -> np.ndarray:
         """Convert a field of displacements to the gap, displacement + separation - height, in place.
 
-        At cells in contact the gap is computed from heights in double precision. The field keeps its own precision.
+        At cells in contact the gap is computed from heights in double precision. The field keeps its precision.
         """
         heights = self.single if displacement.dtype == np.float32 else self.double
         inside = displacement.ravel()[contact.cells] - (self.double.ravel()[contact.cells] - separation)
@@ -112,7 +111,7 @@ class ElasticContact(Contact):
     gap : (n, n), gap at the grid nodes.
     separation : mean separation.
     misfit : (k,), error of the displacement of each cell in contact; at most `tolerance`.
-    tolerance : largest allowed error of these displacements.
+    tolerance : largest allowed error of the displacements of cells in contact.
     """
 
     gap: np.ndarray = field(repr=False)
@@ -135,6 +134,7 @@ def solve_active_set(
 
     Parameters
     ----------
+    contact : initial contact; its cells and pressures are the start of the iteration.
     tolerance : largest allowed error of displacements in contact, in cell sizes. With a tolerance above the rounding
         error of single precision, all fields are computed in single precision.
     separation : mean separation, in cell sizes; ignored if `load` is given.
@@ -144,7 +144,7 @@ def solve_active_set(
     Raises
     ------
     FullContact
-        If all cells are closed at a given separation. The separation is the mean gap, so there is no such solution.
+        If all cells close at a given separation, which is impossible because the separation is the mean gap.
     """
     dtype = np.float32 if tolerance > topography.rounding else float
     keep, gap, before, changing = np.full(len(contact.cells), sticky), None, np.inf, not sticky

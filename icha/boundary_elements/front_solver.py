@@ -4,7 +4,7 @@ Every step lowers the energy U(f) - dgamma A(f), the elastic energy minus the wo
 minimum of the energy. An unstable front runs until it is in equilibrium. A step solves three linearised equations: the
 gap of closed cells is zero, the tension at the front is fraction times strength, and the strength depends on the
 fractions of neighbours. A step that raises the energy is repeated with more damping, that is with softer bonds, which
-makes the step shorter (Levenberg-Marquardt method).
+shortens the step (Levenberg-Marquardt method).
 """
 
 from __future__ import annotations
@@ -42,14 +42,14 @@ class FrontTolerances:
     front : largest residual of a converged front. For comparison, the grid causes relative errors of areas and loads
         of about 1e-3.
     stagnation : largest residual at which a front is accepted although no step lowers its energy.
-    displacement : largest error of displacements in a converged contact.
+    displacement : error of displacements in a converged contact; pressures are never solved more accurately.
     moving_displacement : largest error of displacements in the first steps. After a step, the allowed error is
         residual * min(moving_displacement, max(residual, linear[0])).
     certain_displacement : error of displacements at which the energies of two similar states can be compared.
     linear : smallest and largest relative error of the linearised equations; between them the error is the residual.
     local : residual above which cells are relaxed locally and damped.
-    few : part of the cells at the front. If fewer cells have residuals above `local_few`, only these are relaxed.
-    local_few : residual above which cells are relaxed locally if they are few.
+    few : part of the front, 0 to 1. If a smaller part has residuals above `local_few`, its cells are relaxed locally.
+    local_few : residual above which cells are relaxed locally if they are a smaller part of the front than `few`.
     damping : damping of the bonds after the first step that raises the energy; twice as large if most of the front
         is far from equilibrium at the start.
     """
@@ -69,8 +69,7 @@ class FrontTolerances:
 TOLERANCES = FrontTolerances()
 # Largest numbers of steps, of Krylov vectors, of local relaxations between steps; largest damping.
 _MAX_STEPS, _MAX_KRYLOV, _MAX_LOCAL_RELAXATIONS, _LARGEST_DAMPING = 400, 60, 5, 1e8
-# Largest error of displacements in units of the critical opening, divided by the residual of the front that depends on
-# these displacements.
+# Allowed error of displacements in units of the critical opening, divided by the allowed residual of the front.
 _ACCURACY = 1e-3
 # Relative rounding error of the energy, and relative rounding error of the work of a step.
 _ENERGY_ROUNDING, _WORK_ROUNDING = 1e-12, 1e-11
@@ -202,8 +201,8 @@ def relax_front(
     tolerance : largest allowed residual of the front.
     close : whether the initial contact is close to equilibrium.
     max_steps : number of steps after which the contact is returned, even if it has not converged.
-    relax_locally : function that relaxes the front of a state around given cells, (m,). It returns None where local
-        relaxation would not save time.
+    relax_locally : function that relaxes the front of a state around given cells, (m,). The function returns None if
+        local relaxation would not save time.
 
     Raises
     ------
@@ -248,7 +247,7 @@ class FrontRelaxation:
     """
 
     def __init__(self, problem: FrontProblem, contact: Contact, close: bool):
-        """Solve the elastic contact of the initial contact; `close` means that it is close to equilibrium."""
+        """Solve the elastic contact of the initial contact; `close`: whether this contact is close to equilibrium."""
         self.problem, self.damping, self.local_relaxations, self.steps = problem, 0.0, 0, 0
         self.start = TOLERANCES.certain_displacement if close else TOLERANCES.moving_displacement
         self.coarsest = self.start
@@ -257,9 +256,9 @@ class FrontRelaxation:
         self.state = contact
 
     def refine(self, accuracy: float) -> bool:
-        """Solve the pressures again unless displacement errors are at most `accuracy`; return whether it did so.
+        """Solve the pressures again unless displacement errors are at most `accuracy` (in critical openings).
 
-        accuracy : in units of the critical opening; at least TOLERANCES.displacement is used.
+        Return whether the pressures were solved again.
         """
         accuracy = max(accuracy, TOLERANCES.displacement)
         if self.problem.is_accurate(self.state, accuracy):
@@ -268,7 +267,7 @@ class FrontRelaxation:
         return True
 
     def relax_locally(self, active: ActiveCells, relax: Callable) -> bool:
-        """Relax the front around cells far from equilibrium, if that lowers the energy; return whether it did."""
+        """Relax the front around cells far from equilibrium; keep the result and return True if the energy is lower."""
         far, few = active.cells_to_relax()
         if not far.any() or self.local_relaxations >= (_MAX_LOCAL_RELAXATIONS if few else 1):
             return False
@@ -318,10 +317,7 @@ class FrontRelaxation:
         self._damp(8, active.residual)
 
     def _damp(self, factor: float, residual: float) -> None:
-        """Raise the damping by a factor after a failed step, and solve the pressures more accurately.
-
-        Raise `Stagnation` if the damping is too large.
-        """
+        """Raise the damping and solve the pressures more accurately after a failed step, or raise `Stagnation`."""
         self.coarsest = min(self.coarsest, TOLERANCES.certain_displacement)
         self.refine(min(self.coarsest, _ACCURACY * residual))
         self.damping = max(factor * self.damping, TOLERANCES.damping)
@@ -379,9 +375,7 @@ class LinearisedFront:
         self.unit = np.float32(front.strength or 1.0)
 
     def solve(self, right: np.ndarray, accuracy: float) -> tuple[np.ndarray, np.ndarray]:
-        """Solve for the changes of fraction and pressure, (k,) each, to a relative error of at most `accuracy`.
-
-        right : (k,), right-hand side of the equations, in cell sizes.
+        """Solve for the changes of fraction and pressure, (k,) each, with a right-hand side, to a relative accuracy.
 
         Raises
         ------
@@ -435,10 +429,7 @@ class LinearisedFront:
 
 
 def gmres(matrix: Callable, preconditioner: Callable, right: np.ndarray, accuracy: float) -> np.ndarray:
-    """Solve linear equations by right-preconditioned GMRES without restart, in at most _MAX_KRYLOV steps.
-
-    matrix, preconditioner : functions that return the product with a vector. accuracy : relative residual to reach.
-    """
+    """Solve linear equations by right-preconditioned GMRES to a relative accuracy, or until _MAX_KRYLOV steps."""
     norm = float(np.linalg.norm(right))
     if norm == 0:
         return np.zeros_like(right)

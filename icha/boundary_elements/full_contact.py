@@ -65,7 +65,7 @@ class FullContactProblem(MaterialUnits):
 
     @property
     def opening_pressure(self) -> float:
-        """Nominal pressure at which full contact opens on unloading, Pa; negative in tension."""
+        """Nominal pressure at which full contact opens on unloading, Pa; negative if this is a tension."""
         return -float(self.full_contact_pressure.min()) - self.interface_strength
 
     def full_contact(self, pressure: float) -> CellState:
@@ -80,14 +80,11 @@ class FullContactProblem(MaterialUnits):
 
     @property
     def closing_pressure(self):
-        """Nominal pressure, Pa, given to full contact at an imposed separation, which does not determine it.
-
-        The value only has to be larger than all targets.
-        """
+        """Nominal pressure assigned to full contact at an imposed separation, Pa: a value above all targets."""
         return 10 * max(float(np.abs(self.full_contact_pressure).max()), self.interface_strength)
 
     def open_weakest(self, separation):
-        """Return full contact with the cells of lowest pressure removed, enough cells for a given mean gap (m)."""
+        """Return a start for the solver: full contact without the cells of lowest pressure, for a mean gap (m)."""
         pressure = self.full_contact_pressure.ravel() - self.full_contact_pressure.min()
         # Around the first gap the tension is the strength of a front, not the tension that opened the gap.
         pressure -= self.front.strength * self.contact_modulus

@@ -109,7 +109,7 @@ class Bracket:
         Raises
         ------
         NotConverged
-            If the two separations are equal, or if the predicted one is not finite while `beyond` is unknown.
+            If the separations of both states are equal, or if the prediction is not finite while `beyond` is unknown.
         """
         if self.beyond is None:
             if np.isfinite(separation):

@@ -1,8 +1,9 @@
 """Local relaxation: move parts of the front that are far from equilibrium to equilibrium, in small windows.
 
-Parts of the front are far from equilibrium after new contact, where two patches meet, or after a long step. Such parts
-hardly affect each other. A Fourier transform of a window takes much less time than one of the whole grid, so nearly all
-of the front is relaxed in windows. Steps of the whole contact then account for the interaction between the parts.
+Parts of a front are far from equilibrium after new contact, where two patches meet, or after a long step. These parts
+hardly affect each other before they are relaxed. A Fourier transform of a window takes much less time than a transform
+of the whole grid, so nearly all of the front is relaxed in windows. Steps of the whole contact then account for the
+interaction between the parts.
 """
 
 from __future__ import annotations
@@ -160,7 +161,7 @@ class Places(NamedTuple):
 
 
 def _boxes(labels):
-    """Return the bounding box of each label: rows and columns, in blocks; from negative numbers across the period."""
+    """Return the box (rows, columns) around each label, in blocks; a box across the period has negative numbers."""
     half = len(labels) // 2
     boxes = []
     rolled = np.roll(labels, (half, half), (0, 1))

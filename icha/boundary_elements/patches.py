@@ -110,7 +110,7 @@ def free_edges(cells: np.ndarray, grid: int) -> np.ndarray:
 
 
 def patch_centres(cells: np.ndarray, grid: int, labels: np.ndarray, count: int, weight: np.ndarray) -> np.ndarray:
-    """Return the centre (x, y) of each patch, (count, 2), in cell sizes: the mean position of its weighted cells."""
+    """Return the centre (x, y) of each patch, (count, 2), in cell sizes: the weighted mean position of its cells."""
     turn = np.exp(2j * np.pi * np.arange(grid) / grid)
     result = np.empty((count, 2))
     for axis, at in enumerate((cells % grid, cells // grid)):
@@ -162,7 +162,7 @@ def patch_events(
 
 
 def _events(kind, state, labels, count, energy_of_cells, which, sign, summits, grid, spacing):
-    """Return events of one kind for the patches `which`, (k,), from 0; energy released is sign * patch energy or 0."""
+    """Return one event for each patch in `which`, (k,), from 0; it releases sign * energy of the patch, at least 0."""
     if not len(which):
         return Events.concatenate(())
     energy = np.bincount(labels, energy_of_cells(state), count + 1)[1:]

@@ -52,11 +52,7 @@ _CHECKS = LOOP_CHECKS | {
 
 
 def check_run(run: xr.Dataset, subject: str = "") -> tuple[Check, ...]:
-    """Check a dataset of `icha.simulate`, and return the results of all checks of the run.
-
-    Values must be finite, converged, at their targets and monotone on loading, and the distributions consistent.
-    subject : name of the run, for the results.
-    """
+    """Return the results of all checks of a dataset of `icha.simulate`; `subject` is the name of the run."""
     return check_variables(run.variables, run.attrs, subject)
 
 

@@ -37,12 +37,13 @@ def icha(
         typer.Option("--version", help="Print the version and exit.", callback=_print_version, is_eager=True),
     ] = False,
 ) -> None:
-    """Adhesive contact of rough surfaces: campaigns of runs from one YAML file.
+    """Compute adhesive contacts of rough surfaces; one YAML file describes a campaign of runs.
 
-    Write a campaign with `icha new NAME`. See what it will compute with `icha describe NAME`. Compute it with
-    `icha run NAME`.
+    `icha new NAME` writes the file of a new campaign. `icha describe NAME` prints what the campaign will compute.
+    `icha run NAME` computes the campaign.
 
-    Exit status: 0 on success, 1 if a job, a check or a file has failed, 2 if the call or the configuration is wrong.
+    Exit status: 0 on success, 1 if a job, a check or a file has failed, 2 if the command line or the configuration is
+    invalid.
     """
 
 
@@ -51,5 +52,5 @@ for command in (new, describe, run, show, explore, check, verify, reproduce, upl
 
 
 def main() -> None:
-    """Run the command line."""
+    """Start the command `icha` with the arguments of the command line."""
     app()

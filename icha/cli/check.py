@@ -1,4 +1,4 @@
-"""The command `icha check`: check the format of files, and the identities of the physics in their results."""
+"""The command `icha check`: check the format of files, and whether their results obey identities of the physics."""
 
 from pathlib import Path
 from typing import Annotated
@@ -12,10 +12,10 @@ from icha.support.formatting import format_count, printable
 def check(
     files: Annotated[list[Path], typer.Argument(help="Runs, surfaces, campaign datasets or other results.")],
 ) -> None:
-    """Check files: names, dimensions, units and attributes of their variables, and the physics of the results.
+    """Check the variables, units and attributes of files, and whether results obey identities of the physics.
 
-    The command checks all files, also after a problem, and prints all problems. Exit status: 0 if no file has problems,
-    1 if a file has problems, 2 if ICHA cannot read a file.
+    The command prints all problems of all files. Exit status: 0 if no file has problems, 1 if a file has problems, 2 if
+    ICHA cannot read a file.
     """
     from icha.datasets.format import CAMPAIGN, RUN, SOLUTION, SURFACE, UnknownFile, identify_file
 
@@ -28,7 +28,7 @@ def check(
             status = WRONG
             continue
         if kind not in (RUN, SURFACE, CAMPAIGN, SOLUTION):
-            echo(f"{file}: {kind}; readable; ICHA has no checks for it")
+            echo(f"{file}: {kind}; ICHA can read this file, but has no checks for this kind of file")
             continue
         try:
             problems, count = _problems(kind, data)
@@ -46,7 +46,7 @@ def check(
 
 
 def _problems(kind, data) -> tuple[list[str], int]:
-    """Return all problems of a file, and the number of checks of its numbers."""
+    """Return the problems of a file, and the number of checks that its results have undergone."""
     from icha.analysis.checks import COMPLETED, check_campaign, check_solution
     from icha.checks.run import check_run
     from icha.datasets.format import RUN, SOLUTION, SURFACE, problems_with_file

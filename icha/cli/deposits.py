@@ -20,19 +20,19 @@ from icha.support import formatting
 from icha.support.formatting import format_count, printable
 
 TOKEN = "ZENODO_TOKEN"
-MOST_PROBLEMS = 100  # printed of a damaged deposit
+MOST_PROBLEMS = 100  # problems that are printed for a damaged deposit
 
 Deposit = Annotated[Path, typer.Argument(help="Folder of a deposit, or its zip.", show_default=False)]
 
 
 def verify(deposit: Deposit, large: Large = False) -> None:
-    """Verify a deposit: it must contain all its files with the right checksums, and no others.
+    """Verify that a deposit contains all its files with the right checksums, and no other files.
 
-    Names that lead outside the deposit, links, devices, and zips that unpack to far more than their size are also
-    problems. A zip is unpacked into a temporary folder. Nothing in the deposit is executed.
+    Other problems are file names that lead outside the deposit, links, devices, and zip files that unpack to far more
+    than their size. A zip is unpacked into a temporary folder. No code of the deposit is executed.
 
-    Exit status: 0 if the deposit is intact, 1 if not (the command prints the first hundred problems), 2 if the file or
-    folder does not exist.
+    Exit status: 0 if the deposit is intact, 1 if the deposit is damaged (the command prints the first hundred
+    problems), 2 if the file or folder does not exist.
     """
     try:
         with _intact(deposit, large) as folder:
@@ -43,12 +43,12 @@ def verify(deposit: Deposit, large: Large = False) -> None:
 
 
 class _Damaged(UserError):
-    """A damaged deposit."""
+    """Error: a deposit is damaged."""
 
 
 @contextlib.contextmanager
 def _intact(deposit: Path, large: bool) -> Iterator[Path]:
-    """Verify a deposit and provide its folder, unpacked if it is a zip."""
+    """Verify a deposit and yield its folder; a zip is first unpacked into a temporary folder."""
     from icha.deposit.verify import DamagedDeposit, whole_deposit
 
     if not deposit.exists():
@@ -83,22 +83,23 @@ def reproduce(
     folder: Annotated[
         Path | None,
         option(
-            "Folder to compute in; a call with the same folder continues there. Default: a temporary folder, which is "
-            "removed if everything is reproduced."
+            "Folder for the new results; a later command with the same folder continues. Default: a temporary folder, "
+            "which is removed if everything is reproduced."
         ),
     ] = None,
     cores: Cores = None,
     anyway: Anyway = False,
     large: Large = False,
 ) -> None:
-    """Compute a deposit again and compare every number with the published one.
+    """Compute the results of a deposit again and compare every number with the published number.
 
-    The deposit is verified and not changed. The installed ICHA runs the configuration of the deposit. ICHA and its
-    packages must have the versions of the deposit. Nothing in the deposit is executed. Every computed variable is
-    compared: identical, within tolerance, or different. With `--only smallest` this takes minutes.
+    The command verifies the deposit and does not change it. The installed ICHA computes the configuration of the
+    deposit. ICHA and its packages must have the same versions as for the deposit. No code of the deposit is executed.
+    The command reports each variable as identical, within tolerance, or different. With `--only smallest` the command
+    takes some minutes.
 
-    Exit status: 0 if all is identical or within tolerance, 1 if not, or if the computation fails or is stopped, 2 if
-    the deposit is damaged or missing, or cannot be computed again.
+    Exit status: 0 if all variables are identical or within tolerance, 1 if a variable differs or the computation
+    fails or is stopped, 2 if the deposit is damaged or missing, or cannot be computed again.
     """
     from icha.deposit.compare import compare_folders
     from icha.deposit.reproduce import RerunError, add_surfaces, campaign_name, find_runs, prepare_rerun
@@ -134,7 +135,7 @@ def reproduce(
 
 
 def _introduce(deposit: Path, original: Path, folder: Path | None) -> None:
-    """Print the size of a deposit and what computes it again; refuse it if it was made with other versions."""
+    """Print the size of a deposit and the program that computes it; raise `RerunError` if program versions differ."""
     from icha.deposit.reproduce import RerunError, other_versions
 
     echo(f"deposit:    {printable(deposit)}, {_contents(original)}")
@@ -148,7 +149,7 @@ def _introduce(deposit: Path, original: Path, folder: Path | None) -> None:
 
 
 def _run(project: Path, targets: list[str], cores: int | None, anyway: bool) -> int:
-    """Run the configuration in a folder with the installed program; return the exit status."""
+    """Compute targets of the configuration in a folder with the installed workflow; return the exit status."""
     from icha.datasets.results import CONFIGURATION
     from icha.support.program import own_workflow
 
@@ -162,7 +163,7 @@ def _run(project: Path, targets: list[str], cores: int | None, anyway: bool) -> 
 
 
 def _print_comparison(comparison) -> bool:
-    """Print the comparison; return whether everything is reproduced."""
+    """Print the comparison of deposit and new results; return whether all values are reproduced."""
     from icha.deposit.compare import DIFFERENT, IDENTICAL, TOLERANCE, format_comparison
 
     echo(f"\ncomparison of the deposit with the new results:\n\n{format_comparison(comparison)}\n")
@@ -187,20 +188,21 @@ def upload(
     draft: Annotated[
         int | None,
         option(
-            "Upload into this draft, for example after a failed upload; files in it are not sent again.", metavar="ID"
+            "Continue this draft, for example after a failed upload; files in the draft are not sent again.",
+            metavar="ID",
         ),
     ] = None,
     yes: Annotated[bool, typer.Option("--yes", "-y", help="Do not ask for confirmation.")] = False,
     large: Large = False,
 ) -> None:
-    """Send a deposit to Zenodo as a draft, after printing what is sent where and asking for confirmation.
+    """Send a deposit to Zenodo as a draft, after you have confirmed what is sent.
 
-    The deposit is verified first. The upload consists of the zip, README.md and ro-crate-metadata.json; title, authors,
-    licence and so on are those of the deposit. You can inspect, change and publish the draft on its page. The
-    environment variable ZENODO_TOKEN must hold a token with the scopes deposit:write and deposit:actions. Nothing is
-    sent before you confirm.
+    The command verifies the deposit and prints what it will send. It sends the zip, README.md and
+    ro-crate-metadata.json, with the title, authors and licence of the deposit. You can inspect, change and publish the
+    draft on its page at Zenodo. The environment variable ZENODO_TOKEN must contain a token with the scopes
+    deposit:write and deposit:actions.
 
-    Exit status: 0 if everything was sent, 1 if not, 2 if it cannot be sent.
+    Exit status: 0 if all files were sent, 1 if not all files were sent, 2 if the deposit cannot be sent.
     """
     from icha.deposit.metadata import read_zenodo_metadata, summary_of
     from icha.deposit.upload import Zenodo, server_address
@@ -247,7 +249,7 @@ def _token(address: str) -> str:
 
 
 def _send(server, files, metadata, number) -> None:
-    """Send files and metadata to a draft; if that fails, print how to continue."""
+    """Send files and metadata to a draft at Zenodo; if sending fails, print how to continue the draft."""
     from icha.deposit.upload import ZENODO, ZenodoError, md5_of
 
     draft = None
@@ -261,7 +263,7 @@ def _send(server, files, metadata, number) -> None:
                 server.remove(draft, name)
             else:
                 echo(f"{name}: another file of the draft, not changed")
-        # Metadata go before the files, since their errors are found at once.
+        # Metadata are sent before the files because the server reports errors in metadata at once.
         server.describe(draft, metadata)
         for path in files:
             if path.name in unchanged:
@@ -271,7 +273,7 @@ def _send(server, files, metadata, number) -> None:
             echo(f"{path.name}: sent, {'checksum confirmed' if arrived else 'the server returned no checksum'}")
         if draft.doi:
             echo(f"DOI:       {draft.doi} (reserved)")
-        echo("It is a draft. Inspect and publish it on its page.")
+        echo("The deposit is a draft. Inspect and publish the draft on its page.")
     except (ZenodoError, OSError, KeyboardInterrupt) as error:
         with contextlib.suppress(OSError):
             echo(f"Error: {'stopped' if isinstance(error, KeyboardInterrupt) else error}", err=True, fg="red")

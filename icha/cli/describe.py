@@ -1,4 +1,4 @@
-"""The command `icha describe`: what a campaign computes, what exists, and what the rest costs."""
+"""The command `icha describe`: print what a campaign computes, which results exist, and the cost of the others."""
 
 import statistics
 import sys
@@ -31,12 +31,12 @@ def describe(
     cores: Cores = None,
     folder: Folder = None,
 ) -> None:
-    """List the runs of a campaign, which of them exist, and the expected time, memory and disk space of the rest.
+    """Print what a campaign computes, which results exist, and the expected time, memory and disk space of the others.
 
-    Nothing is computed. Times are estimates, usually right within a factor of two. Once some runs are done, the
-    estimates use their times. A run counts as done if its file was made with the present settings; `icha run -n` also
-    detects changes of the program. For each measured surface, the command prints the number of summits, whether the
-    spectrum ends in noise, and what to do about it.
+    The command computes nothing. Times are estimates, usually right within a factor of two. If some runs are done, the
+    estimates use the times of these runs. A run counts as done if its file was made with the present settings;
+    `icha run -n` also detects changes of the program. For each measured surface, the command prints the number of
+    summits, whether the spectrum ends in noise, and recommended keys.
     """
     path = find_configuration(config)
     campaign = read_configuration(path).campaign
@@ -45,7 +45,7 @@ def describe(
 
 
 def _print_scans(campaign) -> None:
-    """Print what is known of the measured surfaces that a study uses."""
+    """Print the descriptions of the measured surfaces that are used by studies."""
     from icha.configuration.cases import run_cases
     from icha.configuration.surfaces import MeasuredSurface
     from icha.contact.models import MODELS
@@ -66,16 +66,16 @@ def _print_scans(campaign) -> None:
 
 
 def print_plan(path: Path, campaign, workflow: Path, home: Path, cores: int, *, runs=False, profile=None) -> None:
-    """Print what a campaign computes, what exists, the cost of the rest, and what prevents it.
+    """Print what a campaign computes, which results exist, the cost of the others, and reasons that prevent a run.
 
     Parameters
     ----------
-    path : the configuration file.
-    campaign : its content.
+    path : configuration file of the campaign.
+    campaign : content of the configuration.
     workflow : folder of the workflow.
-    home : folder that holds results/.
+    home : folder that contains results/.
     cores : number of cores in use.
-    runs : whether to list every file.
+    runs : whether to print a line for every file.
     profile : folder of the Snakemake profile in use; None is the default profile.
     """
     from rich.console import Console
@@ -135,7 +135,7 @@ def _print_files(console, items) -> None:
 
 
 def _print_sums(console, items) -> None:
-    """Print a table with a row for each kind of result."""
+    """Print a table of numbers of files, times, memory and disk space, with a row for each kind of result."""
     from rich.table import Table
 
     from icha.planning.costs import WORKFLOW
@@ -155,7 +155,7 @@ def _print_sums(console, items) -> None:
     further = start_up(items) + WORKFLOW.job * sum(item.to_do for item in items)
     headings = ("files", "done", "failed", "to do", "each", "core time", "memory", "disk")
     for heading, footer in zip(headings, cells(items, further), strict=True):
-        # A narrow terminal breaks the names, not the numbers.
+        # In a narrow terminal, names are wrapped and numbers are not.
         table.add_column(heading, footer="" if heading == "each" else footer, justify="right", no_wrap=True)
     for kind in dict.fromkeys(item.part for item in items):
         table.add_row(kind, *cells([item for item in items if item.part == kind]))

@@ -1,4 +1,4 @@
-"""The command `icha explore`: write a page on which a slider moves along the loading paths of a campaign."""
+"""The command `icha explore`: write a page that shows the contacts of a campaign step by step along their paths."""
 
 from pathlib import Path
 from typing import Annotated
@@ -20,18 +20,18 @@ def explore(
     seed: Annotated[list[int] | None, option("Only this seed; may be repeated.")] = None,
     size: Annotated[float, typer.Option(help="Largest size of the page, MB.")] = 20.0,
 ) -> None:
-    """Write a page on which a slider moves along the loading paths of a campaign.
+    """Write a page that shows the contacts of a campaign step by step along their loading paths.
 
-    On the page, choose a contact and a model. The slider changes the spots or patches on the topography, the marked
-    point on the curves, and the distributions. The page is one file and needs no network. If the page has no room for
-    all contacts, the command prints how many it has omitted.
+    On the page, choose a contact and a model, and move a slider along the path. The page shows the spots or patches on
+    the topography, the state on the curves, and the distributions. The page is one HTML file and needs no network. If
+    the page is too small for all contacts, the command prints how many contacts are omitted.
     """
     from icha.datasets.results import EXPLORER
     from icha.deposit.verify import CHECKSUMS
     from icha.report.explorer import write_explorer
 
     if output is None and (results / CHECKSUMS).is_file():
-        raise UserError(f"{results}: is a deposit, which must not change; choose another file with --output")
+        raise UserError(f"{results} is a deposit, which must not change; choose another file with --output")
     page = output or results / EXPLORER
     choices = {"study": study, "surface": surface, "material": material, "seed": seed}
     only = {name: values for name, values in choices.items() if values}
@@ -42,8 +42,8 @@ def explore(
     echo(f"{page}: {format_count(written.shown, 'contact')}, {written.size / 1e6:.1f} MB")
     if written.left_out:
         echo(
-            f"omitted, since the page would be larger than {size:g} MB: {format_count(written.left_out, 'contact')}. "
-            "Use --study, --surface, --material and --seed to choose others, or a larger --size"
+            f"omitted, because the page would be larger than {size:g} MB: {format_count(written.left_out, 'contact')}. "
+            "Choose other contacts with --study, --surface, --material and --seed, or use a larger --size"
         )
     if written.without_steps:
-        echo(f"omitted, since their runs reached no target: {format_count(written.without_steps, 'contact')}")
+        echo(f"omitted, because their runs reached no target: {format_count(written.without_steps, 'contact')}")

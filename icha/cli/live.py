@@ -1,4 +1,4 @@
-"""Progress of a running campaign, from the events of Snakemake, and its view in a terminal or a file."""
+"""Progress of a running campaign: events of Snakemake update it, and a view prints it to a terminal or a file."""
 
 import threading
 import time
@@ -18,27 +18,27 @@ from icha.cli.project import TARGETS
 from icha.support import formatting
 from icha.support.formatting import printable
 
-# Measured times outweigh expected ones once the jobs have taken this long, in s.
+# Core-seconds of finished jobs after which measured times have more weight than expected times.
 PRIOR_SECONDS = 5.0
 # Expected core-seconds of a job that the plan does not list. Such a job writes a few lines.
 DEFAULT_SECONDS = 0.1
 MOST_JOBS = 8  # running jobs in the live view
-MOST_ERROR_LINES = 3  # of a failed job in the view
+MOST_ERROR_LINES = 3  # lines of the error of a failed job in the view
 
 
 @dataclass
 class JobRecord:
-    """A job of Snakemake.
+    """A job that Snakemake has started.
 
     Attributes
     ----------
-    rule : name of its rule in Snakemake.
-    title : the message of the rule.
-    outputs : paths of its results.
-    log : path of its log; empty without a log.
-    started : time in s.
-    seconds : duration in s; 0 while the job runs.
-    threads : number of cores that it uses.
+    rule : name of the Snakemake rule of the job.
+    title : message of the rule, printed for the job.
+    outputs : paths of the files that the job writes.
+    log : path of the log file; empty for a job without a log.
+    started : time of the start, s.
+    seconds : duration, s; 0 while the job runs.
+    threads : number of cores that the job uses.
     """
 
     rule: str
@@ -54,19 +54,19 @@ class JobRecord:
 class Progress:
     """Jobs of a campaign, updated by the events of Snakemake.
 
-    Another thread must hold `lock` while it reads them.
+    Other threads must hold `lock` while they read the attributes.
 
     Attributes
     ----------
-    expected : rule and expected core-seconds of the job of an output file, by the path of the file.
-    clock : function that returns the time in s.
-    total : number of jobs by rule.
-    running : running jobs by their number.
+    expected : for the path of each output file, the rule of its job and the expected core-seconds of the job.
+    clock : function that returns the present time, s.
+    total : number of jobs of each rule.
+    running : running jobs, by their number in Snakemake.
     done : jobs that succeeded.
     failed : jobs that failed.
-    cores : number of cores in use; on a cluster, number of jobs that run at a time.
-    started : time of the first plan of Snakemake in s; None before.
-    called : time of the call of `icha run` in s.
+    cores : number of cores in use; on a cluster, largest number of jobs that run at the same time.
+    started : time at which Snakemake finished its first plan, s; None before this time.
+    called : time at which `icha run` was called, s.
     """
 
     expected: Mapping[str, tuple[str, float]] = field(default_factory=dict)
@@ -81,7 +81,7 @@ class Progress:
     lock: threading.RLock = field(default_factory=threading.RLock)
 
     def update(self, event: Mapping) -> JobRecord | None:
-        """Apply an event of the logger plugin; return the job that it ended, if any."""
+        """Update the jobs with an event of the logger plugin; return the job that has just ended, or None."""
         with self.lock:
             match event["event"]:
                 case "run_info":
@@ -121,7 +121,7 @@ class Progress:
     def seconds_left(self) -> float | None:
         """Estimate the time until all jobs are done, from expected and measured times; None before the first plan.
 
-        A job that cannot run because another one failed counts as a job that is still to run.
+        The estimate includes jobs that cannot run because another job failed.
         """
         if self.started is None:
             return None
@@ -141,7 +141,7 @@ class Progress:
     def _waiting_work(self, begun: list[JobRecord]) -> float:
         """Return the expected core-seconds of the jobs that have not begun.
 
-        Snakemake reports only their number by rule, so each counts as the mean over the files of this rule.
+        Snakemake reports only the number of waiting jobs of each rule, so each job counts as the mean of its rule.
         """
         outputs = {output for job in begun for output in job.outputs}
         expected: dict[str, list[float]] = {}
@@ -159,7 +159,7 @@ class Progress:
 
 
 def _complete_lines(job: JobRecord, folder: Path) -> list[str]:
-    """Read the complete lines in the log of a job; return an empty list without a log."""
+    """Return the complete lines in the log of a job; an empty list if the job has no log."""
     try:
         text = (folder / job.log).read_text(encoding="utf-8", errors="replace")
     except OSError:
@@ -168,9 +168,9 @@ def _complete_lines(job: JobRecord, folder: Path) -> list[str]:
 
 
 def read_error(job: JobRecord, folder: Path) -> list[str]:
-    """Return why a job failed: the lines of its log from the last one that begins with `Error:`.
+    """Return the reason of a failed job: the lines of its log from the last line that begins with `Error:`.
 
-    The list is empty if the log has no such line, for example because the job was killed.
+    The list is empty if no line begins with `Error:`, for example because the job was killed.
     """
     lines = _complete_lines(job, folder)
     starts = [number for number, line in enumerate(lines) if line.startswith("Error:")]
@@ -186,18 +186,18 @@ def read_last_line(job: JobRecord, folder: Path) -> str:
 
 
 class View:
-    """View of the jobs: in a terminal a table that is drawn again and again, otherwise a line for each finished job.
+    """View of the jobs: a table that is updated in a terminal, or one line for each finished job in a file.
 
     Parameters
     ----------
-    progress : the jobs.
+    progress : jobs that are shown.
     campaign : name of the campaign.
-    folder : folder from which paths of logs start.
-    console : the terminal or file.
+    folder : folder to which the paths of logs are relative.
+    console : terminal or file to which the view is printed.
     """
 
     def __init__(self, progress: Progress, campaign: str, folder: Path, console: Console):
-        """Store what is shown; `live` is the context in which the table is drawn."""
+        """Store the arguments; the context manager `live` draws the table in a terminal."""
         self._progress, self._campaign, self.folder, self._console = progress, campaign, folder, console
         self._is_live = console.is_terminal
         self.live = nullcontext()
@@ -209,7 +209,7 @@ class View:
         self._console.print(Text(printable(text), style=style), soft_wrap=True)
 
     def print_job(self, job: JobRecord, failed: bool) -> None:
-        """Print a finished job and the number of finished jobs; if there is a table, print only failed jobs."""
+        """Print a finished job and the number of finished jobs; in a terminal, print only failed jobs."""
         if self._is_live and not failed:
             return
         progress, total = self._progress, str(self._progress.job_count)

@@ -1,4 +1,4 @@
-"""The command `icha new`: write a campaign to start from."""
+"""The command `icha new`: write the configuration file of a new campaign."""
 
 import os
 import re
@@ -12,7 +12,7 @@ from icha.cli.project import CAMPAIGNS, UserError, echo, find_workflow, list_cam
 from icha.cli.scans import describe_scan, read_measured_section
 
 TEMPLATE = Path(__file__).parent / "templates/campaign.yaml"
-# Explanations of the keys of a configuration, for editors and for people.
+# Explanations of the keys of a configuration: the first file is for editors, the second for readers.
 SCHEMA, README = Path("workflow/schemas/config.schema.json"), Path("config/README.md")
 
 
@@ -23,17 +23,17 @@ def new(
     ] = None,
     data: Annotated[
         str | None,
-        option("Variable, dataset or channel of the measured file, if it contains several.", metavar="NAME"),
+        option("Variable, dataset or channel of heights, if the measured file has several.", metavar="NAME"),
     ] = None,
     pull_off: Annotated[bool, typer.Option("--pull-off", help="Add a study of pull-off and hysteresis.")] = False,
     boundary_elements: Annotated[
         bool, typer.Option("--boundary-elements", help="Add runs with boundary elements.")
     ] = False,
 ) -> None:
-    """Write a commented campaign, config/campaigns/NAME.yaml, and print the next commands.
+    """Write the file of a new campaign with comments, config/campaigns/NAME.yaml, and print the next commands.
 
-    The campaign runs without changes. With a measured file, first fill in the keys that the command lists. The command
-    also prints the number of summits of the scan, whether its spectrum ends in noise, and what to do about it.
+    The campaign runs without changes. For a measured topography, fill in the keys that the command lists. The command
+    also prints the number of summits of the topography, whether its spectrum ends in noise, and recommended keys.
     """
     from jinja2 import Template
 
@@ -41,7 +41,7 @@ def new(
 
     file = project() / CAMPAIGNS / f"{name}.yaml"
     if not re.fullmatch(NAME_PATTERN, name) or name.startswith("-"):
-        raise UserError(f"{name!r} is not a name; expected lower-case letters, digits, '_' and '-'")
+        raise UserError(f"{name!r} is not a valid name; expected lower-case letters, digits, '_' and '-'")
     if file.exists():
         raise UserError(f"{shorten_path(file)} exists already; choose another name, or remove it")
     if name in list_campaigns():
@@ -67,7 +67,7 @@ def new(
 
 
 def _schema() -> Path:
-    """Return the schema of configurations; outside a clone, copy it and the page on all keys to config/."""
+    """Return the path of the schema of configurations; outside a clone, copy schema and README.md to config/."""
     workflow, folder = find_workflow(), project()
     if workflow == folder:
         return folder / SCHEMA
@@ -79,7 +79,7 @@ def _schema() -> Path:
 
 
 def _print_section(section: dict) -> None:
-    """Print what is known of a scan, and the keys to fill in."""
+    """Print the description of a scan, and the keys that the user has to fill in."""
     to_scale = not section["to_fill_in"].keys() - {"boundary"}
     for line in describe_scan(section["name"], section["scan"], to_scale=to_scale):
         echo(line)

@@ -1,4 +1,4 @@
-"""Shared by all commands: options, printing, error messages, and the project that a command works in."""
+"""Functions for all commands: options, printing, error messages, and the folders of campaigns and results."""
 
 import os
 import re
@@ -23,7 +23,7 @@ DEFAULT_CORES = 2  # of profiles/default
 
 
 def option(help_text: str, *names: str, **settings):
-    """Declare an option without a printed default; `help_text` includes its default."""
+    """Declare an option whose default is not printed automatically; `help_text` states the default."""
     return typer.Option(*names, help=help_text, show_default=False, **settings)
 
 
@@ -37,7 +37,7 @@ Cores = Annotated[int | None, option("Number of cores to use. Default: 2.", "--c
 Folder = Annotated[
     Path | None,
     option(
-        "Folder that holds results/. Default: the clone, or the working directory.",
+        "Folder that contains results/. Default: the clone, or the working directory.",
         "--directory",
         "-d",
         resolve_path=True,
@@ -46,16 +46,16 @@ Folder = Annotated[
 
 
 def echo(text: object = "", *, err: bool = False, **style) -> None:
-    """Print text, to the standard error if `err`; `style` as in `typer.style`: `fg="red"`, `bold=True`."""
+    """Print text, to standard error if `err` is true; `style` as in `typer.style`, such as `fg="red"`."""
     typer.secho(printable_lines(text), err=err, **style)
 
 
 class UserError(Exception):
-    """A command that cannot be carried out; the message gives the reason and a remedy."""
+    """Error: a command cannot be carried out; the message gives the reason and a remedy."""
 
 
 def reports_errors(command: Callable) -> Callable:
-    """Decorate a command: print expected errors as a message and exit with a status, without a traceback."""
+    """Decorate a command so that an expected error prints its message and sets the exit status, without traceback."""
 
     def fail(message: object, status: int):
         echo(f"Error: {message}", err=True, fg="red")
@@ -71,7 +71,7 @@ def reports_errors(command: Callable) -> Callable:
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             raise typer.Exit(FAILED) from None
         except MemoryError as error:
-            fail(f"not enough memory: {error or 'all of it is in use'}", FAILED)
+            fail(f"not enough memory: {error or 'all memory is in use'}", FAILED)
         except OSError as error:  # a folder without permission, a full disk
             fail(f"{error.filename}: {error.strerror}" if error.filename and error.strerror else error, FAILED)
 
@@ -79,7 +79,7 @@ def reports_errors(command: Callable) -> Callable:
 
 
 def find_project() -> Path | None:
-    """Return the clone: the folder with the Snakefile, at or above the working directory."""
+    """Return the clone of ICHA that contains the working directory; None outside a clone."""
     for folder in (Path.cwd(), *Path.cwd().parents):
         if (folder / "Snakefile").is_file() and (folder / "workflow/rules/runs.smk").is_file():
             return folder
@@ -87,19 +87,19 @@ def find_project() -> Path | None:
 
 
 def project() -> Path:
-    """Return the folder that holds campaigns and results: the clone, else the working directory."""
+    """Return the folder of campaigns and results: the clone, or the working directory outside a clone."""
     return find_project() or Path.cwd()
 
 
 def find_workflow() -> Path:
-    """Return the folder of the Snakefile and its profiles: the clone, else the installed workflow."""
+    """Return the folder of the Snakefile and its profiles: the clone, or the installed workflow outside a clone."""
     return find_project() or own_workflow()
 
 
 def list_campaigns() -> dict[str, Path]:
-    """Return the configuration files that commands find by name: those of the project and those shipped with ICHA.
+    """Return the configuration files of the project and of ICHA by the names of their campaigns.
 
-    The default file has the name that is written in it.
+    The default file, config/config.yaml, has the name that is written in this file.
     """
     files: dict[str, Path] = {}
     for folder in (find_workflow(), project()):  # the project's files replace shipped ones of the same name
@@ -138,7 +138,7 @@ def read_configuration(path: Path):
     Raises
     ------
     UserError
-        With all errors of the configuration.
+        If the configuration has errors; the message lists all errors.
     """
     from icha.configuration.errors import ConfigurationError
     from icha.configuration.load import load_configuration
@@ -153,7 +153,7 @@ def read_configuration(path: Path):
 
 
 def read_profile(folder: Path) -> dict:
-    """Read the settings of a Snakemake profile; none if the folder has no config.yaml."""
+    """Read the settings of a Snakemake profile; return an empty dict if the folder has no config.yaml."""
     import yaml
 
     file = folder / "config.yaml"
@@ -161,6 +161,6 @@ def read_profile(folder: Path) -> dict:
 
 
 def shorten_path(path: Path) -> Path:
-    """Shorten a path for printing: relative to the working directory if it lies inside."""
+    """Shorten a path for printing: a path inside the working directory becomes relative to this directory."""
     path = Path(path)
     return path.relative_to(Path.cwd()) if path.is_absolute() and path.is_relative_to(Path.cwd()) else path

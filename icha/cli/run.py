@@ -39,7 +39,7 @@ from icha.support import formatting
 from icha.support.formatting import format_count
 
 STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-MOST_LINES = 12  # printed of the reason of a failure
+MOST_LINES = 12  # lines that are printed of the reason of a failure
 # Snakemake always prints these lines, before the reason why it ends.
 PREAMBLE = r"Using workflow specific profile|Assuming unrestricted|host: |Building DAG of jobs|total +\d+$"
 
@@ -50,7 +50,7 @@ def run(
         list[str] | None,
         typer.Argument(
             metavar="[TARGET]...",
-            help=f"Targets: {', '.join(TARGETS)}, or a file. Default: all. After `--`: options of Snakemake.",
+            help=f"Results to make: {', '.join(TARGETS)}, or a file. Default: all. After `--`: options of Snakemake.",
             show_default=False,
         ),
     ] = None,
@@ -60,18 +60,18 @@ def run(
     ] = None,
     folder: Folder = None,
     dry_run: Annotated[
-        bool, typer.Option("--dry-run", "-n", help="Only print the plan, and which jobs would run.")
+        bool, typer.Option("--dry-run", "-n", help="Print the plan and the jobs that would run; compute nothing.")
     ] = False,
     anyway: Anyway = False,
 ) -> None:
-    """Run a campaign; results that exist and are up to date are not computed again.
+    """Compute the results of a campaign that are missing or out of date.
 
-    In a terminal, a table shows the progress; otherwise the command prints a line for each finished job. At the end it
-    lists failures, and prints the paths of figures, dataset and report. Ctrl-C stops the campaign; the next call
-    continues.
+    In a terminal, a table shows the progress; otherwise the command prints a line for each finished job. At the end the
+    command prints failures, and the paths of figures, dataset and report. Ctrl-C stops the campaign; repeat the command
+    to continue.
 
-    Exit status: 0 if everything was made, 1 if something failed (the other jobs run nevertheless), 2 if the campaign
-    cannot be run, for example because memory or disk space is probably too small.
+    Exit status: 0 if all requested results exist, 1 if a job failed (independent jobs run nevertheless), 2 if the
+    campaign cannot start, for example because memory or disk space is probably too small.
     """
     from icha.planning.ownership import find_conflict
 
@@ -133,7 +133,7 @@ def run(
 
 
 def _profile_folder(profile: str | None, workflow: Path) -> Path:
-    """Find the folder of a profile by its path or its name."""
+    """Find the folder of a Snakemake profile by its path or its name; None means the default profile."""
     for path in (Path(profile or "default"), workflow / "profiles" / (profile or "default")):
         if (path / "config.yaml").is_file():
             return path.resolve()
@@ -147,7 +147,7 @@ def _refuse_if_too_large(items, targets: list[str], cores: int, results: Path, p
 
     if any(target.startswith("results/") for target in targets):
         return  # the cost of single files is unknown
-    # Resources of the command line precede those of the profile.
+    # Resources on the command line have priority over resources in the profile.
     resources = [each for each in targets if "=" in each] + profile.get("resources", [])
     if shortages := find_shortages(items, cores, results, profile | {"resources": resources}):
         lines = "\n  ".join(["this machine is probably too small:", *shortages])
@@ -155,7 +155,7 @@ def _refuse_if_too_large(items, targets: list[str], cores: int, results: Path, p
 
 
 def _dry_run(command: list[str], workflow: Path) -> str:
-    """Let Snakemake plan; return how many jobs of which kind would run, or exit with its reason."""
+    """Let Snakemake plan without jobs; return the numbers of jobs that would run, or print its error and exit."""
     done = subprocess.run(command, cwd=workflow, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
     if done.returncode == 0:
         return _planned_jobs(done.stdout)
@@ -164,7 +164,7 @@ def _dry_run(command: list[str], workflow: Path) -> str:
 
 
 def _planned_jobs(output: str) -> str:
-    """Summarise the output of a dry run: its table of jobs, and the results that the Snakefile marks as outdated."""
+    """Summarise the output of a dry run: the number of jobs of each rule, and the outdated results."""
     outdated = re.findall(r"^(?:.+, )?to be made again: .+$", output, re.MULTILINE)
     table = output.partition("Job stats:")[2].partition("\ntotal")[0]
     rows = re.findall(r"^(\w+) +(\d+)$", table, re.MULTILINE)
@@ -179,7 +179,7 @@ def _planned_jobs(output: str) -> str:
 
 
 def _reason_in(output: str) -> list[str]:
-    """Return why Snakemake ended without a failed job: the last lines after its plan, without tracebacks."""
+    """Return why Snakemake stopped although no job failed: the last lines after its plan, without tracebacks."""
     lines = [line for line in output.splitlines() if line.strip()]
     preamble = [number for number, line in enumerate(lines) if re.match(PREAMBLE, line)]
     lines = lines[preamble[-1] + 1 :] if preamble else lines
@@ -190,7 +190,7 @@ def _reason_in(output: str) -> list[str]:
 
 
 def _log_file(folder: Path, campaign: str) -> Path:
-    """Create a log file beside Snakemake's own logs."""
+    """Create an empty log file for `icha run` in the folder of Snakemake's own logs."""
     logs = folder / ".snakemake/log"
     try:
         logs.mkdir(parents=True, exist_ok=True)
@@ -218,7 +218,7 @@ def _run_snakemake(command: list[str], workflow: Path, log: Path, progress, view
     if sys.platform == "linux":
         environment["ICHA_CALLER"] = str(os.getpid())
     with view.live, log.open("w", encoding="utf-8") as output:
-        # In its own process group, Ctrl-C reaches Snakemake and its jobs once, from `stop`.
+        # Snakemake gets its own process group, so that Ctrl-C reaches Snakemake and its jobs only once, from `stop`.
         process = subprocess.Popen(
             command,
             cwd=workflow,
@@ -259,7 +259,7 @@ def _run_snakemake(command: list[str], workflow: Path, log: Path, progress, view
 
 
 def _listen(reading: int, progress, view, stopped: list) -> None:
-    """Read the events of Snakemake, one JSON object per line, until it ends."""
+    """Read the events of Snakemake, one JSON object per line, and update progress and view until Snakemake ends."""
     from icha.cli.live import read_error
 
     with open(reading, encoding="utf-8") as events:
@@ -292,7 +292,8 @@ def _print_outcome(status: int, stopped: bool, progress, campaign, folder: Path,
     if status and results.is_dir() and (reason := probe_folder(results)):
         # The logs are in this folder, too, so the jobs may have been unable to report the error.
         echo(
-            f"cannot write to {shorten_path(results)}: {reason.strerror}. Repair this and repeat the command", fg="red"
+            f"cannot write to {shorten_path(results)}: {reason.strerror}. Solve this problem and repeat the command",
+            fg="red",
         )
     if stopped or status < 0:
         echo("Stopped before the end. Repeat the command to continue.", fg="red")
@@ -300,7 +301,7 @@ def _print_outcome(status: int, stopped: bool, progress, campaign, folder: Path,
         heading = "Snakemake could not continue:" if ended else "Snakemake could not start:"
         _print_failure(heading, _reason_in(log.read_text(encoding="utf-8", errors="replace")), fg="red")
     elif status and progress.job_count > ended:
-        echo(f"{format_count(progress.job_count - ended, 'job')} not run, since they need results of failed jobs")
+        echo(f"{format_count(progress.job_count - ended, 'job')} not run, because they need results of failed jobs")
     if ended or not status:  # otherwise the existing files are those of an earlier call
         files = {"figures": "figures", "dataset": f"dataset/{campaign.name}.nc", "report": "report.html"}
         for name, file in files.items():
@@ -311,7 +312,7 @@ def _print_outcome(status: int, stopped: bool, progress, campaign, folder: Path,
 
 
 def _print_failures(status: int, stopped: bool, progress, campaign, folder: Path, log: Path) -> None:
-    """List runs without a result, and failed jobs."""
+    """Print the runs without a result and the failed jobs, each with its reason."""
     from icha.cli.live import read_error
     from icha.planning.plan import failed_runs
 
@@ -342,7 +343,7 @@ def _print_failure(heading: str, lines: list[str], **style) -> None:
 
 
 def _print_checks(campaign, results: Path) -> None:
-    """Print whether the checks passed, and whether the models are applicable."""
+    """Print how many checks of the results passed, and whether the models are applicable to the campaign."""
     import xarray as xr
 
     from icha.analysis.checks import read_checks

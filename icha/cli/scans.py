@@ -1,4 +1,4 @@
-"""Description of a scan before anything is computed, and its section in a new campaign."""
+"""Description of a scan (a measured topography) for the user, and its section in the file of a new campaign."""
 
 from __future__ import annotations
 
@@ -17,29 +17,29 @@ from icha.support.input_files import problem_with_path
 if TYPE_CHECKING:
     from icha.contact.models import Model
 
-# Largest share of filled points without a warning; the documentation recommends another measurement above.
+# Largest fraction of filled points without a warning. For more filled points another measurement is recommended.
 MOST_FILLED = 0.05
-# Guesses, in m, for keys that the file lacks, with which it can be read; and examples of values to fill in.
+# Values in m with which ICHA can read a file that lacks these keys; examples of values that the user fills in.
 GUESSES = {"height_unit": 1e-9, "size": (1e-4, 1e-4)}
 EXAMPLES = {"height_unit": "nm", "lateral_unit": "um", "size": "[90 um, 90 um]"}
 
 
 def describe_scan(name: str, scan, *, to_scale: bool = True, models: Iterable[Model] = ()) -> Iterator[str]:
-    """Return the lines that describe a scan.
+    """Return the lines in which `icha new` and `icha describe` describe a scan.
 
     Parameters
     ----------
     name : name of the surface.
-    scan : its `icha.surfaces.measured.resolution.ScanResolution`.
-    to_scale : whether the units of its heights and of its size are known.
-    models : the contact models of its runs; empty if not known yet.
+    scan : resolution of the scan (`icha.surfaces.measured.resolution.ScanResolution`).
+    to_scale : whether the units of the heights and of the side lengths are known.
+    models : contact models of the runs on the surface; empty if no runs are defined yet.
     """
     lines = [*_reading(scan), *_resolution(scan, to_scale, list(models)), *(_noise(scan) if to_scale else ())]
     return (f"{name}: {line}" for line in lines)
 
 
 def _reading(scan) -> Iterator[str]:
-    """Yield lines on the format of the file, missing points, and opposite edges that do not fit."""
+    """Yield lines on the format of the file, on points without a height, and on opposite edges that do not fit."""
     share = formatting.share(scan.filled, scan.points)
     filled = f"{format_count(scan.filled, 'point')} without height filled ({share} of all points)"
     array = f", `data: {printable(scan.data)}` of several" if scan.data else ""
@@ -70,8 +70,8 @@ def _resolution(scan, to_scale: bool, models: list[Model]) -> Iterator[str]:
     )
     if unsupported := len(scan.asperities.unsupported_height):
         yield (
-            f"the asperity model excludes {unsupported} of these summits, because the nodes around them do not support "
-            "them, as at steps, spikes, pits and plateaus"
+            f"the asperity model excludes {unsupported} of these summits, because the nodes around them do not have "
+            "the shape of a smooth summit (steps, spikes, pits, plateaus)"
         )
     reasons = scan.reasons_against_asperities
     if reasons and (not models or any(model.by_summits for model in models)):
@@ -108,26 +108,26 @@ def _noise(scan) -> Iterator[str]:
 
 
 def format_advice(advice: Mapping[str, float | int]) -> dict[str, str]:
-    """Return recommended keys with their values as written in a configuration."""
+    """Return the recommended keys, with their values as text for a configuration file."""
     return {key: formatting.length(value) if key == "cutoff" else str(value) for key, value in advice.items()}
 
 
 def read_measured_section(path: Path, data: str | None, folder: Path) -> dict[str, Any]:
-    """Read a measured topography and return its section for a configuration in a folder.
+    """Read a measured topography and return the section of this surface for a configuration file in `folder`.
 
     Returns
     -------
     name : name of the surface.
-    path : its file, relative to the configuration.
-    lines : keys that the file determines, and keys to fill in.
-    to_fill_in : reason for each key to fill in.
-    advice : recommended keys, as written in a configuration.
-    scan : its `icha.surfaces.measured.resolution.ScanResolution`.
+    path : file of the topography, relative to `folder`.
+    lines : lines of YAML, with the keys that the file determines and the keys that the user fills in.
+    to_fill_in : for each key that the user fills in, the reason.
+    advice : recommended keys, with their values as text.
+    scan : resolution of the scan (`icha.surfaces.measured.resolution.ScanResolution`).
 
     Raises
     ------
     UserError
-        If no setting can read the file, or its topography cannot be used.
+        If ICHA cannot read the file with any setting, or cannot use its topography.
     """
     import numpy as np
 
@@ -165,7 +165,7 @@ def read_measured_section(path: Path, data: str | None, folder: Path) -> dict[st
 
 
 def _load(path: Path, data: str | None):
-    """Load a scan; return it with guesses for the keys that the file lacks, and the reason for each missing key."""
+    """Load a scan; return the scan, guessed values of keys that the file lacks, and a reason for each missing key."""
     from icha.surfaces.measured.scan import load_scan
     from icha.surfaces.measured.settings import Preparation, UnfitTopography
 

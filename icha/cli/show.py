@@ -1,4 +1,4 @@
-"""The command `icha show`: print the content of a file with its main numbers."""
+"""The command `icha show`: print a summary of a file, with its main numbers."""
 
 from pathlib import Path
 from typing import Annotated
@@ -9,13 +9,13 @@ from icha.cli.project import UserError, echo
 from icha.datasets.attributes import reasons_not_applicable, why_no_result
 from icha.support.formatting import format_count, format_quantity, printable
 
-MOST_ROWS = 12  # of the table of steps
+MOST_ROWS = 12  # rows of the table of steps
 CURVES = {"contact_area_fraction": "A/A0", "reduced_pressure": "p*", "reduced_separation": "u/h_rms"}
 COLUMNS = ("reduced_pressure", "contact_area_fraction", "reduced_separation", "spot_count")
 
 
 def show(file: Annotated[Path, typer.Argument(help="A run, surface or campaign dataset (.nc).")]) -> None:
-    """Print the content of a file with its main numbers: a run, a surface or a campaign dataset."""
+    """Print a summary of a run, a surface or a campaign dataset, with its main numbers."""
     from icha.datasets.format import CAMPAIGN, RUN, SURFACE, UnknownFile, identify_file
 
     try:
@@ -78,7 +78,7 @@ def _print_run(run, file: Path) -> None:
 
 
 def _print_surface(surface, file: Path) -> None:
-    """Print attributes and statistics of a surface; for a scan, also the rms height and slope as measured."""
+    """Print attributes and statistics of a surface; for a scan, also the measured rms height and rms slope."""
     from icha.datasets.surface_file import measured_scale
 
     echo(f"{file}: {printable(surface.attrs.get('title', 'surface'))}")
@@ -102,7 +102,7 @@ def _print_surface(surface, file: Path) -> None:
 
 
 def _print_campaign(tree, file: Path) -> None:
-    """Print sizes, models, ranges of results and failures of every study."""
+    """Print, for each study of a campaign, its size, models, ranges of results and failed runs."""
     from icha.datasets.labels import LABELS, labels_at
     from icha.datasets.variables.campaign import BEYOND_MODEL
 
@@ -126,7 +126,7 @@ def _print_campaign(tree, file: Path) -> None:
             echo(f"  model not applicable to {format_count(reasons.total(), 'run')}: {first}", fg="red")
         if "failure" in study:
             failure = study["failure"].transpose(*LABELS).values
-            # The loading of a run beyond its model is a result up to there.
+            # A run beyond its model has not failed: its loading up to the limit of the model is a result.
             failed = study["status"].transpose(*LABELS).values != BEYOND_MODEL
             for index in zip(*((failure != "") & failed).nonzero(), strict=True):
                 labels = ", ".join(map(str, labels_at(study, index, LABELS)))

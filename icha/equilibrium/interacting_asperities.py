@@ -65,8 +65,7 @@ class InteractingAsperities(AsperityContact):
     def mean_gap(self, state: ContactState) -> float:
         """Return the mean gap, m; on a periodic surface the mean separation.
 
-        On a free square the mean gap is the mean separation plus the mean displacement of the half-space. For this
-        displacement, the force of every spot acts at the centre of the spot.
+        On a free square it is the mean separation plus the mean displacement by point forces at the spots' centres.
         """
         if not self.asperities.free:
             return state.separation

@@ -87,8 +87,7 @@ class IterationState:
     def with_events(self, kind, position, members, energy=0.0, asperity=-1) -> IterationState:
         """Return a copy of the state with k more events of one kind in its log.
 
-        position : (k, 2) float, centres of the spots, m.
-        members, energy, asperity : values of the k events, (k,), or one value for all events.
+        position : (k, 2) float, m. The other arguments are arrays (k,), or one value for all events.
         """
         columns = (np.broadcast_to(each, len(position)) for each in (members, energy, asperity))
         rows = ((kind, *row) for row in zip(position, *columns, strict=True))

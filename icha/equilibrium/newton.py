@@ -34,13 +34,10 @@ _PAST_JUMP_OFF = 0.2
 
 
 def newton_step(equations: Equations, evaluation: Evaluation, size: float) -> tuple[Evaluation, bool, bool]:
-    """Take one Newton step, which is halved until the error of the equations is smaller than before the step.
+    """Take one Newton step, halved until the error is smaller than `size`, the error before the step in h_rms.
 
-    The step is computed with the approximate matrix, and if no such step reduces the error, with the exact matrix.
-    Return three values: the evaluation after the step, or the old evaluation if no step reduces the error; whether the
-    error is smaller; and whether the exact matrix was needed.
-
-    size : error before the step, in h_rms.
+    If no step with the approximate matrix reduces the error, the exact matrix is used. Return the evaluation after the
+    step, or the old evaluation if all steps fail; whether the error is smaller; and whether the matrix was exact.
     """
     for exact in (False, True):
         step, separation_step = _solve_step(equations, evaluation, exact)

@@ -43,8 +43,7 @@ class AsperityContact(MaterialUnits):
 
 # Status of a site: in contact, candidate for contact (only without adhesion), or removed.
 CONTACT, CANDIDATE, REMOVED = 1, 2, 3
-# The half-space is set up again when the number of sites has grown by the first factor, or more than the second
-# fraction of the sites has been removed.
+# The half-space is set up again if the number of sites has grown by the factor, or this fraction of them is removed.
 _GROWTH = 1.5
 _REMOVED_FRACTION = 0.25
 
@@ -158,11 +157,10 @@ class Sites:
         return replace(self, status=status)
 
     def compact(self) -> tuple[Sites, np.ndarray | None]:
-        """Delete the removed sites if they are over a quarter of all sites, or if the table has grown by over a half.
+        """Return the table without removed sites, if these are over a quarter or the table has grown by over a half.
 
-        The growth is measured from the last time the half-space was set up. Return the table, and the new index of
-        every site, (n + 1,) int: -1 for removed sites, and -1 as the last value. Return None as the index if no site is
-        deleted.
+        Return also the new index of every site, (n + 1,) int: -1 for removed sites, and -1 as the last value. If the
+        table is unchanged, the index is None. Growth is counted from the last time the half-space was set up.
         """
         removed = self.status == REMOVED
         if len(self) <= _GROWTH * self.arranged and np.count_nonzero(removed) <= _REMOVED_FRACTION * len(self):
@@ -217,8 +215,7 @@ class ContactState:
     site_of_asperity : (asperities,) int, site to which an asperity belongs: its own spot, a union that contains it, or
         a spot that covers it; -1 for an asperity out of contact.
     last_approach : (asperities,) float, approach of an asperity out of contact at its last evaluation, m.
-    last_separation : (asperities,) float, mean separation at the last evaluation of `last_approach`, m; inf if the
-        approach was not evaluated after the last contact.
+    last_separation : (asperities,) float, mean separation at this evaluation, m; inf if the approach is not known.
     residual : largest error of the equilibrium, in h_rms.
     barred_count : number of asperities beyond their jump-in approach that stay out of contact, because they have broken
         contact at this separation.

@@ -20,9 +20,7 @@ from icha.surfaces.square import periodic_difference
 def merge_overlapping(
     state: IterationState, evaluation: Evaluation, margin: float = 0.0, *, deep: bool = False
 ) -> IterationState:
-    """Replace pairs of overlapping spots by unions, and return the new state.
-
-    Each spot merges with at most one other spot. `set_union_heights` sets the heights of the unions afterwards.
+    """Replace pairs of overlapping spots by unions; each spot merges with at most one other. Return the new state.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
 """Cycles of loading and unloading: all equilibria of a path that continues after the first loading.
 
 On unloading every spot follows its stable branch until it jumps off. Unloading ends at complete separation or at a
-turning point. Unloading visits the separations of the loading again, so that both curves can be compared. These
+turning point. Unloading visits the separations of the loading again, so that both curves can be compared. The visited
 separations are called stations. Close to an event that changes the pressure, the steps become so short that the energy
 lost in the event is known accurately.
 """
@@ -93,10 +93,9 @@ class _Cycle:
     state : last equilibrium.
     leg : number of the leg, even on loading and odd on unloading.
     step_length : length of the next step, m.
-    event_at : end of the shortest trial step so far that contains the next event, as direction times separation, m; inf
-        if no event is known. Always inf for models that predict steps.
-    ahead : equilibria at the ends of trial steps that were too long, the next equilibrium last. Always empty for models
-        that do not predict steps.
+    event_at : end of the shortest trial step that contains the next event, as direction times separation, m; inf if no
+        event is known, and always for models that predict steps.
+    ahead : equilibria at the ends of trial steps that were too long, the next one last (models that predict steps).
     longest_part : longest step so far of those into which the last trial step is divided, m.
     accuracy : sums over all steps so far, and the accuracy that further steps need.
     stations : separations visited on loading, which unloading will visit again, ascending, m.
@@ -259,11 +258,10 @@ class _Cycle:
     def _find_equilibrium(self, separation, length, ahead=None):
         """Find the equilibrium at a separation, m, at the end of a step of a given length, m.
 
-        If the state `ahead` is given, it is this equilibrium, and only its events are found.
-
-        On unloading the spots together may lose their equilibrium before any single spot has reached its own jump-off.
-        Then, if the step is very short, the spot closest to jump-off breaks contact. If there is still no equilibrium,
-        the two, four, … spots closest to jump-off break contact.
+        If the state `ahead` is given, this state is the equilibrium, and only its events are found. On unloading the
+        spots together may lose their equilibrium before any single spot has reached its own jump-off. If this
+        happens in a very short step, the spot closest to jump-off breaks contact. If there is still no equilibrium, the
+        two, four, … spots closest to jump-off break contact.
         """
         contact, start = self.contact, self.state
         if ahead is not None:

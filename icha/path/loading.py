@@ -87,7 +87,6 @@ class PathProgress:
         Between targets the mean gap must be positive, unless the model is valid up to full contact. At a target the
         mean gap may be negative, because the range of targets is already limited.
 
-        before, after : states before and after the step.
         target : target that the state after the step meets; None if there is no such target.
         pending : targets that are not met yet, sorted.
         """

@@ -1,11 +1,10 @@
 """Loading and unloading at a finite range of attraction, with boundary elements, from no contact to no contact.
 
 The mean gap is prescribed, as in a stiff testing machine. Each solution starts from the last solution and therefore
-stays on the same branch until the branch ends. At the end of the branch the surfaces jump, and the energy that the jump
-releases is lost. The work done on the contact is minus the integral of the nominal pressure over the mean gap, by the
-trapezoidal rule. The work differs from the change of the stored energy by the energy that jumps dissipate, and by the
-error of the trapezoidal rule. If this difference is too large in a step, the step is halved, at most five times. The
-position of a jump within the smallest step remains unknown.
+stays on the same branch until the branch ends. At its end the surfaces jump, and the energy of the jump is lost.
+The work done on the contact is minus the integral of the nominal pressure over the mean gap, by the trapezoidal rule.
+The work differs from the change of the stored energy by the energy that jumps dissipate, and by the error of this rule.
+A step with too large a difference is halved, at most five times. Therefore the position of a jump remains uncertain.
 """
 
 import math
@@ -36,8 +35,7 @@ _START = 6.0
 # Error of the work of a step, over the surface energy, above which the step is halved; and largest number of halvings.
 _WORK_TOLERANCE = 1e-4
 _MAX_HALVINGS = 5
-# Largest relative error of the largest load, unless this load lies within a jump; and number of attempts to reach the
-# load within one step.
+# Largest relative error of the largest load, unless it lies within a jump; and number of attempts to reach the load.
 _LOAD_TOLERANCE = 1e-3
 _MAX_LOAD_SEARCHES = 12
 # A loop that takes more solutions than this does not end.

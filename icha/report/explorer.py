@@ -1,7 +1,7 @@
 """The page for exploring a campaign: one HTML file that needs neither network nor other files.
 
-It contains the library plotly.js, and a short script (`templates/explorer.js`) with the data of every contact. The same
-results and choices always give exactly the same file.
+The page contains the library plotly.js, a short script (`templates/explorer.js`), and the data of every contact. The
+same results and choices always give exactly the same file.
 """
 
 from __future__ import annotations
@@ -34,16 +34,16 @@ from icha.support.formatting import format_count, printable_lines
 
 # Labels that identify a contact, in the order of the lists on the page.
 CHOICES = ("study", "surface", "rms_slope", "material", "seed")
-# Cells along an edge of a topography, and of a map of contact, whose patches are finer.
+# Largest numbers of cells along an edge of a topography, and along an edge of a contact map, which has finer details.
 MOST_HEIGHTS, MOST_CELLS = 256, 512
 # Smallest pressure density on the page, as a fraction of the highest one: the tail of JKR is infinite.
 LEAST_DENSITY = 1e-3
-LEVELS = 255  # of a picture
-CONTACT_COLOUR = (230, 0, 13)  # red, green and blue, of spots and patches
+LEVELS = 255  # largest grey level of a picture
+CONTACT_COLOUR = (230, 0, 13)  # red, green and blue of spots and patches
 
 
 class PageSummary(NamedTuple):
-    """Summary of a page.
+    """Size of a page, and numbers of contacts on the page and omitted.
 
     Attributes
     ----------
@@ -62,15 +62,15 @@ class PageSummary(NamedTuple):
 def write_explorer(
     folder: str | os.PathLike, page: str | os.PathLike, *, only: Mapping[str, Collection] = {}, largest: float
 ) -> PageSummary:
-    """Write the page of a campaign.
+    """Write the page for exploring a campaign.
 
-    The first seed of each contact precedes the others, so that a small page contains all kinds of contacts.
+    The first seed of each contact precedes the other seeds, so that a small page contains all kinds of contacts.
 
     Parameters
     ----------
-    folder : the campaign's results.
-    page : the HTML file.
-    only : names of studies, surfaces and materials, and seeds to include, by `CHOICES`; all if omitted.
+    folder : folder of the results of the campaign.
+    page : HTML file to write.
+    only : for names in `CHOICES`, such as "study", the values to include; all values of other names are included.
     largest : largest size of the page, MB.
 
     Raises
@@ -112,20 +112,20 @@ def write_explorer(
 
 
 def _dataset(folder: Path) -> Path:
-    """Return the campaign dataset in a folder of results."""
+    """Return the path of the campaign dataset in a folder of results."""
     files = sorted(folder.glob(results.DATASET.format(campaign="*")))
     if len(files) != 1:
         count = f"{len(files)} campaign datasets" if files else "no campaign dataset"
-        raise ValueError(f"{folder}: has {count} in dataset/; expected the results of one campaign")
+        raise ValueError(f"{folder} has {count} in dataset/; expected a folder with the results of one campaign")
     return files[0]
 
 
 def _contacts(labels: list[RunLabels], only: Mapping[str, Collection]) -> list[list[RunLabels]]:
-    """Group runs that differ only in their model. The groups with the first seed of each contact come first."""
+    """Group the chosen runs that differ only in their model. Groups with the first seed of each contact come first."""
     for name, values in only.items():
         known = list(dict.fromkeys(getattr(run, name) for run in labels))
         if unknown := [value for value in values if value not in known]:
-            raise ValueError(f"{name} {unknown[0]}: not in this campaign; expected {', '.join(map(str, known))}")
+            raise ValueError(f"{name} {unknown[0]} is not in this campaign; expected {', '.join(map(str, known))}")
     contacts: dict[tuple, list[RunLabels]] = {}
     for run in labels:
         if all(getattr(run, name) in values for name, values in only.items()):
@@ -154,9 +154,9 @@ def _contact(campaign: xr.DataTree, folder: Path, labels: list[RunLabels]) -> di
 
 
 def _maps(folder: Path, labels: RunLabels, run: xr.Dataset) -> list[str] | None:
-    """Return the map of contact at every snapshot of a run with boundary elements; None if the run has no file.
+    """Return the contact map at every snapshot of a run with boundary elements; None for other runs or without a file.
 
-    Only the file of the run contains maps. The order of its snapshots may differ from that in the campaign dataset.
+    Only the file of the run contains maps. The order of snapshots in this file and in the campaign dataset may differ.
     """
     file = folder / results.RUN.format(**path_fields(labels))
     if not MODELS[labels.model].by_cells or not file.is_file():
@@ -176,7 +176,7 @@ def _printable(data):
 
 
 def _filled(campaign, data, *, library, largest, left_out=0, without_steps=0) -> str:
-    """Return the page as text."""
+    """Return the HTML text of the page."""
     return template("explorer.html").render(
         title=campaign.attrs.get("title", "Rough contact campaign"),
         campaign=campaign.attrs.get("campaign", ""),
@@ -203,7 +203,7 @@ def encode_floats(values: np.ndarray) -> str:
 
 
 def encode_topography(surface: xr.Dataset) -> dict:
-    """Return the heights of a surface file over its rms height: means over blocks of nodes, in 256 levels."""
+    """Return the heights of a surface file, divided by the rms height and averaged over blocks, in 256 levels."""
     heights = surface["height"].transpose("y", "x").values / float(surface["rms_height"])
     means = average_blocks(heights, MOST_HEIGHTS)
     low, high = float(means.min()), float(means.max())
@@ -222,9 +222,9 @@ def encode_run(run: xr.Dataset, maps: Sequence[str] | None) -> dict:
 
     Parameters
     ----------
-    run : a run of a campaign dataset, with at least one step.
-    maps : `encode_map` of every snapshot of boundary elements; None for asperities, whose spots are in the run, and if
-        the file with the maps is missing.
+    run : dataset of a run with at least one step.
+    maps : contact maps (from `encode_map`) at the snapshots of boundary elements. None for the asperity model, whose
+        spots are in `run`, and for boundary elements without a file of maps.
     """
     stops = zip(run["step_kind"].values.astype(str), run["step_target"].values, strict=True)
     return {
@@ -244,7 +244,7 @@ def encode_run(run: xr.Dataset, maps: Sequence[str] | None) -> dict:
 
 
 def _snapshot(run: xr.Dataset, snapshot: int, maps: Sequence[str] | None) -> dict:
-    """Return spots or patches of a snapshot, and the distributions of figures 3 and 8."""
+    """Return the spots or the contact map of a snapshot, and the distributions of figures 3 and 8."""
     by_cells = model_of(run.attrs).by_cells
     cell = float(run["period"]) ** 2
     areas = [patch_areas(run, snapshot)]
@@ -269,7 +269,7 @@ def _snapshot(run: xr.Dataset, snapshot: int, maps: Sequence[str] | None) -> dic
 
 
 def _points(curve) -> list[str]:
-    """Return the points of a curve of a single run."""
+    """Encode the x values and the y values of a curve of one run."""
     x, (y,) = curve
     return [encode_floats(x), encode_floats(y)]
 
@@ -300,7 +300,7 @@ def find_partners(one: xr.Dataset, other: xr.Dataset) -> list[int]:
 
     Parameters
     ----------
-    one : run with `step_kind`, `step_target`, `leg` and `mean_separation`.
+    one : dataset of the first run, with `step_kind`, `step_target`, `leg` and `mean_separation`.
     other : the other run, with the same variables.
     """
     legs, separations = other["leg"].values, other["mean_separation"].values

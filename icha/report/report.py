@@ -1,7 +1,7 @@
 """The report of a campaign: one HTML page that needs neither network nor other files.
 
-The same data always give exactly the same file. Long tables contain only their first rows; the page links to the data,
-which contain all rows.
+The same data always give exactly the same file. The page shows only the first rows of long tables, and links to the
+dataset, which contains all rows.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from icha.report.studies import summarise_study
 from icha.report.template import MOST_ROWS, write_page
 
 SOFTWARE = ("icha", "numpy", "scipy", "finufft", "xarray", "netCDF4", "matplotlib", "snakemake")
-FOLDED_ROWS = 30  # longer tables are folded
+FOLDED_ROWS = 30  # rows of a table; longer tables are folded
 
 
 @dataclass(frozen=True)
@@ -37,10 +37,10 @@ class ReportFigure:
     Attributes
     ----------
     name : name of the figure, such as `fig2_area_and_gap`.
-    caption : its caption.
-    png : its PNG file, which the page contains.
-    pdf : its PDF file, to which the page links.
-    studies : names of the studies whose runs it shows.
+    caption : caption of the figure.
+    png : PNG file of the figure, which the page contains.
+    pdf : PDF file of the figure, to which the page links.
+    studies : names of the studies whose runs the figure shows.
     """
 
     name: str
@@ -65,22 +65,22 @@ def write_report(
     citations: Sequence[str] = (),
     further_software: Sequence[str] = (),
 ) -> None:
-    """Write the report.
+    """Write the report of a campaign as an HTML page.
 
     Parameters
     ----------
-    path : the HTML file; links to other files are relative to its folder.
-    campaign : the campaign dataset, with title, summary and licence.
-    figures : in order; figures of one study are in its section, the others precede all studies.
+    path : HTML file to write; links to other files are relative to the folder of this file.
+    campaign : campaign dataset, with title, summary and licence.
+    figures : figures in their order. A figure of one study is in the section of this study, other figures come first.
     checks : results of `icha.analysis.checks.check_campaign`.
-    model_error : `icha.analysis.model_error.model_error` of the campaign, if it has boundary elements.
-    surfaces : surface files, with or without their heights, for statistics and power spectra.
+    model_error : result of `icha.analysis.model_error.model_error`; None for a campaign without boundary elements.
+    surfaces : datasets of the surfaces, with or without heights, for statistics and power spectra.
     configuration : text of the configuration as used.
-    dataset_path : file of the campaign dataset, for a link.
-    files : further files to link, by their titles.
-    results : folder of the campaign's results, for links.
-    citations : further sources to cite, such as those of measurements.
-    further_software : packages that this campaign needs besides `SOFTWARE`.
+    dataset_path : file of the campaign dataset, to which the page links.
+    files : further files to which the page links, by their titles.
+    results : folder of the results of the campaign, for links to runs and surfaces.
+    citations : further sources to cite, such as sources of measurements.
+    further_software : packages whose versions the page lists besides `SOFTWARE`.
     """
 
     def link(target):
@@ -126,9 +126,9 @@ def write_report(
 
 
 def _pictures(figures: Sequence[ReportFigure], campaign: xr.DataTree, link) -> list[dict]:
-    """Return the figures of the page: first those of no study or of several studies, then those of each study.
+    """Return the figures of the page: first the figures of several studies or none, then the figures of each study.
 
-    The number of a figure is that in its name. Captions give the numbers of missing and of pale runs.
+    The number of a figure is part of its name. Captions state how many runs are missing or drawn pale.
     """
     studies = list(campaign.children)
     pictures = [

@@ -1,4 +1,4 @@
-"""Table of the time and memory of the jobs of a campaign, which differ from one execution to the next."""
+"""Table of the times and the memory of the jobs of a campaign; these values differ between executions."""
 
 import json
 import os
@@ -10,7 +10,7 @@ from icha.support.atomic_files import whole_file
 def write_times(table: str | os.PathLike, benchmarks: str | os.PathLike) -> None:
     """Write the wall time and the peak memory of every job that has a benchmark file below a folder.
 
-    The memory of a job is the unique one (`max_uss`), since forks share the memory of their parent. It is 0 if the job
+    The memory is the part that a job does not share with its parent process (`max_uss`). The value is 0 if the job
     ended before the first measurement.
     """
     rows = ["job\tseconds\tmegabytes"]

@@ -19,7 +19,7 @@ from icha.figures.style import COLOURS, TWO_COLUMNS, in_style, logarithmic_axes,
 from icha.report.template import format_mean, per_cent
 from icha.support.formatting import format_quantity
 
-LEAST_POWER = 1e-16  # smaller fractions of the largest power are rounding errors
+LEAST_POWER = 1e-16  # smallest power that is not a rounding error, divided by the largest power
 
 
 def read_surface_statistics(path: str | os.PathLike) -> xr.Dataset:
@@ -29,7 +29,7 @@ def read_surface_statistics(path: str | os.PathLike) -> xr.Dataset:
 
 
 def summarise_surface(surface: xr.Dataset) -> dict:
-    """Return name, parameters and statistics of a surface file; for a scan, those of the heights as measured."""
+    """Return name, parameters and statistics of a surface file; for a scan, the statistics of the measured heights."""
     lengths = ("period", "rolloff_wavelength", "short_wavelength")
     scale = measured_scale(surface)
     return {
@@ -54,7 +54,7 @@ def list_sources(surfaces) -> list[dict[str, str]]:
 
 
 def picture_of_spectra(surfaces) -> str | None:
-    """Draw the power spectra, averaged over the seeds of each surface: a PNG in base64; None if no file has one."""
+    """Draw the power spectra, averaged over the seeds of each surface, as a PNG in base64; None without spectra."""
     members: dict[str, list] = {}
     for surface in surfaces:
         if "power_spectrum" in surface:
@@ -68,7 +68,7 @@ def picture_of_spectra(surfaces) -> str | None:
 
 @in_style
 def draw_spectra(members):
-    """Draw a curve for each surface; many surfaces have graded colours, and the legend names some of them."""
+    """Draw the mean power spectrum of each surface; if there are many surfaces, the legend names only some of them."""
     colours = graded_colours(len(members)) if len(members) > MOST_COLOURS else COLOURS
     named = some_of(list(members))
     figure = new_figure(TWO_COLUMNS, 3.4)
@@ -85,7 +85,7 @@ def draw_spectra(members):
 
 
 def summarise_errors(errors: xr.Dataset) -> dict:
-    """Return what the page prints about one entry of the model error: its ranges, and a row for each contact state."""
+    """Return the values for the section on one comparison of models: ranges of errors, and a row for each state."""
     rows = []
     for (surface, slope), material in itertools.product(
         surfaces_and_slopes(errors), errors["material"].values.tolist()

@@ -22,14 +22,14 @@ from icha.figures.select import asked_seeds, path_steps
 from icha.report.template import MOST_ROWS, format_mean, format_range, format_scientific
 from icha.support.formatting import choose_unit, format_quantity
 
-# Quantities in a table by the kind of its stops: two of pressure, contact area and mean gap.
+# For each kind of target, the quantities that a table shows: two of pressure, contact area and mean gap.
 SHOWN_AT = {
     "reduced_pressure": ("area", "gap"),
     "relative_load": ("area", "gap"),
     "area_fraction": ("pressure", "gap"),
     "mean_separation": ("pressure", "area"),
 }
-MOST_STOPS = 12  # columns of a table, evenly chosen
+MOST_STOPS = 12  # columns of a table; from more targets, 12 are chosen evenly
 FORMATS = {"pressure": format_scientific, "area": format_scientific, "gap": "{:.3f}".format}
 EVENT_COUNTS = ("spot_count", "jump_in_count", "jump_off_count", "coalescence_count")
 STATISTICS = ("asperity_count", "nayak_parameter", "stickiness", "tabor_parameter", "full_contact_energy_ratio")
@@ -44,7 +44,7 @@ LOSS_NAMES = {
 
 
 def summarise_study(campaign: xr.DataTree, name: str) -> dict:
-    """Return what the page prints about one study."""
+    """Return the values for the section of one study: numbers of runs, failures, materials, and tables of results."""
     dataset = campaign[name].to_dataset()
     status = dataset["status"].values
     axes = {label: dataset[label].values.tolist() for label in LABELS} | {"rms_slope": slopes_of(dataset)}
@@ -92,7 +92,7 @@ def _material(dataset: xr.Dataset) -> dict[str, str]:
 
 
 def _run(labels: RunLabels, run: xr.Dataset) -> dict:
-    """Return the statistics of a run; the numbers of events are those at the end of its first loading."""
+    """Return the statistics of a run; events are counted up to the end of its first loading."""
     loaded = np.flatnonzero(loading_stops(run).values)[-1:]
     return {
         "labels": labels,
@@ -109,7 +109,7 @@ def _run(labels: RunLabels, run: xr.Dataset) -> dict:
 
 
 def collect_states(run: xr.Dataset) -> dict[tuple[str, float], dict[str, float]]:
-    """Return reduced pressure, A/A0 and mean gap over h_rms at the targets of a loading, by kind and value."""
+    """Return reduced pressure, A/A0 and mean gap/h_rms at each target of a loading; keys: kind and value of target."""
     stops = path_steps(run)
     keys = zip(stops["step_kind"].values.tolist(), stops["step_target"].values.tolist(), strict=True)
     values = {
@@ -122,7 +122,7 @@ def collect_states(run: xr.Dataset) -> dict[tuple[str, float], dict[str, float]]
 
 
 def _stops_of(states) -> dict:
-    """Return the targets and the quantities that a table shows, from the states of its runs."""
+    """Choose the targets (at most `MOST_STOPS`) and the two quantities of a table of the given states."""
     keys = dict.fromkeys(key for stops in states for key in stops)
     kind = next((kind for kind, _ in keys), "reduced_pressure")
     targets = sorted(target for each, target in keys if each == kind)
@@ -136,7 +136,7 @@ def _stops_of(states) -> dict:
 
 
 def _table(runs) -> dict:
-    """Return rows with the states of every run."""
+    """Return the table with the states of every run at the targets."""
     states = [(labels, collect_states(run)) for labels, run in runs]
     table = _stops_of([stops for _, stops in states])
 
@@ -148,7 +148,7 @@ def _table(runs) -> dict:
 
 
 def _ensembles(dataset: xr.Dataset, runs: list[RunLabels]) -> list[tuple[dict, list[RunLabels]]]:
-    """Group runs that differ only in their seed; runs to which the model is not applicable are apart.
+    """Group runs that differ only in their seed; runs to which the model is not applicable form separate groups.
 
     Return the start of a table row for each group (labels, numbers of seeds and of requested seeds), and its runs.
     """
@@ -162,7 +162,7 @@ def _ensembles(dataset: xr.Dataset, runs: list[RunLabels]) -> list[tuple[dict, l
 
 
 def _means(dataset: xr.Dataset, complete: list[RunLabels]) -> dict:
-    """Return rows with means over seeds and their accuracy."""
+    """Return the table of means over seeds at the targets, with the accuracy of each mean."""
     groups = [(row, runs) for row, runs in _ensembles(dataset, complete) if row["asked"] > 1]
     variables = ["reduced_pressure", "contact_area_fraction", "reduced_separation", "leg", "step_kind", "step_target"]
     steps = dataset[[*variables, "step_count", "mean_gap", "rms_height", "boundary"]]
@@ -188,7 +188,7 @@ def _means(dataset: xr.Dataset, complete: list[RunLabels]) -> dict:
 
 
 def _loops(campaign: xr.DataTree, dataset: xr.Dataset, complete: list[RunLabels]) -> dict:
-    """Return pull-off and loss of the unloaded runs, averaged over seeds."""
+    """Return the tables of pull-off and hysteresis loss of runs with unloading, averaged over seeds."""
     if "hysteresis_loss" not in dataset:
         return {"rows": [], "parts": {}, "count": 0}
     runs = {labels: select_run(campaign, labels) for labels in complete}
@@ -201,7 +201,7 @@ def _loops(campaign: xr.DataTree, dataset: xr.Dataset, complete: list[RunLabels]
 
 
 def _loop(runs: list[xr.Dataset]) -> dict:
-    """Return the cells of runs that differ only in their seed."""
+    """Return the table cells with pull-off and loss, averaged over runs that differ only in their seed."""
 
     def values(name):
         return np.array([float(run[name]) for run in runs])

@@ -1,4 +1,4 @@
-"""Templates of the pages, and the formats of numbers and symbols on them."""
+"""Templates of HTML pages, and functions that format numbers and symbols on the pages."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from icha.support.atomic_files import whole_file
 from icha.support.formatting import printable_lines
 from icha.support.statistics import ENOUGH, ensemble
 
-MOST_ROWS = 300  # of a table
+MOST_ROWS = 300  # rows of a table
 # Symbols in captions and attributes, and their form on a page.
 SYMBOLS = {
     r"h(?:&#39;|')_?rms": "<i>h</i>′<sub>rms</sub>",
@@ -45,13 +45,13 @@ def format_scientific(value: float | None) -> Markup:
 
 
 def per_cent(value: float, *, signed: bool = True) -> str:
-    """Format a fraction in per cent, to a tenth, with a typographic minus sign."""
+    """Format a fraction in per cent, with one decimal and a typographic minus sign."""
     text = f"{100 * value:+.1f}" if signed else f"{100 * value:.1f}"
     return text.replace("+0.0", "0.0").replace("-0.0", "0.0").replace("-", "−")
 
 
 def format_mean(values: np.ndarray, form) -> Markup:
-    """Format a mean and its accuracy; `form` formats a number."""
+    """Format the mean of values, and its accuracy (`format_range`); the function `form` formats one number."""
     text = format_range(values, form)
     return Markup(form(float(np.mean(values)))) + (Markup(" ") + text if text else "")
 
@@ -59,10 +59,10 @@ def format_mean(values: np.ndarray, form) -> Markup:
 def format_range(values: np.ndarray, form) -> Markup | str:
     """Format the 95 % interval of a mean, or the extremes of fewer than five values; empty if all values are equal.
 
-    If the interval of positive values would reach below zero, the interval of the logarithm is used.
+    If the interval of positive values would reach below zero, the interval is computed from their logarithms.
     """
     over = ensemble(values)
-    # Loads are met exactly, but for rounding errors.
+    # Target loads are met exactly, except for rounding errors.
     if len(values) < 2 or np.ptp(values) <= 1e-6 * abs(over.mean):
         return ""
     if len(values) < ENOUGH:
@@ -75,7 +75,7 @@ def format_range(values: np.ndarray, form) -> Markup | str:
 
 
 def template(name: str) -> jinja2.Template:
-    """Return the template of a page, with the filters above."""
+    """Load the template of a page, with filters that format numbers and symbols."""
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("icha.report", "templates"),
         autoescape=True,
@@ -95,6 +95,6 @@ def template(name: str) -> jinja2.Template:
 
 
 def write_page(path: str | os.PathLike, name: str, **values) -> None:
-    """Fill in a template and write the page."""
+    """Fill in the template `name` with values and write the page."""
     with whole_file(path) as temporary:
         temporary.write_text(template(name).render(values), encoding="utf-8")

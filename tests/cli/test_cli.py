@@ -173,7 +173,7 @@ def test_a_measured_file_fills_in_what_it_contains(project):
 
 def test_scans_that_cannot_be_used_get_no_campaign(project):
     for name, heights, reason in (
-        ("small", rough_heights()[:6], "leaves 6 x 6 points"),
+        ("small", rough_heights()[:6], "a square of 6 x 6 points"),
         ("flat", np.ones((20, 20)), "heights that are all the same"),
         ("profile", rough_heights()[:1].T, "is a line scan, one profile of 64 points"),
     ):
@@ -307,7 +307,7 @@ def test_a_licence_that_no_deposit_can_have_is_reported_before_anything_is_compu
     Path("tiny.yaml").write_text(TINY.replace("CC0-1.0", licence))
     described = printed("describe", "tiny.yaml")
     assert ("published" not in described) == accepted
-    assert accepted or f"cannot be published: tiny.yaml: license: '{licence}' is " in described
+    assert accepted or f"cannot be published: tiny.yaml: license: '{licence}' " in described
 
 
 def test_outside_a_clone_the_installed_workflow_is_used(empty_folder):
@@ -423,7 +423,7 @@ def test_truncated_files_are_damaged_and_computed_again(tiny):
 def test_a_campaign_too_large_for_the_machine_is_refused_without_a_terminal(tiny, small_machine):
     refused = printed("run", "tiny.yaml", status=2)
     assert "this machine has 1.05 MB" in refused and "--anyway" in refused
-    assert "too small: about" in output("describe", "tiny.yaml")
+    assert "too small: jobs on 2 cores need about" in output("describe", "tiny.yaml")
     output("run", "tiny.yaml", "all", "--", "--forceall", "--resources", "mem_mb=60000", status=2)
     output("run", "tiny.yaml", "--profile", "default", status=2)
     # A cluster does not use the memory of this machine.

@@ -79,7 +79,7 @@ def test_a_job_that_crashes_is_named_with_its_log_and_stops_no_other(project):
     assert "1 job failed:\n  Sweep load: rough, seed 1, slope 1, bare" in output
     assert "RuntimeError('a bug in the program')" in output
     assert "log: results/tiny/logs/runs/load/rough/seed1/slope1/bare.log" in output
-    assert "not run, since they need results of failed jobs" in output
+    assert "not run, because they need results of failed jobs" in output
     assert (project / "results/tiny/runs/load/rough/seed1/slope1/sticky.nc").is_file()
     assert not (project / "results/tiny/dataset/tiny.nc").exists()
     # The last line names the log with the output of Snakemake.

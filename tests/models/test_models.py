@@ -150,7 +150,7 @@ def test_asperities_end_at_the_limit_of_their_range_beside_boundary_elements(tmp
     # The loops of the report are those of the runs that were unloaded.
     write_report(tmp_path / "report.html", campaign=tree, figures=[], checks=check_campaign(tree))
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
-    assert "<b>1</b> of them up to the limit of its model" in page and "Failed runs" not in page
+    assert "<b>1</b> of the complete runs ends at the limit of the model" in page and "Failed runs" not in page
 
 
 def test_fronts_are_checked(runs):

@@ -136,10 +136,10 @@ def test_error_of_the_model_has_a_section_if_it_is_known(write):
     adhesive, bare = section(text, "error", "surfaces").split("<h3>")[1:]
     # Without adhesion, a quarter more area and a fifth less separation in every state ...
     for words in (
-        "In 6 states",
+        "The comparison has 6 states",
         "seeds 1, 2, 3",
-        "−20.0 % in the median",
-        "+25.0 %, from +25.0 % to +25.0 %",
+        "The median error of the contact area is −20.0 %",
+        "+25.0 %; errors range from +25.0 % to +25.0 %",
         "96² nodes",
     ):
         assert words in bare, words
@@ -158,7 +158,7 @@ def test_error_of_the_model_has_a_section_if_it_is_known(write):
 
 def test_error_of_surfaces_with_different_slopes_has_no_empty_rows(write):
     text = section(write(campaign=compared.tree(), model_error=compared.errors_at_own_slopes()), "error", "surfaces")
-    assert text.count("In 12 states") == 2 and "nan" not in text
+    assert text.count("The comparison has 12 states") == 2 and "nan" not in text
     assert len(re.findall(r"<td>other</td>|<th[^>]*>other</th>", text)) == 4
 
 
@@ -175,7 +175,7 @@ def test_unloaded_runs_have_tables_of_pull_off_and_loss(write):
     tensions = np.array([float(run["pull_off_pressure"]) for run in runs]) / 1e3
     assert tensions.min() > 10 and tensions.max() < 1000
     assert pull_off["soft"]["Pull-off"] == f"{tensions.mean():.0f} kPa<br>({tensions.min():.0f} … {tensions.max():.0f})"
-    assert pull_off["soft"]["Seeds"] == "2" and pull_off["soft"]["over all asperities"] == "0.250"
+    assert pull_off["soft"]["Seeds"] == "2" and pull_off["soft"]["Pull-off / sum of asperities"] == "0.250"
     assert pull_off["hertz"]["Pull-off"] == "0 Pa" and pull_off["hertz"]["Last contact"] == "–"
     # All is lost in jumps out of contact, and nothing without adhesion.
     assert loss["soft"]["Jump-off, %"] == "100.0" and loss["hertz"]["Jump-off, %"] == "–"

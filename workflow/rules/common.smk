@@ -25,7 +25,7 @@ RESULTS = f"results/{CAMPAIGN.name}"
 # All results with their labels.
 FILES = campaign_files(CAMPAIGN, RESULTS)
 
-# The configuration as used has copies of the files that it names beside it.
+# Files that the configuration names are copied to the folder of the configuration as used.
 CONFIG_TEXT, NAMED_FILES = collect_inputs(CONFIGURATION)
 INPUTS = {f"{RESULTS}/{place}": file for place, file in NAMED_FILES.items()}
 COPIED = {copy: file for copy, file in INPUTS.items() if Path(copy).resolve() != Path(file).resolve()}
@@ -33,7 +33,7 @@ COPIED = {copy: file for copy, file in INPUTS.items() if Path(copy).resolve() !=
 # Checksum of the settings of a run, by its labels.
 SHA256_OF_RUN = cache(lambda case: run_sha256(CAMPAIGN, case))
 
-# Attributes of every dataset; workflow/scripts/job.py adds its `id`, the path.
+# Attributes of every dataset; workflow/scripts/job.py adds the attribute `id`, the path of the dataset.
 ATTRIBUTES = {"campaign": CAMPAIGN.name, "license": PUBLICATION.license}
 
 
@@ -43,7 +43,7 @@ pathvars:
     benchmarks=f"{RESULTS}/benchmarks",
     # One surface against one material.
     contact="{surface}/seed{seed}/slope{slope}/{material}",
-    # The same in a study, with a model.
+    # One run: one surface against one material in a study, with one model.
     run="{study}/{surface}/seed{seed}/slope{slope}/{model_folder}{material}",
 
 
@@ -59,30 +59,30 @@ wildcard_constraints:
 
 
 def labels_of(files, pattern, wildcards):
-    """Return the labels of a file, by the wildcards of its path."""
+    """Return the labels of a result file, found by the wildcards of its path."""
     return files[f"{RESULTS}/{pattern}".format(**wildcards)]
 
 
 def case_of(wildcards):
-    """Return the labels of a run."""
+    """Return the labels of the run with given wildcards."""
     return labels_of(FILES.runs, results.RUN, wildcards)
 
 
 def by_case(value):
-    """Return a value of a run as a function of its wildcards.
+    """Return a function from the wildcards of a run to a value, which `value` computes from the labels of the run.
 
-    If it is the same for all runs, return the value: Snakemake would call the function for up to ten thousand runs.
+    If all runs have the same value, return this value, because Snakemake would call the function for every run.
     """
     values = {value(case) for case in FILES.runs.values()}
     return values.pop() if len(values) == 1 else lambda wildcards: value(case_of(wildcards))
 
 
 def as_it_is(value):
-    """Return a value as a parameter of a rule; braces in texts of users are not wildcards."""
+    """Return a value as a parameter of a rule, so that Snakemake does not read braces in texts as wildcards."""
     return lambda wildcards: value
 
 
 @cache
 def code_of(script, *modules):
-    """Return the fingerprint of a script and of its imports, as a parameter of its rule."""
+    """Return the fingerprint of a script and of the modules that it imports, as a parameter of its rule."""
     return code_fingerprint(Path(ROOT, "workflow/scripts", script), *modules)

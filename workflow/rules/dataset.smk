@@ -1,5 +1,5 @@
-# The configuration as used; all runs in one file, a group per study; the runs of a study at common loads; the error of
-# the model against boundary elements; checks of all results, and the verdict.
+# Rules for the configuration as used, the campaign dataset (all runs, one group for each study), the comparison of the
+# runs at common loads, the error of the asperity model, the checks of all results, and the verdict.
 
 from icha.configuration.cases import campaign_sha256
 from icha.deposit.metadata import discovery_attributes

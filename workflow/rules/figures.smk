@@ -1,5 +1,5 @@
-# figures/<name>.png and .pdf. A figure depends on the data, on its options and on its code. Its module declares inputs
-# and arguments (icha/figures/fig*.py).
+# figures/<name>.png and .pdf. A figure depends on the data, on its options and on its code. The module of a figure
+# declares the inputs and the arguments (icha/figures/fig*.py).
 
 from icha.datasets.results import ResultFiles
 from icha.figures.registry import DECLARATIONS

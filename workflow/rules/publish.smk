@@ -2,7 +2,7 @@
 
 from publishable import publishable_source
 
-# Evaluated once, if the deposit is requested, before anything is computed.
+# The source is evaluated once, before anything is computed, and only if the deposit is requested.
 SOURCE = cache(lambda: publishable_source(CONFIGURATION, ROOT, RESULTS))
 
 

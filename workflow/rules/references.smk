@@ -1,5 +1,5 @@
-# References for runs: theories and published points; boundary elements at a finite range on the topography of a run, at
-# one load or in a cycle.
+# References for runs: theories and published data points; solutions by boundary elements at a finite range for the
+# surface and the material of a run, at one load or in a cycle of loading and unloading.
 
 from icha.configuration.cases import adhesive_contacts, loop_settings, solution_settings
 from icha.planning.requirements import solver_memory

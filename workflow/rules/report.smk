@@ -1,5 +1,5 @@
-# report.html: figures, tables, parameters and checks on one page. The times of jobs differ from one execution to the
-# next. Therefore they are in a separate table, run_times.tsv, and the same data give the same bytes of the page.
+# report.html: figures, tables, parameters and checks on one page. The times of jobs differ between executions, so they
+# are in a separate table, run_times.tsv. Then the same data always give exactly the same page.
 
 from icha.planning.requirements import further_software
 

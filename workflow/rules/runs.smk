@@ -1,4 +1,4 @@
-# One run each; runs with another model than the asperity model are in a folder of its name.
+# One job for each run. Runs with another model than the asperity model are in a folder with the name of the model.
 
 from icha.configuration.cases import run_settings
 from icha.contact.models import MODELS
@@ -10,7 +10,7 @@ wildcard_constraints:
     model_folder="|".join(map(model_folder, MODELS)),
 
 
-# Snakemake needs them several times for each of up to ten thousand runs.
+# Snakemake needs the settings of each run several times, for up to ten thousand runs.
 SETTINGS_OF_RUN = cache(lambda case: run_settings(CAMPAIGN, case))
 
 # Fingerprint by model: the script imports the module of its model.
@@ -42,7 +42,7 @@ rule run:
             "config_sha256": SHA256_OF_RUN(case_of(wildcards)),
         },
         code=by_case(lambda case: CODE_OF_RUN[case.model]),
-        # A run of hours can be resumed.
+        # A run that takes hours can be resumed from checkpoints.
         resumable=by_case(lambda case: MODELS[case.model].resumable and surface_threads(CAMPAIGN, case.surface) > 1),
     message:
         "Sweep {wildcards.study}: {wildcards.surface}, seed {wildcards.seed}, slope {wildcards.slope}, "

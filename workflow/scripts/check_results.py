@@ -8,15 +8,15 @@ from icha.datasets.labels import SolutionLabels
 
 
 def check_results(dataset, solutions, output, *, labels, solution_labels):
-    """Write all checks of a campaign.
+    """Check the results of a campaign and write all checks to a file.
 
     Parameters
     ----------
     dataset : file of the campaign dataset.
-    solutions : files of boundary elements at a finite range.
+    solutions : files of solutions by boundary elements at a finite range.
     output : file to write.
     labels : labels of the runs that the dataset should contain.
-    solution_labels : labels of the solutions, in their order.
+    solution_labels : labels of the solutions, in the order of the files.
     """
     checks = list(check_campaign(read_campaign(dataset), labels))
     for label, path in zip(solution_labels, solutions, strict=True):

@@ -7,7 +7,7 @@ from icha.datasets.files import read_campaign, write_dataset
 
 
 def compare_runs(dataset, output, *, attributes):
-    """Write the comparison of a campaign dataset."""
+    """Compare the runs in a campaign dataset at common loads and write the comparison."""
     write_dataset(compare_campaign(read_campaign(dataset), attrs=attributes), output)
 
 

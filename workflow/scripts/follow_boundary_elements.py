@@ -9,7 +9,7 @@ from icha.references.finite_range_loops import finite_range_loop
 
 
 def follow_boundary_elements(surface, output, *, rms_slope, material, attributes, **settings):
-    """Compute the cycle of a surface file, scaled to an rms slope, and write it."""
+    """Compute and write a cycle of loading and unloading for a surface whose heights are scaled to `rms_slope`."""
     scaled = read_surface(surface).scaled_to_rms_slope(rms_slope)
     write_dataset(finite_range_loop(scaled, Material(**material), **settings).assign_attrs(attributes), output)
 

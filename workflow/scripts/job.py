@@ -1,4 +1,4 @@
-"""Shared by the scripts of all jobs: output to the log, errors, checksums of results, end with Snakemake."""
+"""Functions for the scripts of all jobs: output to the log, errors, checksums, end of the job with Snakemake."""
 
 import contextlib
 import os
@@ -30,10 +30,10 @@ def _solver_errors() -> list[type[Exception]]:
 
 @contextmanager
 def job_context(snakemake):
-    """Verify the inputs of a job, write checksums of its outputs, and report its errors.
+    """Context manager: verify the inputs of a job, write checksums of its outputs, and report its errors.
 
-    All output goes to the log of the job. An error ends the job with its message there. The message of an expected
-    error is sufficient for users; the traceback of another error is written beside the log for the developers.
+    All output goes to the log of the job. An error ends the job, and the error message is written to the log. For an
+    unexpected error, the traceback is written to a file beside the log for the developers.
 
     Yields
     ------
@@ -54,7 +54,7 @@ def job_context(snakemake):
         for path in outputs:
             checksums.begin(results, path)
         inputs = _checksums_of(results, snakemake.input)
-        # Computed first, since the script may change its parameters.
+        # Computed first, because the script may change its parameters.
         asked = checksums.hash_parameters(map(repr, snakemake.params))
         yield asked, inputs
         for path in outputs:
@@ -72,13 +72,13 @@ def job_context(snakemake):
 
 
 def refuse_changed(file, sha256, name=None):
-    """Refuse a file whose content has changed, since results would be attributed to the old content.
+    """Raise an error if a file has changed, because results would be attributed to the old content.
 
     Parameters
     ----------
-    file : the file.
-    sha256 : its expected checksum.
-    name : original name of a copied file.
+    file : path of the file.
+    sha256 : expected checksum of the file.
+    name : original name of a copied file, for the message.
 
     Raises
     ------
@@ -90,7 +90,7 @@ def refuse_changed(file, sha256, name=None):
 
 
 def attributes(snakemake):
-    """Return the attributes of the dataset of a job: those of its rule, and `id`, the same on every machine."""
+    """Return the attributes of the dataset of a job: those of its rule, and an `id` that is equal on all machines."""
     attributes = snakemake.params.attributes
     path = Path(snakemake.output[0]).relative_to(_results(snakemake)).with_suffix("")
     return {"id": f"{attributes['campaign']}/{path.as_posix()}"} | attributes
@@ -108,11 +108,11 @@ def _result(results, path):
 
 
 def _checksums_of(results, inputs):
-    """Return checksums of the inputs that are results; raise an error that names all damaged ones."""
+    """Return the checksums of the inputs that are results; raise an error that names all damaged inputs."""
     paths = [os.path.relpath(path, results) for path in inputs if path.startswith(f"{results}/")]
     damaged = [path for path in paths if not checksums.is_whole(results, path, thorough=True)]
     for path in damaged:
-        # The next call finds them, too.
+        # Mark the file, so that the next call also finds it damaged.
         with contextlib.suppress(OSError):
             checksums.distrust(results, path)
     if damaged:
@@ -141,9 +141,9 @@ def _print(text, terminal):
 
 
 def _end_with_snakemake():
-    """End this process when Snakemake ends, or now if it has ended.
+    """End this process when Snakemake ends, or now if Snakemake has already ended.
 
-    Nobody would use the results of an orphaned job, and it could replace those of the next call.
+    Otherwise the results of an orphaned job could replace the results of the next call.
     """
     number, _, began = os.environ.get(SNAKEMAKE, "").partition(" ")
     if not number:

@@ -1,4 +1,4 @@
-"""Write the verdict on the checks; fail if a check failed that is not a known failure."""
+"""Write the verdict on the checks; the job fails if a check failed that is not a known failure."""
 
 from job import job_context
 
@@ -7,17 +7,17 @@ from icha.support.atomic_files import whole_file
 
 
 def judge_results(checks, output, *, known):
-    """Write the verdict on a file of checks.
+    """Read the checks of a campaign and write the verdict: how many checks passed, and the known failures.
 
     Parameters
     ----------
-    checks, output : files to read and to write.
-    known : reasons of known failures, by run.
+    checks, output : file of checks to read, and file of the verdict to write.
+    known : for each run that is known to fail, the reason.
 
     Raises
     ------
     ValueError
-        With the list of failed checks.
+        If a check failed that is not a known failure; the message lists the failed checks.
     """
     found = read_checks(checks)
     failed = sum(not check.passed for check in found)

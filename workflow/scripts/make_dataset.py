@@ -6,7 +6,7 @@ from icha.datasets.campaign_file import write_campaign
 
 
 def make_dataset(runs, output, *, labels, settings, attributes):
-    """Write the campaign dataset of run files, with their labels and checksums of settings."""
+    """Combine run files into a campaign dataset, with the labels and the checksum of the settings of each run."""
     settings = dict(zip(labels, settings, strict=True))
     write_campaign(zip(labels, runs, strict=True), output, design=labels, settings=settings, attrs=attributes)
 

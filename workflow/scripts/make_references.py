@@ -1,4 +1,4 @@
-"""Write predictions of theories for a surface, and published points."""
+"""Write predictions of theories for a surface, and data points from publications."""
 
 from job import attributes, job_context
 
@@ -10,15 +10,15 @@ from icha.surfaces.spectrum import SelfAffineSpectrum
 
 
 def make_references(surface, output, *, settings, adhesive, attributes):
-    """Write the references for a surface.
+    """Write the references for a surface: predictions of theories, and published data points.
 
-    Theories of separate summits are omitted if they do not apply to the surface or the materials.
+    Theories of independent summits are omitted if they do not apply to the surface or the materials.
 
     Parameters
     ----------
     surface, output : surface file to read, and file to write.
     settings : settings of the surface, in SI units.
-    adhesive : contacts with adhesion, in SI units.
+    adhesive : rms slopes and materials of the contacts with adhesion, in SI units.
     attributes : attributes of the dataset.
     """
     keys = ("period", "rolloff_wavelength", "short_wavelength", "hurst")

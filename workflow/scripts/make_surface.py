@@ -12,15 +12,15 @@ SPECTRUM = ("period", "rolloff_wavelength", "short_wavelength", "hurst")
 
 
 def make_surface(output, *, name, seed, settings, height_map=None, sha256=None, attributes):
-    """Write a surface.
+    """Generate or read a surface, scale its heights to rms slope 1, and write the surface file.
 
     Parameters
     ----------
     output : file to write.
-    name, seed : labels of the surface.
-    settings : its section of the configuration, in SI units.
+    name, seed : name and seed of the surface.
+    settings : settings of the surface in the configuration, in SI units.
     height_map : file of the heights; None for a random surface.
-    sha256 : expected checksum of this file.
+    sha256 : expected checksum of the file of the heights.
     attributes : attributes of the dataset.
     """
     spectrum = measured = None

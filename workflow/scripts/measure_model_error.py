@@ -1,4 +1,4 @@
-"""Compare the runs with the asperity model to boundary elements: other runs, and solutions at finite ranges."""
+"""Compare runs with the asperity model to boundary elements: runs of the campaign, and solutions at finite ranges."""
 
 from job import attributes, job_context
 
@@ -8,7 +8,7 @@ from icha.datasets.labels import RunLabels, SolutionLabels
 
 
 def measure_model_error(campaign, runs, solutions, output, *, run_labels, labels, attributes):
-    """Write the error of a campaign against boundary elements; the labels have the order of the runs and solutions."""
+    """Write the errors of the asperity model; `run_labels` are the labels of `runs`, `labels` those of `solutions`."""
     others = zip((RunLabels(*label) for label in run_labels), map(read_run, runs), strict=True)
     pairs = zip((SolutionLabels(*label) for label in labels), map(read_dataset, solutions), strict=True)
     write_dataset(model_error(read_campaign(campaign), pairs, runs=others, attrs=attributes), output)

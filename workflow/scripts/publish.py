@@ -11,9 +11,9 @@ def publish(archive, *, results, files, named_files, project):
 
     Parameters
     ----------
-    archive : the zip.
+    archive : zip file to write.
     results : folder of the results.
-    files : its files to include.
+    files : files of the results that the deposit includes.
     named_files : files that the configuration names, by their paths relative to the configuration as used.
     project : folder of the workflow.
     """

@@ -25,18 +25,18 @@ def run_sweep(
 ):
     """Compute a run and write its dataset.
 
-    The file of a failed run contains the stops that were reached, and the reason; the campaign continues, and its
-    verdict lists the run. After an unexpected error the campaign also continues, because only the surface, the material
-    and the path of this run can be the cause.
+    The file of a failed run contains the states at the targets that were reached, and the reason of the failure. The
+    campaign continues, and its verdict lists the run. The campaign also continues after an unexpected error, because
+    only the surface, the material and the path of this run can be the cause.
 
     Parameters
     ----------
-    surface : the surface file, which is scaled to `rms_slope`.
+    surface : file of the surface; its heights are scaled to `rms_slope`.
     output : file to write.
     rms_slope, seed, material, path, model : settings of the run, in SI units.
     attributes : attributes of the dataset.
-    progress : function that takes lines of progress.
-    kept : folder of checkpoints; None for none.
+    progress : function that prints a line of progress.
+    kept : folder of checkpoints; None for a run without checkpoints.
     """
     contact = read_surface(surface).scaled_to_rms_slope(rms_slope), Material(**material), Path(**path)
     try:
@@ -59,7 +59,7 @@ def run_sweep(
 
 
 def _checkpoints(output, asked, inputs):
-    """Return the folder of checkpoints, without those of another surface, path or code."""
+    """Return the folder of checkpoints; checkpoints of another surface, path or code are removed from the folder."""
     versions = f"{np.__version__} {scipy.__version__}"
     return prepare_checkpoints(pathlib.Path(output).with_suffix(".kept"), f"{asked} {inputs} {versions}")
 

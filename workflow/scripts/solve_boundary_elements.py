@@ -9,7 +9,7 @@ from icha.references.finite_range import finite_range_solution
 
 
 def solve_boundary_elements(surface, output, *, rms_slope, material, attributes, **settings):
-    """Compute the solution of a surface file, scaled to an rms slope, and write it."""
+    """Compute and write the solution for a surface whose heights are scaled to `rms_slope`."""
     scaled = read_surface(surface).scaled_to_rms_slope(rms_slope)
     solution = finite_range_solution(scaled, Material(**material), **settings)
     write_dataset(solution.assign_attrs(attributes), output)

@@ -1,4 +1,4 @@
-"""Write the configuration of a campaign as used: its file with the values of the command line."""
+"""Write the configuration as used: the configuration file with the values from the command line."""
 
 import shutil
 
@@ -8,7 +8,10 @@ from icha.support.atomic_files import whole_file
 
 
 def write_configuration(output, *, text, copies, sha256):
-    """Write the configuration and copy its input files; `copies`: file by copy, `sha256`: checksums of the files."""
+    """Write the configuration and copy its input files.
+
+    copies : source file of each copy. sha256 : expected checksums of the source files, in the order of `copies`.
+    """
     for (copy, file), expected in zip(copies.items(), sha256, strict=True):
         with whole_file(copy) as temporary:
             shutil.copyfile(file, temporary)

@@ -5,7 +5,7 @@ const CHOICES = ["study", "surface", "rms_slope", "material", "seed"];
 const WORDS = { asperities: "asperities", boundary_elements: "boundary elements" };
 const LOOKS = { asperities: { dash: "solid", symbol: "circle" }, boundary_elements: { dash: "dash", symbol: "square" } };
 const CONTACT = "{{ colour }}";
-// Only maps are enlarged: elsewhere a finger that moves over the page scrolls it.
+// Only maps can be enlarged. On other plots a moving finger scrolls the page.
 const MAP = { displaylogo: false, responsive: true, displayModeBar: true, modeBarButtons: [["zoom2d", "pan2d", "zoomIn2d", "zoomOut2d", "resetScale2d"]] };
 const PLOT = { displayModeBar: false, responsive: true };
 const byId = (id) => document.getElementById(id);
@@ -108,7 +108,7 @@ function drawMaps() {
   }
 }
 
-// All maps show the same part.
+// All maps show the same section of the surface.
 function alike(model, change) {
   const zoomed = Object.fromEntries(Object.entries(change).filter(([key]) => /axis\d?\.(range|autorange)/.test(key)));
   if (!Object.keys(zoomed).length || alike.busy) return;
@@ -124,7 +124,7 @@ function unitOf(metres) {
   return [factor, `${prefix}m`];
 }
 
-// The contact of a snapshot as the source of an image of the cell: the map as it is, or circles, again beyond each edge.
+// Image of the contact in a snapshot, as a URL: the stored map, or circles of the spots with their periodic images.
 function pictureOf(run, snapshot) {
   if (snapshot.map) return `data:image/png;base64,${snapshot.map}`;
   if (!snapshot.circles) return "";
@@ -174,7 +174,7 @@ function drawDistributions(now) {
       const marker = { color: colours[model], symbol: LOOKS[model].symbol, size: 5 };
       return { x, y, mode: name === "larger" ? "lines" : "lines+markers", opacity: exact ? 1 : 0.3, ...lineOf(model), marker };
     });
-    // The axes are those of the whole path, so that it is the curves that move.
+    // The axes cover the whole path, so that only the curves move with the slider.
     if (!ranges[id]) {
       const all = Object.values(runs).flatMap((run) => run.snapshots.map(curveOf));
       ranges[id] = [0, 1].map((k) => rangeOf(all.map((curve) => curve[k]), axes[k].type));
@@ -242,8 +242,8 @@ function noticesOf({ run, step, snapshot, exact }) {
   if (run.failure) found.push(`the run failed; ${run.failure}`);
   if (step < 0) found.push("the run does not have this state.");
   else if (!run.snapshots.length) found.push("the run has no snapshots, so spots and distributions are not available.");
-  else if (!snapshot) found.push(`no snapshot up to this step, so spots and distributions are not shown. The first one is at p* = ${format(run.pressure[Math.min(...run.snapshots.map((each) => each.step))])}.`);
-  else if (!exact) found.push(`no snapshot at this step. Spots and distributions (pale) are those of the previous snapshot: ${legOf(run, snapshot.step)}, p* = ${format(run.pressure[snapshot.step])}.`);
+  else if (!snapshot) found.push(`no snapshot up to this step, so spots and distributions are not shown. The first snapshot is at p* = ${format(run.pressure[Math.min(...run.snapshots.map((each) => each.step))])}.`);
+  else if (!exact) found.push(`no snapshot at this step. The pale spots and distributions belong to the previous snapshot: ${legOf(run, snapshot.step)}, p* = ${format(run.pressure[snapshot.step])}.`);
   if (snapshot && !snapshot.map && !snapshot.circles) found.push("the file of the run with the maps of contact was missing.");
   return found;
 }
@@ -263,7 +263,7 @@ function start() {
   byId("log").checked = Object.values(runs).every((run) => run.pressure.every((value) => value > 0));
   drawAll();
 }
-// Move to the nearest snapshot on one side.
+// Move to the nearest snapshot before (-1) or after (1) the present step.
 function jump(side) {
   const steps = leading.snapshots.map((each) => each.step).filter((step) => (step - Number(stop.value)) * side > 0);
   if (steps.length) stop.value = side < 0 ? Math.max(...steps) : Math.min(...steps);

@@ -1,12 +1,12 @@
-"""Executor of Snakemake. Its jobs are forks of one process that has already imported the libraries.
+"""Executor of Snakemake whose jobs are forks of one process that has already imported the libraries.
 
 Importing NumPy, SciPy, xarray and the package takes seconds, often longer than the work of a job. Therefore the first
-job starts the fork server of `multiprocessing`, a process that imports these libraries. Every job of one thread is a
-fork of this process. Other jobs run in their own process, as with Snakemake's executor `local`. All jobs run in their
-own process if the fork server cannot be started, and on other systems than Linux, where libraries may not survive a
+job starts the fork server of `multiprocessing`, a process that imports these libraries. Every job that uses one thread
+is a fork of the fork server. Other jobs run in a new process, as with Snakemake's executor `local`. All jobs run in a
+new process if the fork server cannot be started, and on systems other than Linux, where libraries may fail after a
 fork.
 
-When one of these processes ends, the processes that it started end, too: Snakemake, the fork server, its forks.
+The fork server ends when Snakemake ends. The forks end when the fork server ends.
 """
 
 import json
@@ -38,7 +38,7 @@ class Executor(LocalExecutor):
     """Executor for this machine that runs scripts of one thread in forks."""
 
     def __post_init__(self):
-        """Set the imports of the fork server, and its number of threads."""
+        """Set the modules that the fork server imports, and one thread for its libraries."""
         super().__post_init__()
         self._processes = multiprocessing.get_context("forkserver")
         self._processes.set_forkserver_preload([f"{__name__}.preload"])
@@ -64,7 +64,7 @@ class Executor(LocalExecutor):
         return self.pool.submit(self._run_forked, str(file), context, benchmark)
 
     def _server_runs(self) -> bool:
-        """Start the fork server if it does not run; return False if this fails."""
+        """Start the fork server if necessary; return False if the fork server cannot be started."""
         if not self._without_server:
             try:
                 # The fork server ends with the thread that starts it, so this must be the main thread.
@@ -72,14 +72,14 @@ class Executor(LocalExecutor):
             except OSError as error:  # such as a path of temporary files that is too long for a socket
                 self._without_server = True
                 self.logger.warning(
-                    f"Every job takes some seconds more, since the fork server cannot be started: {error}."
+                    f"Every job takes some seconds more, because the fork server cannot be started: {error}."
                 )
         return not self._without_server
 
     def _run_forked(self, *job):
         process = self._processes.Process(target=run_script, args=job, daemon=True)
         try:
-            # One at a time, since each call checks all processes for their end.
+            # One thread at a time, because each call checks whether any process has ended.
             with self._turn:
                 process.start()
             wait([process.sentinel])
@@ -95,7 +95,7 @@ class Executor(LocalExecutor):
 
 
 def run_script(script: str, context: Snakemake, benchmark: str | None) -> None:
-    """Run the script of a job with its context as the global variable `snakemake`, and write its benchmark."""
+    """Run the script of a job, with `context` as its global variable `snakemake`, and write times and memory."""
     from . import preload
 
     end_with_parent(preload.SERVER)
@@ -116,6 +116,6 @@ def run_script(script: str, context: Snakemake, benchmark: str | None) -> None:
 
 
 def _shared_megabytes() -> float:
-    """Return the memory that this process shares with others: nearly all that it had after the fork."""
+    """Return the memory that this process shares with other processes, MiB: nearly all of its memory after the fork."""
     memory = psutil.Process().memory_full_info()
     return (memory.rss - memory.uss) / 2**20

@@ -1,4 +1,4 @@
-"""Imports of the fork server before its first fork: all modules that jobs may need."""
+"""Modules that the fork server imports before its first fork: all modules that jobs may need."""
 
 import contextlib
 import os

@@ -1,7 +1,7 @@
 """Logger plugin that writes events of Snakemake for `icha run`, as lines of JSON.
 
-The environment variable ICHA_EVENTS contains the file descriptor. Every line has the name of an event and some of its
-fields. Only `icha run` makes this plugin available to Snakemake.
+The environment variable ICHA_EVENTS contains the file descriptor for the lines. Every line has the name of an event and
+some fields of this event. Only `icha run` makes this plugin available to Snakemake.
 """
 
 import json
@@ -19,7 +19,7 @@ _FIELDS = {
 
 
 class LogHandler(LogHandlerBase):
-    """Log handler that writes the events for the live view."""
+    """Log handler that writes selected events of Snakemake for the live view of `icha run`."""
 
     writes_to_stream = False
     writes_to_file = False
@@ -32,7 +32,7 @@ class LogHandler(LogHandlerBase):
         self._events = os.fdopen(int(os.environ["ICHA_EVENTS"]), "w", encoding="utf-8", buffering=1)
 
     def emit(self, record):
-        """Write one line if the record is a selected event."""
+        """Write one line of JSON if the log record is a selected event or a warning of the Snakefile."""
         name = str(getattr(record, "event", None) or "")
         if name in _FIELDS:
             event = {"event": name} | {field: getattr(record, field, None) for field in _FIELDS[name]}
