@@ -72,7 +72,7 @@ class ConvergenceError(RuntimeError):
         self.dataset = dataset
 
     def __reduce__(self):
-        """Return what is needed to pickle the error together with its dataset."""
+        """Return the class and the arguments from which pickle restores the error with its dataset."""
         return type(self), (self.args[0], self.dataset)
 
 
@@ -106,7 +106,7 @@ def simulate(
     name. On a path that continues after the first loading, all equilibria are steps, and there is a dimension event.
     Boundary elements also have dimensions row and column. The attribute `contact_model` names the model.
     `applicability` gives the reasons why the model is not applicable to this contact, or is empty.
-    `failed_checks` lists the checks that the run fails (`icha.checks.run.check_run`); it exists only if checks fail.
+    `failed_checks` lists the checks that the run fails (`icha.checks.run.check_run`); it is absent if all checks pass.
 
     Warns
     -----
@@ -300,7 +300,7 @@ def _count_uphill_jumps_in(record: _PathRecord) -> int:
 def _record_path(contact, observables, path, reachable, progress) -> _PathRecord:
     """Follow a path and return the record of its steps, snapshots and events.
 
-    reachable : path without targets above the range of the model. If it lacks targets, the record ends before them.
+    reachable : path without targets above the range of the model. The record ends before the first missing target.
     """
     left_out = [target for target in path.targets if target not in reachable.targets]
     remaining = len(reachable.targets)

@@ -63,8 +63,8 @@ def plan_without_collecting() -> None:
 def start_jobs_freely(workflow) -> None:
     """Enable garbage collection, except for the plan; remove Snakemake's limit of jobs started per second.
 
-    With this limit, each finished local job wakes the scheduler once a second until all jobs are done. After a thousand
-    short jobs, this uses most of a core. Snakemake has no option to disable the limit.
+    With Snakemake's limit, each finished local job wakes the scheduler once a second until all jobs are done. After a
+    thousand short jobs, the scheduler uses most of a core. Snakemake has no option to disable the limit.
     """
     gc.collect()
     gc.freeze()
@@ -76,8 +76,8 @@ def start_jobs_freely(workflow) -> None:
 class CampaignResults:
     """Results of a campaign in the working directory, which are inspected and locked before jobs start.
 
-    Snakemake also reads the Snakefile for calls that only report or clean up. The lock does not stop such calls. It
-    stops only calls that start jobs (`begin`).
+    Snakemake also reads the Snakefile for calls that only report or clean up. The lock stops only calls that start jobs
+    (`begin`).
     """
 
     def __init__(self, results: str, name: str, file: str, workflow: str, *, dry_run: bool):
@@ -165,8 +165,8 @@ class CampaignResults:
     def begin(self, missing: str | None = None) -> None:
         """Make this call the owner of the results before its first job starts.
 
-        Afterwards, jobs of an earlier call cannot change the results. The results are inspected again, because a job of
-        an earlier call may have changed them since the first inspection. Calls that only report do not use this method.
+        Afterwards, jobs of an earlier call cannot change the results. The results are inspected again, because such a
+        job may have changed results since the first inspection. Calls that only report do not use this method.
 
         Parameters
         ----------
@@ -264,8 +264,8 @@ def _warn(text: str) -> None:
 def _damaged_records(results: str) -> Iterator[tuple[str, Path]]:
     """Yield results whose Snakemake record is damaged, and the record, for example after the disk was full.
 
-    Snakemake stops at such a record, or considers the result up to date. Snakemake has no public interface that lists
-    damaged records.
+    At a damaged record, Snakemake stops or considers the result up to date. Snakemake has no public interface that
+    lists damaged records.
     """
     for folder, _, names in os.walk(METADATA):
         for record in (Path(folder, name) for name in names):

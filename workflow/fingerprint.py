@@ -4,7 +4,7 @@ Snakemake itself compares only the time stamp of the script. A fingerprint is co
 docstrings, formatting and time stamps do not change a fingerprint. An edit of a module changes the fingerprints of
 exactly the jobs that use this module.
 
-(The library `grimp` also follows imports, but only inside a package. It ignores imports of scripts, and data files.)
+(The library `grimp` also follows imports, but only inside a package. `grimp` ignores scripts and data files.)
 """
 
 import ast

@@ -78,8 +78,8 @@ def model_error(
     - for each name in `SUMMARISED`, the mean over the seeds `<name>_mean`, and for two seeds or more the standard
       deviation `<name>_deviation`;
     - modulus, surface energy, range of attraction and Tabor parameter of the runs;
-    - `status(surface, seed, rms_slope, material)`: whether a run and its reference are complete. If one of them is not
-      complete, the values are missing.
+    - `status(surface, seed, rms_slope, material)`: whether a run and its reference are complete. If the run or the
+      reference is not complete, the values are missing.
 
     Raises
     ------
@@ -186,7 +186,7 @@ def _stops(run):
 
 
 def snapshot_if_any(run: xr.Dataset, kind: str, target: float) -> int | None:
-    """Return the position of the snapshot of a kind and target in a run; None if the run does not have it."""
+    """Return the position of the snapshot of a kind and target in a run; None if the run has no such snapshot."""
     try:
         return find_snapshot(run, kind, target)
     except ValueError:
@@ -242,7 +242,7 @@ def _amounts(state, solution):
 
 
 def _shapes(run, snapshot, solution):
-    """Return differences of distributions and contact maps between a snapshot and a solution, and its densities."""
+    """Return differences of distributions and contact maps between snapshot and solution, and its densities."""
     state, spots = state_of(run, snapshot), contact_of_spots(run, snapshot, solution.sizes["x"])
     contact = solution["contact"].transpose("y", "x").values == 1
     height, nominal = float(solution["rms_height"]), float(state["nominal_pressure"])
@@ -278,14 +278,14 @@ def state_of(run: xr.Dataset, snapshot: int) -> xr.Dataset:
 
 
 def contact_of_spots(run: xr.Dataset, snapshot: int, grid: int) -> np.ndarray:
-    """Return whether each node lies inside a spot of a snapshot, (n, n) bool along y and x."""
+    """Return the contact map of the spots of a snapshot, (n, n) bool along y and x: True for nodes inside a spot."""
     spots = spots_of(run, snapshot)
     centres = np.column_stack([spots["spot_x"].values, spots["spot_y"].values])
     return cover_grid(float(run["period"]), grid, centres, spots["spot_radius"].values)[1]
 
 
 def jaccard(one: np.ndarray, other: np.ndarray) -> float:
-    """Return the Jaccard index of two contact maps: number of nodes in both over number in at least one, 1 if empty."""
+    """Return the Jaccard index of two contact maps: nodes in both over nodes in at least one; 1 if both are empty."""
     return shared(one | other, one & other)
 
 

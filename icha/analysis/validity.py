@@ -171,14 +171,16 @@ def _full_contact(cases):
         pressures = lowest.facts[COMPLETE], lowest.facts[COMPLETE] - lowest.facts[STRENGTH], lowest.facts[STRENGTH]
         complete, opening, strength = (format_quantity(pressure, "Pa") for pressure in pressures)
         if lowest.facts[STRENGTH] < lowest.facts[THEORETICAL]:
-            strength += f", that of its flaw; without the flaw {format_quantity(lowest.facts[THEORETICAL], 'Pa')}"
+            strength += f" with its flaw, {format_quantity(lowest.facts[THEORETICAL], 'Pa')} without the flaw"
         text += (
             f"; full contact is complete at about {complete} without adhesion and opens at {opening} (strength of the "
             f"interface: {strength}){_unresolved_strength(lowest.facts)}"
         )
     if STICKY_HEIGHT in lowest.facts:
         heights = (format_quantity(lowest.facts[name], "m") for name in (STICKY_HEIGHT, RMS_HEIGHT))
-        text += "; by the bearing area model the surface sticks below an rms height of {}, it has {}".format(*heights)
+        text += "; in the bearing area model, the surface sticks below the rms height {}; its rms height is {}".format(
+            *heights
+        )
     if any(MODELS[case.model].by_summits and case.ratio < FULL_CONTACT_BELOW for case in cases):
         text += f"; the asperity model is not applicable below {FULL_CONTACT_BELOW:g}"
     yield Statement("adhesion", text, lowest.ratio >= HIGH_PULL_OFF_BELOW)
@@ -273,7 +275,7 @@ def _not_applicable(campaign):
 
 
 def _cases(study):
-    """Yield a case for every computed run of a study."""
+    """Yield a `Case` for every computed run of a study."""
     measured = [name for name in (*VALIDATED, *_OF_FULL_CONTACT) if name in study]
     status = study["status"].transpose(*LABELS)
     values = {

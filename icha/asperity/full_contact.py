@@ -1,4 +1,4 @@
-"""Energy of full contact, and pressure at which contact is complete. Both show whether a surface is sticky.
+"""Energy of full contact, and pressure at which contact is complete. Energy and pressure indicate stickiness.
 
 In full contact the pressure p(q) = q E* h(q)/2 flattens the wave h(q) of wave number q. Source: B. N. J. Persson and
 E. Tosatti, J. Chem. Phys. 115 (2001) 5597-5610, doi:10.1063/1.1398300.
@@ -27,7 +27,7 @@ def full_contact_energy_ratio(full_contact_energy: float, contact_modulus: float
 def gaussian_complete_pressure(waves: float) -> float:
     """Estimate the pressure over E* h'_rms at which contact with a Gaussian surface is complete without adhesion.
 
-    This pressure compensates the largest tension of full contact at zero load. That tension is the largest of about
+    The estimated pressure compensates the largest tension of full contact at zero load, which is the largest of about
     2 pi waves^2 independent values with the standard deviation E* h'_rms/2. `waves` is the side of the surface over the
     shortest wavelength. For five spectra, the mean of five surfaces differed from this estimate by 0 to 9 %.
     """

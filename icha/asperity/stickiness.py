@@ -38,7 +38,7 @@ def sticky_rms_height(longest_wavelength: float, material: Material) -> float:
     M. Ciavarella, Meccanica 53 (2018) 241-250, doi:10.1007/s11012-017-0701-6. At the mean separation u the area whose
     gap is less than the range of attraction pulls with p_a = dgamma/(sqrt(2 pi) h) exp(-u^2/(2 h^2)), and the contact
     repels with Persson's p_r = (3/(8 beta)) q_L h E* exp(-u/(beta h)), where beta = 1/2 and q_L = 2 pi/lambda_L. Here
-    h is the rms height. The ratio p_a/p_r is largest at u = h/beta. There p_a exceeds p_r if
+    h is the rms height. The ratio p_a/p_r is largest at u = h/beta. At u = h/beta, p_a exceeds p_r if
 
         h^2 < e^2/(sqrt(2 pi) 3 pi/2) lambda_L dgamma/E* = 0.63 lambda_L dgamma/E*.
 

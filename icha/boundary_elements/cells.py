@@ -17,7 +17,7 @@ def mask_of(cells: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
 
 
 def rim_of(cells: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
-    """Find the rim of a set of cells: other cells, (m,), ascending, that share an edge with a cell of the set."""
+    """Find the rim of a set of cells: cells outside the set, (m,), ascending, that share an edge with one inside."""
     inside = mask_of(cells, shape)
     rim = inside.copy()
     for target, source in ((slice(1, None), slice(-1)), (slice(1), slice(-1, None))):
@@ -58,7 +58,7 @@ def merge_cells(
 
 
 def find_among(places: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Look up `places`, (m,), in ascending `cells`; return (m,) bool of those found, and their indices in `cells`."""
+    """Find which `places`, (m,), are in ascending `cells`: (m,) bool, and the indices in `cells` of those found."""
     index = np.searchsorted(cells, places)
     # No cell has the number -1.
     present = np.append(cells, -1)[index] == places

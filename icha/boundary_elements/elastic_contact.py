@@ -1,9 +1,9 @@
 """Elastic contact of bonded cells, solved with an active set of cells and conjugate gradients for their pressures.
 
 The cells of the initial contact stay in contact, under pressure or tension. Other cells join the active set where the
-surfaces overlap, and leave it when they are in tension. This is a Newton method for the complementarity of pressure and
-gap (Hintermueller, Ito & Kunisch, SIAM J. Optim. 13 (2003) 865). A bond transmits only tension, so that a partial cell
-under pressure closes.
+surfaces overlap, and leave the set when they are in tension. The iteration is a Newton method for the complementarity
+of pressure and gap (Hintermueller, Ito & Kunisch, SIAM J. Optim. 13 (2003) 865). A bond transmits only tension, so that
+a partial cell under pressure closes.
 """
 
 from __future__ import annotations
@@ -88,7 +88,7 @@ class Topography:
     def gap(self, displacement: np.ndarray, separation: float, contact: Contact) -> np.ndarray:
         """Convert a field of displacements to the gap, displacement + separation - height, in place.
 
-        At cells in contact the gap is computed from heights in double precision. The field keeps its own precision.
+        At cells in contact the gap is computed from heights in double precision. The field keeps its precision.
         """
         heights = self.single if displacement.dtype == np.float32 else self.double
         inside = displacement.ravel()[contact.cells] - (self.double.ravel()[contact.cells] - separation)
@@ -111,7 +111,7 @@ class ElasticContact(Contact):
     gap : (n, n), gap at the grid nodes.
     separation : mean separation.
     misfit : (k,), error of the displacement of each cell in contact; at most `tolerance`.
-    tolerance : largest allowed error of these displacements.
+    tolerance : largest allowed error of the displacements of cells in contact.
     """
 
     gap: np.ndarray = field(repr=False)
@@ -144,7 +144,7 @@ def solve_active_set(
     Raises
     ------
     FullContact
-        If all cells are closed at a given separation. The separation is the mean gap, so there is no such solution.
+        If all cells close at a given separation, which is impossible because the separation is the mean gap.
     """
     dtype = np.float32 if tolerance > topography.rounding else float
     keep, gap, before, changing = np.full(len(contact.cells), sticky), None, np.inf, not sticky

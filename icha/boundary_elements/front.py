@@ -3,16 +3,16 @@
 Each cell has a fraction of contact f and a bond to the half-space with the compliance c(f) = C (1/f - 1). The bond is
 rigid at f = 1 and broken at f = 0. The sum of elastic energy and adhesion energy is stationary in f if the tension of
 the cell is f s. The strength s = sqrt(2 dgamma/C) contains the work of adhesion dgamma (A. A. Griffith, Phil. Trans.
-A 221 (1921) 163). Without f this is a cohesive law: the tension falls linearly with the gap g, t = s (1 - g/g_c), to
-zero at g_c = C s, and does the work dgamma. The range g_c depends on the cell size. C is the compliance of a row of
-cells at a straight front, times a factor. With this factor the front moves across cells without being trapped, and is
-about two cells wide.
+A 221 (1921) 163). With f eliminated, bonds obey a cohesive law: the tension falls linearly with the gap g to zero at
+g_c, t = s (1 - g/g_c) with g_c = C s, and does the work dgamma. The range g_c depends on the cell size. C is the
+compliance of a row of cells at a straight front, times a factor. The factor lets the front move across cells without
+being trapped, and makes the front about two cells wide.
 
 The sum of the fractions overestimates the contact radius by a constant part of a cell. So the area
 
     A = sum f - b sum f (1 - w*f),   w a Gaussian stencil,
 
-subtracts a term in proportion to the perimeter. With this area the work of adhesion is lower at convex fronts.
+subtracts a term in proportion to the perimeter. With the area A the work of adhesion is lower at convex fronts.
 
 Lengths are in units of the cell size, pressures in E*.
 """

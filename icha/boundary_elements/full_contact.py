@@ -80,7 +80,7 @@ class FullContactProblem(MaterialUnits):
 
     @property
     def closing_pressure(self):
-        """Nominal pressure assigned to full contact at an imposed separation, Pa; it must only exceed all targets."""
+        """Nominal pressure assigned to full contact at an imposed separation, Pa: a value above all targets."""
         return 10 * max(float(np.abs(self.full_contact_pressure).max()), self.interface_strength)
 
     def open_weakest(self, separation):

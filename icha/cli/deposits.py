@@ -249,7 +249,7 @@ def _token(address: str) -> str:
 
 
 def _send(server, files, metadata, number) -> None:
-    """Send files and metadata to a draft; if that fails, print how to continue."""
+    """Send files and metadata to a draft at Zenodo; if sending fails, print how to continue the draft."""
     from icha.deposit.upload import ZENODO, ZenodoError, md5_of
 
     draft = None

@@ -141,7 +141,7 @@ class Progress:
     def _waiting_work(self, begun: list[JobRecord]) -> float:
         """Return the expected core-seconds of the jobs that have not begun.
 
-        Snakemake reports only the number of waiting jobs of each rule, so each counts as the mean job of its rule.
+        Snakemake reports only the number of waiting jobs of each rule, so each job counts as the mean of its rule.
         """
         outputs = {output for job in begun for output in job.outputs}
         expected: dict[str, list[float]] = {}

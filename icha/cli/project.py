@@ -138,7 +138,7 @@ def read_configuration(path: Path):
     Raises
     ------
     UserError
-        If the configuration has errors; the message lists all of them.
+        If the configuration has errors; the message lists all errors.
     """
     from icha.configuration.errors import ConfigurationError
     from icha.configuration.load import load_configuration

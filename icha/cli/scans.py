@@ -32,7 +32,7 @@ def describe_scan(name: str, scan, *, to_scale: bool = True, models: Iterable[Mo
     name : name of the surface.
     scan : resolution of the scan (`icha.surfaces.measured.resolution.ScanResolution`).
     to_scale : whether the units of the heights and of the side lengths are known.
-    models : contact models of the runs on this surface; empty if they are not known yet.
+    models : contact models of the runs on the surface; empty if no runs are defined yet.
     """
     lines = [*_reading(scan), *_resolution(scan, to_scale, list(models)), *(_noise(scan) if to_scale else ())]
     return (f"{name}: {line}" for line in lines)

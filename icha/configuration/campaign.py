@@ -99,11 +99,11 @@ class Campaign(Section):
     """Loops of loading and unloading with boundary elements at a finite range of attraction, by name, to compare with
     the runs of a study that unloads."""
     measurements: Annotated[dict[Name, Measurement], _FEW] = {}
-    """Your own measurements by name. Figure 5 shows them with the runs."""
+    """Your own measurements by name. Figure 5 shows the measurements with the runs."""
     figures: Figures = Figures()
     """Figures to draw, with options."""
     publication: Publication = Publication()
-    """Metadata of a deposit. These values do not change any result."""
+    """Metadata of a deposit. Metadata do not change any result."""
 
     _contacts: dict[str, tuple[Contact, ...]] = PrivateAttr(default={})
     _topographies: dict[str, Topography] = PrivateAttr(default={})
@@ -126,7 +126,7 @@ class Campaign(Section):
         return list(self._contacts[study])
 
     def with_contacts(self, contacts: Mapping[str, Iterable[Contact]]) -> Campaign:
-        """Return the campaign with the given contacts; each list of a study is replaced by the values in them."""
+        """Return the campaign with the given contacts; lists of studies are replaced by the values in the contacts."""
         contacts = {study: tuple(dict.fromkeys(runs)) for study, runs in contacts.items()}
         studies = {}
         for label, study in self.studies.items():

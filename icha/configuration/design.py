@@ -35,7 +35,7 @@ _ORDER += tuple(_OF_MATERIAL)
 _SYMBOLS = {"m": "m", "Pa": "Pa", "J/m^2": "J"}
 _PREFIXES = {-15: "f", -12: "p", -9: "n", -6: "u", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 
-# A value in the design, and its location in the configuration.
+# Location of a value in the configuration, and the value.
 _Located = tuple[tuple, Any]
 
 

@@ -39,10 +39,7 @@ class ConfigurationError(ValueError):
 
 
 def refuse(origin: str, problems: Iterable[Problem], implausible: Iterable[Problem] = ()) -> None:
-    """Raise ConfigurationError if there are problems; the message also lists implausible values, a possible cause.
-
-    `origin` is the path of the configuration file.
-    """
+    """Raise ConfigurationError if there are problems; the message also lists implausible values, a possible cause."""
     found = list(itertools.islice(problems, MOST_PROBLEMS + 1))
     if not found:
         return

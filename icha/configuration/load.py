@@ -55,7 +55,7 @@ def load_configuration(
 ) -> Configuration:
     """Read and check a configuration file, and all surfaces and measurements in other files.
 
-    The text is checked before the other files, because this finds most errors quickly.
+    The text is checked before the other files, because this order finds most errors quickly.
 
     Parameters
     ----------
@@ -159,6 +159,6 @@ def collect_inputs(configuration: Configuration) -> tuple[str, dict[str, str]]:
         content[section][name] = (content[section][name] or {}) | {"path": stored}
         if section == "measurements" or (section, name) in used:
             files[stored] = path
-    # Every surface has its own path now.
+    # Every surface now has a path, so defaults must not contain one.
     (content.get("defaults") or {}).get("surfaces", {}).pop("path", None)
     return dump_yaml(content, configuration.origin), files

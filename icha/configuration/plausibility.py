@@ -71,7 +71,7 @@ class Unusual(NamedTuple):
     Attributes
     ----------
     location : keys that lead to the value in the configuration.
-    source : text for messages about the origin of a value that is not in the configuration; begins with a blank.
+    source : text for messages, with a blank before it: origin of a value that is not in the configuration.
     """
 
     location: tuple

@@ -86,7 +86,7 @@ def _matching(pattern: str) -> Callable[[str], str | None]:
 
 
 def _checked(read: Callable[[str], str | None], what: str, example: str):
-    """Return the type of a text that is checked by `read`, which returns its plain form, or None for a wrong text."""
+    """Return the type of a text; the function `read` returns the plain form of a text, or None for a wrong text."""
 
     def check(value: Any) -> str:
         # The YAML reader turns a date into a `datetime.date`, and a version such as 1.10 into the number 1.1.
@@ -107,7 +107,7 @@ Identifier = _checked(lambda value: _doi(value) or _web(value), "a DOI, arXiv:12
 FunderId = _checked(lambda value: _doi(value) or _ror(value), "a ROR identifier, or a DOI", "https://ror.org/00k4n6c32")
 Date = _checked(_date, "year, month and day", "2026-01-31")
 Community = _checked(_matching(r"[a-z0-9_-]+"), "the end of the address of a community of Zenodo", "contact-mechanics")
-# Part of the name of a folder.
+# The version is part of the name of a folder.
 Version = _checked(
     _matching(r"[0-9A-Za-z]([0-9A-Za-z.+_-]{0,38}[0-9A-Za-z])?"),
     "letters and digits, with . + - _ between them, in quotes if it looks like a number",

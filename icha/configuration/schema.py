@@ -20,7 +20,7 @@ def json_schema() -> str:
     """Return the JSON schema with which editors check and complete configuration files."""
     schema = _schema()
     for name in (*(kind.__name__ for kind in SURFACE_KINDS.values()), "Material", "Study"):
-        # A required key may be among the defaults instead.
+        # The defaults may contain a required key, so the schema must not require the key in every entry.
         schema["$defs"][name].pop("required", None)
     schema["$schema"] = "https://json-schema.org/draft/2020-12/schema"
     return json.dumps(schema, indent=2, ensure_ascii=False) + "\n"
@@ -28,7 +28,7 @@ def json_schema() -> str:
 
 def _schema() -> dict:
     text = json.dumps(Campaign.model_json_schema())
-    # Rename the section as in the configuration, and remove line breaks from descriptions.
+    # Use the section's name `Material`, and remove line breaks from descriptions.
     return json.loads(re.sub(r"\\n *", " ", text.replace("MaterialSection", "Material")))
 
 

@@ -32,7 +32,7 @@ class MaterialSection(Section):
     surface_energy: SurfaceEnergy
     """Work of adhesion Δγ. The value `0 J/m^2` means no adhesion."""
     interaction_range: Length
-    """Range ε of the attraction. It determines when asperities jump into contact. The Tabor parameter is μ =
+    """Range ε of the attraction. The range determines when asperities jump into contact. The Tabor parameter is μ =
     (RΔγ²/E*²)^(1/3)/ε, where 1/R is the rms curvature of the surface."""
     flaw_radius: Length | None = None
     """Radius a of the largest flaw of the interface. With a flaw, full contact opens at the tension √(πE*Δγ/(2a)), at
@@ -187,8 +187,8 @@ class SelfAffineSurface(Section):
     rolloff_wavelength: Length
     """Roll-off wavelength 2π/q0, at most the period. The spectrum is flat at longer wavelengths."""
     short_wavelength: Length
-    """Shortest wavelength 2π/q1. It must be less than the roll-off wavelength and at least 2 grid cells. A length below
-    4 grid cells causes a warning; 8 grid cells are recommended."""
+    """Shortest wavelength 2π/q1. The length must be less than the roll-off wavelength and at least 2 grid cells. A
+    length below 4 grid cells causes a warning; 8 grid cells are recommended."""
     hurst: number(HURST)
     """Hurst exponent H, in (0, 1]."""
     grid: integer(GRID)

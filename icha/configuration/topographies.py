@@ -70,7 +70,7 @@ def inspect_file(section: MeasuredSurface | FileSurface) -> Topography:
 
 def read_surface(section: MeasuredSurface | FileSurface) -> Surface:
     """Read a surface from a file, and prepare it as its section of the configuration describes."""
-    # These modules import SciPy, which takes time; campaigns without such a surface do not need it.
+    # The modules below import SciPy, which takes time; campaigns without surfaces from files do not need SciPy.
     if isinstance(section, MeasuredSurface):
         from icha.surfaces.measured.topography import prepared_topography
 

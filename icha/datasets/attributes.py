@@ -1,8 +1,8 @@
 """Global attributes that describe every file, and the reasons why a run is not a result.
 
 The attributes follow the CF conventions (section 2.6.2) and partly the Attribute Convention for Data Discovery (ACDD
-1.3). The files do not claim to follow ACDD, because its attributes for places and times on earth do not apply. Authors
-and date describe a publication as a whole, and not a single file.
+1.3). The files do not claim to follow ACDD, because the ACDD attributes for places and times on earth do not apply.
+Authors and date describe a publication as a whole, and not a single file.
 """
 
 from collections import Counter
@@ -23,7 +23,7 @@ INPUT, COMPUTED, COLLECTED, DERIVED, THEORY = (
 
 
 def why_no_result(attrs: Mapping) -> str:
-    """Return the reason why a run is not a result (ended early, or failed checks) from its attributes; "" if it is."""
+    """Return the reason why a run is not a result (ended early, or failed checks); "" for a run that is a result."""
     return str(attrs.get("incomplete") or attrs.get("failed_checks", ""))
 
 

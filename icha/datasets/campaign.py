@@ -78,9 +78,9 @@ def run_place(study: xr.Dataset, labels: RunLabels) -> dict[str, int]:
 def select_run(tree: xr.DataTree, labels: RunLabels | tuple) -> xr.Dataset:
     """Select one run of a campaign dataset, with all steps and spots of the run.
 
-    The run has the attributes of its file. Some attributes explain its status: `incomplete` (why the run failed),
-    `beyond_model` (why it ended at the limit of the model), `failed_checks` (which checks failed), and `applicability`
-    (why the model is not applicable).
+    The run has the attributes of its file. Some attributes explain the status of the run: `incomplete` (why the run
+    failed), `beyond_model` (why the run ended at the limit of the model), `failed_checks` (which checks failed), and
+    `applicability` (why the model is not applicable).
 
     Raises
     ------

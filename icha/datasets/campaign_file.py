@@ -321,5 +321,5 @@ def _put_shared(name: str, column: Column, known: np.ndarray, index: tuple, valu
     equal = present == values if values.dtype.kind == "S" else abs(present - values) <= _SAME * abs(values)
     if not np.all(unknown | equal):
         shared = ", ".join(column.along) or "the study"
-        raise ValueError(f"{run}: {name} differs between runs that share {shared}")
+        raise ValueError(f"{run}: {name} differs between runs that share {shared}; expected equal values")
     known[index] = np.where(unknown, values, present)

@@ -1,4 +1,4 @@
-"""The data dictionary of a deposit: all variables of its netCDF files, with their meanings and units."""
+"""Write the data dictionary of a deposit, a table of all variables in the netCDF files with meanings and units."""
 
 import csv
 import io
@@ -13,7 +13,7 @@ import numpy as np
 from icha.datasets.results import LOOP, RUN, SOLUTION, SURFACE, THEORIES
 
 _COLUMNS = "file group variable dimensions type units long_name flags missing comment files".split()
-# Placeholders for the parts of a path in which files of one kind differ.
+# Placeholders for the parts of a path that differ between files of one kind.
 _PLACEHOLDERS = {name: f"<{name}>" for name in ("study", "entry", "surface", "material")}
 _PLACEHOLDERS |= {"seed": "<k>", "slope": "<g>", "pressure": "<load>"}
 _KINDS = [
@@ -24,12 +24,12 @@ _KINDS = [
 
 
 def data_dictionary(folder: Path, files: Iterable[str]) -> str:
-    """Write `data_dictionary.csv`: a row for each variable of each kind of file, with the number of files that have it.
+    """Return the text of `data_dictionary.csv`, with one row for each variable of each kind of file.
 
     Parameters
     ----------
-    folder : the folder of the files.
-    files : paths of the files in that folder; files that are not netCDF are left out.
+    folder : folder of the files.
+    files : paths of the files, relative to `folder`; files that are not netCDF are left out.
     """
     found: Counter[tuple[str, ...]] = Counter()
     for name in sorted(files):
@@ -44,12 +44,12 @@ def data_dictionary(folder: Path, files: Iterable[str]) -> str:
 
 
 def file_pattern(path: str) -> str:
-    """Return the path pattern of a kind of file, such as `surfaces/<surface>/seed<k>.nc`."""
+    """Return the path pattern of the kind of file that `path` belongs to, such as `surfaces/<surface>/seed<k>.nc`."""
     return next((kind for kind in _KINDS if re.fullmatch(re.sub("<.*?>", "[^/]+", kind), path)), path)
 
 
 def _described(variable: netCDF4.Variable) -> tuple[str, ...]:
-    """Return the columns of a variable, from its name to its comment."""
+    """Return the values of the columns from `variable` to `comment` for a variable in a file."""
     attributes = {name: str(variable.getncattr(name)) for name in variable.ncattrs()}
     units, long_name, meanings, missing, comment = (
         attributes.get(name, "") for name in ("units", "long_name", "flag_meanings", "missing", "comment")

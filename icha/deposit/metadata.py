@@ -224,9 +224,9 @@ def summary_of(metadata: dict[str, Any]) -> dict[str, str]:
 
 
 def datacite_metadata(publication: Publication) -> dict[str, Any]:
-    """Return the metadata of `datacite.json` after DataCite's schema 4.5 (https://doi.org/10.14454/g8e5-6293).
+    """Return the metadata of `datacite.json` in DataCite's schema 4.5 (https://doi.org/10.14454/g8e5-6293).
 
-    The publisher is known only from a DOI of Zenodo. Otherwise it is `:tba`, DataCite's code for "to be announced".
+    The publisher is Zenodo if the DOI is one of Zenodo. Otherwise `:tba` is DataCite's code for "to be announced".
     """
     licence = find_licence(publication.license)
     paper = RelatedIdentifier(identifier=f"arXiv:{MODEL_PAPER.arxiv}", relation="Cites", resource="Preprint")

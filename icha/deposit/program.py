@@ -156,8 +156,8 @@ def _installed_source(packages: Path) -> Source:
     if wrong := _changes(recorded, present, "not of the installed version"):
         raise ValueError(
             f"{packages}: differs from icha {installed.version}, so the deposit would not contain the program that "
-            "made the data. Use `pip install --force-reinstall icha`. To change the program, use a clone of the "
-            f"repository:\n{_listed(wrong)}"
+            "made the data. Use `pip install --force-reinstall icha`, or change the program in a clone of the "
+            f"repository. The differences are:\n{_listed(wrong)}"
         )
     sums = "".join(f"{digest}  {name}\n" for name, digest in recorded.items())
     files = {name.removeprefix(f"{INSTALLED}/"): (present[name].read_bytes(), 0o644) for name in recorded}

@@ -38,8 +38,8 @@ def gap_distribution(law: JKR, surface: Surface, state: ContactState) -> dict:
     -------
     gap_density : (bins,) float, P(u) in the bins of `icha.contact.model.gap_bins`, 1/m.
     overlap_fraction : fraction of the nominal area with negative gap, where the surfaces overlap in the model.
-    area_beyond_edges : contact area fraction A/A0 minus the fraction of the nominal area that spots cover. This
-        difference is not zero if spots reach over the edges of a free square, or if two spots that have split
+    area_beyond_edges : contact area fraction A/A0 minus the fraction of the nominal area that spots cover. The
+        value is not zero if spots reach over the edges of a free square, or if two spots that have split
         overlap. The sum of the integral of P(u), A/A0 and overlap_fraction is 1 + area_beyond_edges.
     """
     edges = gap_bins(surface)

@@ -7,7 +7,7 @@ The unknowns are the local approaches delta_i of the spots in contact:
 Here h_i is the height of the asperity, u the mean separation, and w_i the displacement of the half-space at spot i,
 caused by all other spots and all periodic images. A positive w_i points away from the rough surface. On a free
 half-space there are no images, and u is the distance between the mean plane of the surface and the half-space far away.
-This distance may be negative because the loaded part of the half-space sinks in. The mean gap is u plus the mean of w
+The distance may be negative because the loaded part of the half-space sinks in. The mean gap is u plus the mean of w
 over the square. Below its jump-off approach, a spot keeps its jump-off radius (zero without adhesion).
 """
 

@@ -1,1 +1,1 @@
-"""Figures, one module each, and what they share."""
+"""Draw the figures of a campaign: one module for each figure, and modules with functions for all figures."""

@@ -80,7 +80,7 @@ class Curves(NamedTuple):
 def study_curves(campaign: xr.DataTree, study: str, boundary_elements: str | None = None, **changed: object) -> Curves:
     """Return the curves of a study, with boundary elements of the same study or of the study `boundary_elements`.
 
-    `changed` overrides the look of all markers.
+    `changed` are arguments of `Axes.plot` that replace others for all markers.
     """
     groups = select.group_by_contact(campaign, select.select_runs(campaign, study, ragged=False))
     dataset = campaign[study].to_dataset()
@@ -168,7 +168,7 @@ def draw_curves(
     ----------
     curves : the curves.
     panels : for each panel, the function that returns the points of a run.
-    unloading : whether unloading is drawn as well.
+    unloading : True to draw unloading as well.
 
     Returns
     -------

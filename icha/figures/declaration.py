@@ -71,7 +71,7 @@ class Declaration:
     description : what the figure shows, in one line, for authors of configurations.
     options : class of the section in a configuration; the first line of the docstring of the class is in the schema.
     inputs : function that returns the input files. `figure` gets the datasets of netCDF files and the paths of others.
-    holds_topography : whether drawing needs memory for arrays of the size of the surface.
+    holds_topography : True if drawing needs memory for arrays of the size of the surface.
     """
 
     description: str
@@ -202,7 +202,7 @@ class RunFigure(TopographyFigure):
 
 
 class ComparedFigure(StudyFigure):
-    """A figure that compares a study with boundary elements. It needs both `models`, or an entry of `finite_range`."""
+    """A comparison of a study with boundary elements. The study needs both `models`, or an entry of `finite_range`."""
 
     def study_problems(self, campaign: Campaign, study: Any) -> Iterator[Problem]:
         """Also yield a problem if the study has no boundary elements at the same loads."""
@@ -214,7 +214,7 @@ class ComparedFigure(StudyFigure):
 
 
 def is_solved_at_finite_range(campaign: Campaign, study: str) -> bool:
-    """Return whether an entry of `finite_range` solves the contacts of a study."""
+    """Return True if an entry of `finite_range` requests boundary-element solutions for the runs of a study."""
     return any(entry.study == study for entry in campaign.finite_range.values())
 
 

@@ -162,7 +162,7 @@ class Points:
     """
 
     def __init__(self, groups: Sequence[ContactRuns], *quantities: str, factor: float = 1.0):
-        """Arrange the values by seed."""
+        """Arrange the values of all points in one array along seeds and points."""
         common = set.intersection(*(set(group.by_seed) for group in groups))
         seeds = sorted(common or set().union(*(group.by_seed for group in groups)))
         members = np.full((len(quantities), len(seeds), len(groups)), np.nan)

@@ -36,9 +36,9 @@ def draw_errors(
 
     Parameters
     ----------
-    campaign : the campaign dataset; the order of its materials gives their colours.
+    campaign : the campaign dataset, in which the order of materials determines the colours.
     model_error : `icha.analysis.model_error.model_error` of the campaign.
-    study : name of the study; all entries that compare its runs are drawn.
+    study : name of the study. All entries of the model error that compare runs of the study are drawn.
     labels : labels of the axes by the names of the variables.
     percent : True for relative errors, which are drawn in per cent; False for variables that are never negative.
     """

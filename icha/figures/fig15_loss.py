@@ -68,7 +68,7 @@ def figure(campaign: xr.DataTree, *, studies: Sequence[str]) -> Figure:
     looks = looks_of_studies(campaign, studies, [contact for contact, _ in runs])
     sticky = {key: line for key, line in runs.items() if looks.adhesive(key[0][0])}
     if not sticky:
-        raise NothingToDraw(f"studies {', '.join(studies)}: no run with adhesion, so no surface energy to compare with")
+        raise NothingToDraw(f"studies {', '.join(studies)}: no run with adhesion; the figure needs a surface energy")
 
     fig, [(loss, parts)] = new_panels(3.1, width_ratios=(1.25, 1))
     handles, counts = _draw_losses(loss, sticky, looks)

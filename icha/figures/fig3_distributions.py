@@ -91,11 +91,11 @@ def _finish(left, right, pressures, highest, load):
 
 
 def singular_tail(members: Sequence[tuple[xr.Dataset, int]], lowest: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return p/(E* h'_rms) and P(p) E* h'_rms beyond the tension that the grid resolves, as the mean over snapshots.
+    """Return p/(E* h'_rms) and the mean P(p) E* h'_rms over snapshots, for tensions that the grid does not resolve.
 
-    At a distance x from the edge of contact the tension is K_c/sqrt(2 pi x), with K_c^2 = 2 E* dgamma. Along the length
-    L of the edge this gives the density P(p) = L K_c^2/(pi |p|^3 A0). The tail reaches from the resolved tension to
-    the pressure `lowest`; it is empty without adhesion.
+    At a distance x from the edge of contact the tension is K_c/sqrt(2 pi x), with K_c^2 = 2 E* dgamma. With the
+    length L of the edge, the density is P(p) = L K_c^2/(pi |p|^3 A0). The tail reaches from the resolved tension to
+    the pressure `lowest`. Without adhesion, the tail is empty.
     """
     (run, _), *_ = members
     unit = float(run["contact_modulus"]) * float(run["rms_slope"])

@@ -63,7 +63,7 @@ def figure(
     Parameters
     ----------
     campaign : the campaign dataset.
-    tables : files of measured curves; panel (b) shows only those whose slope is known.
+    tables : files of measured curves; panel (b) shows only curves with a known rms slope.
     measurements : for each table: `label`; `columns` (headings of load and area, with factors); `load_unit` (load
         over p/(E* h'rms)); `material` and `rms_slope`, None if they are not known.
     """

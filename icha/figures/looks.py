@@ -2,8 +2,8 @@
 
 The colour of a marker shows the material. Crosses are results of boundary elements. Closed markers are results of the
 asperity model with adhesion, open markers those without adhesion. The shape of closed and open markers distinguishes
-surfaces and slopes. Many materials, or many surfaces and slopes, have graded colours from dark to bright. The legend
-then names only some of them.
+surfaces and slopes. Many materials, or many surfaces and slopes, have graded colours from dark to bright, and the
+legend names only some of these materials or surfaces.
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ class Looks:
 
     Parameters
     ----------
-    campaign : the campaign dataset; the order of its materials gives their colours.
+    campaign : the campaign dataset, in which the order of materials determines the colours.
     interfaces : modulus, surface energy and range of attraction of the materials.
     contacts : material, surface and rms slope of every line.
     by_place : True if colours distinguish places instead of materials. More than `MOST_COLOURS` places have colours.
@@ -216,7 +216,7 @@ _MOST_COLUMNS = 4
 def legend_below(figure: Figure, handles: Mapping[str, object]) -> None:
     """Add a legend below the panels, with an entry for each handle, in as many columns as fit.
 
-    The legend increases the height of the figure. Therefore it must be added last.
+    The legend increases the height of the figure, and must therefore be added last.
     """
     marks = named_handles(figure.axes)
     handles = dict(handles) | {name: marks[name] for name in (FEWER_SEEDS, NOT_APPLICABLE) if name in marks}

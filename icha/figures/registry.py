@@ -45,7 +45,7 @@ def draw_figure(
     inputs: Mapping[str, str | Sequence[str]],
     arguments: Mapping[str, Any],
 ) -> None:
-    """Draw a figure and write it to `png` and `pdf`; if none of its runs is complete, write a page with a message.
+    """Draw a figure and write it to `png` and `pdf`; if no run in the figure is complete, write a message only.
 
     The declaration of the figure gives `inputs` and `arguments`.
     """

@@ -128,7 +128,7 @@ def select_by_labels(
 
 
 def select_complete_run(campaign: xr.DataTree, labels: RunLabels) -> xr.Dataset:
-    """Return a run of the campaign; raise `NothingToDraw` if it is not complete."""
+    """Return a run of the campaign; raise `NothingToDraw` if the run is not complete."""
     from icha.datasets.campaign import run_place, select_run
     from icha.datasets.variables.campaign import COMPLETE
 

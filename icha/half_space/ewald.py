@@ -275,7 +275,7 @@ class PointHalfSpace:
 
     @classmethod
     def _assemble(cls, ewald, points, before, later, earlier):
-        """Build the half-space from new pairs of points, and from those of the half-space `before`, or None."""
+        """Build the half-space from new pairs of points, and from those of another half-space `before`, or None."""
         n, known = len(points), 0 if before is None else len(before.points)
         difference = periodic_difference(points[later], points[earlier], ewald.period)
         r = np.sqrt(difference[:, 0] ** 2 + difference[:, 1] ** 2)

@@ -1,9 +1,9 @@
 """Single square on a free half-space: removal of the images from a periodic sum.
 
 The square lies in a periodic cell of twice its side. The nearest image of a point is at least one side of the square
-away, so that the displacement by images is smooth. This displacement is interpolated by Lagrange polynomials through n
-Chebyshev nodes along each side; the error falls as 5.8^-n. After the displacement by images is subtracted from the
-periodic sum, the plain sum of 1/r remains.
+away, so that the displacement by images is smooth. The smooth displacement is interpolated by Lagrange polynomials
+through n Chebyshev nodes along each side; the error falls as 5.8^-n. If the displacement by images is subtracted from
+the periodic sum, the plain sum of 1/r remains.
 """
 
 from functools import lru_cache

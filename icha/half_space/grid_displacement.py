@@ -52,8 +52,8 @@ def row_blocks(grid: int) -> list[slice]:
 class DisplacementField:
     """Displacement w of the half-space at the nodes of a regular grid by m spots: the sum of eq. (9).
 
-    The displacement is periodic and has zero mean. On a free half-space it is the sum over the spots without images. At
-    a node under a spot, the displacement by this spot is included.
+    The displacement is periodic and has zero mean. On a free half-space there are no images, and the mean
+    is not zero. At a node under a spot, the displacement by this spot is included.
 
     Attributes
     ----------

@@ -138,8 +138,8 @@ def displacement_at(
 ) -> np.ndarray:
     """Return the displacement w (n,), m, of the half-space at n points by m spots, the sum of eq. (9).
 
-    The displacement is periodic and has zero mean. On a free half-space it is the sum over the spots without images. At
-    a point under a spot, the displacement by this spot is included.
+    The displacement is periodic and has zero mean. On a free half-space there are no images, and the mean
+    is not zero. At a point under a spot, the displacement by this spot is included.
 
     Parameters
     ----------

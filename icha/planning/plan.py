@@ -75,12 +75,8 @@ def plan(campaign: Campaign, results: Path) -> list[Item]:
 
     A run is done if its file exists and has the present settings (`config_sha256`). Only Snakemake detects changes of
     the program. Any other file is done if the file and its inputs exist. A file is damaged if it differs from its
-    checksum (`icha.support.checksums`).
-
-    Parameters
-    ----------
-    campaign : the campaign.
-    results : folder of results of the campaign; times in its benchmarks correct the expected times for this machine.
+    checksum (`icha.support.checksums`). Measured times in the folder `results` correct the expected times for this
+    machine.
     """
     items = _items(campaign, results)
     kinds: dict[tuple[str, str], list[Item]] = {}

@@ -1,7 +1,7 @@
 """Loading and unloading at a finite range of attraction, with boundary elements, from no contact to no contact.
 
 The mean gap is prescribed, as in a stiff testing machine. Each solution starts from the last solution and therefore
-stays on the same branch until the branch ends. Then the surfaces jump, and the energy that the jump releases is lost.
+stays on the same branch until the branch ends. At its end the surfaces jump, and the energy of the jump is lost.
 The work done on the contact is minus the integral of the nominal pressure over the mean gap, by the trapezoidal rule.
 The work differs from the change of the stored energy by the energy that jumps dissipate, and by the error of this rule.
 A step with too large a difference is halved, at most five times. Therefore the position of a jump remains uncertain.

@@ -59,7 +59,7 @@ def persson_mean_separation(reduced_pressure, spectrum):
 
         u(p) = sqrt(pi) int dq q^2 C(q) w(q) int_p^inf dp'/p' [gamma + 3 (1 - gamma) P^2] exp(-(w p'/E*)^2).
 
-    This equation results from -p A0 du = dU_el, U_el = A0 E* (pi/2) int dq q^2 C P [gamma + (1 - gamma) P^2]. With the
+    The equation results from -p A0 du = dU_el, U_el = A0 E* (pi/2) int dq q^2 C P [gamma + (1 - gamma) P^2]. With the
     substitution t = w p'/E* the inner integral is the same function of t for all wave numbers.
 
     Parameters

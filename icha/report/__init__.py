@@ -1,1 +1,1 @@
-"""The pages of a campaign: the report and the page of `icha explore`; the table of the times of its jobs."""
+"""HTML pages about a campaign (the report, the page of `icha explore`), and the table of the times of jobs."""

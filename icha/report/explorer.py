@@ -116,7 +116,7 @@ def _dataset(folder: Path) -> Path:
     files = sorted(folder.glob(results.DATASET.format(campaign="*")))
     if len(files) != 1:
         count = f"{len(files)} campaign datasets" if files else "no campaign dataset"
-        raise ValueError(f"{folder}: has {count} in dataset/; expected the results of one campaign")
+        raise ValueError(f"{folder} has {count} in dataset/; expected a folder with the results of one campaign")
     return files[0]
 
 
@@ -125,7 +125,7 @@ def _contacts(labels: list[RunLabels], only: Mapping[str, Collection]) -> list[l
     for name, values in only.items():
         known = list(dict.fromkeys(getattr(run, name) for run in labels))
         if unknown := [value for value in values if value not in known]:
-            raise ValueError(f"{name} {unknown[0]}: not in this campaign; expected {', '.join(map(str, known))}")
+            raise ValueError(f"{name} {unknown[0]} is not in this campaign; expected {', '.join(map(str, known))}")
     contacts: dict[tuple, list[RunLabels]] = {}
     for run in labels:
         if all(getattr(run, name) in values for name, values in only.items()):

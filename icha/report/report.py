@@ -1,7 +1,7 @@
 """The report of a campaign: one HTML page that needs neither network nor other files.
 
-The same data always give exactly the same file. Long tables contain only their first rows; the page links to the data,
-which contain all rows.
+The same data always give exactly the same file. The page shows only the first rows of long tables, and links to the
+dataset, which contains all rows.
 """
 
 from __future__ import annotations
@@ -126,7 +126,7 @@ def write_report(
 
 
 def _pictures(figures: Sequence[ReportFigure], campaign: xr.DataTree, link) -> list[dict]:
-    """Return the figures of the page: first those of no study or of several studies, then those of each study.
+    """Return the figures of the page: first the figures of several studies or none, then the figures of each study.
 
     The number of a figure is part of its name. Captions state how many runs are missing or drawn pale.
     """

@@ -109,7 +109,7 @@ def _run(labels: RunLabels, run: xr.Dataset) -> dict:
 
 
 def collect_states(run: xr.Dataset) -> dict[tuple[str, float], dict[str, float]]:
-    """Return reduced pressure, A/A0 and mean gap/h_rms at each target of a loading; keys are its kind and value."""
+    """Return reduced pressure, A/A0 and mean gap/h_rms at each target of a loading; keys: kind and value of target."""
     stops = path_steps(run)
     keys = zip(stops["step_kind"].values.tolist(), stops["step_target"].values.tolist(), strict=True)
     values = {

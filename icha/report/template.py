@@ -1,4 +1,4 @@
-"""Templates of the pages, and the formats of numbers and symbols on them."""
+"""Templates of HTML pages, and functions that format numbers and symbols on the pages."""
 
 from __future__ import annotations
 

@@ -92,7 +92,7 @@ class IntegerRange:
 
 NUMBER = FloatRange()
 POSITIVE = FloatRange(above=0)
-# Bounds far beyond physical values; within the bounds, products of powers neither overflow nor vanish.
+# Bounds far beyond physical lengths; within the bounds, products of powers neither overflow nor vanish.
 LENGTH = FloatRange("m", least=1e-24, most=1e9)
 
 # Surfaces.

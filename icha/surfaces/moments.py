@@ -1,4 +1,4 @@
-"""Spectral moments, which statistical theories use to describe a rough surface, and its radial power spectrum.
+"""Spectral moments of rough surfaces, for statistical theories, and radial power spectra.
 
 Moments are averages over profiles in all directions, as P. R. Nayak defined them for isotropic surfaces, J. Lubr.
 Technol. 93 (1971) 398-407, doi:10.1115/1.3451608.
@@ -17,12 +17,12 @@ if TYPE_CHECKING:
     from icha.surfaces.surface import Surface
 
 
-# Cells per wavelength that resolve the summits of a wave.
+# Number of cells per wavelength at which a grid resolves the summits of a wave.
 RESOLVED_CELLS = 8
-# Cells per summit of a surface with RESOLVED_CELLS / 2 cells per shortest wave. Isotropic surfaces have about 0.2
-# summits in a square with the side of the shortest wavelength.
+# Number of cells per summit on a surface with RESOLVED_CELLS / 2 cells per shortest wave. Isotropic surfaces have about
+# 0.2 summits in a square with the side of the shortest wavelength.
 LEAST_CELLS_OF_SUMMIT = 80
-# Fewest cells per shortest wave on which boundary elements represent the surface.
+# Fewest cells per shortest wave with which boundary elements represent the surface.
 LEAST_CELLS_PER_WAVE = 1.5
 # Smallest ratio of the mean square slopes along two directions at which the smaller slope is not a rounding error.
 _NO_SLOPE = 1e-12

@@ -66,12 +66,12 @@ MAX_SHARE = 0.1
 
 @dataclass(frozen=True, eq=False)
 class Asperities:
-    """The summits of a surface.
+    """Positions, heights and curvatures of the summits of a surface, which the asperity model uses as asperities.
 
     Attributes
     ----------
-    position : (n, 2) array, (x, y) in [0, period), m.
-    height : (n,) array, above the mean plane, m.
+    position : (n, 2) array, positions (x, y) of the summits in [0, period), m.
+    height : (n,) array, heights of the summits above the mean plane, m.
     radius_of_curvature : (n,) array, 1/sqrt(kappa1 kappa2), the geometric mean of the principal radii of curvature, m.
     period : side of the square, m.
     free : True for a single square on a half-space, False for one cell of a periodic surface.
@@ -118,10 +118,10 @@ def locate_summits(surface: Surface) -> Asperities:
     """Locate the summits of a surface: maxima of a quintic spline, where the curvature is negative-definite.
 
     A comparison of every node with its neighbours would miss or misplace elongated summits. On a crest oblique to the
-    grid, the highest node can lie several cells away from the summit, or no node is a maximum. The contact area would
-    then depend on the grid by some per cent. Instead, Newton's method starts from every node whose parabola has its top
-    at a distance of at most one cell. A start counts only if Newton's method converges near its node, because some
-    steps are very long where a principal curvature is nearly zero.
+    grid, the highest node can lie several cells away from the summit, or no node is a maximum. Errors of this kind
+    would change the contact area by some per cent from grid to grid. Instead, Newton's method starts from every node
+    whose parabola has its top at a distance of at most one cell. A start counts only if Newton's method converges near
+    its node, because some steps are very long where a principal curvature is nearly zero.
 
     The edges of a free square have no maxima, because a crest that crosses an edge has its top outside. The spline
     continues the heights by point reflection at the edges, and only summits between the outermost nodes count.
@@ -218,7 +218,7 @@ def _climb(coefficients, node, flat):
 
 
 def _nodes_near_summits(coefficients):
-    """Return the nodes (k, 2) at most one Newton step and one cell from a maximum, and the least curvature of a summit.
+    """Return the nodes (k, 2) whose Newton step to a maximum is at most one cell, and the least curvature of a summit.
 
     A node with a smaller curvature counts as flat. The unit of the curvature is metres per squared cell.
     """
@@ -305,9 +305,9 @@ def paraboloid_departure(
     Returns
     -------
     float, the mean of abs(ln(d / (a^2 / 2R))) over the spots, weighted by their areas. Here d is the mean depth of the
-    surface below the summit on the circle of radius a. At small a, the curvature of an elongated summit is the
-    arithmetic mean of its principal curvatures. The value is computed with both curvatures, and the smaller result is
-    returned; it is 0 if no spot is wider than half a cell.
+    surface below the summit on the circle of radius a. Near the top of an elongated summit, d follows the arithmetic
+    mean of the principal curvatures, not 1/R. The function computes the value with both curvatures and returns the
+    smaller one; 0 if no spot is wider than half a cell.
     """
     mode = "mirror" if surface.free else "grid-wrap"
     spline = scipy.ndimage.spline_filter(surface.heights, order=3, mode=mode)
@@ -337,7 +337,7 @@ def paraboloid_departure(
 
 @dataclass(frozen=True, eq=False)
 class SummitCoverage:
-    """The peaks of a surface, which are the highest nodes around them, and the summits that may represent these peaks.
+    """The peaks of a surface (locally highest nodes), and the summits that may represent these peaks.
 
     Attributes
     ----------

@@ -51,7 +51,7 @@ class Surface:
 
     Parameters
     ----------
-    heights : (n, n) array, metres. Its mean is removed; the array is copied and made read-only.
+    heights : (n, n) array, metres. The mean height is removed; the array is copied and made read-only.
     period : side of the square, metres, in [1e-24, 1e9]; a periodic surface repeats after this length.
     boundary : "periodic" (in both directions), or "free" (a single square; the half-space is larger than the square).
 
@@ -108,14 +108,14 @@ class Surface:
         return self.boundary == FREE
 
     def require_periodic(self, purpose: str) -> None:
-        """Raise ValueError if the surface is a free square; the message names the purpose."""
+        """Raise ValueError if the surface is a free square; the message contains `purpose`, a computation."""
         if self.free:
             raise ValueError(f"boundary: {FREE!r}; {purpose} needs a surface of boundary {PERIODIC!r}")
 
     def by_wave_vector(self, function) -> list:
         """Return the results of `function(k2, count, power)`, called for blocks of all wave vectors except zero.
 
-        Wave vectors are 2 pi/L (kx, ky) with integers kx and ky.k2 = kx^2 + ky^2, (n, m). power: |h_q|^2, m^2, (n, m).
+        Wave vectors are 2 pi/L (kx, ky) with integers kx and ky. k2 = kx^2 + ky^2, (n, m). power: |h_q|^2, m^2, (n, m).
         count: (m,), 2 in columns whose power is the sum over two opposite wave vectors, else 1. A free square is
         treated as one cell of a periodic surface.
         """
@@ -130,7 +130,8 @@ class Surface:
         def along_y(columns):
             modes = scipy.fft.fft(half[:, columns], axis=0, norm="forward", workers=1)
             power = modes.real**2 + modes.imag**2
-            # The half spectrum omits the opposites of all columns but the first (and, on even grids, the last).
+            # The half spectrum contains one of two opposite wave vectors, except in the first column and, on even
+            # grids, the last.
             kx = np.arange(columns.start, columns.stop)
             count = np.where((kx > 0) & (2 * kx < n), 2.0, 1.0)
             power *= count

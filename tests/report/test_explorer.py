@@ -207,10 +207,10 @@ def test_the_command_writes_the_page_and_refuses_wrong_calls(folder, tmp_path):
     (tmp_path / "deposit/SHA256SUMS").write_text("")
     (tmp_path / "missing/dataset/small.nc").symlink_to(folder / "dataset/small.nc")
     for arguments, reason in (
-        ([tmp_path / "nowhere"], "nowhere: has no campaign dataset"),
-        ([tmp_path / "empty"], "empty: has no campaign dataset"),
+        ([tmp_path / "nowhere"], "nowhere has no campaign dataset"),
+        ([tmp_path / "empty"], "empty has no campaign dataset"),
         ([tmp_path / "deposit"], "deposit is a deposit"),
-        ([folder, "--study", "other"], "study other: not in this campaign; expected slopes, single, one, loops"),
+        ([folder, "--study", "other"], "study other is not in this campaign; expected slopes, single, one, loops"),
         ([folder, "--size", 1], "not even one contact fits on a page of 1 MB"),
         ([tmp_path / "missing"], "surfaces/rough/seed1.nc: no such file"),
     ):

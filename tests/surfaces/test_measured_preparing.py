@@ -197,7 +197,7 @@ def test_the_cutoff_is_that_of_iso_16610(prepared, boundary):
 @pytest.mark.parametrize("cutoff", [3.9, 65.1])
 def test_a_cutoff_that_the_scan_does_not_hold_is_refused(prepared, cutoff):
     heights = np.random.default_rng(1).normal(size=(65, 65))
-    with refused("cutoff", "expected from 4 pixels, 4 m, to the side of the square, 65 m"):
+    with refused("cutoff", r"expected at least 4 pixels \(4 m\), at most the side of the square \(65 m\)"):
         prepared(heights, boundary="window", taper=0.1, size=(65.0, 65.0), cutoff=cutoff)
 
 

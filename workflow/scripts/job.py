@@ -32,7 +32,7 @@ def _solver_errors() -> list[type[Exception]]:
 def job_context(snakemake):
     """Context manager: verify the inputs of a job, write checksums of its outputs, and report its errors.
 
-    All output goes to the log of the job. An error ends the job, and its message is written to the log. For an
+    All output goes to the log of the job. An error ends the job, and the error message is written to the log. For an
     unexpected error, the traceback is written to a file beside the log for the developers.
 
     Yields

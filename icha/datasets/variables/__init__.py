@@ -1,1 +1,1 @@
-"""The vocabulary of all files: dimensions, units, long name and type of every variable, file by file."""
+"""Descriptions of the variables in all files: dimensions, units, long name and type of every variable."""

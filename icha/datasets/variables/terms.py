@@ -83,9 +83,9 @@ def read_tables(
 def bin_table(quantity: str, units: str, over: str = "") -> Table:
     """Describe the variables for the bins of a quantity: edges, centres and bounds.
 
-    `<quantity>_bin_bounds` are the CF bounds (CF 1.11, section 7.1) of the coordinate `<quantity>_bin_centre`. Both
-    have the same units and long name. The coordinate must not have the name of its dimension, because CF would read
-    a coordinate variable in Pa as a height.
+    `<quantity>_bin_bounds` are the CF bounds (CF 1.11, section 7.1) of the coordinate `<quantity>_bin_centre`. Bounds
+    and centres have the same units and long name. The coordinate must not have the name of its dimension, because CF
+    would read a coordinate variable in Pa as a height.
 
     Parameters
     ----------

@@ -65,7 +65,8 @@ def read_netcdf(source, settings: Preparation) -> FileContent:
         chosen = file[name]
         if not _is_map(chosen.shape):
             raise UnfitTopography(
-                "data", f"has {chosen.ndim} dimensions; expected two, as {', '.join(maps) or 'no variable has'}"
+                "data",
+                f"has {chosen.ndim} dimensions; expected two, as in {', '.join(maps) or 'no variable of this file'}",
             )
         heights = _read_variable(chosen)
         heights = heights.reshape(heights.shape[-2:])
@@ -92,7 +93,7 @@ def _side(coordinate, count):
         return None, False
     _, lines, step = grid_indices(values, coordinate.name)
     if lines != count:
-        raise UnfitTopography("path", f"has unequal distances along {coordinate.name}; expected equal distances")
+        raise UnfitTopography("path", f"has coordinates {coordinate.name} with unequal steps; expected equal steps")
     return (count * step * unit if unit is not None else None), values[0] > values[-1]
 
 

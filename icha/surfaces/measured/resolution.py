@@ -30,7 +30,7 @@ _WORTH = 0.75
 
 @dataclass(frozen=True)
 class NoiseFloor:
-    """Noise floor: the flat end of the spectrum of a scan, at short waves.
+    """Noise floor: flat part of the spectrum of a scan at short wavelengths.
 
     Attributes
     ----------

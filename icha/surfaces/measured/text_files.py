@@ -106,7 +106,7 @@ def read_matrix(file: SourceFile, settings: Preparation) -> FileContent:
 
 
 def _as_instrument_file(file, settings):
-    """Read a text with SurfaceTopography; None if this gives no unit, or heights unlike the numbers in the file."""
+    """Read a text with SurfaceTopography; None without a unit, or if heights differ from the numbers in the file."""
     try:
         found = read_instrument(file, settings)
     except Exception:  # SurfaceTopography raises many types of errors for texts of other formats
@@ -279,7 +279,10 @@ def _number(text):
 
 
 def read_fourier(file: SourceFile, settings: Preparation) -> FileContent:
-    """Read a wave in every line and sum h = sum h_q exp(i q.r); a wave without its opposite counts for both."""
+    """Read a text file with a wave in every line, and sum the waves: h = sum h_q exp(i q.r).
+
+    If the wave -q is missing, its amplitude is the conjugate of the amplitude of q.
+    """
     table = file.values
     if table.shape[1] != 4 or not np.all(np.isfinite(table)):
         raise _not_waves("expected four numbers in each line: qx qy Re Im")

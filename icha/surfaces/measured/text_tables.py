@@ -53,12 +53,7 @@ class Layout:
 
 @dataclass(eq=False)
 class SourceFile:
-    """Text file or instrument file of a scan. Each attribute is read from the file at its first use, and then stored.
-
-    Attributes
-    ----------
-    path : path of the file.
-    """
+    """Text file or instrument file of a scan. Each attribute is read from the file once, at its first use."""
 
     path: Path
 
@@ -69,7 +64,7 @@ class SourceFile:
 
     @property
     def table_layout(self) -> Layout:
-        """The same as `layout`, but raises UnfitTopography if the file has no numbers."""
+        """Heading, notation and number of columns; raises UnfitTopography if the file has no numbers."""
         if self.layout is None:
             raise UnfitTopography(
                 "path",

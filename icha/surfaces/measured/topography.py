@@ -258,8 +258,9 @@ def filter_short_waves(scan: Scan, settings: Preparation) -> Scan:
     if not least * (1 - 1e-9) <= settings.cutoff <= most:
         raise UnfitTopography(
             "cutoff",
-            f"is {settings.cutoff / max(scan.pixel):.3g} pixels{scan.remark_on_unit}; expected from {LEAST_PIXELS} "
-            f"pixels, {formatting.length(least)}, to the side of the square, {formatting.length(most)}",
+            f"is {settings.cutoff / max(scan.pixel):.3g} pixels{scan.remark_on_unit}; expected at least "
+            f"{LEAST_PIXELS} pixels ({formatting.length(least)}), at most the side of the square "
+            f"({formatting.length(most)})",
         )
     dx, dy = scan.pixel
     sigma = DEVIATION * settings.cutoff

@@ -6,7 +6,7 @@ is a fork of the fork server. Other jobs run in a new process, as with Snakemake
 new process if the fork server cannot be started, and on systems other than Linux, where libraries may fail after a
 fork.
 
-When Snakemake ends, the fork server ends, too. When the fork server ends, its forks end.
+The fork server ends when Snakemake ends. The forks end when the fork server ends.
 """
 
 import json
@@ -64,7 +64,7 @@ class Executor(LocalExecutor):
         return self.pool.submit(self._run_forked, str(file), context, benchmark)
 
     def _server_runs(self) -> bool:
-        """Start the fork server if it does not run; return False if this fails."""
+        """Start the fork server if necessary; return False if the fork server cannot be started."""
         if not self._without_server:
             try:
                 # The fork server ends with the thread that starts it, so this must be the main thread.
