@@ -14,7 +14,6 @@ import matplotlib.pyplot as plt
 from validation.tables import DOCS, Table, percent, write_tables
 
 RESULTS = Path(__file__).resolve().parent / "results"
-MIB = 2.0**20
 OWN = ("icha", "icha-boundary-elements")  # ICHA's models
 WITH = {False: "without adhesion", True: "with adhesion"}
 
@@ -44,10 +43,6 @@ def seconds(value: float) -> str:
 
 def times(ratio: float) -> str:
     return f"{ratio:.2g}" if ratio < 10 else f"{ratio:.0f}"
-
-
-def mib(value: float) -> str:
-    return f"{value / MIB:.0f} MiB"
 
 
 # --- the sweep ----------------------------------------------------------------------------------------------------
@@ -121,7 +116,8 @@ def sweep(results, grid, adhesion) -> Table:
                 *differences(results, result),
             ]
         spent = [more + seconds(result["wall"]), more + seconds(result["processor"])]
-        rows.append([name, *spent, compute + seconds(computation(result)), mib(result["peak"]), *ratios])
+        spent += [compute + seconds(computation(result)), f"{result['peak'] / 2**20:.0f} MiB"]
+        rows.append([name, *spent, *ratios])
     head = ["code", "wall", "processor", "computation", "memory", "time / ICHA's", "computation / ICHA's"]
     return Table([*head, "memory / ICHA's", "ICHA's area", "and gap or load"], rows, numbers=True)
 

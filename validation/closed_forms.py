@@ -223,15 +223,15 @@ class SphereInCell:
 
     def loaded_radius(self, force: float) -> float:
         """Return the larger contact radius at a force (N), m; ValueError if the tension exceeds pull-off."""
-        least = float(np.cbrt(9 * np.pi / 8 * self.material.adhesion_length * self.radius_of_curvature**2))
-        if least:
-            bounds = (0.5 * least, 2 * least)
-            least = float(minimize_scalar(self.force, bounds=bounds, options={"xatol": 1e-10 * least}).x)
+        least = self._pull_off().x if self.material.surface_energy else 0.0
         return brentq(lambda a: float(self.force(a)) - force, least, self.period / 4, xtol=1e-14, rtol=1e-14)
 
     @property
     def pull_off_force(self) -> float:
         """Largest tension, N; 3/2 pi dgamma R for a single sphere."""
+        return -float(self._pull_off().fun)
+
+    def _pull_off(self):
+        """Return the contact radius (x) and the force (fun) at the largest tension."""
         single = float(np.cbrt(9 * np.pi / 8 * self.material.adhesion_length * self.radius_of_curvature**2))
-        bounds = (0.5 * single, 2 * single)
-        return -float(minimize_scalar(self.force, bounds=bounds, options={"xatol": 1e-10 * single}).fun)
+        return minimize_scalar(self.force, bounds=(0.5 * single, 2 * single), options={"xatol": 1e-10 * single})

@@ -1,6 +1,6 @@
 """Disturb a small campaign and check that it recovers: tables of docs/faults.md.
 
-    python -m validation.faults [--parts PART ...] [--trials N] [--seed N] [--scratch FOLDER]
+    python -m validation.faults [--parts PART ...] [--trials N] [--seed N]
 
 Processes are killed, the power is cut, the disk is full, and files are damaged. Afterwards every result must be, byte
 for byte, that of an undisturbed campaign, and the next call must finish the campaign or print what to do. Counts are
@@ -230,11 +230,6 @@ class Reference:
         return [*([f"the next call failed: {output[-500:]}"] if status else []), *self.differences(place)]
 
 
-def first_line_with(output: str, words: str) -> str:
-    """Return the first line that contains some words."""
-    return next((line.strip()[:200] for line in output.splitlines() if words in line), "")
-
-
 # --- kills --------------------------------------------------------------------------------------------------------
 
 VICTIMS = ("Snakemake", "the whole session", "a job", "the process that the jobs are forked from", "icha run")
@@ -346,7 +341,7 @@ def disturb_by_full_disk(reference: Reference, place: Place, number: int, chance
     subprocess.run(["mount", "-t", "tmpfs", "-o", options, "none", str(folder)], check=True)
     try:
         status, output = place.run(CALLS[number // 2 % 2])
-        words = first_line_with(output, "No space left on device")
+        words = next((line.strip()[:200] for line in output.splitlines() if "No space left on device" in line), "")
         wrong = [*place.end_remaining(), *reference.foreign_results(place)]
         wrong += [] if not status or words else [f"no message about the full disk: {output[-500:]}"]
         subprocess.run(["mount", "-o", f"remount,size={4 * size + 2**24}", str(folder)], check=True)
@@ -435,15 +430,8 @@ def count_trials(part: str, trials: list[Trial]) -> list[dict]:
     """Count the outcomes of the trials of a part for each fault."""
     rows: dict[str, dict] = {}
     for trial in trials:
-        new = {
-            "part": part,
-            "fault": trial.fault,
-            "trials": 0,
-            RESUMED: 0,
-            REFUSED: 0,
-            "messages": [],
-            "violations": [],
-        }
+        new = {"part": part, "fault": trial.fault, "messages": [], "violations": []}
+        new |= dict.fromkeys(("trials", RESUMED, REFUSED), 0)
         row = rows.setdefault(trial.fault, new)
         row["trials"] += 1
         row["violations"] += trial.violations
@@ -460,14 +448,13 @@ def main() -> None:
     parser.add_argument("--parts", nargs="+", choices=PARTS, default=PARTS)
     parser.add_argument("--trials", type=int, default=50, help="of each part")
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--scratch", type=Path, default=None, help="an empty folder")
     parser.add_argument("--in-namespace", action="store_true", help=argparse.SUPPRESS)
     options = parser.parse_args()
     if not options.in_namespace:
         # In a mount namespace no other process sees the disks, and they end with this process.
         unshare = ["unshare", "--mount", *([] if os.getuid() == 0 else ["--map-root-user"])]
         os.execvp(unshare[0], [*unshare, sys.executable, "-m", "validation.faults", *sys.argv[1:], "--in-namespace"])
-    with tempfile.TemporaryDirectory(prefix="icha-faults-", dir=options.scratch) as name:
+    with tempfile.TemporaryDirectory(prefix="icha-faults-") as name:
         scratch = Path(name)
         # The committed state of the program, so that edits during the trials have no effect.
         subprocess.run(["git", "clone", "--quiet", str(HERE.parent), str(scratch / "project")], check=True)

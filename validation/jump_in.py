@@ -59,7 +59,10 @@ class _Problem:
         self.compliance = 8 / 3 * tabor_parameter**1.5
         self.radius = np.sqrt(scale) * nodes()
         self.influence = np.sqrt(scale) * displacement_matrix()
-        self.at_axis = _weights_at_axis()
+        # Weights that extrapolate a function of r^2 from the nodes to the axis.
+        x, weights = _chebyshev()
+        to_axis = weights / (-1 - x)
+        self.at_axis = to_axis / to_axis.sum()
 
     def equilibrium(self, gap, start):
         """Return the state with a given gap at the axis, by Newton's method."""
@@ -92,13 +95,6 @@ def nodes() -> np.ndarray:
     """Return distances from the axis (n,), Chebyshev's nodes in (r^2 - 1)/(r^2 + 1)."""
     x, _ = _chebyshev()
     return np.sqrt((1 + x) / (1 - x))
-
-
-def _weights_at_axis():
-    """Return weights (n,) that extrapolate a function of r^2 from the nodes to the axis."""
-    x, weights = _chebyshev()
-    to_axis = weights / (-1 - x)
-    return to_axis / to_axis.sum()
 
 
 def _chebyshev():

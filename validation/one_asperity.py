@@ -30,7 +30,7 @@ from icha.surfaces.summits import find_summits
 from icha.surfaces.surface import Surface
 from validation.single_contacts import force_and_area
 from validation.surfaces import paraboloid
-from validation.tables import Table, write_tables
+from validation.tables import Table, percent, write_tables
 
 # Relative tolerance of the boundary elements, with which forces and areas are right to a few parts in 1e5.
 _TOLERANCE = 1e-6
@@ -151,8 +151,7 @@ def _range(error, digits):
     """Return the range of an error in per cent, one number if both ends are equal as printed, a dash if empty."""
     if not error.size:
         return "–"
-    ends = [f"{100 * float(end):+.{digits}f}" for end in (error.min(), error.max())]
-    return " to ".join(dict.fromkeys(end.replace("-", "+") if float(end) == 0 else end for end in ends))
+    return " to ".join(dict.fromkeys(percent(float(end), digits) for end in (error.min(), error.max())))
 
 
 def tables(adhesive: Sequence[xr.Dataset], hertz: xr.Dataset) -> dict[str, Table]:

@@ -1,6 +1,6 @@
 """Random loops by boundary elements: each one must end where it was asked to end.
 
-python -m validation.random_loops [--count N] [--first K] [--grid CELLS]
+python -m validation.random_loops [--count N] [--first K]
 
 Smooth, elliptic and rough surfaces and plateaus, half of them sticky, under control of separation, load or area. A
 target may lie inside a jump, where there is no equilibrium; any other failure is one of the solver.
@@ -86,11 +86,10 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--count", type=int, default=300)
     parser.add_argument("--first", type=int, default=0)
-    parser.add_argument("--grid", type=int, default=None)
     options = parser.parse_args()
     failed = 0
     for number in range(options.first, options.first + options.count):
-        loop, clock = random_loop(number, options.grid), time.process_time()
+        loop, clock = random_loop(number), time.process_time()
         with threadpool_limits(1):
             reason = follow_loop(loop)
         failed += bool(reason)

@@ -48,20 +48,18 @@ def states_at(contact: BoundaryElements, separations: Iterable[float]):
         yield state
 
 
-def by_cells_per_wave(
-    waves: int, cells: Sequence[int], separations: Sequence[float], material: Material = SOFT, seed: int = 1
-) -> Iterator[dict]:
+def by_cells_per_wave(waves: int, cells: Sequence[int], separations: Sequence[float]) -> Iterator[dict]:
     """Solve one surface on several grids at falling separations (h_rms)."""
-    coarse = rough(waves * min(cells), waves, min(cells), seed)
+    coarse = rough(waves * min(cells), waves, min(cells))
     for count in cells:
         surface = coarse.refined(count // min(cells))
-        contact = contact_of(surface, material)
+        contact = contact_of(surface, SOFT)
         for separation, state in zip(separations, states_at(contact, separations), strict=True):
             yield {
                 "cells": count,
                 "grid": surface.grid,
                 "separation": separation,
-                "reduced_pressure": contact.pressure(state) / (material.contact_modulus * coarse.rms_slope),
+                "reduced_pressure": contact.pressure(state) / (SOFT.contact_modulus * coarse.rms_slope),
                 "area": contact.area_fraction(state),
                 "patches": contact.spot_count(state),
             }
@@ -72,7 +70,7 @@ def symmetries(surface: Surface, separation: float, material: Material = SOFT) -
     turns = {
         "shifted by 7 and 3 cells": (lambda h: np.roll(h, (7, 3), (0, 1))),
         "reflected": (lambda h: h[:, ::-1]),
-        "turned by 90 degrees": (lambda h: np.rot90(h)),
+        "turned by 90 degrees": np.rot90,
         "turned and reflected": (lambda h: h.T),
     }
 
@@ -92,15 +90,13 @@ def symmetries(surface: Surface, separation: float, material: Material = SOFT) -
         }
 
 
-def by_steps(
-    surface: Surface, separation: float, counts: Sequence[int], material: Material = SOFT, first: float = 3.0
-) -> list[dict]:
-    """Reach a stop from a separation `first` (both h_rms) in several numbers of steps, and compare with the most."""
-    contact = contact_of(surface, material)
+def by_steps(surface: Surface, separation: float, counts: Sequence[int]) -> list[dict]:
+    """Reach a separation from 3 (both h_rms) in several numbers of steps, and compare with the largest number."""
+    contact = contact_of(surface, SOFT)
     unit, found = surface.rms_height, {}
     for count in sorted(counts, reverse=True):
         state = contact.untouched()
-        for u in np.linspace(first, separation, count + 1):
+        for u in np.linspace(3.0, separation, count + 1):
             state = contact.equilibrium(state, u * unit)
         found[count] = state
     best = found[max(counts)]

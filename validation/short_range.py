@@ -70,13 +70,6 @@ PARTS: dict[str, Callable] = {
 }
 
 
-def measured(part: str) -> dict:
-    """Return the rows of a part and the time of its measurement, s."""
-    clock = time.perf_counter()
-    rows = list(PARTS[part]())
-    return {"seconds": round(time.perf_counter() - clock, 1), "rows": rows}
-
-
 # --- errors -------------------------------------------------------------------------------------------------------
 
 
@@ -320,12 +313,14 @@ def main() -> None:
     options = parser.parse_args()
     for part in () if options.tables else options.parts:
         print(f"{part} ...", end=" ", flush=True)
+        clock = time.perf_counter()
         with threadpool_limits(1):
-            found = measured(part)
+            rows = list(PARTS[part]())
+        found = {"seconds": round(time.perf_counter() - clock, 1), "rows": rows}
         (RESULTS / f"{part}.json").write_text(
             json.dumps(found, indent=1, default=lambda number: number.item()) + "\n", encoding="utf-8"
         )
-        print(f"{len(found['rows'])} rows in {found['seconds']:.0f} s", flush=True)
+        print(f"{len(rows)} rows in {found['seconds']:.0f} s", flush=True)
     write_tables(tables(read_measurements()))
 
 

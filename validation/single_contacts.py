@@ -4,7 +4,6 @@ Units: E* = 1 Pa and dgamma = 1 J/m^2; spheres have radius 1 m, so that lengths 
 functions give rows, dictionaries of numbers for JSON. Errors are ratios minus one unless their description differs.
 """
 
-import itertools
 import math
 from collections.abc import Iterator, Sequence
 
@@ -38,20 +37,17 @@ def force_and_area(contact: BoundaryElements, state) -> tuple[float, float]:
     return contact.pressure(state) * contact.area, contact.area_fraction(state) * contact.area
 
 
-def sphere_loop(
-    grid: int, offset=(0.0, 0.0), approaches: Sequence[float] = APPROACHES, material: Material = MATERIAL
-) -> Iterator[dict]:
-    """Unload a sphere from a strong contact and load it again, at given approaches (m, falling).
+def sphere_loop(grid: int, offset=(0.0, 0.0)) -> Iterator[dict]:
+    """Unload a sphere from a strong contact and load it again, at the same approaches.
 
     `cells` is the contact radius of the closed form in cells.
     """
     surface, top = bump(grid, _PERIOD, offset)
-    contact, exact = contact_of(surface, material), SphereInCell(material, 1.0, _PERIOD)
-    radius = exact.contact_radius(approaches[0])
-    state = contact.relax_region(disc(grid, _PERIOD, radius, offset), top - approaches[0])
-    for branch, approach in itertools.chain(
-        (("unloading", one) for one in approaches), (("loading", one) for one in approaches[-2::-1])
-    ):
+    contact, exact = contact_of(surface, MATERIAL), SphereInCell(MATERIAL, 1.0, _PERIOD)
+    radius = exact.contact_radius(APPROACHES[0])
+    state = contact.relax_region(disc(grid, _PERIOD, radius, offset), top - APPROACHES[0])
+    unloading, loading = (("unloading", one) for one in APPROACHES), (("loading", one) for one in APPROACHES[-2::-1])
+    for branch, approach in (*unloading, *loading):
         state = contact.equilibrium(state, top - approach)
         force, area = force_and_area(contact, state)
         radius = exact.contact_radius(approach)
@@ -173,12 +169,11 @@ def flat_punch(grid: int, cells: float, square: bool = False) -> dict:
 
     Both are over the closed form of a round punch; for a square punch this is that of the inscribed circle.
     """
-    period = _PERIOD
-    spacing = period / grid
+    spacing = _PERIOD / grid
     radius = cells * spacing
     round_ = RoundPunch(MATERIAL, radius)
-    let_go = round_.displacement_in_cell(round_.pull_off_force, period)
-    surface, face = punch(grid, period, radius, 10 * let_go, square)
+    let_go = round_.displacement_in_cell(round_.pull_off_force, _PERIOD)
+    surface, face = punch(grid, _PERIOD, radius, 10 * let_go, square)
     contact = contact_of(surface, MATERIAL)
     base = float(surface.heights.max())
     state = contact.relax_region(face, base + 0.02 * let_go)
@@ -191,17 +186,16 @@ def flat_punch(grid: int, cells: float, square: bool = False) -> dict:
         "square": square,
         "pull_off": tension / round_.pull_off_force,
         "pull_off_of_nodes": tension / RoundPunch(MATERIAL, nodes).pull_off_force,
-        "compliance": compliance / round_.displacement_in_cell(1.0, period),
+        "compliance": compliance / round_.displacement_in_cell(1.0, _PERIOD),
     }
 
 
 def row_of_strips(grid: int, half_width: float) -> dict:
     """Pull-off of strips of a half-width (in periods) against Koiter's, and their compliance."""
-    period = _PERIOD
     cells = round(half_width * grid)
-    exact = Strips(MATERIAL, cells / grid * period, period)
+    exact = Strips(MATERIAL, cells / grid * _PERIOD, _PERIOD)
     let_go = exact.pull_off_tension * exact.compliance
-    surface, face = strips(grid, period, exact.half_width, 10 * let_go)
+    surface, face = strips(grid, _PERIOD, exact.half_width, 10 * let_go)
     contact = contact_of(surface, MATERIAL)
     base = float(surface.heights.max())
     state = contact.relax_region(face, base + 0.02 * let_go)

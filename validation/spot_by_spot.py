@@ -10,6 +10,7 @@ from scipy.sparse.csgraph import connected_components
 from icha.equilibrium.interacting_asperities import InteractingAsperities
 from icha.equilibrium.sites import ContactState
 from icha.references.finite_range import NodalState, perimeter_correction
+from validation.paraboloids import fourth_order_terms
 
 
 class Patches(NamedTuple):
@@ -87,14 +88,14 @@ def compare_single_spots(
     contact: InteractingAsperities, state: ContactState, truth: NodalState
 ) -> dict[str, np.ndarray]:
     """Compare the single spots of one state without adhesion with their patches, by the names of the variables."""
-    spots, law = state.spots, contact.law
-    patches = contact_patches(truth)
+    spots, patches = state.spots, contact_patches(truth)
     single, patch = match(spots.position, spots.contact_radius, spots.members > 1, patches, contact.asperities.period)
     return {
         "pair_spot_area": np.pi * spots.contact_radius[single] ** 2,
         "pair_patch_area": patches.area[patch],
-        "pair_spot_force": law.force(spots.contact_radius, spots.radius_of_curvature)[single],
         "pair_patch_force": patches.force[patch],
         "pair_patch_nodes": patches.nodes[patch],
         "pair_curvature_radius": spots.radius_of_curvature[single],
+        # The centre of a single spot is its summit.
+        "pair_fourth_order": fourth_order_terms(truth.surface, spots.position[single]),
     }

@@ -34,7 +34,11 @@ def write_tables(tables: Mapping[str, Table]) -> None:
 
 def percent(value: float, digits: int = 2) -> str:
     """Format a relative error in per cent, zero without a minus sign."""
-    text = f"{100 * value:+.{digits}f}"
+    return _without_minus_zero(100 * value, f"{{:+.{digits}f}}")
+
+
+def _without_minus_zero(value, form):
+    text = form.format(value)
     return text.replace("-", "+") if float(text) == 0 else text
 
 
@@ -43,16 +47,11 @@ def means(values: Sequence[np.ndarray], form: str) -> list[str]:
 
     `form` formats a number, such as `"{:+.1f}"`; deviations have no sign.
     """
-
-    def formatted(value):
-        text = form.format(value)
-        return text.replace("-", "+") if float(text) == 0 else text
-
-    mean = np.mean(values, axis=0)
+    found = [_without_minus_zero(mean, form) for mean in np.mean(values, axis=0)]
     if len(values) == 1:
-        return [formatted(m) for m in mean]
+        return found
     deviation = np.std(values, axis=0, ddof=1)
-    return [f"{formatted(m)} ± {form.replace('+', '').format(d)}" for m, d in zip(mean, deviation, strict=True)]
+    return [f"{mean} ± {form.replace('+', '').format(d)}" for mean, d in zip(found, deviation, strict=True)]
 
 
 def pressures(values: np.ndarray) -> list[str]:

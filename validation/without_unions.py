@@ -66,14 +66,7 @@ def independent_discs(summits: Asperities, law: JKR, pressure: float) -> Discs:
     return Discs(summits.position[touching], law.contact_radius(approach, R), R, separation)
 
 
-def discs_apart(
-    summits: Asperities,
-    law: JKR,
-    pressure: float,
-    rms_height: float,
-    *,
-    field_shape: bool = False,
-) -> Discs:
+def discs_apart(summits: Asperities, law: JKR, pressure: float, rms_height: float, *, field_shape: bool) -> Discs:
     """Solve the model without unions and adhesion at a nominal pressure (Pa).
 
     A summit within the contact of a larger one is removed.
@@ -101,7 +94,7 @@ def discs_apart(
         # Constant windows for the largest possible radii, because the equations must be continuous.
         largest = law.contact_radius(height - separation + _FALL * rms_height, R[sites])
         interaction = Interaction.between(law, half_space, R[sites], largest)
-        problem = _Apart(law, half_space, height, R[sites], pressure, rms_height, interaction)
+        problem = _Apart(law, height, R[sites], pressure * summits.period**2, rms_height, interaction)
         approach, separation, error = problem.solve(approach, separation)
         a = law.contact_radius(approach, R[sites])
         touching = np.flatnonzero(a > 0)
@@ -140,10 +133,9 @@ class _Apart:
     """delta_i + w_i(a(delta)) = h_i - u with a given load: Newton's method in approaches and separation."""
 
     law: JKR
-    half_space: PointHalfSpace
     height: np.ndarray
     R: np.ndarray
-    pressure: float
+    load: float
     rms_height: float
     interaction: Interaction
 
@@ -174,19 +166,17 @@ class _Apart:
         a = self.law.contact_radius(approach, self.R)
         force = self.law.force(a, self.R)
         w = self.interaction.displacement(a)
-        nominal = self.half_space.ewald.period**2 * self.pressure
-        return (approach + w + separation - self.height) / self.rms_height, np.sum(force) / nominal - 1
+        return (approach + w + separation - self.height) / self.rms_height, np.sum(force) / self.load - 1
 
     def _newton_step(self, approach, separation, point):
         a, n = self.law.contact_radius(approach, self.R), len(approach)
         growth = np.divide(self.R, 2 * a, out=np.zeros(n), where=a > 0)
         stiffness = self.law.force_derivative(a, self.R) * growth
-        nominal = self.half_space.ewald.period**2 * self.pressure
         tangent, _ = self.interaction.tangent(a)
 
         def apply(y):  # lengths in h_rms
             return np.append(
-                y[:n] + tangent(growth * y[:n]) + y[n], np.sum(stiffness * y[:n]) * self.rms_height / nominal
+                y[:n] + tangent(growth * y[:n]) + y[n], np.sum(stiffness * y[:n]) * self.rms_height / self.load
             )
 
         operator = LinearOperator((n + 1, n + 1), matvec=apply, dtype=float)

@@ -41,13 +41,7 @@ def main():
         if not found.success:
             raise RuntimeError(f"no convergence at {pressure:g} Pa: {found.message}")
         gap = found.x
-        task.answer_stop(
-            pressure=pressure,
-            area_fraction=area_on_grid(gap <= 0),
-            mean_gap=gap.mean() * unit,
-            iterations=int(found.nit),
-            products=int(found.nb_hessp),
-        )
+        task.answer_stop(pressure=pressure, area_fraction=area_on_grid(gap <= 0), mean_gap=gap.mean() * unit)
 
 
 main()

@@ -34,7 +34,6 @@ def main():
             pressure=pressures.mean() * modulus,
             area_fraction=area_on_grid(contact),
             mean_gap=(gap.mean() - gap[contact].mean()) * unit,
-            iterations=found.iterations,
         )
 
 

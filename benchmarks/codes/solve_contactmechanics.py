@@ -34,7 +34,6 @@ def main():
             pressure=-forces.sum() / (size[0] * size[1]) * modulus,
             area_fraction=area_on_grid(contact),
             mean_gap=(gap.mean() - gap[contact].mean()) * unit,
-            iterations=int(found.nit),
         )
 
 

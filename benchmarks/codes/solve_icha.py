@@ -40,7 +40,6 @@ def main():
                 pressure=contact.pressure(state),
                 area_fraction=contact.area_fraction(state),
                 mean_gap=state.separation,
-                spots=contact.spot_count(state),
             )
 
 

@@ -50,11 +50,11 @@ class Task:
         self.about = {"version": version(package), "settings": how}
         self.clock = time.perf_counter()
 
-    def answer_stop(self, *, pressure, area_fraction, mean_gap, **more):
-        """Record a stop: nominal pressure (Pa), A/A0, mean gap (m), and counts of the code."""
+    def answer_stop(self, *, pressure, area_fraction, mean_gap):
+        """Record a stop: nominal pressure (Pa), A/A0 and mean gap (m)."""
         seconds = time.perf_counter() - self.clock
-        row = {"pressure": pressure, "area_fraction": area_fraction, "mean_gap": mean_gap, "seconds": seconds, **more}
-        self.rows.append({key: value if isinstance(value, int) else float(value) for key, value in row.items()})
+        row = {"pressure": pressure, "area_fraction": area_fraction, "mean_gap": mean_gap, "seconds": seconds}
+        self.rows.append({key: float(value) for key, value in row.items()})
         self.answer.write_text(json.dumps({**self.about, "stops": self.rows}))
 
 

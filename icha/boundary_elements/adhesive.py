@@ -8,15 +8,10 @@ import numpy as np
 
 from icha.boundary_elements.cells import mask_of
 from icha.boundary_elements.elastic_contact import AdhesiveContact, Contact
-from icha.boundary_elements.front_solver import FrontProblem, relax_front
+from icha.boundary_elements.front_solver import TOLERANCES, FrontProblem, relax_front
 from icha.boundary_elements.local_relaxation import relax_in_windows
 from icha.contact.model import NotConverged
 
-# At the first residual of the front, contact forms where the gap is below the reach of the attraction by at least this
-# distance (in critical openings). At the second residual, contact forms wherever the gap is below the reach.
-_CLEAR_RESIDUAL, _CLEAR_DISTANCE, _CERTAIN_RESIDUAL = 3e-2, 0.02, 1e-3
-# Largest error of displacements in a round of new contact, in units of the critical opening.
-_ROUND_ACCURACY = 1e-2
 # Largest number of rounds of new contact, for safety; in theory there can be one round per cell.
 _MAX_ROUNDS = 1000
 
@@ -95,13 +90,13 @@ def solve_adhesive_contact(
     NotConverged
         If no equilibrium is found.
     """
-    margin = _CLEAR_DISTANCE * problem.front.critical_opening
+    margin = TOLERANCES.coarse * problem.front.critical_opening
 
     def relax_locally(state, far):
         return relax_in_windows(problem.space, problem.front, problem.separation, state, state.gap, far)
 
-    stages = [(_CLEAR_RESIDUAL, margin), (_CERTAIN_RESIDUAL, 0.0), (tolerance, 0.0)]
-    if tolerance > _CERTAIN_RESIDUAL:
+    stages = [(TOLERANCES.coarse, margin), (TOLERANCES.fine, 0.0), (tolerance, 0.0)]
+    if tolerance > TOLERANCES.fine:
         stages[1:] = [(tolerance, margin)]
     first = len(stages) - 1 if close else 0
     tried, rounds, stage = np.zeros(problem.space.size, dtype=bool), 0, first
@@ -135,4 +130,4 @@ def _form_contact(problem, contact, formed):
     relaxed = relax_in_windows(problem.space, problem.front, problem.separation, closed, contact.gap, formed)
     if relaxed is None:
         return closed
-    return problem.solve_elastic(relaxed, _ROUND_ACCURACY)
+    return problem.solve_elastic(relaxed, TOLERANCES.displacement)

@@ -38,7 +38,7 @@ from icha.surfaces.surface import Surface
 # Smallest critical opening divided by the largest height. Rounding of the heights would hide a smaller opening.
 _SMALLEST_OPENING = 1e-4
 # Largest change of a fraction of contact up to which the rates of a state predict the next state.
-_LARGEST_PREDICTION = 0.25
+_LARGEST_PREDICTION = 1.0
 # Smallest work to which errors of a loop are compared, divided by the surface energy times the nominal area A0. The
 # value is the work of adhesion of 0.1 % of A0.
 _SMALLEST_WORK = 1e-3

@@ -32,7 +32,7 @@ from icha.contact.models import MODELS, REFERENCE_MODEL
 
 @dataclass(frozen=True)
 class FrontTolerances:
-    """Tolerances of the front solver.
+    """Tolerances of the solver; `docs/short_range.md` justifies them by measurements.
 
     The residual of a cell is |K/K_c - 1| with the stress intensity K/K_c = sqrt(G/dgamma). Errors of displacements are
     divided by the critical opening.
@@ -42,35 +42,38 @@ class FrontTolerances:
     front : largest residual of a converged front. For comparison, the grid causes relative errors of areas and loads
         of about 1e-3.
     stagnation : largest residual at which a front is accepted although no step lowers its energy.
-    displacement : error of displacements in a converged contact; pressures are never solved more accurately.
+    coarse : residual above which cells are relaxed locally and damped. Below it, contact forms where the gap is below
+        the reach of the attraction by at least `coarse` critical openings, and the first trial for a load ends.
+    fine : residual below which contact forms wherever the gap is below the reach, and later trials for a load end.
+        Cells above it are relaxed locally if they are a smaller part of the front than `few`. Also the relative error
+        of a load below which its trials are solved to the final tolerances.
+    few : part of the front, 0 to 1.
+    displacement : largest error of displacements, divided by the allowed residual of the front.
     moving_displacement : largest error of displacements in the first steps. After a step, the allowed error is
         residual * min(moving_displacement, max(residual, linear[0])).
     certain_displacement : error of displacements at which the energies of two similar states can be compared.
     linear : smallest and largest relative error of the linearised equations; between them the error is the residual.
-    local : residual above which cells are relaxed locally and damped.
-    few : part of the front, 0 to 1. If a smaller part has residuals above `local_few`, its cells are relaxed locally.
-    local_few : residual above which cells are relaxed locally if they are a smaller part of the front than `few`.
     damping : damping of the bonds after the first step that raises the energy; twice as large if most of the front
         is far from equilibrium at the start.
     """
 
     front: float = 1e-6
     stagnation: float = 1e-3
-    displacement: float = 1e-9
+    coarse: float = 3e-2
+    fine: float = 1e-3
+    few: float = 0.01
+    displacement: float = 1e-2
     moving_displacement: float = 0.1
     certain_displacement: float = 1e-5
     linear: tuple[float, float] = (MODELS[REFERENCE_MODEL].stiffness_error, 0.1)
-    local: float = 0.03
-    few: float = 0.01
-    local_few: float = 1e-3
     damping: float = 0.1
 
 
 TOLERANCES = FrontTolerances()
+# Smallest error to which displacements are solved, in units of the critical opening.
+_SMALLEST_ERROR = 1e-3 * TOLERANCES.front
 # Largest numbers of steps, of Krylov vectors, of local relaxations between steps; largest damping.
 _MAX_STEPS, _MAX_KRYLOV, _MAX_LOCAL_RELAXATIONS, _LARGEST_DAMPING = 400, 60, 5, 1e8
-# Allowed error of displacements in units of the critical opening, divided by the allowed residual of the front.
-_ACCURACY = 1e-3
 # Relative rounding error of the energy, and relative rounding error of the work of a step.
 _ENERGY_ROUNDING, _WORK_ROUNDING = 1e-12, 1e-11
 
@@ -110,10 +113,10 @@ class ActiveCells(Contact):
     def cells_to_relax(self) -> tuple[np.ndarray, bool]:
         """Find cells far from equilibrium, (k,) bool; also return whether they are a small part of the front."""
         few = TOLERANCES.few * np.count_nonzero(self.at_front)
-        uneasy = self.residuals > TOLERANCES.local_few
+        uneasy = self.residuals > TOLERANCES.fine
         if np.count_nonzero(uneasy) <= few:
             return uneasy, True
-        far = self.residuals > TOLERANCES.local
+        far = self.residuals > TOLERANCES.coarse
         return far, bool(np.count_nonzero(far) <= few)
 
 
@@ -217,14 +220,14 @@ def relax_front(
         active = find_active_cells(problem.front, relaxation.state)
         try:
             if active.residual <= tolerance:
-                if not relaxation.refine(_ACCURACY * tolerance):
+                if not relaxation.refine(TOLERANCES.displacement * tolerance):
                     return relaxation.state
             elif not relaxation.relax_locally(active, relax_locally):
                 relaxation.step(active)
         except Stagnation as failure:
             if active.residual > TOLERANCES.stagnation:
                 raise NotConverged(f"{failure} (residual of sqrt(G/dgamma): {active.residual:.1e})") from None
-            if not relaxation.refine(TOLERANCES.displacement):
+            if not relaxation.refine(_SMALLEST_ERROR):
                 return relaxation.state
     if max_steps or active.residual <= TOLERANCES.stagnation:
         return relaxation.state
@@ -260,7 +263,7 @@ class FrontRelaxation:
 
         Return whether the pressures were solved again.
         """
-        accuracy = max(accuracy, TOLERANCES.displacement)
+        accuracy = max(accuracy, _SMALLEST_ERROR)
         if self.problem.is_accurate(self.state, accuracy):
             return False
         self.state = self.problem.solve_elastic(self.state, accuracy)
@@ -276,7 +279,7 @@ class FrontRelaxation:
         if contact is not None:
             accuracy = min(self.start, 0.1 * TOLERANCES.moving_displacement, self._moving_accuracy(active))
             try:
-                new = self.problem.solve_elastic(contact, max(TOLERANCES.displacement, accuracy))
+                new = self.problem.solve_elastic(contact, max(_SMALLEST_ERROR, accuracy))
             except FullContact:
                 # In a window, pressures outside are fixed. So the last gap can close although it should stay open.
                 contact = None
@@ -301,25 +304,21 @@ class FrontRelaxation:
         if np.sum((active.intensity**2 - 1) * change) > _WORK_ROUNDING * np.abs(change).sum():
             self._damp(2, active.residual)
             return
-        accuracy = max(TOLERANCES.displacement, min(self.coarsest, self._moving_accuracy(active)))
-        # A short step costs as much as a long one. After two lengths, more damping gives a better direction.
-        for length in (1.0, 0.5) if self.coarsest <= TOLERANCES.certain_displacement else (1.0,):
-            try:
-                new = problem.solve_elastic(active.apply_step(length * change, length * pressure_change), accuracy)
-            except FullContact:
-                # The separation fixes the volume of the gap, so the gap cannot close.
-                continue
-            if problem.is_lower(new, self.state):
-                if length == 1.0:
-                    self.damping = self.damping / 4 if self.damping > 0.01 else 0.0
-                self.state, self.coarsest, self.local_relaxations = new, self.start, 0
-                return
-        self._damp(8, active.residual)
+        accuracy = max(_SMALLEST_ERROR, min(self.coarsest, self._moving_accuracy(active)))
+        try:
+            new = problem.solve_elastic(active.apply_step(change, pressure_change), accuracy)
+        except FullContact:
+            new = None  # the separation fixes the volume of the gap, so the gap cannot close
+        if new is None or not problem.is_lower(new, self.state):
+            self._damp(8, active.residual)
+            return
+        self.damping = self.damping / 4 if self.damping > 0.01 else 0.0
+        self.state, self.coarsest, self.local_relaxations = new, self.start, 0
 
     def _damp(self, factor: float, residual: float) -> None:
         """Raise the damping and solve the pressures more accurately after a failed step, or raise `Stagnation`."""
         self.coarsest = min(self.coarsest, TOLERANCES.certain_displacement)
-        self.refine(min(self.coarsest, _ACCURACY * residual))
+        self.refine(min(self.coarsest, TOLERANCES.displacement * residual))
         self.damping = max(factor * self.damping, TOLERANCES.damping)
         if self.damping > _LARGEST_DAMPING:
             raise Stagnation("no step of the front lowers the energy")
@@ -329,7 +328,7 @@ def newton_step(problem: FrontProblem, active: ActiveCells, damping: float) -> t
     """Solve the linearised equations of the front; return the changes of fraction and pressure, (k,) each."""
     front, at_front = problem.front, active.at_front
     # A running front needs shorter steps.
-    local = np.where(np.abs(active.intensity - 1) > TOLERANCES.local, max(damping, 2 * TOLERANCES.damping), damping)
+    local = np.where(np.abs(active.intensity - 1) > TOLERANCES.coarse, max(damping, 2 * TOLERANCES.damping), damping)
     linear = LinearisedFront(problem.space, front, active, active.mean_fraction, at_front, local)
     # First set the tension to that of the law at the present fraction. Then change tension and fraction by the law.
     strengths = front.strengths(active.mean_fraction)

@@ -18,10 +18,6 @@ if TYPE_CHECKING:
 
 # Relative error at which a load or area counts as met. A path recognises a stop at a larger error, 1e-9.
 _MET = 5e-10
-# Relative error below which trials are solved to the final tolerances; relative error below which slopes are reused.
-_CLOSE, _SAME_SLOPES = 1e-3, 1e-4
-# Residual of the front in the first coarse trial, and in the later coarse trials.
-_FIRST_RESIDUAL, _RESIDUAL = 3e-2, 1e-3
 # Smallest difference of two separations, divided by h_rms.
 _SAME_SEPARATION = 1e-13
 # Reference for errors if the target is zero load, divided by stiffness times h_rms. At zero load, attraction and
@@ -165,12 +161,12 @@ def bracket_loosely(
 
     After a trial that passes the target with an event, the next trial starts again from the state before the target.
     """
-    contact, start, residual = problem.contact, bracket.before, _FIRST_RESIDUAL
+    contact, start, residual = problem.contact, bracket.before, TOLERANCES.coarse
     control_is_load = problem.control.quantity == PRESSURE
-    close = _CLOSE * scale if contact.adhesive else problem.tolerance(scale)
+    close = TOLERANCES.fine * scale if contact.adhesive else problem.tolerance(scale)
     trials = _MAX_TRIALS // 2 if contact.adhesive else 2 * _MAX_TRIALS
     for _ in range(trials):
-        trial, residual = problem.solve(start, separation, residual), _RESIDUAL
+        trial, residual = problem.solve(start, separation, residual), TOLERANCES.fine
         error = problem.error(trial)
         if abs(error) <= close:
             return trial, bracket
@@ -196,13 +192,13 @@ def iterate_secant(problem: ControlProblem, bracket: Bracket, trial: CellState, 
         separation = bracket.limit(problem.newton_separation(trial, before))
         if separation < problem.contact.smallest_gap:
             raise FullContact("the mean gap vanishes")
-        same = before is not None and abs(error) < _SAME_SLOPES * scale
         start, before = trial, trial if before is not None or trial.front_residual <= TOLERANCES.front else None
+        same = before is not None and abs(error) < TOLERANCES.linear[0] * scale
         trial = problem.solve(start, separation, TOLERANCES.front, close=True, same_slopes=same)
         error = problem.error(trial)
         if abs(error) <= problem.tolerance(scale):
             return trial, True
-        if abs(error) > _CLOSE * scale:
+        if abs(error) > TOLERANCES.fine * scale:
             return trial, False
         bracket = bracket.with_state(trial, error)
     raise NotConverged(f"{_MAX_TRIALS} secant steps did not meet the target")

@@ -32,25 +32,9 @@ _SIDES, _PIECE = (64, 128, 256), 64
 _BATCH = 65_536
 # Largest residual of the front in windows; the whole front is relaxed afterwards.
 _TOLERANCE = 1e-4
-
-
-class _Extent(NamedTuple):
-    """Size and effort of the windows.
-
-    Parameters
-    ----------
-    reach : distance from the given cells within which the front may move, in cells.
-    cover : largest total area of the windows, divided by the area of the grid.
-    max_steps : largest number of steps of the front in a window.
-    """
-
-    reach: int
-    cover: float
-    max_steps: int
-
-
-# If the windows cover little of the grid, they are wider and get more steps.
-_EXTENTS = (_Extent(20, 0.05, 60), _Extent(4, 0.5, 20))
+# Distance from the given cells within which the front may move, in cells; largest total area of the windows, divided by
+# the area of the grid; largest number of steps of the front in a window. Windows that cover little are wider.
+_EXTENTS = ((20, 0.05, 60), (4, 0.5, 20))
 
 
 def relax_in_windows(
@@ -69,8 +53,9 @@ def relax_in_windows(
     or if the front converges in none of them.
     """
     for extent in _EXTENTS:
-        places = Places.around(far, space.grid, extent.reach)
-        if np.sum(places.sides**2) <= extent.cover * space.size:
+        reach, cover, max_steps = extent
+        places = Places.around(far, space.grid, reach)
+        if np.sum(places.sides**2) <= cover * space.size:
             break
     else:
         return None
@@ -81,7 +66,7 @@ def relax_in_windows(
     def relax(window):
         cells, free = window
         small = HalfSpace(cells.shape, *kernels[cells.shape[-1]])
-        return _relax_window(small, front, separation, contact, gap, mean_fraction, cells, free, extent.max_steps)
+        return _relax_window(small, front, separation, contact, gap, mean_fraction, cells, free, max_steps)
 
     found = on_cores(relax, windows)
     moved = np.zeros(space.size, dtype=bool)

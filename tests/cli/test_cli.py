@@ -423,7 +423,7 @@ def test_truncated_files_are_damaged_and_computed_again(tiny):
 def test_a_campaign_too_large_for_the_machine_is_refused_without_a_terminal(tiny, small_machine):
     refused = printed("run", "tiny.yaml", status=2)
     assert "this machine has 1.05 MB" in refused and "--anyway" in refused
-    assert "too small: about" in output("describe", "tiny.yaml")
+    assert "too small: jobs on 2 cores need about" in output("describe", "tiny.yaml")
     output("run", "tiny.yaml", "all", "--", "--forceall", "--resources", "mem_mb=60000", status=2)
     output("run", "tiny.yaml", "--profile", "default", status=2)
     # A cluster does not use the memory of this machine.

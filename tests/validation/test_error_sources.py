@@ -10,8 +10,9 @@ from icha.equilibrium.interacting_asperities import InteractingAsperities
 from icha.path.follow import follow
 from icha.references.finite_range import NodalState, contact_state, perimeter_correction
 from icha.surfaces.summits import Asperities, find_summits
-from validation.error_sources import chain, effects, error_sources, shape_ratio
-from validation.paraboloids import summit_curvatures
+from validation.error_source_tables import figure
+from validation.error_sources import chain, effects, error_sources, shape_ratio, shape_ratio_of_fourth_order
+from validation.paraboloids import fourth_order_terms, summit_curvatures
 from validation.spot_by_spot import contact_patches, match
 from validation.without_unions import discs_apart
 
@@ -34,13 +35,13 @@ def surface():
 
 @pytest.fixture(scope="module")
 def sources(surface):
-    return error_sources(surface, HARD, PRESSURES, seed=3)
+    return error_sources(surface, HARD, PRESSURES)
 
 
 # --- surfaces ---------------------------------------------------------------------------------------------------
 
 
-def test_curvatures_of_crossed_waves():
+def test_curvatures_and_fourth_order_of_crossed_waves():
     x = np.arange(48) * (2.0 / 48)
     q, along_x, along_y = np.pi, 0.3, 0.1
     surface = icha.Surface(along_x * np.cos(q * x) + along_y * np.cos(q * x)[:, None], 2.0)
@@ -48,6 +49,7 @@ def test_curvatures_of_crossed_waves():
     assert summit_curvatures(surface, summits) == pytest.approx(
         np.array([[-along_x * q**2, 0.0, -along_y * q**2]]), abs=1e-9
     )
+    assert fourth_order_terms(surface, summits.position) == pytest.approx([(along_x + along_y) * q**4 / 64], rel=1e-9)
 
 
 # --- contact without unions -------------------------------------------------------------------------------------
@@ -72,7 +74,7 @@ def test_without_overlaps_it_is_the_model(surface):
     (waypoint,) = follow(contact, icha.Path(reduced_pressures=[5e-4]))
     state = waypoint.state
     assert np.all(state.spots.members == 1)
-    discs = discs_apart(contact.asperities, LAW, 5e-4 * unit, surface.rms_height)
+    discs = discs_apart(contact.asperities, LAW, 5e-4 * unit, surface.rms_height, field_shape=False)
     assert discs.separation == pytest.approx(state.separation, rel=1e-7)
     assert np.sort(discs.contact_radius) == pytest.approx(np.sort(state.spots.contact_radius), rel=1e-6)
     area = np.pi * np.sum(discs.contact_radius**2) / surface.period**2
@@ -127,10 +129,12 @@ def test_area_on_a_rotational_profile_of_fourth_order():
             "pair_patch_area": ("pair", patches.area),
             "pair_patch_force": ("pair", patches.force),
             "pair_curvature_radius": ("pair", [radius]),
+            "pair_fourth_order": ("pair", [fourth]),
             "contact_modulus": 2.0,
         }
     )
     assert float(shape_ratio(pair)[0]) == pytest.approx((1 - 3.2 * fourth * 0.35**2) ** (-2 / 3), rel=0.015)
+    assert float(shape_ratio_of_fourth_order(pair)[0]) == pytest.approx(float(shape_ratio(pair)[0]), rel=0.015)
 
 
 # --- the whole --------------------------------------------------------------------------------------------------
@@ -148,3 +152,12 @@ def test_effects_add_up_to_the_error(sources):
     error = np.log(area.sel(variant="icha") / area.sel(variant="boundary_elements"))
     assert effects(sources).sum("source").values == pytest.approx(error.values, rel=1e-9)
     assert effects(sources).sizes["source"] == len(chain(sources)) - 1
+
+
+def test_bars_of_the_figure_add_up_to_the_effects(sources):
+    _, _, bars, spots = figure([sources, sources]).axes
+    mean = effects(sources).values
+    ends = np.array([[(bar.get_y(), bar.get_y() + bar.get_height()) for bar in each] for each in bars.containers])
+    assert ends.min(axis=(0, 2)) == pytest.approx(np.minimum(mean, 0).sum(axis=0))
+    assert ends.max(axis=(0, 2)) == pytest.approx(np.maximum(mean, 0).sum(axis=0))
+    assert {line.get_label() for line in spots.lines} > {"boundary elements", "fourth-order term"}
