@@ -51,7 +51,7 @@ class InteractingAsperities(AsperityContact):
         return find_equilibrium(self, state, separation, control, let_go=let_go)
 
     def continue_from(self, state: ContactState, before: ContactState) -> ContactState:
-        """Raise `NotImplementedError`: a path calls this method only for models that predict steps."""
+        """Raise `NotImplementedError`: a path calls this method only if the error controls the steps."""
         raise NotImplementedError
 
     def pressure(self, state: ContactState) -> float:
