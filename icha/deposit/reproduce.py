@@ -47,7 +47,7 @@ def campaign_name(deposit: Path) -> str:
     except ValueError as error:
         raise RerunError(str(error).replace(f"{deposit}/", "")) from None
     if not (isinstance(name, str) and re.fullmatch(NAME_PATTERN, name)):
-        raise RerunError(f"{CONFIGURATION}: name: {name!r} is not a valid name of a campaign")
+        raise RerunError(f"{CONFIGURATION}: name: {name!r} is not the name of a campaign")
     return name
 
 
