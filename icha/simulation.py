@@ -133,7 +133,7 @@ def simulate(
     dataset = _compute(solver, surface, material, path, model, seed, progress, kept)
     if failed := reasons_of_failure(check_run(dataset)):
         dataset = dataset.assign_attrs(failed_checks=failed)
-        warnings.warn(f"The run fails checks, do not use its numbers: {failed}", stacklevel=2)
+        warnings.warn(f"The run fails checks; do not use the numbers of this run: {failed}", stacklevel=2)
     return dataset
 
 

@@ -153,7 +153,7 @@ class JKR:
     def second_moment(self, a, R):
         """Return 1/4 of the integral of p r^2 over the spot, N m^2: the strength of the second term of its far field.
 
-        The mean of r^2 is 2a^2/5 for Hertz's pressure and 2a^2/3 for that of the flat punch.
+        The mean of r^2 is 2a^2/5 for Hertz's pressure and 2a^2/3 for the pressure of a flat punch.
         """
         return a**2 * (self.repulsive_force(a, R) / 10 - self.adhesive_force(a) / 6)
 
@@ -164,7 +164,7 @@ class JKR:
     def fourth_moment(self, a, R):
         """Return 9/64 of the integral of p r^4 over the spot, N m^4: the strength of the third term of its far field.
 
-        The mean of r^4 is 8a^4/35 for Hertz's pressure and 8a^4/15 for that of the flat punch.
+        The mean of r^4 is 8a^4/35 for Hertz's pressure and 8a^4/15 for the pressure of a flat punch.
         """
         return a**4 * (self.repulsive_force(a, R) * (9 / 280) - self.adhesive_force(a) * (3 / 40))
 

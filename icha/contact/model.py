@@ -86,7 +86,7 @@ class Events:
 
 
 class State(Protocol):
-    """Equilibrium of a contact; each model adds attributes of its own. A state never changes.
+    """Equilibrium of a contact; each model adds further attributes. A state never changes.
 
     Attributes
     ----------

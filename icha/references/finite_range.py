@@ -149,7 +149,7 @@ def finite_range_solution(
     ValueError
         If an argument is out of range, or the grid does not resolve the attraction.
     NotSolved
-        If the solver does not reach its tolerance, or the contact carries the load at no mean gap.
+        If the solver does not reach its tolerance, or if no mean gap gives the load.
     """
     state = contact_state(
         surface, material, reduced_pressure, refinement=refinement, tolerance=tolerance, progress=progress

@@ -4,7 +4,7 @@ import numpy as np
 
 
 def cell_of(period, free):
-    """Return the period of the points of a square, m: its side if it is periodic, twice its side if it is single."""
+    """Return the period (m) of the points of a square: the side if `free` is False, twice the side if True."""
     return 2 * period if free else period
 
 

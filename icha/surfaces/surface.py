@@ -147,7 +147,7 @@ class Surface:
         """Sums of |h_q|^2, q^2 |h_q|^2 and q^4 |h_q|^2 over all wave vectors, in m^2, 1 and m^-2.
 
         The sums equal the mean squares of height, of slope |grad h| and of the Laplacian. A free square has no
-        spectrum; its mean squares are computed at the nodes of a quintic spline.
+        spectrum; a quintic spline gives its mean squares at the nodes.
         """
         if self.free:
             return _mean_squares(self.heights, self.spacing)
