@@ -36,7 +36,7 @@ class Measurement(Section):
     label: Text
     """Name in the legend of the figure. Write formulas between two `$`."""
     citation: Text
-    """Source of the numbers, which the report prints."""
+    """Source of the numbers. The report prints this text."""
     study: Name
     """Name of the study that is compared with the measurement."""
     load: Column

@@ -103,11 +103,11 @@ class Targets(Section):
 
     reduced_pressures: stops(ReducedPressure, increasing) | None = Field(
         default=None,
-        description=f"Reduced pressures p/(E* h'rms), increasing. Largest for asperities: {MAX_REDUCED_PRESSURE}.",
+        description=f"Reduced pressures p/(E* h'rms), increasing. Limit for asperities: {MAX_REDUCED_PRESSURE}.",
     )
     area_fractions: stops(AreaFraction, increasing) | None = Field(
         default=None,
-        description=f"Contact area fractions A/A0, increasing. Largest for asperities: {MAX_AREA_FRACTION}.",
+        description=f"Contact area fractions A/A0, increasing. Limit for asperities: {MAX_AREA_FRACTION}.",
     )
     mean_separations: stops(Length, decreasing) | None = None
     """Mean separations with unit, decreasing."""

@@ -35,8 +35,9 @@ class MaterialSection(Section):
     """Range ε of the attraction. The range determines when asperities jump into contact. The Tabor parameter is μ =
     (RΔγ²/E*²)^(1/3)/ε, where 1/R is the rms curvature of the surface."""
     flaw_radius: Length | None = None
-    """Radius a of the largest flaw of the interface. With a flaw, full contact opens at the tension √(πE*Δγ/(2a)), at
-    which a penny-shaped crack grows, or at the theoretical strength 1.03 Δγ/ε if that is smaller. Default: no flaw."""
+    """Radius a of the largest flaw of the interface. A penny-shaped crack of radius a grows at the tension
+    √(πE*Δγ/(2a)). Full contact opens at the smaller of this tension and the theoretical strength 1.03 Δγ/ε. Default: no
+    flaw."""
 
 
 def _unit_of_length(value: Any) -> float:
