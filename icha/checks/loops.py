@@ -6,8 +6,8 @@ import numpy as np
 
 from icha.checks.findings import IDENTITY_LIMIT
 from icha.contact.models import RESIDUAL_TOLERANCE, model_of
-from icha.path.energy_balance import integration_error, pressure_jump, unresolved_work
-from icha.path.targets import UNRESOLVED_LOSS
+from icha.path.energy_balance import event_error, integration_error, pressure_jump
+from icha.path.targets import EVENT_ERROR_OVER_LOSS
 
 # Parts of the hysteresis loss of a run.
 LOSSES = ("loss_by_jump_in", "loss_by_jump_off", "loss_by_coalescence", "loss_by_load_jump", "loss_unattributed")
@@ -78,7 +78,7 @@ def _has_united(run):
 
 def _check_losses(run, scale):
     """Yield the checks that a loop and its kinds of events do not gain energy: name, value and limit."""
-    unknown = IDENTITY_LIMIT + (_unresolved_work(run) + work_error(run)) / scale
+    unknown = IDENTITY_LIMIT + (_event_error_bound(run) + work_error(run)) / scale
     tolerance = CELL_LOSS_LIMIT if model_of(run.attrs).by_cells else min(unknown, LARGEST_UNKNOWN_WORK)
     with_unions = max(tolerance, UNION_LIMIT) if _has_united(run) else tolerance
     into, out, unions, at_load = (
@@ -129,21 +129,21 @@ def work_error(run) -> float:
     return float(np.sum(width * ends * (0.5 * separation + relative * width / 12)))
 
 
-def _unresolved_work(run):
+def _event_error_bound(run):
     """Return an upper bound, J/m^2, for the error of the work because events may happen anywhere in their steps.
 
-    The bound of a step is the sum of `unresolved_work`, from the jump of the pressure, and `integration_error`, from
-    the change of the stiffness (an event may change the stiffness alone). The path limits the unknown work of each
-    step, so the total is at most the number of steps times the larger of two energies: UNRESOLVED_LOSS times the energy
-    of all jumps, and the model's accuracy of a loss times the sum of all changes of work and loss.
+    The bound of a step is the sum of `event_error`, from the jump of the pressure, and `integration_error`, from
+    the change of the stiffness (an event may change the stiffness alone). The path limits the error of the work of
+    each step, so the total is at most the number of steps times the larger of two energies: EVENT_ERROR_OVER_LOSS times
+    the energy of all jumps, and the model's accuracy of a loss times the sum of all changes of work and loss.
     """
     events = sum(np.diff(run[name]) for name in EVENT_COUNTS) > 0
     events &= np.diff(run["dissipated_by_load_jump"]) == 0  # in a jump at constant load the pressure is constant
     width, slope = np.diff(run["mean_separation"]), -finite_stiffness(run)
     jumped = pressure_jump(width, np.diff(run["nominal_pressure"]), slope[:-1], slope[1:])
-    work = float(np.sum(events * (unresolved_work(width, jumped) + integration_error(width, slope[:-1], slope[1:]))))
+    work = float(np.sum(events * (event_error(width, jumped) + integration_error(width, slope[:-1], slope[1:]))))
     released = sum(abs(float(run[f"dissipated_by_{name}"][-1])) for name in ("jump_in", "jump_off"))
     lost = run["work"] - run["stored_energy"]
     effort = float(np.sum(np.abs(np.diff(run["work"])) + np.abs(np.diff(lost))))
-    unknown = max(UNRESOLVED_LOSS * released, model_of(run.attrs).accuracy.loss * effort)
+    unknown = max(EVENT_ERROR_OVER_LOSS * released, model_of(run.attrs).accuracy.loss * effort)
     return min(work, np.count_nonzero(events) * unknown)

@@ -145,7 +145,7 @@ class ContactModel(Protocol):
     def continue_from(self, state: State, before: State) -> State:
         """Return a state with the history of the state `before` and the events between both states.
 
-        A path uses this method only for models that predict steps.
+        A path uses this method only if `path_accuracy.error_controlled_steps` is True.
         """
 
     def pressure(self, state: State) -> float:
