@@ -179,7 +179,7 @@ class UnloadedFigure(StudyFigure):
 
 
 class RunFigure(TopographyFigure):
-    """A figure of one run. For an omitted option, ICHA uses the first value in the study."""
+    """A figure of one run. ICHA draws the first run that fits the options, if possible with adhesion."""
 
     rms_slope: Positive | None = Field(default=None, description="Rms slope to show. Default: the first of the study.")
     material: Label | None = Field(

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 class SnapMapFigure(RunFigure, UnloadedFigure):
-    """A figure of the events of one run. For an omitted option, ICHA uses the first value in the study."""
+    """A figure of the events of one run. ICHA draws the first run that fits the options, if possible with adhesion."""
 
 
 def inputs(campaign: Campaign, options: SnapMapFigure, files: results.ResultFiles) -> Inputs:

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 class MapFigure(SnapshotFigure, RunFigure):
-    """A figure of one snapshot of one run. For an omitted option, ICHA uses the first value in the study."""
+    """A figure of one snapshot. ICHA draws the first run that fits the options, if possible with adhesion."""
 
 
 def inputs(campaign: Campaign, options: MapFigure, files: results.ResultFiles) -> Inputs:
