@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 class SnapMapFigure(RunFigure, UnloadedFigure):
-    """A figure of the events of one run. An option that is left out has the first value in the study."""
+    """A figure of the events of one run. Each missing option takes the first value in the study."""
 
 
 def inputs(campaign: Campaign, options: SnapMapFigure, files: results.ResultFiles) -> Inputs:

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 class MapFigure(SnapshotFigure, RunFigure):
-    """A figure of one snapshot of one run. An option that is left out has the first value in the study."""
+    """A figure of one snapshot of one run. Each missing option takes the first value in the study."""
 
 
 def inputs(campaign: Campaign, options: MapFigure, files: results.ResultFiles) -> Inputs:
