@@ -62,7 +62,7 @@ class BoundaryElements(FullContactProblem):
     def path_accuracy(self) -> PathAccuracy:
         """Accuracy to which a path resolves its events; without adhesion there are no jumps and no losses."""
         least_work = _SMALLEST_WORK * self.law.material.surface_energy
-        return replace(MODELS[REFERENCE_MODEL].accuracy, least_work=least_work, predicts_steps=self.adhesive)
+        return replace(MODELS[REFERENCE_MODEL].accuracy, least_work=least_work, error_controlled_steps=self.adhesive)
 
     def untouched(self) -> CellState:
         """Return the state without contact at the separation at which the first summit or plateau starts to touch."""

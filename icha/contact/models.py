@@ -55,13 +55,13 @@ class PathAccuracy:
     Attributes
     ----------
     event : step length, in h_rms, up to which an event in the step counts as located.
-    loss : largest uncertainty of the work of one step with events, relative to the work so far.
-    balance : largest difference between work and change of energy in a long step without events, relative to the work
-        so far.
+    loss : largest error of the work of one step with events, relative to `StepAccuracy.energy_scale`.
+    balance : largest difference between work and change of energy in a long step without events, relative to the same
+        scale.
     tension : largest relative error of the largest tension between two equilibria without an event.
-    least_work : smallest work to which `loss` is relative, J/m^2.
-    predicts_steps : whether the error of the work decides the length of every step, because the pressure may jump
-        without an event. If False, the length of steps without events doubles.
+    least_work : smallest energy to which `loss` is relative, J/m^2.
+    error_controlled_steps : if True, the error of the work of each step decides the length of the next step, because
+        the pressure may jump without an event. If False, each step may be twice as long as the last one.
     """
 
     event: float = 1e-12
@@ -69,7 +69,7 @@ class PathAccuracy:
     balance: float = 3e-6
     tension: float = 1e-8
     least_work: float = 0.0
-    predicts_steps: bool = False
+    error_controlled_steps: bool = False
 
 
 @dataclass(frozen=True)
@@ -89,7 +89,7 @@ class Model:
     by_summits : whether summits represent the surface. Spots then unite by a rule, which may cost or gain some energy.
     by_cells : whether contact is counted in cells of the grid; runs then contain a map of the contact.
     periodic_only : whether the model cannot press a square with free edges.
-    least_cells : smallest number of grid cells per shortest wavelength; 0 for any number.
+    least_cells : smallest valid number of grid cells per shortest wavelength; 0 for no limit.
     accuracy : accuracy with which a path resolves its events.
     resumable : whether a run saves checkpoints, by the function `resumable(contact, folder)` of `module`.
     """
@@ -163,7 +163,7 @@ MODELS = {
         periodic_only=True,
         least_cells=4,
         # Fronts that hop from cell to cell lose energy that only a finer grid would resolve.
-        accuracy=PathAccuracy(event=1e-5, loss=1e-4, tension=1e-5, predicts_steps=True),
+        accuracy=PathAccuracy(event=1e-5, loss=1e-4, tension=1e-5, error_controlled_steps=True),
         resumable=True,
     ),
 }
@@ -175,5 +175,5 @@ def model_of(attributes: Mapping[str, str]) -> Model:
 
 
 def first_model(models: Iterable[str]) -> str:
-    """Return the one of several models that comes first in `MODELS`; used where only one model is shown."""
+    """Return the model that comes first in `MODELS`, for a figure or text that shows only one of several models."""
     return min(models, key=list(MODELS).index)

@@ -16,7 +16,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from icha.contact.model import ContactModel, NotConverged, State
-from icha.path.energy_balance import Step, Waypoint, waypoint_without_target
+from icha.path.energy_balance import Step, Waypoint, waypoint_between_targets
 from icha.path.loading import PathProgress
 from icha.path.step_accuracy import StepAccuracy
 from icha.path.stops import (
@@ -42,8 +42,9 @@ def follow_cycle(
     """Follow a path that continues after the first loading, and yield a waypoint for each equilibrium.
 
     After each waypoint the caller may send one additional target for the next step (`generator.send`). If the step
-    meets this target first, the generator yields the waypoint at this target. The waypoints have no energy balances.
-    Raise the errors of `icha.path.follow.follow`.
+    meets this target first, the generator yields the waypoint at this target. A sent target is ignored if it lies
+    inside a jump, or if it is sent after the last waypoint of a leg. The waypoints have no energy balances. Raise the
+    errors of `icha.path.follow.follow`.
 
     longest : longest step of the separation, m.
     progress : record of the path's progress, which counts and reports the targets.
@@ -51,13 +52,13 @@ def follow_cycle(
     start, targets = contact.untouched(), [TargetFunction(target, contact) for target in path.targets]
     # Targets at separations above first contact, where nothing touches.
     above = [t for t in targets if t.target.kind == MEAN_SEPARATION and t.target.value > start.separation]
-    for each in sorted(above, key=lambda each: -each.target.value):
+    for each in sort_targets(above, -1):
         state = contact.equilibrium(start, each.target.value)
         targets.remove(each)
         progress.record_target(each.target, state)
         yield Waypoint(each.target, state, 0)
-    yield waypoint_without_target(start, 0)
-    cycle = _Cycle(contact, longest, progress, start)
+    yield waypoint_between_targets(start, 0)
+    cycle = _Cycle(contact, longest, progress, start, longest, StepAccuracy(contact, longest))
     if contact.adhesive:
         cycle.step_length = cycle.event_length
     else:
@@ -91,13 +92,13 @@ class _Cycle:
     longest : longest step of the separation, m.
     progress : record of the path.
     state : last equilibrium.
-    leg : number of the leg, even on loading and odd on unloading.
-    step_length : length of the next step, m.
-    event_at : end of the shortest trial step that contains the next event, as direction times separation, m; inf if no
-        event is known, and always for models that predict steps.
-    ahead : equilibria at the ends of trial steps that were too long, the next one last (models that predict steps).
-    longest_part : longest step so far of those into which the last trial step is divided, m.
+    step_length : length of the next trial step where no station and no equilibrium of `ahead` lies ahead, m.
     accuracy : sums over all steps so far, and the accuracy that further steps need.
+    leg : number of the leg, even on loading and odd on unloading.
+    event_at : end of the shortest trial step that contains the next event, as direction times separation, m; inf if no
+        event is known, and always with error-controlled steps.
+    ahead : with error-controlled steps, equilibria at the ends of trial steps that were too long, the next one last.
+    longest_part : longest step so far of those into which the last trial step is divided, m.
     stations : separations visited on loading, which unloading will visit again, ascending, m.
     """
 
@@ -105,17 +106,13 @@ class _Cycle:
     longest: float
     progress: PathProgress
     state: State
+    step_length: float
+    accuracy: StepAccuracy
     leg: int = 0
-    step_length: float = np.nan
     event_at: float = np.inf
     ahead: list[State] = field(default_factory=list)
     longest_part: float = 0.0
-    accuracy: StepAccuracy = field(init=False)
     stations: list[float] = field(default_factory=list)
-
-    def __post_init__(self):
-        """Start with the longest step, and with sums of zero."""
-        self.step_length, self.accuracy = self.longest, StepAccuracy(self.contact, self.longest)
 
     @property
     def loading(self) -> bool:
@@ -139,7 +136,11 @@ class _Cycle:
     def follow_leg(
         self, leg: int, targets: list[TargetFunction], until_apart: bool = False
     ) -> Generator[Waypoint, TargetFunction | None, None]:
-        """Follow one leg to all its targets or, with `until_apart`, to complete separation; yield all waypoints."""
+        """Follow one leg to all its targets or, with `until_apart`, to complete separation; yield all waypoints.
+
+        At the end of a loading leg, the separations that it visited become stations. A target inside a jump is kept in
+        `progress.skipped` in leg 0, raises an error at once in later legs, and is left out with `until_apart`.
+        """
         self.leg, self.event_at, self.longest_part = leg, np.inf, 0.0
         self.ahead.clear()
         pending, sent = sort_targets(targets, self.direction), None
@@ -149,7 +150,7 @@ class _Cycle:
                 if until_apart:
                     return
                 raise self.make_path_error(self._make_separation_error(pending[0]))
-            state, step = self.find_next_equilibrium(min(self._distance_to_station(), length_limit))
+            state, step = self.find_next_equilibrium(min(self._first_trial_length(), length_limit))
             candidates = next_of_each_kind(pending) + ([sent] if sent else [])
             try:
                 target, met = find_first_target(candidates, self.state, state, self.direction)
@@ -170,15 +171,17 @@ class _Cycle:
                 self._keep(state)
                 continue
             if met is not state:
-                if target and self.contact.path_accuracy.predicts_steps and self._is_behind(met):
-                    # The branch after a jump leads back to the target.
+                behind = self.direction * (met.separation - self.state.separation) < 0
+                if target and self.contact.path_accuracy.error_controlled_steps and behind:
+                    # The branch after a jump leads back to the target. Load control sends no target after this waypoint
+                    # (it would be lost), because load control visits every state beyond a target.
                     yield self._advance(step, state)
                 else:
                     self._keep(state)
                 step = Step.between(self.contact, self.state, met)
             listed = None if target is sent else target
             self.progress.require_valid_state(self.state, met, listed, pending, self.loading)
-            # The first contact forms in a step of `event_length`; the next step is the longest one.
+            # With adhesion the first step is only `event_length` long. The next step may be the longest one.
             first = leg == 0 and len(visited) == 1
             self.step_length = self.longest if first else self._choose_next_length(step)
             between, length_limit = self._advance(step, met), np.inf
@@ -201,28 +204,25 @@ class _Cycle:
         self.progress.record_equilibrium(state, self.loading)
         self.state = state
         self.ahead = [each for each in self.ahead if self.direction * (each.separation - state.separation) > 0]
-        return waypoint_without_target(state, self.leg, step)
+        return waypoint_between_targets(state, self.leg, step)
 
     def _keep(self, state):
-        """If the model predicts steps, keep an equilibrium in `ahead`, because it may be the end of a later step."""
-        if self.contact.path_accuracy.predicts_steps:
+        """With error-controlled steps, keep an equilibrium in `ahead`, because it may be the end of a later step."""
+        if self.contact.path_accuracy.error_controlled_steps:
             self.ahead.append(state)
-
-    def _is_behind(self, state):
-        """Return whether a state lies behind the present state in the direction of the leg."""
-        return self.direction * (state.separation - self.state.separation) < 0
 
     def find_next_equilibrium(self, length: float) -> tuple[State, Step]:
         """Find the next equilibrium by a step so short that its work is known; return the equilibrium and the step.
 
         The step is halved until the solver finds an equilibrium. Then the step is halved until its work and its largest
-        tension are known accurately enough, or until its length is at most `event_length`. If the tension has a new
-        maximum within the step, the step ends at the maximum. If the model predicts steps, the ends of steps that were
+        tension are known accurately enough, or until its event is located. An event is located if the step is at most
+        `event_length` long, or if the step starts at most `event_length` before `event_at`. If the tension has a new
+        maximum within the step, the step ends at the maximum. With error-controlled steps, the ends of steps that were
         too long are tried again as ends of later steps.
 
-        length : length of the first trial step, m.
+        length : largest length of the first trial step, m; the step to an equilibrium of `ahead` may be shorter.
         """
-        start, accuracy, keeps = self.state, self.accuracy, self.contact.path_accuracy.predicts_steps
+        start, accuracy, keeps = self.state, self.accuracy, self.contact.path_accuracy.error_controlled_steps
         ahead = None
         if self.ahead and abs(self.ahead[-1].separation - start.separation) < (1 + SAME_EXCESS) * length:
             ahead = self.ahead.pop()
@@ -235,20 +235,20 @@ class _Cycle:
                 continue
             step = Step.between(self.contact, start, state)
             # Because equilibria have errors, an event may happen in a long step and not in a short one.
-            passed = step.has_jump and self.direction * start.separation + self.event_length >= self.event_at
-            sharp = length <= self.event_length or passed
-            if sharp or (accuracy.is_work_known(state, step) and accuracy.is_tension_known(start, state, step)):
-                if ahead is not None and abs(step.loss) > accuracy.allowed_unknown_work(step):
+            passed = step.may_change_pressure and self.direction * start.separation + self.event_length >= self.event_at
+            located = length <= self.event_length or passed
+            if located or (accuracy.is_work_known(state, step) and accuracy.is_tension_known(start, state, step)):
+                if ahead is not None and abs(step.loss) > accuracy.allowed_work_error(step):
                     ahead = None  # after a loss of energy, the equilibrium is found from the present state
                     continue
-                if step.has_jump:
+                if step.may_change_pressure:
                     self.event_at = np.inf
-                tension_peak = None if sharp else accuracy.locate_largest_tension(start, state, step)
+                tension_peak = None if located else accuracy.locate_largest_tension(start, state, step)
                 if tension_peak is None:
                     return state, step
                 shorter = tension_peak - start.separation
             else:
-                if step.has_jump and not keeps:
+                if step.may_change_pressure and not keeps:
                     self.event_at = min(self.event_at, self.direction * state.separation)
                 shorter = 0.5 * length
             self._keep(state)
@@ -261,7 +261,8 @@ class _Cycle:
         If the state `ahead` is given, this state is the equilibrium, and only its events are found. On unloading the
         spots together may lose their equilibrium before any single spot has reached its own jump-off. If this
         happens in a very short step, the spot closest to jump-off breaks contact. If there is still no equilibrium, the
-        two, four, … spots closest to jump-off break contact.
+        two, four, … spots closest to jump-off break contact, while so many spots exist. When the surfaces move apart,
+        an unstable equilibrium counts as none. Raise `NotConverged` if there is no equilibrium.
         """
         contact, start = self.contact, self.state
         if ahead is not None:
@@ -281,27 +282,27 @@ class _Cycle:
         raise first
 
     def _halve_step(self, length, failure):
-        """Return half the length, m, of a step without an equilibrium, and limit the next step to this length."""
+        """Return half the length, m, of a step without an equilibrium, and limit `step_length` to it."""
         length = self.progress.halve_step(length, failure, self.state, self.loading)
         self.step_length = min(self.step_length, length)
         return length
 
     def _choose_next_length(self, step):
-        """Return the length of the next step after a step, m.
+        """Return the value of `step_length` after a step, m; at most `longest`.
 
-        If the model does not predict steps, the next step is twice as long as the last step. Otherwise the next step is
-        twice as long as the longest of the steps into which the last trial step was divided. If the last trial step was
-        not divided, the next step is equally long, or twice as long if the error would be small enough.
+        Without error-controlled steps it doubles. With them it does not change while equilibria lie ahead. After the
+        last one of these, it is twice the longest of the steps into which the last trial step was divided. If the last
+        of these steps is the longest, as in a trial step that was not divided, it doubles only if the error allows it.
         """
-        longer = min(self.longest, 2 * self.step_length)
-        if not self.contact.path_accuracy.predicts_steps:
-            return longer
+        if not self.contact.path_accuracy.error_controlled_steps:
+            return min(self.longest, 2 * self.step_length)
         self.longest_part = max(self.longest_part, abs(step.separation_change))
         if self.ahead or not step.separation_change:
             return self.step_length
-        single, part = self.longest_part == abs(step.separation_change), self.longest_part
+        last_is_longest, part = self.longest_part == abs(step.separation_change), self.longest_part
         self.longest_part = 0.0
-        if single and not self.accuracy.allows_twice_the_length(step):
+        # A step of twice the length has eight times the error.
+        if last_is_longest and 8 * step.work_error > self.accuracy.allowed_work_error(step):
             return part
         return min(self.longest, 2 * part)
 
@@ -312,17 +313,17 @@ class _Cycle:
         highest = self.contact.untouched().separation - SAME_SEPARATION * self.contact.rms_height
         return self.state.separation >= highest
 
-    def _is_new_station(self, separation, last):
-        """Return whether a separation, m, is far enough from the last station to be a new station.
+    def _is_new_station(self, separation, last_visited):
+        """Return whether a separation, m, is far enough from the last visited one to become a station later.
 
         Without this minimum distance, all the short steps around an event would become stations.
         """
         contact = self.contact
         between = self.longest / 64 if contact.adhesive else SAME_SEPARATION * contact.rms_height
-        return abs(separation - last) > between
+        return abs(separation - last_visited) > between
 
-    def _distance_to_station(self):
-        """Return the distance to the next equilibrium ahead or station, m, or `step_length` if there is neither."""
+    def _first_trial_length(self):
+        """Return the distance to the next state of `ahead`, m, or else to the next station, or else `step_length`."""
         if self.ahead:
             return abs(self.ahead[-1].separation - self.state.separation)
         at, same, stations = self.state.separation, SAME_SEPARATION * self.contact.rms_height, self.stations

@@ -25,7 +25,7 @@ def pressure_jump(du, dp, slope, end_slope):
     return dp - 0.5 * du * (slope + end_slope)
 
 
-def unresolved_work(du, pressure_jump):
+def event_error(du, pressure_jump):
     """Return the largest error of the work of a step because its events may happen anywhere in the step, J/m^2."""
     return 0.5 * abs(du * pressure_jump)
 
@@ -35,7 +35,7 @@ def integration_error(du, slope, end_slope):
     return du**2 * abs(end_slope - slope) / 24
 
 
-# If the loss of a step exceeds this fraction of the work, jumps cause the loss, and not the error of the interaction.
+# If the loss of a step exceeds this fraction of its work, jumps cause the loss, and not the error of the interaction.
 _CERTAIN_LOSS = 0.1
 
 
@@ -63,7 +63,7 @@ class Step:
     stored : change of the stored energy, J/m^2.
     pressure_jump : change of the pressure that the stiffnesses at both ends do not explain, Pa.
     integration_error : estimated error of the work by the numerical integration, without events, J/m^2.
-    has_jump : whether there are events that may change the pressure.
+    may_change_pressure : whether there are events that may change the pressure; without adhesion only unions or splits.
     events : events of the step.
     """
 
@@ -72,15 +72,15 @@ class Step:
     stored: float
     pressure_jump: float
     integration_error: float
-    has_jump: bool
+    may_change_pressure: bool
     events: Events
 
     @classmethod
     def between(cls, contact: ContactModel, before: State, after: State) -> Step:
         """Return the step from one state to the next.
 
-        The work is the integral of the cubic polynomial that has the pressures and stiffnesses of both states. If the
-        pressure jumps in the middle of the step, this work is exact.
+        The work is the integral of the cubic polynomial that has the pressures and stiffnesses of both states. If both
+        stiffnesses are equal and the pressure jumps in the middle of the step, this work is exact.
         """
         events = events_between(before, after)
         du = after.separation - before.separation
@@ -90,14 +90,14 @@ class Step:
         if np.isinf(slope) or np.isinf(end_slope):
             p, q, slope, end_slope, error = _extrapolate_to_full_contact(du, p, q, slope, end_slope)
         # Without adhesion contact forms and breaks without a jump of the pressure.
-        jumps = len(events) if contact.adhesive else events.count(COALESCENCE) + events.count(SPLIT)
+        count = len(events) if contact.adhesive else events.count(COALESCENCE) + events.count(SPLIT)
         return cls(
             separation_change=du,
             work=-(0.5 * du * (p + q) + du**2 * (slope - end_slope) / 12),
             stored=contact.stored_energy(after) - contact.stored_energy(before),
             pressure_jump=pressure_jump(du, q - p, slope, end_slope),
             integration_error=error,
-            has_jump=bool(jumps),
+            may_change_pressure=bool(count),
             events=events,
         )
 
@@ -112,21 +112,22 @@ class Step:
         return self.work - self.stored
 
     @property
-    def unresolved(self) -> float:
-        """Largest error of the work, J/m^2, because the events may happen anywhere in the step."""
-        return unresolved_work(self.separation_change, self.pressure_jump) if self.has_jump else 0.0
+    def event_error(self) -> float:
+        """Largest error of the work, J/m^2, because the events may happen anywhere in the step; 0 without events."""
+        return event_error(self.separation_change, self.pressure_jump) if self.may_change_pressure else 0.0
 
     @property
-    def unknown_work(self) -> float:
+    def work_error(self) -> float:
         """Largest error of the work, J/m^2, if the pressure may jump anywhere in the step even without an event.
 
-        If no energy is lost, the work is the change of the stored energy, which is exact.
+        It is the larger one of the errors by such a jump and by the integration. It is at most the loss, because the
+        work is the change of the stored energy, which is exact, if no energy is lost.
         """
-        jump = unresolved_work(self.separation_change, self.pressure_jump)
-        return min(max(jump, self.integration_error), abs(self.loss))
+        jump_error = event_error(self.separation_change, self.pressure_jump)
+        return min(max(jump_error, self.integration_error), abs(self.loss))
 
-    def jump_energy(self, contact: ContactModel) -> float:
-        """Return the energy that the jumps of the step would release if every spot were alone, J/m^2."""
+    def reference_loss(self, contact: ContactModel) -> float:
+        """Return the sum of the absolute reference losses (see `EnergyBalance.add_step`) of all events, J/m^2."""
         return float(np.abs(self.events.energy).sum()) / contact.area
 
 
@@ -192,10 +193,11 @@ class Waypoint:
 
     Attributes
     ----------
-    target : target that the state meets; a target of kind BETWEEN for a state between two targets.
+    target : target that the state meets; a target of kind BETWEEN for a state between targets.
     state : state of the contact.
     leg : number of the leg of the path: 0 for the first loading, 1 for the first unloading, and so on.
-    step : step from the last waypoint to this waypoint; only on a cyclic path.
+    step : step from the previous equilibrium of the path under separation control; None on a path that is not cyclic,
+        up to first contact, and where a jump at constant load ends exactly at its load.
     balance : energy balance from first contact to this waypoint; only on a cyclic path.
     """
 
@@ -211,8 +213,8 @@ class Waypoint:
         return self.leg % 2 == 0
 
 
-def waypoint_without_target(state: State, leg: int, step: Step | None = None) -> Waypoint:
-    """Return the waypoint of an equilibrium that meets no target."""
+def waypoint_between_targets(state: State, leg: int, step: Step | None = None) -> Waypoint:
+    """Return the waypoint of an equilibrium that meets no target of the path; its own target has the kind BETWEEN."""
     return Waypoint(Target(BETWEEN, state.separation), state, leg, step)
 
 
@@ -226,7 +228,7 @@ def summarise_loop(
     summit_pull_off_pressure: float,
     unattributed: float,
 ) -> dict[str, float]:
-    """Return pull-off, detachment and losses of a loop that ends without contact, as a dictionary by variable name.
+    """Return pull-off, detachment (last contact) and losses of a loop that ends without contact, by variable name.
 
     Parameters
     ----------

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 from icha.contact.model import ContactModel, State
 from icha.path.cycle import follow_cycle
-from icha.path.energy_balance import EnergyBalance, Waypoint, waypoint_without_target
+from icha.path.energy_balance import EnergyBalance, Waypoint, waypoint_between_targets
 from icha.path.loading import PathProgress, first_loading
 from icha.path.stops import SAME_EXCESS, TargetFunction
 from icha.path.targets import BETWEEN, LOAD_CONTROL, REDUCED_PRESSURE, Path, Target
@@ -22,14 +22,16 @@ def follow(contact: ContactModel, path: Path, report: Callable[[str], None] | No
     ----------
     contact : contact to follow.
     path : targets and turning points.
-    report : function that is called with a line of text at every target; None for no reports.
+    report : function that is called with a line of text at every target of the first loading, at every turning point,
+        and at complete separation; None for no reports.
 
     Raises
     ------
     NotConverged
-        If an equilibrium is not found even with short steps, if the model is not valid in a state of the path, or if a
-        target lies inside a jump. On the first loading, the error for a target inside a jump is raised after the other
-        targets have been met. On the last unloading, targets inside jumps are left out without an error.
+        If an equilibrium is not found even with short steps, if the path makes no progress, if the model is not valid
+        in a state of the path, or if the surfaces separate before a turning point. Also if a target lies inside a jump:
+        at a turning point at once, and on the first loading after the other targets have been met. On the last
+        unloading, targets inside jumps are left out without an error.
     """
     longest = path.max_step * contact.rms_height
     record = PathProgress(contact, len(path.targets), longest, report)
@@ -57,9 +59,10 @@ def select_load_control(
 
     The cycle is under separation control. Where its pressure falls on loading or rises on unloading, load control
     cannot follow the curve of pressure against separation. The state then jumps at constant pressure to the next state
-    of the curve with the same pressure, or to the state without contact. The states in between are left out, and their
-    events belong to the state after the jump. To find this state exactly, its pressure is sent to the cycle as an
-    additional target.
+    of the curve with the same pressure, or to the last state of the path if there is no such state. The states in
+    between are left out; the history of the state after the jump contains their events. To find this state exactly, its
+    pressure is sent to the cycle as an additional target. If the pressure of the curve jumps past this value, the jump
+    ends at the next state of the curve, and its work is still computed with the pressure before the jump.
 
     Parameters
     ----------
@@ -91,7 +94,7 @@ def select_load_control(
             balance = balance.add_load_jump(contact, visited, state, level)
         elif waypoint.step is not None:
             balance = balance.add_step(contact, waypoint.step)
-        yield replace(waypoint_without_target(state, waypoint.leg) if landed else waypoint, balance=balance)
+        yield replace(waypoint_between_targets(state, waypoint.leg) if landed else waypoint, balance=balance)
         visited, left_out, landing, level = state, None, None, pressure
     if visited is not None and left_out is not None:
         yield replace(left_out, balance=balance.add_load_jump(contact, visited, left_out.state, level))

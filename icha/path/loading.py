@@ -35,10 +35,10 @@ class PathProgress:
     Attributes
     ----------
     contact : contact that the path follows.
-    total : number of targets of the first loading.
+    total : number of targets of the first loading; messages call these targets stops.
     longest : longest step of the separation, m.
-    report : function that is called with a line of text at every target; None for no reports.
-    reached : number of targets met so far.
+    report : function that is called with each line of a report; None for no reports.
+    reached : number of targets of the first loading met so far.
     skipped : errors of the targets that lie inside jumps.
     mark : reference separation, m; a path makes progress when its distance from `mark` is at least one longest step.
     idle : number of equilibria since the last target, or since `mark` was set.
@@ -66,7 +66,7 @@ class PathProgress:
         self.idle += 1
 
     def record_target(self, target: Target, state: State) -> None:
-        """Count and report a target that the path has met."""
+        """Count and report a target that the first loading has met."""
         self.reached, self.idle = self.reached + 1, 0
         self.report_position(f"stop {self.reached} of {self.total}: {target.describe(6)}", state)
 
@@ -108,7 +108,7 @@ class PathProgress:
         return step / 2
 
     def make_path_error(self, state: State, loading: bool, *failures: NotConverged) -> NotConverged:
-        """Return the exception for a path that cannot continue after a state; its message names sticky surfaces."""
+        """Return the exception for a path that ends after a state; its message says if the surface is sticky."""
         contact, failures = self.contact, (*self.skipped, *failures)
         sticky = ""
         # A surface is sticky if adhesion alone has spread the contact, or has prevented the first equilibrium.
@@ -136,8 +136,9 @@ def first_loading(
 ) -> Iterator[Waypoint]:
     """Follow a path that ends with the first loading, and yield a waypoint for every target.
 
-    If a target is expected within the next step, the solver looks directly for the state at this target. Otherwise the
-    separation decreases by one step, which is at most `longest`, m. Raise the errors of `icha.path.follow.follow`.
+    If a target is expected within the next step, the solver looks directly for the state at this target. Otherwise, or
+    if this fails twice, the separation decreases by one step, which is at most `longest`, m, and a target within the
+    step is found by bisection. Raise the errors of `icha.path.follow.follow`.
     """
     state = first_contact = contact.untouched()
     pending, step, failed_trials, successes = sort_targets(targets, -1), longest, 0, 0
@@ -184,7 +185,7 @@ def first_loading(
 
 
 def _solve_within_step(target, expected, pending, state, step) -> State | None:
-    """Return the state at a target; None if this state is not within a step, m, or another target comes first."""
+    """Return the state at a target; None if none is found within a step, m, or if another target comes first."""
     try:
         found = target.solve(state, expected)
     except NotConverged:

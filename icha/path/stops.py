@@ -1,4 +1,4 @@
-"""Targets as functions of the state of a contact, and the search for the equilibrium at a target."""
+"""Stops of a path: targets as functions of the state of a contact, and the search for the equilibrium at a target."""
 
 from collections.abc import Iterable
 from contextlib import suppress
@@ -32,7 +32,7 @@ class TargetFunction:
     contact: ContactModel
 
     def excess(self, state: State) -> float:
-        """Return by how much a state exceeds the target, relative to the target value; the excess rises on loading.
+        """Return by how much a state exceeds the target, relative to its absolute value; the excess rises on loading.
 
         The excess over a mean separation is relative to h_rms, and over a load of zero to LEAST_PRESSURE.
         """
@@ -50,7 +50,7 @@ class TargetFunction:
         return self.target.quantity.control(self.contact, self.target.value)
 
     def predict_separation(self, state: State) -> float:
-        """Return the separation, m, at which load or area, extrapolated exponentially, meet the target; or -inf."""
+        """Return the separation, m, at which an exponential curve from a state meets a positive target; or -inf."""
         control = self.control
         if control is None:
             return self.target.value
@@ -58,7 +58,7 @@ class TargetFunction:
         return state.separation - np.log(value) / (slope / value) if value > 0 and slope < 0 else -np.inf
 
     def solve(self, state: State, separation: float) -> State:
-        """Find the equilibrium at the target, starting from a nearby state and a guess of the separation, m."""
+        """Find the equilibrium at the target from a nearby state and a separation, m: a guess, or the target itself."""
         return self.contact.equilibrium(state, separation, self.control)
 
 
@@ -67,13 +67,8 @@ def sort_targets(targets: Iterable[TargetFunction], direction: int) -> list[Targ
 
     direction : direction of the separation: -1 on loading, 1 on unloading.
     """
-
-    def sort_key(function):
-        """Return a number that is smaller for targets that the path meets earlier."""
-        value = function.target.value
-        return direction * (value if function.target.kind == MEAN_SEPARATION else -value)
-
-    return sorted(targets, key=sort_key)
+    signs = {MEAN_SEPARATION: direction}  # loads and areas change in the opposite direction
+    return sorted(targets, key=lambda each: signs.get(each.target.kind, -direction) * each.target.value)
 
 
 def next_of_each_kind(pending: Iterable[TargetFunction]) -> list[TargetFunction]:
@@ -85,7 +80,7 @@ def next_of_each_kind(pending: Iterable[TargetFunction]) -> list[TargetFunction]
 
 
 class InsideJump(NotConverged):
-    """Error: the path jumps over the target, and no equilibrium has the value of the target."""
+    """Error: the path jumps over the target, and no equilibrium at the target is found after the jump."""
 
     def __init__(self, target: TargetFunction, before: State, after: State):
         """Write the message about a target that lies between the states before and after a jump."""
@@ -104,9 +99,9 @@ def find_target_state(target: TargetFunction, before: State, after: State) -> St
     """Find the state at a target that lies between two states of the path, on loading or unloading.
 
     The interval between the two states is halved until the solver finds the state at the target inside the interval. If
-    an event changes the prescribed quantity beyond the target, the interval becomes very narrow. Then the solver looks
-    for the target on the branch after the event, where load control would continue. Raise `InsideJump` if there is no
-    such equilibrium. Raise `NotConverged` if an equilibrium far from any jump is not found.
+    the load or area jumps past the target, the interval becomes very narrow. Then the solver looks for the target on
+    the branch after the jump, where load control would continue; the found state may lie behind `before`. Raise
+    `InsideJump` if there is no such equilibrium. Raise `NotConverged` if an equilibrium far from any jump is not found.
     """
     contact = target.contact
     if target.control is None:
@@ -116,7 +111,7 @@ def find_target_state(target: TargetFunction, before: State, after: State) -> St
         width = sign * (before.separation - after.separation)
         if width <= max(SAME_SEPARATION, contact.path_accuracy.event) * contact.rms_height:
             return _solve_after_jump(target, before, after)
-        reached = not contact.path_accuracy.predicts_steps or _is_near(target, before, after)
+        reached = not contact.path_accuracy.error_controlled_steps or _is_near(target, before, after)
         if reached and (halvings < _TRIALS or halvings & (halvings - 1) == 0):
             with suppress(NotConverged):
                 found = target.solve(before, _guess_separation(target, before, after))
@@ -139,7 +134,7 @@ def find_target_state(target: TargetFunction, before: State, after: State) -> St
 
 
 def _is_near(target, before, after):
-    """Return whether load or area may reach the target between two states without a jump, according to its slopes."""
+    """Return whether load or area, with its slope at one of two states, may reach the target between them."""
     control, contact, width = target.control, target.contact, abs(after.separation - before.separation)
     value = contact.pressure if control.quantity == PRESSURE else contact.area_fraction
     return any(
@@ -172,7 +167,8 @@ def find_first_target(
 ) -> tuple[TargetFunction | None, State]:
     """Find the target that the path meets first between two states, and the state at this target.
 
-    If there is no target between the states, return None and `after`.
+    If there is no target between the states, return None and `after`. Raise the errors of `find_target_state`.
+
     direction : direction of the separation: -1 on loading, 1 on unloading.
     """
     first: tuple[TargetFunction | None, State] = None, after

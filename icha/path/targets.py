@@ -23,9 +23,9 @@ LEAST_PRESSURE, LEAST_AREA = 1e-12, 1e-9
 # ten thousand equilibria.
 MIN_STEP, MAX_STEP = 1e-4, 0.5
 DEFAULT_STEP = 0.15
-# Largest uncertainty of the work of one step, relative to the energy that jumps have released so far. The work is
-# uncertain because the events of a step may happen anywhere in it.
-UNRESOLVED_LOSS = 5e-4
+# Largest error of the work of one step because its events may happen anywhere in the step, relative to the sum of the
+# absolute reference losses of all jumps so far.
+EVENT_ERROR_OVER_LOSS = 5e-4
 
 STEP = FloatRange("h_rms", least=MIN_STEP, most=MAX_STEP)
 
@@ -39,17 +39,17 @@ class TargetQuantity:
     name : name in targets and in files; with an s at the end, the argument of `Path` for a list of such targets.
     rule : range of values that a target may have.
     controlled : PRESSURE or AREA_FRACTION if the solver prescribes this quantity; None for the mean separation.
-    pressure_unit : attribute of the contact that is the unit of a pressure; empty for other quantities.
+    unit_attribute : name of the attribute of the contact that is the unit of a pressure; empty for other quantities.
     """
 
     name: str
     rule: FloatRange
     controlled: str | None = None
-    pressure_unit: str = ""
+    unit_attribute: str = ""
 
     def scale(self, contact: ContactModel) -> float:
         """Return the factor from the value of a target to SI units: a pressure, Pa, or 1."""
-        return getattr(contact, self.pressure_unit) if self.pressure_unit else 1.0
+        return getattr(contact, self.unit_attribute) if self.unit_attribute else 1.0
 
     def evaluate(self, contact: ContactModel, state: State) -> float:
         """Return the value of the quantity in a state, in the same unit as the value of a target."""
@@ -81,7 +81,7 @@ QUANTITIES = {
     )
 }
 LOADS = (REDUCED_PRESSURE, RELATIVE_LOAD)
-# Kind of the target of an equilibrium between two targets. The value of this target is the mean separation.
+# Kind of the target of an equilibrium between the targets of a path. The value of this target is the mean separation.
 BETWEEN = "path"
 # Kinds whose values are in m; all others have no unit.
 IN_METRES = (MEAN_SEPARATION, BETWEEN)
@@ -91,12 +91,12 @@ SEPARATION_CONTROL, LOAD_CONTROL = "separation", "load"
 
 @dataclass(frozen=True)
 class Target:
-    """A state that a path must reach.
+    """A state that a path must reach, or (kind BETWEEN) the mean separation of a state between targets.
 
     Attributes
     ----------
     kind : name of the prescribed quantity, a key of `QUANTITIES`; or BETWEEN.
-    value : prescribed value, SI units.
+    value : prescribed value, in m for a mean separation; all other kinds have no unit.
     snapshot : whether the distributions and spots of the state are stored.
     """
 
@@ -130,8 +130,8 @@ class Path:
     turning_points : pairs (kind, value) at which the path turns after its last target: the first one ends unloading,
         the second one ends loading, and so on. The kinds are those of snapshots. Loads that end unloading may be
         tensile (negative) or zero.
-    unload : whether the path ends with complete separation. Unloading meets the targets again, except those above
-        first contact.
+    unload : whether the path ends with complete separation. The last unloading meets again each target between its
+        start and complete separation, except targets inside jumps.
     control : "separation": the mean separation is prescribed. "load": the load is prescribed, and all targets and
         turning points must be loads. The path then follows the same curve of pressure against separation, but jumps at
         constant load where the pressure falls on loading or rises on unloading.
@@ -189,7 +189,7 @@ class Path:
         )
 
     def within_asperity_range(self) -> Path:
-        """Return a copy of the path without the targets outside the range of the asperity model."""
+        """Return a copy without the targets outside the range of the asperity model; turning points stay."""
         path, ranges = copy.copy(self), ASPERITY_RANGES
         within = (t for t in self.targets if t.kind not in ranges or ranges[t.kind].contains(t.value))
         vars(path).update(targets=tuple(within))
@@ -227,12 +227,12 @@ def _validate_snapshots(snapshots):
     return recorded
 
 
-def _validate_turning_points(turning_points, last):
+def _validate_turning_points(turning_points, previous):
     """Return the turning points as targets; raise `ValueError` if a value is out of range or on the wrong side.
 
-    A turning point that ends unloading must have a smaller load or area than the last turning point, or a larger
-    separation. A turning point that ends loading must have a larger load or area, or a smaller separation. Only turning
-    points of the same kind are compared; the first one is compared with `last`, the last target.
+    A turning point that ends unloading must have a smaller load or area than the point before it, or a larger
+    separation. A turning point that ends loading must have a larger load or area, or a smaller separation. Two points
+    are compared only if both have the same kind. The point before the first one is `previous`, the last target.
     """
     turns = []
     for k, (label, kind, value) in enumerate(_label_pairs("turning_points", turning_points)):
@@ -245,13 +245,13 @@ def _validate_turning_points(turning_points, last):
                 f"{LEAST_PRESSURE:g}"
             )
         falls = unloading != (kind == MEAN_SEPARATION)
-        if kind == last.kind and not (value < last.value if falls else value > last.value):
+        if kind == previous.kind and not (value < previous.value if falls else value > previous.value):
             raise ValueError(
                 f"{label}: {value!r} cannot end {'unloading' if unloading else 'loading'} that begins at "
-                f"{last.value!r}; expected {'less' if falls else 'more'} than {last.value!r}"
+                f"{previous.value!r}; expected {'less' if falls else 'more'} than {previous.value!r}"
             )
-        last = Target(kind, value)
-        turns.append(last)
+        previous = Target(kind, value)
+        turns.append(previous)
     return tuple(turns)
 
 

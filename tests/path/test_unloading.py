@@ -19,6 +19,7 @@ from icha.equilibrium.interacting_asperities import InteractingAsperities
 from icha.path.cycle import _Cycle
 from icha.path.follow import follow
 from icha.path.loading import PathProgress
+from icha.path.step_accuracy import StepAccuracy
 from icha.path.targets import LOAD_CONTROL, MAX_REDUCED_PRESSURE
 from icha.surfaces.summits import find_summits
 from validation.surfaces import paraboloid
@@ -331,8 +332,7 @@ def touchy(lengths, farthest=np.inf):
 def test_a_step_that_fails_is_halved_whatever_the_one_before(stride):
     contact = touchy((0.6, np.inf))
     start = contact.equilibrium(contact.untouched(), few.HEIGHT - 3.0)
-    cycle = _Cycle(contact, 1.5, PathProgress(contact, 1, 1.5), start, leg=1)
-    cycle.step_length = stride
+    cycle = _Cycle(contact, 1.5, PathProgress(contact, 1, 1.5), start, stride, StepAccuracy(contact, 1.5), leg=1)
     state, step = cycle.find_next_equilibrium(1.0)
     assert (
         step.separation_change == pytest.approx(0.5) and state.separation == start.separation + step.separation_change
