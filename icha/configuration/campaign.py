@@ -99,7 +99,7 @@ class Campaign(Section):
     """Loops of loading and unloading with boundary elements at a finite range of attraction, by name, to compare with
     the runs of a study that unloads."""
     measurements: Annotated[dict[Name, Measurement], _FEW] = {}
-    """Your own measurements by name. Figure 5 shows the measurements with the runs."""
+    """Your own measurements by name. Figure 5 shows the measurements beside the results of runs."""
     figures: Figures = Figures()
     """Figures to draw, with options."""
     publication: Publication = Publication()

@@ -164,8 +164,8 @@ class SnapshotFigure(StudyFigure):
 class TopographyFigure(StudyFigure):
     """A figure of one topography of a study."""
 
-    surface: Label | None = Field(default=None, description="Surface to show. Default: the first of the study.")
-    seed: Seed | None = Field(default=None, description="Seed to show. Default: the first of the study.")
+    surface: Label | None = Field(default=None, description="Surface to show. Default: the first surface of the study.")
+    seed: Seed | None = Field(default=None, description="Seed to show. Default: the first seed of the study.")
 
 
 class UnloadedFigure(StudyFigure):
@@ -181,9 +181,9 @@ class UnloadedFigure(StudyFigure):
 class RunFigure(TopographyFigure):
     """A figure of one run. ICHA draws the first run that fits the options, if possible with adhesion."""
 
-    rms_slope: Positive | None = Field(default=None, description="Rms slope to show. Default: the first of the study.")
+    rms_slope: Positive | None = Field(default=None, description="Rms slope to show. Default: the study's first slope.")
     material: Label | None = Field(
-        default=None, description="Material to show. Default: the first one with adhesion, if there is any."
+        default=None, description="Material to show. Default: the first material with adhesion, if any."
     )
 
     def arguments(self, campaign: Campaign) -> dict[str, Any]:

@@ -16,12 +16,12 @@ class Snapshot(Section):
         default=None, description="Reduced pressure p/(E* h'rms) of the state."
     )
     relative_load: Positive | None = Field(
-        default=None, description="Relative load p/E* = F/(E* A0) of the state, independent of the slope."
+        default=None, description="Relative load p/E* = F/(E* A0) of the state, independent of the surface slope."
     )
     area_fraction: AreaFraction | None = Field(  # type: ignore[valid-type]
         default=None, description="Contact area fraction A/A0 of the state."
     )
-    mean_separation: Length | None = Field(default=None, description="Mean separation of the state, with unit.")
+    mean_separation: Length | None = Field(default=None, description="Mean separation of the state, with its unit.")
 
     _check = model_validator(mode="after")(exactly_one)
 
