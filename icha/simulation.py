@@ -92,7 +92,7 @@ def simulate(
     ----------
     surface : rough surface, scaled to its final rms slope.
     material : contact modulus, work of adhesion, range of attraction and flaws of the contact.
-    path : loads, areas or separations to reach, and the snapshots, whose distributions and spots are stored.
+    path : loads, areas or separations to reach, and the snapshots to store with distributions and spots.
     model : "asperities" or "boundary_elements". Boundary elements are slower, use the limit of a short range of
         attraction, and need a periodic surface.
     seed : number that is recorded in the dataset; -1 for a surface without a seed.
@@ -133,12 +133,12 @@ def simulate(
     dataset = _compute(solver, surface, material, path, model, seed, progress, kept)
     if failed := reasons_of_failure(check_run(dataset)):
         dataset = dataset.assign_attrs(failed_checks=failed)
-        warnings.warn(f"The run fails checks, do not use its numbers: {failed}", stacklevel=2)
+        warnings.warn(f"The run fails checks; do not use the numbers of this run: {failed}", stacklevel=2)
     return dataset
 
 
 def _compute(solver, surface, material, path, model, seed, progress, kept):
-    """Return the dataset of a run before its checks; raise `ConvergenceError` if it is incomplete.
+    """Return the dataset of a run before its checks; raise `ConvergenceError` if the run is incomplete.
 
     solver : module of the model; all other arguments are those of `simulate`.
     """
@@ -236,7 +236,7 @@ def asperity_applicability(
 def _check_arguments(surface, material, path, by_summits):
     """Raise `ValueError` for arguments of the wrong type, and for targets out of range on this surface.
 
-    by_summits : whether the model represents the surface by its summits, which limits loads and areas.
+    by_summits : whether summits represent the surface in the model; loads and areas then have lower limits.
     """
     for name, value, kind in (("surface", surface, Surface), ("material", material, Material), ("path", path, Path)):
         if not isinstance(value, kind):
@@ -267,7 +267,7 @@ def _check_arguments(surface, material, path, by_summits):
 
 @dataclass
 class _PathRecord:
-    """Values of all steps, snapshots and events of a path, and the reason if it ends early.
+    """Values of all steps, snapshots and events of a path, and the reason if the path ends early.
 
     Attributes
     ----------
@@ -289,7 +289,7 @@ class _PathRecord:
 
 
 def _count_uphill_jumps_in(record: _PathRecord) -> int:
-    """Return the number of jumps into contact that cost energy, by the law of a spot or by the energy balance."""
+    """Return the number of jumps into contact that cost energy according to spot law or energy balance."""
     gained = np.diff([step["dissipated_by_jump_in"] for step in record.steps], prepend=0.0) < 0
     return sum(
         int(np.count_nonzero((events.kind == JUMP_IN) & ((events.energy < 0) | uphill)))
@@ -409,7 +409,7 @@ def _describe_targets(table: Table, path: Path) -> Table:
 
 
 def _target_unit(kinds: set[str], named_by: str) -> dict:
-    """Return the unit of targets of given kinds, and a comment which kinds are in m if units differ."""
+    """Return the unit of targets of given kinds, and a comment on the kinds in m if the units differ."""
     metres = kinds.intersection(IN_METRES)
     if not metres or metres == kinds:
         return {"units": "m" if metres else "1"}

@@ -1,6 +1,6 @@
 """Boundary elements in the limit of short range against closed forms: spheres, punches, waves, cracks, pairs.
 
-Units: E* = 1 Pa and dgamma = 1 J/m^2; spheres have radius 1 m, so that lengths are in (dgamma R^2/E*^2)^(1/3). The
+Units: E* = 1 Pa and dgamma = 1 J/m^2; spheres have radius 1 m, so that lengths are in (dgamma^2 R/E*^2)^(1/3). The
 functions give rows, dictionaries of numbers for JSON. Errors are ratios minus one unless their description differs.
 """
 

@@ -1,4 +1,4 @@
-"""Check campaigns and boundary-element solutions by identities and bounds that are computed from the datasets."""
+"""Check campaigns and boundary-element solutions with equalities and bounds that datasets must satisfy."""
 
 import json
 import os
@@ -26,7 +26,7 @@ COMPLETED = "completed"
 def check_campaign(tree: xr.DataTree, expected: Iterable[RunLabels | tuple] | None = None) -> tuple[Check, ...]:
     """Check that a campaign dataset has all runs and describes all variables, and check every run (`check_run`).
 
-    A run that is incomplete, or that failed the checks of its job, has a single failed check, described by the reason.
+    An incomplete run, or a run that failed the checks of its job, has a single failed check that states the reason.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ def _findings(solution) -> Iterator[Finding]:
 
 
 def worst(checks: Iterable[Check]) -> tuple[Check, ...]:
-    """Return the worst check of each name: the one with the largest value, where failed checks precede passed ones."""
+    """Return the worst check of each name: the failed check, or else the passed check, with the largest value."""
     found: dict[str, Check] = {}
     for check in checks:
         best = found.get(check.name)

@@ -1,4 +1,4 @@
-"""Compare the runs of a study: contact areas and mean separations at common loads, their means and their scatter."""
+"""Compare contact areas and mean separations of the runs of a study at common loads, with means and scatter."""
 
 import warnings
 from collections.abc import Mapping, Sequence
@@ -39,7 +39,7 @@ def interpolate(load, values, at, *, logarithmic: bool) -> np.ndarray:
 
     Parameters
     ----------
-    load, values : points of the curve, in any order; loads are positive. The first of several equal loads is used.
+    load, values : points of the curve, in any order; loads are positive. Of points at equal loads, the first is used.
     at : loads within the range of the curve.
     logarithmic : True to interpolate the logarithm of the values, which must then be positive.
 
@@ -74,19 +74,19 @@ def compare_runs(study: xr.Dataset) -> xr.Dataset:
 
     Returns
     -------
-    Dataset on two grids of loads, `reduced_pressure` and `relative_load`. Each grid spans the range of loads that the
-    targets of the first loading cover in all runs. A grid is empty if there is no such range. Variables on the second
-    grid have the suffix `_at_load`. On each grid the dataset has
+    Dataset on two grids of loads, `reduced_pressure` and `relative_load`. Each grid spans the range of loads that all
+    runs cover in the first loading. A grid is empty if the runs have no loads in common. Variables on the second grid
+    have the suffix `_at_load`. On each grid the dataset has
 
     - `contact_area_fraction` and `reduced_separation` along the labels of the runs;
     - the mean of both variables over the seeds, the standard deviation, and half the width of the 95 % confidence
       interval (`area_mean`, `area_deviation`, `area_confidence`, `separation_mean`, …; `icha.support.statistics`);
     - `material_spread` and `slope_spread`: the largest area of all materials (slopes) over the smallest, minus one.
 
-    Incomplete runs (`status`) have no values and are in no mean. Runs that left the range of the model have values up
-    to the limit of the model. Runs for which the asperity model is not applicable have values, but are in no mean.
-    `seed_count` is the number of seeds in the means, `asked_seed_count` the number of requested seeds. For a single
-    seed, standard deviation and confidence interval are missing.
+    Incomplete runs (`status`) have no values and do not contribute to means. Runs that left the range of the model have
+    values up to the limit of the model. Runs for which the asperity model is not applicable have values, but do not
+    contribute to means. `seed_count` is the number of seeds in the means, `asked_seed_count` the number of requested
+    seeds. For a single seed, standard deviation and confidence interval are missing.
     """
     status = study["status"].transpose(*LABELS).values
     loaded, asked = np.isin(status, LOADED_RUNS), np.isin(status, (*COMPUTED_RUNS, MISSING))
@@ -119,7 +119,7 @@ def compare_runs(study: xr.Dataset) -> xr.Dataset:
 
 
 def _loads(study):
-    """Return the loads of all steps on both load axes; NaN except at compressive targets of the first loading."""
+    """Return reduced pressures and relative loads of steps; NaN except at compressive targets of the first loading."""
     pressure = study["reduced_pressure"].transpose(*LABELS, "step").values
     slope = study["rms_slope"].broadcast_like(study["status"]).transpose(*LABELS).values[..., None]
     shown = loading_stops(study).transpose(*LABELS, "step").values & (pressure > 0)
@@ -128,7 +128,7 @@ def _loads(study):
 
 
 def _on_common_grid(study, load, loaded):
-    """Return loads that all runs in `loaded` cover, and the values of all runs at these loads by name of variable."""
+    """Return common loads of the `loaded` runs, and areas and separations of these runs at the common loads."""
     curves = {
         "contact_area_fraction": study["contact_area_fraction"].transpose(*LABELS, "step").values,
         "reduced_separation": reduced_gap(study).transpose(*LABELS, "step").values,
@@ -146,7 +146,7 @@ def _on_common_grid(study, load, loaded):
 
 
 def _spreads(on_grid, averaged):
-    """Return statistics over the seeds and ratios between materials and slopes: descriptions and values by name."""
+    """Return descriptions and values of statistics over the seeds, and of ratios between materials or slopes."""
     found = {}
     for name, short, symbol in _AVERAGED:
         over_seeds = ensemble(np.where(averaged[..., None], on_grid[name], np.nan), LABELS.index("seed"))
@@ -177,9 +177,9 @@ def at_common_loads(
 
     Returns
     -------
-    loads : (loads,) float, the loads of the members if these are equal; otherwise loads with equal steps of the
-        logarithm in the range that all members cover. Empty if there is no such range.
-    values : (members, loads) float, values of every member at these loads.
+    loads : (loads,) float, the loads of the members if all members have equal loads. Otherwise loads with equal steps
+        of the logarithm in the common range of the members; empty if there is no common range.
+    values : (members, loads) float, values of every member at the common loads.
     """
     curves = [(load[load > 0], values[load > 0]) for load, values in curves]
     loads = [np.sort(load) for load, _ in curves]

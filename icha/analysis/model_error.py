@@ -61,7 +61,7 @@ def model_error(
 
     Parameters
     ----------
-    campaign : the campaign dataset. Its runs have a snapshot of kind `reduced_pressure` at the load of every solution.
+    campaign : the campaign dataset; asperity runs have a `reduced_pressure` snapshot at the load of every solution.
     solutions : labels and dataset of each solution at a finite range of attraction (`icha.references.finite_range`).
     runs : labels and dataset of each run with boundary elements in the limit of a short range, with contact maps. Areas
         and separations are compared at the targets of kind `reduced_pressure` of the first loading. Distributions and
@@ -70,9 +70,9 @@ def model_error(
 
     Returns
     -------
-    DataTree with one group for every study in `runs`, named after the study, and one group for every entry in
-    `solutions`. The attribute `truth` of a group names the reference (`SHORT_RANGE` or `FINITE_RANGE`). The dimensions
-    of variables are surface, seed, rms_slope, material and the target of the reduced pressure:
+    DataTree with one group for every study in `runs` and one group for every entry in `solutions`. The attribute
+    `truth` of a group names the reference (`SHORT_RANGE` or `FINITE_RANGE`). Dimensions are surface, seed, rms_slope,
+    material and the target of the reduced pressure. A group has
 
     - the variables of `icha.datasets.variables.model_error`;
     - for each name in `SUMMARISED`, the mean over the seeds `<name>_mean`, and for two seeds or more the standard
@@ -160,7 +160,7 @@ def compare_state(run: xr.Dataset, snapshot: int, solution: xr.Dataset) -> dict[
 
 
 def _compare_stops(labels, run, truth):
-    """Compare a run of each model at each load; the result is None if one run has no state, or if contact is full."""
+    """Compare the asperity and boundary-element run at each load; None if a state is missing or contact is full."""
     if difference := difference_of_contacts(run, truth):
         raise ValueError(difference)
     failed = why_no_result(run.attrs) or why_no_result(truth.attrs)
@@ -180,13 +180,13 @@ def _compare_stops(labels, run, truth):
 
 
 def _stops(run):
-    """Return the positions of the steps of the first loading whose target is a reduced pressure, by the target."""
+    """Return the index of each step of the first loading at a target of reduced pressure, by value of the target."""
     targets = loading_stops(run) & (run["step_kind"] == REDUCED_PRESSURE)
     return {float(run["step_target"].values[step]): step for step in np.flatnonzero(targets.values).tolist()}
 
 
 def snapshot_if_any(run: xr.Dataset, kind: str, target: float) -> int | None:
-    """Return the position of the snapshot of a kind and target in a run; None if the run has no such snapshot."""
+    """Return the index of the snapshot of a kind and target in a run; None if the run has no such snapshot."""
     try:
         return find_snapshot(run, kind, target)
     except ValueError:
@@ -194,10 +194,10 @@ def snapshot_if_any(run: xr.Dataset, kind: str, target: float) -> int | None:
 
 
 def _as_solution(run, step, load):
-    """Return a step of a run with boundary elements, with the variables of a solution at a finite range.
+    """Convert a step of a boundary-element run to the variables of a solution at a finite range.
 
     If the step has a snapshot, the distributions and the contact map are included. In the limit of a short range, no
-    stress acts outside contact, so the contact areas by all definitions are equal.
+    stress acts outside contact, so all definitions of the contact area give the same value.
     """
     state = run.drop_dims([*RAGGED, "snapshot"], errors="ignore").isel(step=step)
     snapshot = snapshot_if_any(run, REDUCED_PRESSURE, load)
@@ -214,7 +214,7 @@ def _as_solution(run, step, load):
 
 
 def _amounts(state, solution):
-    """Return areas, separations and errors of a state and a solution, and residual and grid of the solution."""
+    """Return areas, separations and errors of a state, with residual and grid of the boundary-element solution."""
     area, truth = (float(each["contact_area_fraction"]) for each in (state, solution))
     separation, true_separation = (float(each["reduced_separation"]) for each in (state, solution))
     for name, value in (("contact area", truth), ("mean separation", true_separation)):
@@ -242,7 +242,7 @@ def _amounts(state, solution):
 
 
 def _shapes(run, snapshot, solution):
-    """Return differences of distributions and contact maps between snapshot and solution, and its densities."""
+    """Return differences of distributions and contact maps between models, and the densities of the solution."""
     state, spots = state_of(run, snapshot), contact_of_spots(run, snapshot, solution.sizes["x"])
     contact = solution["contact"].transpose("y", "x").values == 1
     height, nominal = float(solution["rms_height"]), float(state["nominal_pressure"])
@@ -278,25 +278,25 @@ def state_of(run: xr.Dataset, snapshot: int) -> xr.Dataset:
 
 
 def contact_of_spots(run: xr.Dataset, snapshot: int, grid: int) -> np.ndarray:
-    """Return the contact map of the spots of a snapshot, (n, n) bool along y and x: True for nodes inside a spot."""
+    """Return the contact map of a snapshot, an array along y and x that is True for nodes inside a spot."""
     spots = spots_of(run, snapshot)
     centres = np.column_stack([spots["spot_x"].values, spots["spot_y"].values])
     return cover_grid(float(run["period"]), grid, centres, spots["spot_radius"].values)[1]
 
 
 def jaccard(one: np.ndarray, other: np.ndarray) -> float:
-    """Return the Jaccard index of two contact maps: nodes in both over nodes in at least one; 1 if both are empty."""
+    """Return the number of nodes in both contact maps divided by the number in at least one; 1 if both are empty."""
     return shared(one | other, one & other)
 
 
 def shared(one: np.ndarray, other: np.ndarray) -> float:
-    """Return the number of nodes in both contact maps over the number in the first; 1 if the first map is empty."""
+    """Return the number of nodes in both contact maps divided by the number in the first; 1 if the first is empty."""
     count = np.count_nonzero(one)
     return np.count_nonzero(one & other) / count if count else 1.0
 
 
 def distribution_distance(quantity: str, one: xr.Dataset, other: xr.Dataset) -> float:
-    """Return the first Wasserstein distance between two distributions of the gap (m) or of the pressure (Pa).
+    """Return the first Wasserstein distance between two distributions of the gap (in m) or of the pressure (in Pa).
 
     The distributions are over the nominal area. The distance is the area between the cumulative distributions. The gap
     counts as zero in contact, and where surfaces overlap outside contact. The pressure counts as zero outside contact,
@@ -357,7 +357,7 @@ def _entry_dataset(campaign, entry, states):
 
 
 def _of_asperities(quantity, labelled):
-    """Return a quantity of the asperity runs along the labels of the dataset `labelled`; NaN where there is no run."""
+    """Return a quantity of the asperity runs along the labels of the dataset `labelled`; NaN for missing runs."""
     none = "" if quantity.dtype.kind in "OSU" else np.nan
     values = np.full([labelled.sizes[label] for label in _LABELS], none, object if none == "" else float)
     for place in np.ndindex(values.shape):

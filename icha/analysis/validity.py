@@ -83,7 +83,7 @@ VALIDATED = {
 
 
 def outside_validation(facts: Mapping[str, float]) -> list[str]:
-    """Describe each fact outside the range of the validation, with value and range; `facts` has keys of `VALIDATED`."""
+    """Describe each quantity outside the range of the validation; `facts` are values by key of `VALIDATED`."""
     return [
         f"{words} {facts[name]:.2g}, validated: {least:g} {'and more' if most == math.inf else f'to {most:g}'}"
         for name, (words, least, most) in VALIDATED.items()
@@ -112,7 +112,7 @@ class Case(NamedTuple):
     Attributes
     ----------
     model, surface, material : names.
-    facts : values for the keys of `VALIDATED`; also quantities of full contact and of the grid, if known.
+    facts : values of quantities by key of `VALIDATED`; also quantities of full contact and of the grid, if known.
     """
 
     model: str
@@ -138,8 +138,8 @@ def statements(
     ----------
     models : names of the models of each study.
     cases : the runs.
-    outside : text that names the cases whose jumps into contact are outside the verified range; "" if there are none,
-        None without adhesion.
+    outside : text that lists surfaces and materials with jumps into contact outside the verified range; "" if there are
+        none, None without adhesion.
     sticky : surfaces and materials whose attraction outweighs repulsion, from `describe_sticky`.
     """
     cases = list(cases)
@@ -158,7 +158,7 @@ def statements(
 
 
 def _full_contact(cases):
-    """Yield the statement on full contact for the case with the strongest adhesion, if any case has adhesion."""
+    """Yield the statement on full contact for the run with the strongest adhesion, if any run has adhesion."""
     adhesive = [case for case in cases if case.ratio < math.inf]
     if not adhesive:
         return
@@ -187,7 +187,7 @@ def _full_contact(cases):
 
 
 def _unresolved_strength(facts):
-    """Describe the largest tension that the grid resolves if the strength of the interface is higher; "" otherwise."""
+    """Describe the largest tension that the grid resolves; "" if the grid resolves the strength of the interface."""
     if not 0 < facts.get(RESOLVED, math.inf) < facts[STRENGTH]:
         return ""
     needed = facts[SPACING] * (facts[RESOLVED] / facts[STRENGTH]) ** 2
@@ -198,7 +198,7 @@ def _unresolved_strength(facts):
 
 
 def _resolution(cases):
-    """Yield the statement on surfaces for which boundary elements have few grid cells per shortest wave."""
+    """Yield the statement on surfaces for which boundary elements have few grid cells per shortest wavelength."""
     few = {
         case.surface: cells
         for case in cases
@@ -214,7 +214,7 @@ def _resolution(cases):
 
 
 def _accuracy(cases, measured):
-    """Return the statement on the error of the asperity model, which is known only in the range of the validation.
+    """Return the statement on the error of the asperity model; the error is known only in the range of the validation.
 
     `cases` are runs of the asperity model. `measured` is True if the campaign also has runs with boundary elements.
     """
@@ -296,7 +296,7 @@ def _cases(study):
 
 
 def describe_sticky(stickiness: Mapping[tuple[str, str], float]) -> list[str]:
-    """Describe surfaces and materials (the keys) whose stickiness (`icha.asperity.stickiness`) is larger than 1."""
+    """Describe each pair of surface and material with a stickiness (`icha.asperity.stickiness`) larger than 1."""
     return [
         f"{material} on {surface} (stickiness {value:.2g})"
         for (surface, material), value in stickiness.items()
@@ -317,8 +317,8 @@ def _describe_shares(shares):
 def _shares_outside(study):
     """Return the fraction of single spots outside the range of Wu's formula, by surface and material.
 
-    The fraction is that at the end of the first loading, the largest over all seeds and slopes. Materials without
-    adhesion are left out, because their spots do not jump into contact.
+    The fraction is the value at the end of the first loading; of all seeds and slopes, the largest value is used.
+    Materials without adhesion are left out, because their spots do not jump into contact.
     """
     runs = study[["status", "leg", "outside_wu_fraction", "surface_energy"]].sel(model=DEFAULT_MODEL).load()
     end = (runs["leg"] == 0).sum("step") - 1
@@ -338,7 +338,7 @@ def _used(models):
 
 
 def _error(adhesive):
-    """Describe the errors in the validation, with adhesion (True in `adhesive`) and without (False in `adhesive`)."""
+    """Describe the errors in the validation; `adhesive` has True for runs with adhesion, False for runs without."""
     found = []
     for quantity in VALIDATION[True]:
         ranges = (VALIDATION[each][quantity] for each in sorted(adhesive, reverse=True))

@@ -11,7 +11,7 @@ from icha.surfaces.square import periodic_difference
 
 
 def overlapping_pairs(position, a, first, second, r):
-    """Return the pairs (k, 2) of spots that overlap, r_ij < a_i + a_j, sorted by the depth of their overlap.
+    """Return pairs of overlapping spots (r_ij < a_i + a_j), sorted by depth of overlap: array of shape (k, 2).
 
     The pair with the deepest overlap a_i + a_j - r_ij comes first. Pairs of equal depth are sorted by their positions,
     so that the result does not depend on the order of the input.
@@ -36,7 +36,7 @@ def overlapping_pairs(position, a, first, second, r):
 
 
 def disjoint_pairs(pairs):
-    """Return those of k pairs (k, 2) of spots that share no spot with an earlier selected pair."""
+    """Select the pairs of spots that share no spot with an earlier selected pair."""
     taken, chosen = set(), []
     for i, j in pairs.tolist():
         if i not in taken and j not in taken:
@@ -46,7 +46,7 @@ def disjoint_pairs(pairs):
 
 
 def equivalent_spots(law: JKR, position_i, a_i, R_i, position_j, a_j, R_j, period):
-    """Return centres (k, 2), contact radii and radii of curvature (k,), m, of the spots that replace k pairs i, j."""
+    """Return the centres, contact radii and radii of curvature (m) of the spots that replace the pairs i, j."""
     a, R, fraction = law.union(a_i, R_i, a_j, R_j)
     offset = periodic_difference(position_j, position_i, period)
     centre = np.mod(position_i + fraction[:, None] * offset, period)
@@ -55,7 +55,7 @@ def equivalent_spots(law: JKR, position_i, a_i, R_i, position_j, a_j, R_j, perio
 
 
 def covering_spot(points, position, a, period, larger_than=None):
-    """Return for each of k points the index of the spot that covers the point deepest, (k,) int; -1 if none covers it.
+    """Return for each point the index of the spot that covers the point deepest; -1 if no spot covers the point.
 
     Parameters
     ----------

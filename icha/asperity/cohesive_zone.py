@@ -15,7 +15,7 @@ MAX_STRENGTH_NUMBER = 0.5
 
 
 def longest_spacing(material: Material) -> float:
-    """Return the largest spacing that resolves the cohesive zone, 8 rho^2 E*/(3 pi dgamma), m; inf without adhesion."""
+    """Return the largest spacing (m) that resolves the cohesive zone, 8 rho^2 E*/(3 pi dgamma); inf if dgamma = 0."""
     if material.surface_energy == 0:
         return math.inf
     return 8 * material.interaction_range**2 / (3 * math.pi * material.adhesion_length)
@@ -27,13 +27,13 @@ def strength_number(material: Material, spacing: float) -> float:
 
 
 def shortest_range(material: Material, spacing: float) -> float:
-    """Return the shortest range of attraction, m, that a grid of this spacing, m, resolves."""
+    """Return the shortest range of attraction (m) that a grid of the given spacing (m) resolves."""
     zone = math.sqrt(3 * math.pi * material.adhesion_length * spacing / 8)
     return max(zone, math.sqrt(material.adhesion_length * spacing) / MAX_STRENGTH_NUMBER)
 
 
 def resolution_problem(material: Material, spacing: float) -> str | None:
-    """Return the reason why a grid of this spacing, m, does not resolve the attraction; None if it does."""
+    """Return the reason why a grid of the given spacing (m) does not resolve the attraction; else None."""
     if spacing <= longest_spacing(material) and strength_number(material, spacing) < MAX_STRENGTH_NUMBER:
         return None
     return (

@@ -27,9 +27,9 @@ def full_contact_energy_ratio(full_contact_energy: float, contact_modulus: float
 def gaussian_complete_pressure(waves: float) -> float:
     """Estimate the pressure over E* h'_rms at which contact with a Gaussian surface is complete without adhesion.
 
-    The estimated pressure compensates the largest tension of full contact at zero load, which is the largest of about
-    2 pi waves^2 independent values with the standard deviation E* h'_rms/2. `waves` is the side of the surface over the
-    shortest wavelength. For five spectra, the mean of five surfaces differed from this estimate by 0 to 9 %.
+    The estimated pressure compensates the largest tension of full contact at zero load. This tension is the largest of
+    about 2 pi waves^2 independent values with the standard deviation E* h'_rms/2. `waves` is the side of the surface
+    over the shortest wavelength. For five spectra, the mean of five surfaces differed from this estimate by 0 to 9 %.
     """
     return math.sqrt(2 * math.log(2 * math.pi * waves**2)) / 2
 

@@ -1,8 +1,8 @@
 """The law of one asperity: Johnson, Kendall & Roberts contact with Wu's jump into contact.
 
-Every method is a function of contact radius `a` and radius of curvature `R` (arrays that broadcast, metres). With
-zero surface energy the law is Hertz's, by the same formulas. Equation numbers are those of Violano & Afferrante,
-"Modeling the adhesive contact of rough soft media with an advanced asperity model".
+Every method is a function of contact radius `a` and radius of curvature `R` (arrays that broadcast, metres). With zero
+surface energy, the same formulas give Hertz's law. Equation numbers are those of Violano & Afferrante, "Modeling the
+adhesive contact of rough soft media with an advanced asperity model".
 """
 
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ _MAX_NEWTON_STEPS = 200
 class JKR:
     """Contact of one paraboloid with an elastic half-space.
 
-    The solver of many spots uses no other properties of a law than the methods of this class.
+    The solver of many spots uses only the methods of this class.
     """
 
     material: Material
@@ -62,7 +62,7 @@ class JKR:
         """Solve eq. (2) for its larger (stable) root a, m; below the jump-off approach return the jump-off radius.
 
         With a = A x^2, A = (gamma R^2/E*)^(1/3), eq. (2) is the convex quartic x^4 - sqrt(2 pi) x - d = 0. Newton's
-        method descends to its root from above.
+        method descends to the larger root from above.
         """
         approach, R = np.broadcast_arrays(np.asarray(approach, float), np.asarray(R, float))
         if self.material.surface_energy == 0:
@@ -153,7 +153,7 @@ class JKR:
     def second_moment(self, a, R):
         """Return 1/4 of the integral of p r^2 over the spot, N m^2: the strength of the second term of its far field.
 
-        The mean of r^2 is 2a^2/5 for Hertz's pressure and 2a^2/3 for that of the flat punch.
+        The mean of r^2 is 2a^2/5 for Hertz's pressure and 2a^2/3 for the pressure of a flat punch.
         """
         return a**2 * (self.repulsive_force(a, R) / 10 - self.adhesive_force(a) / 6)
 
@@ -164,7 +164,7 @@ class JKR:
     def fourth_moment(self, a, R):
         """Return 9/64 of the integral of p r^4 over the spot, N m^4: the strength of the third term of its far field.
 
-        The mean of r^4 is 8a^4/35 for Hertz's pressure and 8a^4/15 for that of the flat punch.
+        The mean of r^4 is 8a^4/35 for Hertz's pressure and 8a^4/15 for the pressure of a flat punch.
         """
         return a**4 * (self.repulsive_force(a, R) * (9 / 280) - self.adhesive_force(a) * (3 / 40))
 
@@ -173,7 +173,7 @@ class JKR:
         return a**3 * (self.repulsive_force(a, R) * (9 / 40) - self.adhesive_force(a) * (5.5 * 3 / 40))
 
     def moments(self, a, R, count):
-        """Return the integrals of p (r/a)^(2k), k = 0 ... count-1, over spots a, R (m,): (m, count), N."""
+        """Return the integrals of p (r/a)^(2k) over m spots for k = 0 ... count-1: array of shape (m, count), N."""
         order = np.arange(count)
         # Means of (r/a)^(2k), weighted with Hertz's pressure and with that of the flat punch.
         hertz, punch = 1.5 * beta(order + 1, 1.5), 0.5 * beta(order + 1, 0.5)
@@ -192,10 +192,10 @@ class JKR:
         return peak * s - neck / s
 
     def pressure_distribution(self, p, a, R):
-        """Return the area of the spot where the pressure is at most p, Pa, and the force on this area: m^2 and N.
+        """Return the area (m^2) of the spot where the pressure is at most p (Pa), and the force (N) on this area.
 
-        The pressure rises with s = sqrt(1 - r^2/a^2); the area up to s is pi a^2 s^2 and its force
-        2 pi a^2 (P s^3/3 - B s).
+        The pressure rises with s = sqrt(1 - r^2/a^2); the area up to s is pi a^2 s^2, and the force on this
+        area is 2 pi a^2 (P s^3/3 - B s).
         """
         peak, neck = self.pressure_amplitudes(a, R)
         root = np.sqrt(p**2 + 4 * peak * neck)
@@ -206,7 +206,7 @@ class JKR:
         return np.pi * a**2 * s**2, 2 * np.pi * a**2 * (peak * s**3 / 3 - neck * s)
 
     def union(self, a_i, R_i, a_j, R_j):
-        """Return contact radius and radius of curvature of the union of two spots, m, and the position of its centre.
+        """Return contact radius (m), radius of curvature (m) and position of the centre of the union of two spots.
 
         a^2 = a_i^2 + a_j^2 and R^2 = R_i^2 + R_j^2. The centre is the centroid of the cap volumes pi a^4/(4R). The
         position of the centre is a fraction of the distance from the first spot to the second.
@@ -216,7 +216,7 @@ class JKR:
 
 
 def wu_gap(tabor_parameter: np.ndarray | float) -> np.ndarray | float:
-    """Return the gap at the jump into contact over the range of attraction, 2.641 mu^(3/7), Wu's formula in eq. (3)."""
+    """Return Wu's gap at the jump into contact, divided by the range of attraction: 2.641 mu^(3/7), eq. (3)."""
     return 2.641 * tabor_parameter ** (3 / 7)
 
 

@@ -58,9 +58,9 @@ class Material:
     def interface_strength(self) -> float:
         """Tension at which closed contact opens, Pa: the theoretical strength, or the strength with the flaw if lower.
 
-        A penny-shaped crack of radius a grows at the tension sigma = sqrt(pi E* dgamma/(2 a)). Its stress intensity
-        K = 2 sigma sqrt(a/pi) then has the energy release rate K^2/(2 E*) = dgamma, because one of the two bodies is
-        rigid (I. N. Sneddon, Proc. R. Soc. A 187 (1946) 229-260).
+        A penny-shaped crack of radius a grows at the tension sigma = sqrt(pi E* dgamma/(2 a)). The stress
+        intensity K = 2 sigma sqrt(a/pi) of the crack then gives the energy release rate K^2/(2 E*) = dgamma, because
+        one of the two bodies is rigid (I. N. Sneddon, Proc. R. Soc. A 187 (1946) 229-260).
         """
         if not self.flaw_radius:
             return self.theoretical_strength

@@ -1,4 +1,4 @@
-"""Stickiness of rough surfaces: two criteria for whether adhesion overcomes the roughness."""
+"""Stickiness of rough surfaces: two criteria that show whether adhesion overcomes the roughness."""
 
 import numpy as np
 
@@ -35,16 +35,16 @@ def stickiness(moments: SpectralMoments, material: Material) -> float:
 def sticky_rms_height(longest_wavelength: float, material: Material) -> float:
     r"""Return the rms height, m, below which a random surface is sticky according to the bearing area model (BAM).
 
-    M. Ciavarella, Meccanica 53 (2018) 241-250, doi:10.1007/s11012-017-0701-6. At the mean separation u the area whose
-    gap is less than the range of attraction pulls with p_a = dgamma/(sqrt(2 pi) h) exp(-u^2/(2 h^2)), and the contact
-    repels with Persson's p_r = (3/(8 beta)) q_L h E* exp(-u/(beta h)), where beta = 1/2 and q_L = 2 pi/lambda_L. Here
-    h is the rms height. The ratio p_a/p_r is largest at u = h/beta. At u = h/beta, p_a exceeds p_r if
+    M. Ciavarella, Meccanica 53 (2018) 241-250, doi:10.1007/s11012-017-0701-6. Here u is the mean separation, h the rms
+    height, beta = 1/2 and q_L = 2 pi/lambda_L. The attraction acts where the gap is less than the range,
+    with the nominal pressure p_a = dgamma/(sqrt(2 pi) h) exp(-u^2/(2 h^2)). The contact repels with Persson's pressure
+    p_r = (3/(8 beta)) q_L h E* exp(-u/(beta h)). The ratio p_a/p_r is largest at u = h/beta, where p_a exceeds p_r if
 
         h^2 < e^2/(sqrt(2 pi) 3 pi/2) lambda_L dgamma/E* = 0.63 lambda_L dgamma/E*.
 
     Parameters
     ----------
-    longest_wavelength : lambda_L, m: the roll-off wavelength of a self-affine surface.
+    longest_wavelength : lambda_L in m, the roll-off wavelength of a self-affine surface.
     material : contact modulus and surface energy.
     """
     factor = np.exp(2) / (np.sqrt(2 * np.pi) * 1.5 * np.pi)

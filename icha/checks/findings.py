@@ -20,7 +20,7 @@ class Check:
     Attributes
     ----------
     name : name of the check.
-    value : value that was found; -1 if it is not finite.
+    value : value that was found; -1 if the found value is not finite.
     limit : largest value that passes.
     passed : whether the value is finite and at most the limit.
     description : meaning of the value.
@@ -37,7 +37,7 @@ class Check:
 
 @dataclass(frozen=True)
 class RunArrays:
-    """Arrays of a run by name. Checks of a small run are much faster with these arrays than with xarray."""
+    """Arrays of a run by name. Checks of a small run are much faster with NumPy arrays than with xarray."""
 
     values: dict[str, np.ndarray]
     sizes: dict[str, int]

@@ -72,12 +72,12 @@ def check_loop(run) -> Iterator[tuple]:
 
 
 def _has_united(run):
-    """Return whether spots have united by a rule, which may cost or gain a little energy."""
+    """Return whether spots have united by a rule; the unions may cost or gain a little energy."""
     return model_of(run.attrs).by_summits and int(run["coalescence_count"][-1]) > 0
 
 
 def _check_losses(run, scale):
-    """Yield the checks that a loop and its kinds of events do not gain energy: name, value and limit."""
+    """Yield the checks that neither a loop nor a kind of event gains energy: name, value and limit."""
     unknown = IDENTITY_LIMIT + (_event_error_bound(run) + work_error(run)) / scale
     tolerance = CELL_LOSS_LIMIT if model_of(run.attrs).by_cells else min(unknown, LARGEST_UNKNOWN_WORK)
     with_unions = max(tolerance, UNION_LIMIT) if _has_united(run) else tolerance
@@ -117,10 +117,10 @@ def finite_stiffness(run) -> np.ndarray:
 
 
 def work_error(run) -> float:
-    """Return an upper bound, J/m^2, for the error of the work of a path, from the tolerances of the equilibria.
+    """Return an upper bound (J/m^2) of the work error of a path, computed from the tolerances of the equilibria.
 
-    An error of the separation causes an error of the pressure that is larger by the factor of the stiffness. An error
-    of the stiffness changes the cubic polynomial between both ends of a step; the work is the integral of this cubic.
+    The error of the pressure is the error of the separation multiplied by the stiffness. An error of the stiffness
+    changes the cubic polynomial between both ends of a step; the work is the integral of this cubic.
     """
     width, stiffness = np.abs(np.diff(run["mean_separation"])), finite_stiffness(run)
     ends = np.abs(stiffness[1:]) + np.abs(stiffness[:-1])
@@ -130,12 +130,12 @@ def work_error(run) -> float:
 
 
 def _event_error_bound(run):
-    """Return an upper bound, J/m^2, for the error of the work because events may happen anywhere in their steps.
+    """Return an upper bound (J/m^2) of the work error due to unknown positions of events within their steps.
 
-    The bound of a step is the sum of `event_error`, from the jump of the pressure, and `integration_error`, from
-    the change of the stiffness (an event may change the stiffness alone). The path limits the error of the work of
-    each step, so the total is at most the number of steps times the larger of two energies: EVENT_ERROR_OVER_LOSS times
-    the energy of all jumps, and the model's accuracy of a loss times the sum of all changes of work and loss.
+    The bound of a step is the sum of `event_error` and `integration_error`. The jump of the pressure causes
+    `event_error`. The change of the stiffness causes `integration_error`. The path limits the error of the work of each
+    step, so the total is at most the number of steps times the larger of two energies: EVENT_ERROR_OVER_LOSS times the
+    energy of all jumps, and the model's accuracy of a loss times the sum of all changes of work and loss.
     """
     events = sum(np.diff(run[name]) for name in EVENT_COUNTS) > 0
     events &= np.diff(run["dissipated_by_load_jump"]) == 0  # in a jump at constant load the pressure is constant

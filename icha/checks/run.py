@@ -110,10 +110,10 @@ def _check_loading(run) -> Iterator[tuple]:
 
 
 def _largest_fall_in_loading(loading, name):
-    """Return the largest decrease of a variable from target to target or step to step, over its largest magnitude.
+    """Return the largest decrease of a variable between targets or steps, divided by its largest magnitude.
 
-    A union may carry less load than its two spots at the same separation. Therefore the variable may decrease in a step
-    in which spots unite, but not from one target to the next.
+    Two united spots may carry less load than the same two spots before their union at the same separation. Therefore
+    the variable may decrease in a step in which spots unite, but not from one target to the next.
     """
     values, at_targets = loading[name], loading["step_kind"] != BETWEEN
     united = np.cumsum(np.diff(loading["coalescence_count"], prepend=0) != 0)
@@ -125,7 +125,7 @@ def _largest_fall_in_loading(loading, name):
 def _largest_rises_of_separation(loading):
     """Return the largest rise of the mean separation, m, in steps without unions, and in steps with unions.
 
-    Steps to area targets are ignored, because the separation may rise in these steps: if the area jumps past a target,
+    Steps to area targets are ignored, because the separation may rise in such a step. If the area jumps past a target,
     the path meets the target on the branch after the jump.
     """
     rise = np.diff(loading["mean_separation"])
@@ -135,7 +135,7 @@ def _largest_rises_of_separation(loading):
 
 
 def _target_error(run):
-    """Return the largest relative error of a target; the tolerance of areas counted in cells is subtracted."""
+    """Return the largest relative error of a target; areas counted in cells may differ by their tolerance."""
     scale = float(run["contact_modulus"])
     reached = {
         "reduced_pressure": run["reduced_pressure"],

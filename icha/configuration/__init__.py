@@ -1,1 +1,1 @@
-"""Configuration files: keys and their meaning, reading and checks, and the runs of a campaign."""
+"""Read and check configuration files, explain their keys, and list the runs of a campaign."""

@@ -99,7 +99,7 @@ class Campaign(Section):
     """Loops of loading and unloading with boundary elements at a finite range of attraction, by name, to compare with
     the runs of a study that unloads."""
     measurements: Annotated[dict[Name, Measurement], _FEW] = {}
-    """Your own measurements by name. Figure 5 shows the measurements with the runs."""
+    """Your own measurements by name. Figure 5 shows the measurements beside the results of runs."""
     figures: Figures = Figures()
     """Figures to draw, with options."""
     publication: Publication = Publication()
@@ -196,7 +196,7 @@ class Campaign(Section):
         return list(filter(is_asked_for, self._contacts[entry.study]))
 
     def problems(self) -> Iterator[Problem]:
-        """Yield the problems of the campaign whose single values are valid, such as names that are not defined.
+        """Yield the problems that concern several values of the campaign, such as names that are not defined.
 
         Problems that depend on files (measured slopes, grids) are left out until the files are read.
         """
@@ -280,6 +280,6 @@ class Campaign(Section):
 
 
 def _within(location: tuple, problems: Iterable[Problem]) -> Iterator[Problem]:
-    """Prepend the location of a section to the locations of its problems."""
+    """Put the location of a section in front of the locations of its problems."""
     for inner, value, reason in problems:
         yield (*location, *inner), value, reason

@@ -1,8 +1,8 @@
 """Expand each study of a campaign into runs: combinations of surfaces, seeds, slopes and materials.
 
-A study runs all combinations of the entries of its lists. Lists in a group of `zip` are combined entry by entry. The
-values of `cases` replace lists. Each combination of varied parameters defines a new surface or material, called a
-variant, with a name such as `rough-hurst0.6`.
+A study runs all combinations of the entries of its lists. Lists in a group of `zip` are combined entry by entry. A
+value in `cases` replaces the list of the same parameter. Each combination of varied parameters defines a new surface or
+material, called a variant, with a name such as `rough-hurst0.6`.
 """
 
 import hashlib
@@ -147,7 +147,7 @@ def _study_problems(campaign: Campaign, label: str, study: Study) -> Iterator[Pr
     lists, cases = _lists(label, study), study.cases or []
 
     def values(one):
-        """Return the values of the list for `one`, and the values in `cases` that replace the list, with locations."""
+        """Return all values of the parameter `one`, from its list and from `cases`, with their locations."""
         located = (((*prefix, "cases", index, one), getattr(case, one)) for index, case in enumerate(cases))
         return [*lists[one], *((location, value) for location, value in located if value is not None)]
 

@@ -36,7 +36,7 @@ class Measurement(Section):
     label: Text
     """Name in the legend of the figure. Write formulas between two `$`."""
     citation: Text
-    """Source of the numbers, which the report prints."""
+    """Source of the numbers. The report prints this text."""
     study: Name
     """Name of the study that is compared with the measurement."""
     load: Column
@@ -45,9 +45,9 @@ class Measurement(Section):
     area: Column
     """Column of the contact area fractions A/A0 (unit `1` or `percent`)."""
     material: Name | None = None
-    """Material of the measurement. Required if the loads are nominal pressures."""
+    """Material of the measurement. This key is required if the loads are nominal pressures."""
     rms_slope: Positive | None = None
-    """Rms slope of the measured surface. Required if the loads are nominal pressures."""
+    """Rms slope of the measured surface. This key is required if the loads are nominal pressures."""
 
     @property
     def load_is_pressure(self) -> bool:

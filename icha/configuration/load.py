@@ -143,7 +143,7 @@ def collect_inputs(configuration: Configuration) -> tuple[str, dict[str, str]]:
     Returns
     -------
     text : the configuration, in which files have the paths `inputs/<section>/<entry>/<name>`.
-    files : present paths of the files, by their paths in the text. Surfaces that no study uses are left out.
+    files : present paths of the files, by the new paths in `text`. Surfaces that no study uses are left out.
     """
     campaign = configuration.campaign
     # Variants of a surface have the same file as the original.

@@ -71,7 +71,7 @@ class Unusual(NamedTuple):
     Attributes
     ----------
     location : keys that lead to the value in the configuration.
-    source : text for messages, with a blank before it: origin of a value that is not in the configuration.
+    source : origin of a value that is not in the configuration, as text for messages with a blank in front.
     """
 
     location: tuple
@@ -120,7 +120,7 @@ def unusual_topography(location: tuple, section: Any, period: float, rms_slope: 
 def plausibility_problems(
     unusual: Collection[Unusual], confirmed: Any, addition: str = f"`{CONFIRMED}: [{{}}]` at the top level"
 ) -> Iterator[Problem]:
-    """Yield a problem for each unusual value whose key is not confirmed; `addition` says how to confirm the key {}."""
+    """Yield a problem for each unusual value whose key is not confirmed; `addition` explains how to confirm keys."""
     for each in unusual:
         if not (isinstance(confirmed, list) and each.key in confirmed):
             reason = f"is unusual{each.source}; expected {each.usual}. Correct the value, or add "
@@ -148,7 +148,7 @@ def energy_ratio(campaign: Campaign, contact) -> float:
 
 
 def sticky_runs(campaign: Campaign) -> Iterator[Unusual]:
-    """Yield for each study the asperity run with the smallest U_full/dgamma, if full contact has the lower energy."""
+    """Yield the asperity run of each study with the smallest U_full/dgamma, if this ratio favours full contact."""
     for name, study in campaign.studies.items():
         if DEFAULT_MODEL not in study.models:
             continue

@@ -103,11 +103,11 @@ class Targets(Section):
 
     reduced_pressures: stops(ReducedPressure, increasing) | None = Field(
         default=None,
-        description=f"Reduced pressures p/(E* h'rms), increasing. Largest for asperities: {MAX_REDUCED_PRESSURE}.",
+        description=f"Reduced pressures p/(E* h'rms), increasing. Limit for asperities: {MAX_REDUCED_PRESSURE}.",
     )
     area_fractions: stops(AreaFraction, increasing) | None = Field(
         default=None,
-        description=f"Contact area fractions A/A0, increasing. Largest for asperities: {MAX_AREA_FRACTION}.",
+        description=f"Contact area fractions A/A0, increasing. Limit for asperities: {MAX_AREA_FRACTION}.",
     )
     mean_separations: stops(Length, decreasing) | None = None
     """Mean separations with unit, decreasing."""
@@ -174,7 +174,7 @@ Scalar = Annotated[Any, AfterValidator(scalar), WithJsonSchema(SCALAR_SCHEMA)]
 Case = _section_of_scalars(
     "Case",
     Scalar,
-    "An entry of `cases`. If the entry has no value for a parameter, the parameter takes all values of the study.",
+    "A case of a study. If the case has no value for a parameter, the parameter takes all values of the study.",
     {
         "surface": (Name | None, Field(default=None, description="Name of a surface.")),
         "seed": (Seed | None, Field(default=None, description="Seed of the random phases.")),
@@ -222,8 +222,8 @@ class Study(Section):
     """States at which the path turns after the last target. The first unloading ends at the first state, the next
     loading at the second state, and so on."""
     control: Literal["separation", "load"] = "separation"
-    """Controlled quantity: the mean separation or the load. Under load control the contact jumps where the curve of
-    load against separation turns back. All targets and turning points must then be loads."""
+    """Controlled quantity: the mean separation or the load. Under load control the separation jumps where
+    the load has a maximum or minimum along the path. All targets and turning points must then be loads."""
     max_step: number(STEP) = DEFAULT_STEP
     """Largest change of the mean separation between two equilibria, in units of the rms height."""
 
@@ -301,11 +301,11 @@ class BesideStudy(Section):
     study: Name
     """Name of the study with the topographies."""
     surfaces: _Labels | None = None
-    """Surfaces of the study to solve. Default: all."""
+    """Surfaces of the study for which the contact is solved. Default: all."""
     seeds: Seeds | None = None
-    """Seeds of the study to solve. Default: all."""
+    """Seeds of the study for which the contact is solved. Default: all."""
     rms_slopes: Annotated[list[Positive], Field(min_length=1), AfterValidator(distinct)] | None = None
-    """Rms slopes of the study to solve. Default: all."""
+    """Rms slopes of the study for which the contact is solved. Default: all."""
     materials: _Labels | None = None
     """Materials of the study. Default: all. The grid must resolve the `interaction_range` of materials with
     adhesion."""
@@ -352,8 +352,8 @@ class BoundaryElements(BesideStudy):
     """Boundary elements that solve the contacts of a study at a finite range of attraction, for comparison."""
 
     reduced_pressures: stops(ReducedPressure, increasing)
-    """Reduced pressures p/(E* h'rms) to solve, increasing. The runs of the study save a snapshot at each of these
-    loads."""
+    """Reduced pressures p/(E* h'rms) at which the contact is solved, increasing. The runs of the study save a snapshot
+    at each reduced pressure."""
 
 
 class BoundaryElementLoops(BesideStudy):

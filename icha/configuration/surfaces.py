@@ -35,8 +35,8 @@ class MaterialSection(Section):
     """Range ε of the attraction. The range determines when asperities jump into contact. The Tabor parameter is μ =
     (RΔγ²/E*²)^(1/3)/ε, where 1/R is the rms curvature of the surface."""
     flaw_radius: Length | None = None
-    """Radius a of the largest flaw of the interface. With a flaw, full contact opens at the tension √(πE*Δγ/(2a)), at
-    which a penny-shaped crack grows, or at the theoretical strength 1.03 Δγ/ε if that is smaller. Default: no flaw."""
+    """Radius a of the largest flaw of the interface. A flaw grows as a penny-shaped crack at the tension √(πE*Δγ/(2a)).
+    Full contact opens at this tension or at the theoretical strength 1.03 Δγ/ε, if smaller. Default: no flaw."""
 
 
 def _unit_of_length(value: Any) -> float:
@@ -106,8 +106,8 @@ class MeasuredSurface(_SurfaceFromFile):
     SurfaceTopography can read). With `auto`, ICHA chooses the format by the ending of the file name and, for text, by
     the number of columns."""
     columns: Annotated[list[integer(IntegerRange(1))], Field(min_length=3, max_length=3)] | None = None
-    """Numbers (from 1) of the columns x, y and z of a text file, such as `[1, 2, 3]`. Required if the file has more
-    than three columns."""
+    """Numbers (from 1) of the columns x, y and z of a text file, such as `[1, 2, 3]`. This key is required if
+    the file has more than three columns."""
     data: Text | None = None
     """Array or channel with the heights, if the file has several: name of the variable (netcdf), path of the dataset
     (hdf5), or name of the channel (instrument). Default: the only array, or the file's default channel."""
@@ -115,8 +115,8 @@ class MeasuredSurface(_SurfaceFromFile):
     """First axis of the array in npy, netcdf, hdf5 and matrix files: `y` if each row of the array is a line along x,
     else `x`. ICHA ignores this key if the dimensions in the file have the names x and y."""
     height_unit: UnitOfLength | None = None
-    """Unit of the heights, such as `nm` or `0.1 mm`. Required if the file does not contain the unit. This key replaces
-    the unit in the file."""
+    """Unit of the heights, such as `nm` or `0.1 mm`. Required for a file without this unit. The key replaces the
+    unit in the file."""
     lateral_unit: UnitOfLength | None = None
     """Unit of the coordinates x and y; with `format: fourier`, unit of 1/q. Default: the unit in the file or, if there
     is none, the unit of the heights."""
@@ -137,8 +137,8 @@ class MeasuredSurface(_SurfaceFromFile):
     (`curvature`). Default: `tilt`, or `none` with `boundary: periodic`."""
     cutoff: Length | None = None
     """Cut-off wavelength (nesting index) of a Gaussian S-filter (ISO 25178-3, areal filter of ISO 16610-61). The filter
-    removes shorter waves, and halves the amplitude of waves of this length. The edges are treated after the filter. The
-    cut-off must be at least 4 pixels. Default: no filter."""
+    weakens short waves: a wave as long as the cut-off keeps half its amplitude. The edges are treated after the filter.
+    The cut-off must be at least 4 pixels. Default: no filter."""
     boundary: Literal["periodic", "window", "mirror", "free"]
     """Treatment of the edges. `periodic`: the unchanged topography repeats. `window`: the heights fall smoothly to the
     mean height at the edges, and the topography repeats. `mirror`: the topography and its mirror images form a periodic
@@ -185,17 +185,17 @@ class SelfAffineSurface(Section):
     period: Length
     """Side L of the periodic cell."""
     rolloff_wavelength: Length
-    """Roll-off wavelength 2π/q0, at most the period. The spectrum is flat at longer wavelengths."""
+    """Roll-off wavelength 2π/q0, at most the period. At longer wavelengths the spectrum is constant."""
     short_wavelength: Length
-    """Shortest wavelength 2π/q1. The length must be less than the roll-off wavelength and at least 2 grid cells. A
-    length below 4 grid cells causes a warning; 8 grid cells are recommended."""
+    """Shortest wavelength 2π/q1. This wavelength must be less than the roll-off wavelength and at least 2 grid
+    cells. Less than 4 grid cells cause a warning; 8 grid cells are recommended."""
     hurst: number(HURST)
     """Hurst exponent H, in (0, 1]."""
     grid: integer(GRID)
     """Number of nodes along a side of the periodic cell."""
     amplitudes: Literal["fixed", "gaussian"] = "fixed"
     """Amplitudes of the waves. `fixed`: every amplitude has the value of the spectrum, so all seeds have the same rms
-    height and slope. `gaussian`: amplitudes are random, and their mean square is the spectrum."""
+    height and slope. `gaussian`: amplitudes are random, with the spectrum as mean square."""
 
     @property
     def lengths_and_hurst(self) -> tuple[float, float, float, float]:

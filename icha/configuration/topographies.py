@@ -95,8 +95,8 @@ def read_scan(path: str | os.PathLike, *, confirmed: Collection[str] = (), **key
     Raises
     ------
     ConfigurationError
-        A ValueError. Raised if a key is missing or wrong, if the file cannot be read or prepared with these keys, or if
-        an unusual size or slope is not confirmed.
+        If a key is missing or wrong, if the file cannot be read or prepared with these keys, or if an unusual size or
+        slope is not confirmed. A ConfigurationError is also a ValueError.
     """
     from icha.configuration.plausibility import plausibility_problems, unusual_topography, unusual_values
     from icha.surfaces.measured.settings import UnfitTopography

@@ -1,8 +1,8 @@
 """Checkpoints: save each equilibrium of a contact, so that an interrupted run can resume.
 
 The name of a checkpoint depends on all earlier solves and on their order. If a path is repeated after an interruption,
-it loads exactly the same equilibria up to the interruption. A different path loads only those equilibria at its
-beginning that both paths have in common.
+it loads exactly the same equilibria up to the interruption. A different path loads only the first equilibria, up to the
+first difference between both paths.
 """
 
 from __future__ import annotations

@@ -86,7 +86,7 @@ class Events:
 
 
 class State(Protocol):
-    """Equilibrium of a contact; each model adds attributes of its own. A state never changes.
+    """Equilibrium of a contact; each model adds further attributes. A state never changes.
 
     Attributes
     ----------
@@ -139,7 +139,7 @@ class ContactModel(Protocol):
         ----------
         separation : mean separation, or its first guess if there is a `control`, m.
         control : load or area that is prescribed instead of the separation.
-        let_go : number of spots, those closest to jump-off, whose contact is broken before the search.
+        let_go : number of spots to separate before the search; the spots closest to jump-off are separated first.
         """
 
     def continue_from(self, state: State, before: State) -> State:
@@ -167,7 +167,7 @@ class ContactModel(Protocol):
         """Return the derivative of PRESSURE or AREA_FRACTION with respect to the mean separation, without events."""
 
     def stored_energy(self, state: State) -> float:
-        """Return elastic energy minus energy of adhesion, over the nominal area, J/m^2; zero without contact."""
+        """Return elastic energy minus energy of adhesion per nominal area, J/m^2; zero without contact."""
 
     def is_unstable(self, state: State) -> bool:
         """Return whether a spot approaches as the surfaces move apart, which happens only on an unstable branch."""
@@ -211,8 +211,8 @@ def gap_bins(surface: Surface) -> np.ndarray:
     """Return the edges of the bins of the gap on a surface, m.
 
     When the surfaces just touch, the largest gap is the height from the deepest pit to the highest peak. If this gap is
-    more than 31.6 h_rms, the last bin ends at this gap. By Chebyshev's inequality less than 0.2 % of a surface is so
-    deep, so that one bin is enough.
+    more than 31.6 h_rms, the last bin ends at this gap. At separations up to 9 h_rms, the last bin contains less than
+    0.2 % of the undeformed surface (Chebyshev's inequality).
     """
     edges = GAP_BINS * surface.rms_height
     edges[-1] = max(edges[-1], np.ptp(surface.heights))

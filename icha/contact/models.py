@@ -89,7 +89,7 @@ class Model:
     by_summits : whether summits represent the surface. Spots then unite by a rule, which may cost or gain some energy.
     by_cells : whether contact is counted in cells of the grid; runs then contain a map of the contact.
     periodic_only : whether the model cannot press a square with free edges.
-    least_cells : smallest number of grid cells per shortest wavelength; 0 for any number.
+    least_cells : smallest valid number of grid cells per shortest wavelength; 0 for no limit.
     accuracy : accuracy with which a path resolves its events.
     resumable : whether a run saves checkpoints, by the function `resumable(contact, folder)` of `module`.
     """
@@ -175,5 +175,5 @@ def model_of(attributes: Mapping[str, str]) -> Model:
 
 
 def first_model(models: Iterable[str]) -> str:
-    """Return the one of several models that comes first in `MODELS`; used where only one model is shown."""
+    """Return the model that comes first in `MODELS`, for a figure or text that shows only one of several models."""
     return min(models, key=list(MODELS).index)

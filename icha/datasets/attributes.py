@@ -49,7 +49,7 @@ def file_attributes(
     title, summary : content of the file, in one line and in sentences.
     level : one of the processing levels of this module.
     programs : names of the Python packages that computed the content; the installed versions are added.
-    sources : names and versions of programs, if other than the installed ones computed the content.
+    sources : names and versions of the programs that computed the content. Default: the installed `programs`.
     references : publications of the methods.
     keywords : keywords besides those that all files have.
     """

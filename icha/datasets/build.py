@@ -19,7 +19,7 @@ def build_dataset(table: Table, values: Mapping[str, Any], attrs: Mapping[str, s
     Parameters
     ----------
     table : descriptions of the variables (`icha.datasets.variables`).
-    values : numbers, texts or arrays by name of variable, for the variables that the dataset shall have.
+    values : numbers, texts or arrays, by name of each variable of the dataset.
     attrs : global attributes.
 
     Raises
@@ -50,14 +50,14 @@ def make_variable(description: Variable, values: Any) -> xr.Variable:
 
 
 def get_values(thing: Any, *names: str) -> dict[str, Any]:
-    """Return the named attributes of a surface, a material or a spectrum, as values of variables of the same name."""
+    """Return attributes of a surface, a material or a spectrum by name, as values of variables with the same names."""
     return {name: getattr(thing, name) for name in names}
 
 
 def stack_rows(
     table: Table, rows: Sequence[Mapping[str, Any]], dim: str, sizes: Mapping[str, int] = {}
 ) -> dict[str, np.ndarray]:
-    """Stack rows to arrays, for the variables whose first dimension is `dim`; each row has the values of one position.
+    """Stack rows to arrays, for variables with `dim` as first dimension; each row contains the values at one index.
 
     `sizes` are the sizes of the other dimensions.
     """
@@ -68,7 +68,7 @@ def stack_rows(
 
 
 def concatenate_rows(table: Table, rows: Sequence[Mapping[str, Any]], dim: str, instance: str) -> dict[str, np.ndarray]:
-    """Concatenate arrays along the ragged dimension `dim`, along which the arrays of each row have different lengths.
+    """Concatenate the arrays of all rows along `dim`; the rows may have different numbers of values (ragged dimension).
 
     The variable `<dim>_<instance>` gives the number of the row to which each value belongs.
     """

@@ -55,7 +55,7 @@ def runs_of_status(study: xr.Dataset, name: str, statuses: Collection[int]) -> l
 
 
 def run_place(study: xr.Dataset, labels: RunLabels) -> dict[str, int]:
-    """Return the position of a run along each label of the dataset of a study.
+    """Return the index of a run along each label of the dataset of a study.
 
     Raises
     ------
@@ -78,9 +78,9 @@ def run_place(study: xr.Dataset, labels: RunLabels) -> dict[str, int]:
 def select_run(tree: xr.DataTree, labels: RunLabels | tuple) -> xr.Dataset:
     """Select one run of a campaign dataset, with all steps and spots of the run.
 
-    The run has the attributes of its file. Some attributes explain the status of the run: `incomplete` (why the run
-    failed), `beyond_model` (why the run ended at the limit of the model), `failed_checks` (which checks failed), and
-    `applicability` (why the model is not applicable).
+    The returned dataset has the attributes of the file of the run. Some attributes explain the status of the run:
+    `incomplete` (why the run failed), `beyond_model` (why the run ended at the limit of the model), `failed_checks`
+    (which checks failed), and `applicability` (why the model is not applicable).
 
     Raises
     ------
@@ -135,7 +135,7 @@ def variables_of_run(tree: xr.DataTree, labels: RunLabels | tuple) -> tuple[dict
 
 
 def _ragged_slice(study: xr.Dataset, dim: str, place: tuple[int, ...]) -> slice:
-    """Return the slice of the spots or events of a run along `dim`; runs follow each other in the order of labels."""
+    """Return the slice of the spots or events of a run along `dim`; the dataset stores one run after the other."""
     begin, end = 0, study.sizes[dim]
     for label, k in zip(LABELS, place, strict=True):
         column = study.variables[f"{dim}_{label}"].values[begin:end]
@@ -159,7 +159,7 @@ def loading_stops(data: xr.Dataset) -> xr.DataArray:
 
 
 def find_snapshot(run: xr.Dataset, kind: str | None = None, target: float | None = None) -> int:
-    """Return the position of the first snapshot with a kind and a target; None means any kind or any target.
+    """Return the index of the first snapshot with a kind and a target; None means any kind or any target.
 
     Raises
     ------

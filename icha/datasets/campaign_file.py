@@ -1,7 +1,7 @@
 """Write the campaign dataset run by run, so that only a few numbers of each run stay in memory.
 
-ICHA reads one run after the other and appends the values of the run to a temporary file. Numbers of steps and spots,
-snapshots and lengths of texts stay in memory, because they are needed before the first run can be written. Then ICHA
+ICHA reads one run after the other and appends the values of the run to a temporary file. The sizes of all arrays, the
+snapshots and the lengths of texts stay in memory, because ICHA needs them before it writes the first run. Then ICHA
 reads the temporary file in the order of the dataset, one block of neighbouring runs at a time.
 """
 
@@ -80,13 +80,13 @@ class Column(NamedTuple):
         return padded
 
     def slots(self, snapshots: list[int], values: np.ndarray) -> tuple[list[int] | slice, ...]:
-        """Return the index of a run's values along `dims`; `snapshots` are positions of its snapshots in the file."""
+        """Return the indices of a run's values along `dims`; `snapshots` are those of the snapshots in the file."""
         sizes = zip(self.dims, values.shape, strict=False)
         return tuple(snapshots if dim == "snapshot" else slice(0, size) for dim, size in sizes)
 
 
 class Group(NamedTuple):
-    """The group of a study, whose dimensions and variables are defined, but which has no values yet.
+    """The group of a study in a file, with defined dimensions and variables but without values.
 
     Attributes
     ----------
@@ -105,7 +105,7 @@ class Group(NamedTuple):
 
 
 def _group_attributes(study: Arrangement, attrs: Mapping[str, str]) -> dict:
-    """Return the attributes of a study's group; `attrs` are those of the file."""
+    """Return the attributes of a study's group; `attrs` are the attributes of the file."""
     # config_sha256 is the checksum of the campaign, and not that of one of the runs.
     shared = {"license": study.origins[0].get("license"), "config_sha256": attrs.get("config_sha256")}
     return (
@@ -116,7 +116,7 @@ def _group_attributes(study: Arrangement, attrs: Mapping[str, str]) -> dict:
 
 
 def define_group(group: netCDF4.Dataset, study: Arrangement, attrs: Mapping[str, str]) -> Group:
-    """Define dimensions, variables and attributes of a study's group; `attrs` are those of the file."""
+    """Define dimensions, variables and attributes of a study's group; `attrs` are the attributes of the file."""
     counts = {
         dim: sum(entry.sizes.get(dim, 0) for entry in study.entries)
         for dim in RAGGED
@@ -175,7 +175,7 @@ def define_group(group: netCDF4.Dataset, study: Arrangement, attrs: Mapping[str,
 
 
 def _storage(sizes, block, along, dims, width):
-    """Return the storage options of a variable: none for a small one, else compression with one chunk per block."""
+    """Return the storage options of a variable: large variables are compressed, with a chunk per block of runs."""
     shape = (*(sizes[dim] for dim in dims), *([width] if width > 1 else []))
     if math.prod(sizes[dim] for dim in along) * math.prod(shape) < LEAST_COMPRESSED:
         return {}
@@ -187,7 +187,7 @@ def _storage(sizes, block, along, dims, width):
 
 
 def _block(sizes, along, values):
-    """Return the number of neighbouring runs in a block, along every label; a run has `values` values."""
+    """Return the number of neighbouring runs per block along every label; `values` is the number of values per run."""
     left = max(1, min(_RUNS_IN_BLOCK, VALUES_IN_BLOCK // max(1, values)))
     block = []
     for size in reversed([sizes[label] for label in along]):
@@ -197,7 +197,7 @@ def _block(sizes, along, values):
 
 
 def _why_lacking(study, name):
-    """Return an attribute that names the models of the study without the variable; empty if there are none."""
+    """Return the attribute `missing`, which names models without the variable; {} if all models have it."""
     owners = [model for model, names in FURTHER.items() if name in names]
     lacking = [model for model in study.known["model"] if owners and model not in owners]
     return {"missing": f"in runs with the model {' or '.join(lacking)}"} if lacking else {}
@@ -217,8 +217,8 @@ def write_campaign(
 
     Parameters
     ----------
-    runs : pairs of labels (study, model, surface, seed, rms_slope, material) and run dataset, or path of its file.
-        Names keep the order of the design; seeds and slopes are sorted. A run is incomplete if its attribute
+    runs : pairs of the labels of a run (study, model, surface, seed, rms_slope, material) and the dataset or path of
+        the run. Names keep the order of the design; seeds and slopes are sorted. A run is incomplete if its attribute
         `incomplete` states the reason, or if it lacks snapshots of its study.
     path : the file to write. A file appears only when it is complete. The same runs give the same bytes.
     design : labels of all runs of the campaign. Default: the labels in `runs`. Other combinations of these labels have
@@ -300,7 +300,7 @@ def _write_ragged(
 ) -> int:
     """Write the values of a run along a ragged dimension, beginning at index `begin`; return the number of values.
 
-    Spots are sorted by the positions of their snapshots in the file.
+    Spots have the order of the snapshots in the file.
     """
     found = {name: values[name] for name in variables if name in values}
     count = len(next(iter(found.values()), ()))

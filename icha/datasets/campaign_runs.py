@@ -68,12 +68,12 @@ class Entry(NamedTuple):
     ----------
     labels : labels of the run.
     source : dataset of the run, or path of its file.
-    place : position of the values of the run in the temporary file, bytes.
+    place : number of bytes before the values of the run in the temporary file.
     names : names of the variables of the run.
     sizes : sizes of the dimensions of the run, by name.
     widths : length in bytes of the longest text, for each variable with texts.
     snapshots : kind and target of each snapshot of the run.
-    status : status of the run, if the run has all snapshots of its study.
+    status : status of the run before ICHA checks that the run has all snapshots of its study.
     failure : reason why the run is not complete; "" for a complete run.
     applicability : reason why the model is not applicable to the run; "" if it is applicable.
     """
@@ -91,7 +91,7 @@ class Entry(NamedTuple):
 
     @property
     def extent(self) -> tuple[bool, int]:
-        """Whether the run reached its end, and its number of steps; the run with the largest pair has all variables."""
+        """True if the run reached its end, and the number of steps; the run with the largest pair has all variables."""
         return self.status not in _ENDED_EARLY, self.sizes.get("step", 0)
 
 
@@ -102,7 +102,7 @@ def spool_runs(
 
     Parameters
     ----------
-    runs, settings : parameters of `icha.datasets.campaign_file.write_campaign`.
+    runs, settings : as in `icha.datasets.campaign_file.write_campaign`.
     spool : the temporary file.
 
     Raises
@@ -172,19 +172,19 @@ def _snapshots_of(values: Values) -> tuple[tuple[bytes, float], ...]:
 
 @dataclass(frozen=True, eq=False)
 class Arrangement:
-    """The runs of a study, arranged along labels.
+    """The runs of a study, arranged along labels such as surface and seed.
 
     Attributes
     ----------
     name : name of the study.
     known : values of the variables that list the runs: labels, `status`, `step_count`, `failure`, `applicability`.
-    variables : variables of all models; each is taken from one run.
+    variables : variables of all models, each from one run as an example.
     coordinates : names of the variables that are coordinates.
     origins : global attributes of one run of every model.
-    sizes : sizes of the dimensions in the file, except ragged ones.
-    snapshots : position of every snapshot along the dimension `snapshot`, by kind and target.
+    sizes : sizes of the dimensions in the file, except dimensions of spots and events.
+    snapshots : index of every snapshot along the dimension `snapshot`, by kind and target.
     entries : the computed runs, in the order of the labels.
-    positions : (n, 5) int, positions of the n entries along the five labels.
+    positions : (n, 5) int, indices of the n entries along the five labels.
     """
 
     name: str
@@ -203,7 +203,7 @@ class Arrangement:
         return slope_dims(self.known["rms_slope"])
 
     def dims_of(self, name: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
-        """Return the dimensions of a variable of the runs: labels (none for ragged variables), and other dimensions."""
+        """Return the labels (none for spots and events) and the other dimensions along which a variable is stored."""
         dims = self.variables[name].dims
         if name in self.sizes or set(RAGGED) & set(dims):
             return (), dims
@@ -303,7 +303,7 @@ def _arrange_study(name: str, found: dict[RunLabels, Entry], design: list[RunLab
 
 
 def _positions(axes: Mapping[str, Any], design: list[RunLabels]) -> dict[RunLabels, tuple[int, ...]]:
-    """Return the position of every run of a design along each label."""
+    """Return the index of every run of a design along each label."""
     at = {(label, value): k for label in LABELS if label != "rms_slope" for k, value in enumerate(axes[label])}
     rows = np.broadcast_to(axes["rms_slope"], (len(axes["surface"]), axes["rms_slope"].shape[-1])).tolist()
     for surface, row in zip(axes["surface"], rows, strict=True):

@@ -3,8 +3,8 @@
 A file never appears before it is complete. The same values always give the same bytes. All values are finite, except
 values of missing runs and values after the last step of a run.
 
-Files of runs contain many small variables. ICHA defines all variables before it writes the first one, because the
-netCDF library needs time for all variables whenever it changes between defining and writing.
+Files of runs contain many small variables. The netCDF library is slow if a program defines and writes variables by
+turns. Therefore ICHA defines all variables before it writes the first one.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ def write_dataset(data: xr.Dataset | xr.DataTree, path: str | os.PathLike) -> No
     Raises
     ------
     ValueError
-        If a variable has no units, or has a value that is not finite and not allowed to be missing.
+        If a variable has no units, or has missing or infinite values that are not allowed.
     """
     nodes = {"/": data}
     if isinstance(data, xr.DataTree):
@@ -151,7 +151,7 @@ def readable(path: str | os.PathLike) -> Iterator[None]:
 
 
 def read_run(path: str | os.PathLike) -> xr.Dataset:
-    """Read the dataset of a run, which equals the dataset that `icha.simulate` returned.
+    """Read the dataset of a run from a file; the dataset equals the result of `icha.simulate`.
 
     Raises
     ------
@@ -183,7 +183,7 @@ def characters(texts: np.ndarray) -> np.ndarray:
 
 
 def define_dimensions(group: netCDF4.Dataset, sizes: Mapping[Hashable, int]) -> None:
-    """Define the dimensions of a group of a netCDF file; `sizes` are by name."""
+    """Define the dimensions of a group of a netCDF file; `sizes` are sizes by name of the dimension."""
     for name, size in sizes.items():
         group.createDimension(name, size)
 
@@ -214,7 +214,7 @@ def is_refused(values: np.ndarray, attrs: Mapping[str, object]) -> np.ndarray:
 
 
 def not_finite(name: Hashable, dims: tuple[Hashable, ...], bad: np.ndarray) -> str:
-    """Describe the values of a variable that are not finite; `bad` is True for these values."""
+    """Describe the values of a variable that are not finite; the array `bad` is True for these values."""
     first = ", ".join(f"{dim}={index}" for dim, index in zip(dims, np.argwhere(bad)[0], strict=True))
     text = f"{name!r} holds {np.count_nonzero(bad)} of {bad.size} values that are not finite"
     return f"{text}, the first at {first}" if first else text

@@ -143,7 +143,7 @@ def _problems_with_surface(surface: xr.Dataset) -> Iterator[str]:
 
 
 def _problems_with_variables(data: xr.Dataset, table: Table, *further: Table) -> Iterator[str]:
-    """Yield differences of variables from `table`; a `further` table applies if the file has one of its variables."""
+    """Yield variables that differ from `table`, or from a `further` table with at least one variable in the file."""
     for each in further:
         if each.keys() & data.variables.keys():
             table = table | each

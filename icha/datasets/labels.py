@@ -1,9 +1,9 @@
-"""Labels of runs and of reference solutions, and the positions of labels in a dataset.
+"""Labels of runs and of reference solutions, and the indices of labels in a dataset.
 
 Labels, such as surface and material, are the dimensions of a dataset. The values of the labels are the coordinates of
 the dataset. If all surfaces have the same rms slopes, the coordinate `rms_slope` has one dimension. Measured surfaces
-have different slopes, so that an array of all surfaces and all slopes would be nearly empty. Then the coordinate
-`rms_slope(surface, rms_slope)` contains the slopes of every surface, with missing values after the last slope.
+have different slopes. For such surfaces, the coordinate `rms_slope(surface, rms_slope)` contains the slopes of every
+surface, with missing values after the last slope.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ class RunLabels(NamedTuple):
 
     @property
     def path(self) -> str:
-        """Path of the run's file below the folder of runs, without ending."""
+        """Path of the run's file in the folder of runs, without file extension."""
         return RUN.format(**path_fields(self))
 
     def __str__(self):
@@ -74,12 +74,12 @@ class ContactLabels(NamedTuple):
 
     @property
     def path(self) -> str:
-        """Path of the file of the solution below the folder for this kind of file, without ending."""
+        """Path of the solution's file in the folder for this kind of file, without file extension."""
         return CONTACT.format(**path_fields(self))
 
 
 class SolutionLabels(NamedTuple):
-    """Labels of a boundary-element solution: the requesting entry, labels of the compared run, and the load."""
+    """Labels of a boundary-element solution: entry of the configuration, labels of the compared run, and load."""
 
     entry: str
     study: str
@@ -96,7 +96,7 @@ class SolutionLabels(NamedTuple):
 
     @property
     def path(self) -> str:
-        """Path of the file of the solution below the folder of solutions, without ending."""
+        """Path of the solution's file in the folder of solutions, without file extension."""
         return SOLUTION.format(**path_fields(self))
 
     def __str__(self):
@@ -127,7 +127,7 @@ def arrange_slopes(pairs: Iterable[tuple[str, float]]) -> np.ndarray:
 
     Returns
     -------
-    (slope,) float, or (surface, slope) float with NaN after the last slope of a surface.
+    Slopes, an array along slope, or along surface and slope with NaN after the last slope of a surface.
     """
     found: dict[str, set[float]] = {}
     for surface, slope in pairs:
@@ -168,12 +168,12 @@ def labels_at(data: xr.Dataset, place: Sequence[int], labels: Sequence[str]) -> 
 
 
 def place_of(data: xr.Dataset, wanted: Mapping[str, Any]) -> dict[str, int]:
-    """Return the position of the wanted value along every label; the labels must include `surface`.
+    """Return the index of the wanted value along every label; the labels must include `surface`.
 
     Raises
     ------
     KeyError
-        If a label does not have the wanted value; the argument is the name of the label.
+        If a label does not have the wanted value; the argument of the error is the name of the label.
     """
     at: dict[str, int] = {}
     # The slope comes last because slopes may depend on the surface.
@@ -187,6 +187,6 @@ def place_of(data: xr.Dataset, wanted: Mapping[str, Any]) -> dict[str, int]:
 
 
 def slopes_at(data: xr.Dataset, at: Mapping[str, int]) -> np.ndarray:
-    """Return the rms slopes, (slope,) float, of the surface whose position is `at["surface"]`."""
+    """Return the rms slopes of the surface with index `at["surface"]`."""
     slopes = data.variables["rms_slope"]
     return slopes.values[at["surface"]] if slopes.ndim == 2 else slopes.values

@@ -42,18 +42,18 @@ class ResultFiles:
     folder: str = ""
 
     def path(self, pattern: str, case: NamedTuple | None = None, **names: object) -> str:
-        """Return the path of one file; fields of the pattern are the campaign, the labels of `case`, and `names`."""
+        """Return the path of one file from a pattern; `case` and `names` give the values of names in braces."""
         of_case = {} if case is None else labels.path_fields(case)
         return "/".join(filter(None, (self.folder, pattern.format(campaign=self.campaign, **of_case, **names))))
 
 
 def job_file(path: str, kind: str, ending: str) -> str:
-    """Return the path of the log or benchmark of the job that makes a file (or the files of a pattern).
+    """Return the path of the log file or benchmark file of the job that makes a file.
 
     Parameters
     ----------
     path : path of the file, relative to the folder of results.
-    kind, ending : `logs` and `.log`, or `benchmarks` and `.jsonl`.
+    kind, ending : folder and file extension, `logs` and `.log`, or `benchmarks` and `.jsonl`.
     """
     folder, _, rest = path.partition("/")
     # Each kind of reference solution has a folder; the theories of the surfaces have none.

@@ -5,16 +5,16 @@ processor, the last digits of sums and Fourier transforms differ, and these diff
 Therefore two numbers count as equal within a tolerance:
 
 - Two numbers are equal if their difference is at most `TOLERANCE` times the larger number.
-- For values smaller than `FLOOR` times the largest value of the variable, the difference is at most `TOLERANCE` times
-  `FLOOR` times this largest value. A value near zero is often a difference of two large values, whose absolute error
-  does not become smaller.
+- Two values smaller than `FLOOR` times the largest value of the variable are equal if their difference is at most
+  `TOLERANCE` times `FLOOR` times this largest value. A value near zero is often a difference of large values and has
+  their absolute error.
 - Two residuals of a solver are equal if they differ by at most the largest residual that the solver accepts (`NOISE`),
   because all digits of a residual are rounding errors.
 
 Everything else must be equal: integers, text, positions of missing values, dimensions, types, attributes. Storage
-(chunks, compression, order in the file) is not compared. Figures and the report are drawn from the compared values.
-Figures may differ because other machines have other fonts and libraries. If only figures or the report differ, the
-comparison prints a remark, and the results still count as reproduced.
+(chunks, compression, order in the file) is not compared. Figures and the report show the compared values. Figures may
+differ because other machines have other fonts and libraries. If only figures or the report differ, the comparison
+prints a remark, and the results still count as reproduced.
 """
 
 import os
@@ -54,7 +54,7 @@ class Difference(NamedTuple):
     ----------
     name : name of the variable, group or dimension that differs; "" if the file as a whole differs.
     verdict : one of `VERDICTS` except `identical`.
-    detail : description of the difference; the value in the deposit precedes that of the rerun.
+    detail : description of the difference; first the value in the deposit, then the value in the rerun.
     deviation : largest relative difference of the numbers; infinite if something else differs.
     """
 
@@ -85,7 +85,7 @@ class File(NamedTuple):
 
     @property
     def is_remark(self) -> bool:
-        """True if the file is made from the data, such as a figure, and differs only in its bytes."""
+        """True if the file only shows other results, as a figure does, and differs from the file of the rerun."""
         return self.verdict == DIFFERENT and self.path.endswith(_DERIVED)
 
 
@@ -161,7 +161,7 @@ def _compare_groups(a: netCDF4.Dataset, b: netCDF4.Dataset, path: str) -> Iterat
 
 
 def _paired(a: Mapping, b: Mapping) -> Iterator[tuple]:
-    """Yield each key of two mappings with both values; None stands for a missing value."""
+    """Yield each key of two mappings with the value in each mapping; None stands for a missing value."""
     return ((key, a.get(key), b.get(key)) for key in dict.fromkeys([*a, *b]))
 
 
@@ -263,7 +263,7 @@ def format_comparison(comparison: Comparison) -> str:
 
 
 def _lines(comparison: Comparison, within: bool) -> list[str]:
-    """Return one line for each variable within tolerance (`within`), or for each variable that differs by more."""
+    """Return one line for each variable within tolerance if `within` is True, else for each different variable."""
     grouped = defaultdict(list)
     for file in comparison.files:
         for each in file.differences:

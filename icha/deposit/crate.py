@@ -1,7 +1,7 @@
 """Describe a deposit as a Provenance Run RO-Crate: the type of every file, and the job and inputs that made the file.
 
-Profiles: RO-Crate 1.1 (https://w3id.org/ro/crate/1.1) and Provenance Run Crate 0.5
-(https://w3id.org/ro/wfrun/provenance/0.5), with the profiles on which they build.
+The crate follows RO-Crate 1.1 (https://w3id.org/ro/crate/1.1) and Provenance Run Crate 0.5
+(https://w3id.org/ro/wfrun/provenance/0.5).
 
 The crate does not contain the times of jobs or the person who ran them, so that the same data have the same crate.
 """
@@ -41,7 +41,7 @@ class Job(NamedTuple):
     Attributes
     ----------
     rule : name of the rule in the workflow.
-    inputs, outputs : paths in the deposit of the files that the job read and wrote; at least one file was written.
+    inputs, outputs : paths in the deposit of the files that the job read and wrote; a job writes at least one file.
     parameters : names and values of the settings of the job.
     description : sentence on what the script does.
     script : path in the deposit of the script that the job ran.
@@ -70,7 +70,7 @@ def write_crate(
     ----------
     folder : folder of the deposit, which contains all files in `checksums`.
     publication : complete metadata of the deposit.
-    jobs : jobs that made the results, in any order. The deposit contains all files that the jobs read and wrote.
+    jobs : jobs that made the results, in any order; the deposit contains all files that the jobs read and wrote.
     campaign : name of the campaign.
     revision : revision of the program whose source is in `source/`.
     checksums : hexadecimal sha256 of every file, by path in the deposit.
@@ -153,7 +153,7 @@ def _add_organisation(crate: ROCrate, name: str, address: str | None) -> Entity:
 
 
 def _describe_workflow(crate: ROCrate, files: Mapping[str, File], revision: str, jobs: Sequence[Job]) -> None:
-    """Add the workflow, one step for each rule, and the scripts to the crate; scripts are programs and files."""
+    """Add the workflow, one step for each rule, and the scripts to the crate; a script is both program and file."""
     configuration = crate.dereference("#configuration")
     _set(files[CONFIGURATION], exampleOfWork=configuration)
     tools, steps = {}, []
@@ -229,7 +229,7 @@ def _add(crate: ROCrate, key: str, kind: str | list[str], **properties: Any) -> 
 
 
 def _set(entity: Entity, kind: list[str] | None = None, **properties: Any) -> None:
-    """Set the properties of an entity that are not empty, and the types of the entity if `kind` is given."""
+    """Set the types of an entity if `kind` is given, and all properties of the entity that are not empty."""
     if kind:
         entity.properties()["@type"] = kind
     for name, value in properties.items():

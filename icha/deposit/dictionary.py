@@ -49,7 +49,7 @@ def file_pattern(path: str) -> str:
 
 
 def _described(variable: netCDF4.Variable) -> tuple[str, ...]:
-    """Return the values of the columns from `variable` to `comment` for a variable in a file."""
+    """Return the row of the data dictionary for a variable in a file, from column `variable` to column `comment`."""
     attributes = {name: str(variable.getncattr(name)) for name in variable.ncattrs()}
     units, long_name, meanings, missing, comment = (
         attributes.get(name, "") for name in ("units", "long_name", "flag_meanings", "missing", "comment")

@@ -108,13 +108,13 @@ def refuse_mixed(results: Path, campaign: Campaign, recorded: Mapping[str, str])
     ----------
     results : folder of results of the campaign.
     campaign : configuration of the campaign.
-    recorded : checksums of the parameters that the workflow recorded for the job of each result
-        (`icha.support.checksums.hash_parameters`), by the path of the result in `results`.
+    recorded : checksums of the parameters of jobs, as recorded by the workflow
+        (`icha.support.checksums.hash_parameters`), by path of the result in `results`.
 
     Raises
     ------
     ValueError
-        If results do not belong together. The message lists these results with the reasons.
+        If a result has other settings or inputs. The message lists these results with the reasons.
     """
     files = campaign_files(campaign)
     expected = {path: run_sha256(campaign, case) for path, case in files.runs.items()}
@@ -162,7 +162,7 @@ def _write(path: Path, text: str) -> None:
 
 
 def _write_zip(path: Path, folder: Path, name: str) -> None:
-    """Write a folder to a zip, as a folder `name`, without compression, whose bytes depend on the version of zlib."""
+    """Write a folder to a zip as `name`; without compression, because compressed bytes depend on the zlib version."""
     with zipfile.ZipFile(path, "w", zipfile.ZIP_STORED) as archive:
         for file in files_of(folder):
             status = (folder / file).stat()

@@ -48,7 +48,7 @@ def find_licence(identifier: str) -> Licence:
     Raises
     ------
     ValueError
-        If SPDX does not have the identifier or spells it differently, or if it combines several licences.
+        If the identifier is not an SPDX identifier of a single licence, or has another spelling than in SPDX.
     """
     try:
         found = canonicalize_license_expression(identifier)
@@ -212,7 +212,7 @@ def read_zenodo_metadata(folder: Path) -> dict[str, Any]:
 
 
 def summary_of(metadata: dict[str, Any]) -> dict[str, str]:
-    """Return title, version, authors, licence and communities as text from Zenodo metadata with values of any type."""
+    """Return title, version, authors, licence and communities of Zenodo metadata as text; values may have any type."""
 
     def join(entries: Any, key: str) -> str:
         entries = entries if isinstance(entries, list) else ()
@@ -226,7 +226,7 @@ def summary_of(metadata: dict[str, Any]) -> dict[str, str]:
 def datacite_metadata(publication: Publication) -> dict[str, Any]:
     """Return the metadata of `datacite.json` in DataCite's schema 4.5 (https://doi.org/10.14454/g8e5-6293).
 
-    The publisher is Zenodo if the DOI is one of Zenodo. Otherwise `:tba` is DataCite's code for "to be announced".
+    The publisher is Zenodo if the DOI is from Zenodo, and otherwise `:tba`, DataCite's code for "to be announced".
     """
     licence = find_licence(publication.license)
     paper = RelatedIdentifier(identifier=f"arXiv:{MODEL_PAPER.arxiv}", relation="Cites", resource="Preprint")

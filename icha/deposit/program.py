@@ -134,7 +134,7 @@ def _changes(recorded: Mapping[str, str], present: Mapping[str, Path], added: st
 def _installed_source(packages: Path) -> Source:
     """Return the source of the program that was installed from a wheel into the folder `packages`.
 
-    The revision is the version and a checksum. The checksum is that of the list which `sha256sum` prints for all files.
+    The revision is the version and a checksum, computed from the list of all files that `sha256sum` prints.
     """
     installed = next(iter(importlib.metadata.distributions(name="icha", path=[str(packages)])), None)
     if installed is None:

@@ -40,7 +40,7 @@ def campaign_name(deposit: Path) -> str:
     """Return the name of the campaign in a deposit; raise `RerunError` if the deposit lacks what a rerun needs."""
     for file in (CONFIGURATION, _PYPROJECT, _LOCK):
         if not (deposit / file).is_file():
-            raise RerunError(f"the deposit has no {file}, without which its results cannot be computed again")
+            raise RerunError(f"the deposit has no {file}, which is necessary to compute the results again")
     try:
         read_text(deposit, CONFIGURATION)  # raises ValueError if the file is too large
         name = read_yaml(deposit / CONFIGURATION).get("name")
@@ -102,7 +102,7 @@ def _smallest(deposit: Path, runs: list[str]) -> str:
     for run in sorted(runs, key=lambda run: sizes[run]):
         if _is_complete(deposit, run):
             return run
-    raise RerunError(f"--only {SMALLEST}: no run of the deposit is complete; expected the name of a run with steps")
+    raise RerunError(f"--only {SMALLEST}: no run of the deposit is complete; expected the name of a run")
 
 
 def _is_complete(deposit: Path, run: str) -> bool:

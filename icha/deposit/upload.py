@@ -85,7 +85,7 @@ def md5_of(path: str | os.PathLike) -> str:
 
 
 class Zenodo:
-    """A client of a Zenodo server. Every method raises `ZenodoError` if the server refuses or does not answer."""
+    """A client of a Zenodo server. Every method raises `ZenodoError` if the server refuses a request or fails."""
 
     def __init__(self, address: str, token: str, patience: Retry | None = None):
         """Store the address of the server (see `server_address`) and the token; no request is sent."""
@@ -97,7 +97,7 @@ class Zenodo:
             self._session.mount(scheme, HTTPAdapter(max_retries=patience or _PATIENCE))
 
     def _authorize(self, request: requests.PreparedRequest) -> requests.PreparedRequest:
-        """Add the token to a request; as authentication of the session, the token takes precedence over `.netrc`."""
+        """Add the token to a request. The session calls this function, so that the token has priority over `.netrc`."""
         request.headers["Authorization"] = f"Bearer {self._token}"
         return request
 
@@ -171,7 +171,7 @@ class Zenodo:
         with contextlib.suppress(ValueError, RecursionError):
             if isinstance(found := answer.json() if answer.content else {}, dict):
                 return found
-        raise ZenodoError(f"{self.address} does not answer like Zenodo: {path} is not a mapping")
+        raise ZenodoError(f"{self.address} does not answer like Zenodo: the answer to {path} is not a JSON object")
 
     def _refusal(self, path: str, answer: requests.Response) -> str:
         """Describe why the server refused a request, with the message of the server and advice."""

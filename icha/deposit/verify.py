@@ -42,7 +42,7 @@ _BLOCK = 1 << 20
 
 
 class DamagedDeposit(ValueError):
-    """A deposit is damaged or incomplete; the arguments are the problems, one line each."""
+    """A deposit is damaged or incomplete; the arguments of the error are the problems, one line each."""
 
 
 @contextlib.contextmanager
@@ -126,12 +126,12 @@ def _extract(path: Path, folder: Path, large: bool) -> Path:
                 raise DamagedDeposit(_too_many(len(entries)))
             if unpacked > MOST_GROWTH * packed + ALLOWANCE and not large:
                 raise DamagedDeposit(
-                    f"{name}: unpacks from {formatting.size(packed)} to {formatting.size(unpacked)}; expected "
-                    f"at most {MOST_GROWTH} times its size and {formatting.size(ALLOWANCE)}. Use {LARGE} to accept more"
+                    f"{name}: unpacks from {formatting.size(packed)} to {formatting.size(unpacked)}; expected at "
+                    f"most {MOST_GROWTH} times its size plus {formatting.size(ALLOWANCE)}. Use {LARGE} to accept more"
                 )
             if unpacked > free:
                 raise OSError(
-                    f"{folder.parent}: {name} needs {formatting.size(unpacked)} unpacked, and {formatting.size(free)} "
+                    f"{folder.parent}: {name} needs {formatting.size(unpacked)}, but only {formatting.size(free)} "
                     "are free. Set TMPDIR to a folder with more space"
                 )
             archive.extractall(folder)
@@ -151,7 +151,7 @@ def _too_many(count: int) -> str:
 
 
 def _problems(folder: Path, large: bool) -> Iterator[str]:
-    """Yield the differences between the files in a folder and the list of checksums in the folder."""
+    """Yield the differences between the files in a folder and the folder's list of checksums."""
     found, special = _inspect(folder, large)
     yield from (f"{printable(name)}: {problem}" for name, problem in special.items())
     if CHECKSUMS not in found:

@@ -29,11 +29,10 @@ def cover_grid(period: float, grid: int, centres, radii, free_square: bool = Fal
 
 
 def gap_distribution(law: JKR, surface: Surface, state: ContactState) -> dict:
-    """Return the distribution P(u) of the gap in an equilibrium, as a dictionary with the keys below.
+    """Return the distribution P(u) of the local gap u in an equilibrium, as a dictionary with the keys below.
 
     If a spot covers part of a grid cell, only the uncovered fraction of the cell is counted. The gap of this fraction
     is the gap at the node of the cell, or zero if the node lies inside the spot. The last bin includes all larger gaps.
-    The gaps are computed in blocks of grid rows to save memory.
 
     Returns
     -------
@@ -138,11 +137,8 @@ def _disc_area_left_below(x, y, a):
     corner = x**2 + y**2 < a**2
     quarter = 0.5 * (left + below) + x * y - 0.25 * np.pi * a**2
     # If the two lines cross outside the disc, at least one of the four parts is empty.
-    outside = np.where(
-        (x < 0) & (y < 0),
-        0.0,
-        np.where((x >= 0) & (y >= 0), left + below - np.pi * a**2, np.where(x < 0, left, below)),
-    )
+    cases = [(x < 0) & (y < 0), (x >= 0) & (y >= 0), x < 0]
+    outside = np.select(cases, [0.0, left + below - np.pi * a**2, left], below)
     return np.where(corner, quarter, outside)
 
 

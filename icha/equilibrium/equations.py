@@ -2,13 +2,13 @@
 
 The unknowns are the local approaches delta_i of the spots in contact:
 
-    delta_i + w_i(a(delta)) = h_i - u,        a_i = a_law(delta_i),
+    delta_i + w_i(a(delta)) = h_i - u,        a_i = a_law(delta_i).
 
 Here h_i is the height of the asperity, u the mean separation, and w_i the displacement of the half-space at spot i,
-caused by all other spots and all periodic images. On a free half-space there are no images, and u is the distance
-between the mean plane of the surface and the half-space far away. The distance may be negative because the loaded part
-of the half-space sinks in. The mean gap is u plus the mean of w over the square. During the Newton steps, a spot below
-its jump-off approach keeps its jump-off radius (zero without adhesion). So the equations are defined for any approach.
+caused by all other spots and all periodic images. A positive w_i points away from the rough surface. On a free
+half-space there are no images, and u is the distance between the mean plane of the surface and the half-space far away.
+The distance may be negative because the loaded part of the half-space sinks in. The mean gap is u plus the mean of w
+over the square. Below its jump-off approach, a spot keeps its jump-off radius (zero without adhesion).
 """
 
 from dataclasses import dataclass
@@ -49,7 +49,10 @@ def nominal_derivative(contact: AsperityContact, quantity: str, a, R):
 
 
 def radius_slope(law: JKR, a, R, approach, jump_off_approach):
-    """Return da/d(delta) of n spots, the derivative of radius by approach: zero past jump-off, limited near it."""
+    """Return da/d(delta) of n spots, the derivative of radius by approach; zero past jump-off.
+
+    Near jump-off, where this derivative is infinite, `JKR.radius_derivative` limits its value.
+    """
     slope = np.zeros(len(a))
     touching = (a > 0) & (approach >= jump_off_approach)
     slope[touching] = law.radius_derivative(a[touching], R[touching])
@@ -100,7 +103,8 @@ class Equations:
     def evaluate(self, approach, separation: float, interaction: Interaction | None = None) -> Evaluation:
         """Compute contact radii, displacements and errors at given approaches (n,) and mean separation, m.
 
-        interaction : interaction of an earlier evaluation, used again unless it was set up for smaller contact radii.
+        interaction : interaction of an earlier evaluation. It is used again if it belongs to the same half-space and
+            was set up for contact radii at least as large.
         """
         contact, sites, law = self.contact, self.sites, self.contact.law
         present, R = sites.present, sites.radius_of_curvature

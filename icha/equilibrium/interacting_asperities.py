@@ -19,7 +19,8 @@ from icha.half_space.free_square import mean_displacement
 from icha.surfaces.summits import LARGEST_DEPARTURE, SummitCoverage, find_summits, paraboloid_departure
 from icha.surfaces.surface import Surface
 
-# Derivative of the approach with respect to the mean separation, above which a spot is on an unstable branch.
+# Derivative of the approach with respect to the mean separation, above which a spot counts as unstable. A stable spot
+# can have a smaller positive derivative: when its neighbours lose load, the half-space below the spot rises.
 _UNSTABLE_RESPONSE = 10.0
 
 
@@ -103,7 +104,7 @@ class InteractingAsperities(AsperityContact):
         return float(np.sum(law.energy(a, R) + 0.5 * law.force(a, R) * displacement)) / self.area
 
     def is_unstable(self, state: ContactState) -> bool:
-        """Return whether any spot is unstable: its approach grows with the separation, d(delta)/du > 10."""
+        """Return whether any spot is unstable: its approach grows fast with the separation, d(delta)/du > 10."""
         return bool(np.max(state.sites.response[state.contact_index], initial=0.0) > _UNSTABLE_RESPONSE)
 
     def observables(self, surface: Surface) -> AsperityObservables:
@@ -150,7 +151,10 @@ class AsperityObservables:
         }
 
     def reasons_against(self, separations: Iterable[float], pressed: ContactState | None) -> list[str]:
-        """Return reasons why summits do not represent the surface in the first loading; see `Observables`."""
+        """Return reasons why summits do not represent the surface at the mean separations of the first loading, m.
+
+        pressed : state with the largest contact area; None if there is no state.
+        """
         reasons = SummitCoverage.of(self.surface, self.contact.asperities).reasons_against(separations)
         if pressed is None:
             return reasons

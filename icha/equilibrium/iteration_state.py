@@ -44,12 +44,12 @@ class IterationState:
 
     @classmethod
     def towards(cls, contact: AsperityContact, state: ContactState, separation: float) -> IterationState:
-        """Start a search: return the state of an equilibrium with its approaches extrapolated to a separation, m."""
+        """Start a search from an equilibrium; extrapolate its approaches linearly to a mean separation, m."""
         count, before = len(contact.asperities), state.sites
         sites = replace(
             before,
             approach=before.approach + before.response * (separation - state.separation),
-            was_in_contact=before.status == CONTACT,
+            counts_as_old=before.status == CONTACT,
         )
         sites, index = sites.compact()
         return cls(
@@ -69,7 +69,7 @@ class IterationState:
 
     @property
     def without_site(self) -> np.ndarray:
-        """Mask (asperities,) of the asperities without a site: no spot, union or candidate contains them."""
+        """Mask (asperities,) of the asperities that have no site: no spot or candidate contains or covers them."""
         without_site = self.site_of_asperity < 0
         single = (self.sites.asperity >= 0) & self.sites.present
         without_site[self.sites.asperity[single]] = False

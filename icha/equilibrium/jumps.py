@@ -19,20 +19,20 @@ from icha.equilibrium.sites import CANDIDATE, CONTACT
 from icha.half_space.interaction import displacement_at
 
 # Largest and usual increase of the approach of an asperity out of contact, relative to the decrease of the separation.
-_FASTEST_APPROACH = 3.0
-_PROBABLE_APPROACH = 1.2
+_LARGEST_APPROACH_RATE = 3.0
+_USUAL_APPROACH_RATE = 1.2
 # Jumps of other spots may increase an approach by up to x h_rms + y |delta_off|, where delta_off is the jump-off
 # approach of the bluntest asperity. Each pair contains x and y: the guess during the search, the bound at its end.
 _SUDDEN_GUESS = 0.02, 2.0
 _SUDDEN_BOUND = 1.0, 10.0
 # Spots break contact together if the increases of separation up to their jump-offs differ by at most this fraction.
-_SAME_STRENGTH = 1e-3
+_TIE_TOLERANCE = 1e-3
 
 
 def add_candidates(state: IterationState, separation: float) -> IterationState:
     """Without adhesion: add the asperities that will probably touch at a separation, m, to the sites as candidates."""
     fall = state.last_separation - separation
-    growth = _PROBABLE_APPROACH * fall + _sudden_growth(state.contact, _SUDDEN_GUESS)
+    growth = _USUAL_APPROACH_RATE * fall + _sudden_growth(state.contact, _SUDDEN_GUESS)
     candidates = np.flatnonzero((state.last_approach + growth > 0) & state.without_site)
     # If an asperity was in contact just before, its approach is not known, but it is small.
     expected = np.where(np.isfinite(fall), state.last_approach + fall, 0.0)
@@ -40,11 +40,13 @@ def add_candidates(state: IterationState, separation: float) -> IterationState:
 
 
 def apply_jump_in(state: IterationState, evaluation: Evaluation, margin: float) -> tuple[IterationState, bool]:
-    """Bring those asperities into contact whose approach exceeds the jump-in approach by more than a margin, m.
+    """Add sites for those asperities whose approach exceeds the jump-in approach by more than a margin, m.
 
-    An asperity under a spot becomes part of this spot. An asperity that a union has just released stays in contact if
-    its approach exceeds the jump-off approach. If any asperity of a released union stays in contact, a split of this
-    union is logged. Return the new state, and whether sites were added.
+    The new sites are contacts, or candidates without adhesion. An asperity under a spot becomes part of this spot. An
+    asperity under a larger spot of another new site gets no site now. An asperity that the last jump-off of a union has
+    released stays in contact if its approach exceeds the jump-off approach, and is barred otherwise. This holds only in
+    the first call after the jump-off. If any asperity of the union gets a site, a split of the union is logged. Return
+    the new state, and whether sites were added.
     """
     contact, law, asperities = state.contact, state.contact.law, state.contact.asperities
     spots = np.flatnonzero((evaluation.a > 0) & state.sites.present)
@@ -89,18 +91,12 @@ def _sudden_growth(contact, reach):
 def _evaluate_approaches(state, evaluation, spots, margin):
     """Compute the approaches of all asperities that may have reached jump-in; return the state and these indices."""
     contact, asperities, sites = state.contact, state.contact.asperities, state.sites
-    reach = state.last_approach + _FASTEST_APPROACH * np.abs(state.last_separation - evaluation.separation)
+    reach = state.last_approach + _LARGEST_APPROACH_RATE * np.abs(state.last_separation - evaluation.separation)
     reach += _sudden_growth(contact, _SUDDEN_GUESS if margin > 0 else _SUDDEN_BOUND)
     evaluated = np.flatnonzero((reach >= contact.jump_in_approach) & state.without_site)
-    w = displacement_at(
-        contact.law,
-        asperities.period,
-        asperities.position[evaluated],
-        sites.position[spots],
-        evaluation.a[spots],
-        sites.radius_of_curvature[spots],
-        sites.half_space.ewald.once,
-    )
+    points, position = asperities.position[evaluated], sites.position[spots]
+    a, R, ewald = evaluation.a[spots], sites.radius_of_curvature[spots], sites.half_space.ewald.once
+    w = displacement_at(contact.law, asperities.period, points, position, a, R, ewald)
     last_approach, last_separation = state.last_approach.copy(), state.last_separation.copy()
     last_approach[evaluated] = asperities.height[evaluated] - evaluation.separation - w
     last_separation[evaluated] = evaluation.separation
@@ -108,10 +104,8 @@ def _evaluate_approaches(state, evaluation, spots, margin):
 
 
 def _largest_of_each_group(state, jumping):
-    """Return those jumping asperities (indices) that would not lie under a larger spot of another jumping asperity."""
+    """Return those jumping asperities (indices) whose centres are not under a larger spot of another one of them."""
     asperities = state.contact.asperities
-    if len(jumping) < 2:
-        return jumping
     position = asperities.position[jumping]
     a = state.contact.law.contact_radius(state.last_approach[jumping], asperities.radius_of_curvature[jumping])
     under = covering_spot(position, position, a, asperities.cell, larger_than=a)
@@ -136,7 +130,7 @@ def _add_sites(state, asperity, status, approach):
         union=np.full(len(asperity), None),
         approach=approach,
         status=status,
-        was_in_contact=False,
+        counts_as_old=False,
     )
     return replace(state, sites=sites, site_of_asperity=site_of_asperity)
 
@@ -144,14 +138,14 @@ def _add_sites(state, asperity, status, approach):
 def apply_jump_off(state: IterationState, evaluation: Evaluation, margin: float) -> IterationState:
     """Break the contact of all spots whose approach is below the jump-off approach by more than a margin, m.
 
-    If spots that have formed during this search are past jump-off, only these new spots break contact, because the
-    older spots may be stable afterwards. Without adhesion only unions break contact here, because a single asperity
-    with a negative approach exerts no force. Return the new state.
+    If spots that do not count as old (`Sites.counts_as_old`) are past jump-off, even by less than the margin, no other
+    spot breaks contact: the other spots may be stable afterwards. Without adhesion only unions break contact here, when
+    the margin is 0, because a single asperity with a negative approach exerts no force. Return the new state.
     """
     sites = state.sites
     breaking = sites.status == CONTACT
     if state.contact.adhesive:
-        new = breaking & ~sites.was_in_contact
+        new = breaking & ~sites.counts_as_old
         breaking &= evaluation.approach < sites.jump_off_approach - margin
         if np.any(new & (evaluation.approach < sites.jump_off_approach)):
             breaking &= new
@@ -163,16 +157,18 @@ def apply_jump_off(state: IterationState, evaluation: Evaluation, margin: float)
 def break_closest_to_jump_off(state: IterationState, separation: float, let_go: int) -> IterationState:
     """Break the contact of the `let_go` spots closest to jump-off, and of spots equally close; return the new state.
 
-    The approaches of all sites are reset to their values at the start of the search.
+    The closest spots are those that reach jump-off after the smallest increase of the separation, as their responses
+    predict. All approaches are reset to the start of the search, because this increase is counted from there.
 
     separation : mean separation to which the search has extrapolated the approaches, m.
+    let_go : at most the number of spots in contact.
     """
     sites = state.sites
     approach = sites.approach - sites.response * (separation - state.start.separation)
     rate = np.maximum(-sites.response, 1e-3)
     rise = np.where(sites.status == CONTACT, (approach - sites.jump_off_approach) / rate, np.inf)
     last = np.partition(rise, let_go - 1)[let_go - 1]
-    return _break_contact(state.with_approach(approach), rise <= last * (1 + _SAME_STRENGTH))
+    return _break_contact(state.with_approach(approach), rise <= last * (1 + _TIE_TOLERANCE))
 
 
 def _break_contact(state, breaking):

@@ -83,13 +83,14 @@ class Sites:
     height, radius_of_curvature : (n,) float, heights and radii of curvature of asperities and unions, m.
     jump_off_approach : (n,) float, approaches at which the spots jump out of contact, m.
     asperity : (n,) int, index of the asperity; -1 for a union.
-    members : (n,) int, number of asperities in the spot.
+    members : (n,) int, number of asperities that united to this spot, without those that the spot only covers.
     union : (n,) object, `MergeRecord` of a union; None for other sites.
     split_number : (n,) int, the same number for the two spots from one split of a union; -1 for other sites.
     status : (n,) int, CONTACT, CANDIDATE or REMOVED.
     approach : (n,) float, last known approach of each site, m.
     response : (n,) float, derivative of the approach with respect to the mean separation.
-    was_in_contact : (n,) bool, whether the site was in contact before the present search for equilibrium.
+    counts_as_old : (n,) bool, True for spots in contact before the present search for equilibrium, for unions, and for
+        spots from a split; False for candidates, and for single asperities added to the table in this search.
     half_space : elastic half-space with a point at every site.
     arranged : number of sites when the half-space was set up for the last time.
     """
@@ -105,7 +106,7 @@ class Sites:
     status: np.ndarray
     approach: np.ndarray
     response: np.ndarray
-    was_in_contact: np.ndarray
+    counts_as_old: np.ndarray
     half_space: PointHalfSpace
     arranged: int
 
@@ -120,7 +121,7 @@ class Sites:
     def empty(cls, law: JKR, asperities: Asperities) -> Sites:
         """Return a table without sites for a surface of these asperities."""
         types = {"asperity": int, "members": int, "union": object, "split_number": int, "status": np.int8}
-        types |= {"was_in_contact": bool}
+        types |= {"counts_as_old": bool}
         arrays: dict = {name: np.empty(0, types.get(name, float)) for name in _ARRAYS} | {"position": np.empty((0, 2))}
         modulus = law.material.contact_modulus
         half_space = PointHalfSpace.at(arrays["position"], asperities.period, modulus, asperities.free)
@@ -131,10 +132,10 @@ class Sites:
         """Mask of the sites that are in contact or candidates for contact, (n,) bool."""
         return self.status != REMOVED
 
-    def append(self, law: JKR, *, status, was_in_contact, split_number=-1, **more) -> Sites:
+    def append(self, law: JKR, *, status, counts_as_old, split_number=-1, **more) -> Sites:
         """Return a table with k more sites.
 
-        status, was_in_contact, split_number : one value for all new sites.
+        status, counts_as_old, split_number : one value for all new sites.
         more : position, height, radius_of_curvature, asperity, members, union and approach, arrays of k rows.
         """
         count = len(more["height"])
@@ -143,7 +144,7 @@ class Sites:
             "split_number": np.full(count, split_number),
             "status": np.full(count, status, dtype=np.int8),
             "response": np.full(count, -1.0),
-            "was_in_contact": np.full(count, was_in_contact),
+            "counts_as_old": np.full(count, counts_as_old),
         }
         arrays = {name: np.concatenate([getattr(self, name), more[name]]) for name in _ARRAYS}
         if not len(self):
@@ -157,10 +158,10 @@ class Sites:
         return replace(self, status=status)
 
     def compact(self) -> tuple[Sites, np.ndarray | None]:
-        """Return the table without removed sites, if these are over a quarter or the table has grown by over a half.
+        """Delete removed sites and set up the half-space again, if over a quarter are removed or many sites are new.
 
-        Return also the new index of every site, (n + 1,) int: -1 for removed sites, and -1 as the last value. If the
-        table is unchanged, the index is None. Growth is counted from the last time the half-space was set up.
+        Many means that the table has grown by over a half since the last set-up. Return the table, and the new index of
+        every site, (n + 1,) int: -1 for removed sites, and -1 as the last value. If nothing is done, the index is None.
         """
         removed = self.status == REMOVED
         if len(self) <= _GROWTH * self.arranged and np.count_nonzero(removed) <= _REMOVED_FRACTION * len(self):
@@ -213,7 +214,7 @@ class ContactState:
     sites : table of sites, n of them.
     contact_radius : (n,) float, contact radius of each site, zero out of contact, m.
     site_of_asperity : (asperities,) int, site to which an asperity belongs: its own spot, a union that contains it, or
-        a spot that covers it; -1 for an asperity out of contact.
+        a spot that covered it when it came into contact; -1 for an asperity out of contact.
     last_approach : (asperities,) float, approach of an asperity out of contact at its last evaluation, m.
     last_separation : (asperities,) float, mean separation at this evaluation, m; inf if the approach is not known.
     residual : largest error of the equilibrium, in h_rms.

@@ -17,7 +17,7 @@ from icha.equilibrium.iteration_state import IterationState
 from icha.equilibrium.jumps import add_candidates, apply_jump_in, apply_jump_off, break_closest_to_jump_off
 from icha.equilibrium.newton import newton_step, solve_response
 from icha.equilibrium.sites import CANDIDATE, CONTACT, AsperityContact, ContactState
-from icha.equilibrium.unions import absorb_covered, merge_overlapping, set_union_heights, split_unions
+from icha.equilibrium.unions import absorb_new_asperities, merge_overlapping, set_union_heights, split_unions
 
 # Error in h_rms below which the search applies events. If the condition of an event is exceeded by less than ten times
 # the error, the event waits until the equations are solved.
@@ -41,10 +41,9 @@ def find_equilibrium(
 ) -> ContactState:
     """Find the equilibrium at another mean separation, load or contact area, starting from an equilibrium.
 
-    Parameters and errors are those of `icha.contact.model.ContactModel.equilibrium`. Newton steps solve the equations
-    for the present spots. When the equations are nearly solved, all events that are due are applied: spots past
-    jump-off break contact, asperities beyond jump-in make contact, overlapping spots coalesce, and on unloading unions
-    split. The search ends when the equations are solved and no event is due.
+    Parameters and errors are those of `icha.contact.model.ContactModel.equilibrium`; the `let_go` spots break contact
+    before the first Newton step. When the equations are nearly solved, all events that are due are applied. The search
+    ends when the equations are solved and no event is due.
 
     An asperity that has broken contact may not make contact again at this separation; `barred_count` counts the
     asperities that this rule keeps out of contact.
@@ -58,8 +57,10 @@ def find_equilibrium(
     steps, exact_steps, wait = 0, 0, False
     visited: Counter = Counter()
     while True:
-        state, evaluation = _absorb_and_evaluate(state, evaluation, control)
+        before, state = state, absorb_new_asperities(state, evaluation)
         equations = Equations(contact, state.sites, control)
+        if state is not before:
+            evaluation = equations.evaluate(state.sites.approach, evaluation.separation, evaluation.interaction)
         size = equations.error_size(evaluation)
         # With the weight 1, a relative error of the load counts as much as the same error of the approaches in h_rms.
         closeness = equations.error_size(evaluation, 1.0)
@@ -125,19 +126,11 @@ def _count_round(state, visited):
         raise NotConverged(f"no equilibrium after {rounds} rounds of jumps and unions")
 
 
-def _absorb_and_evaluate(state, evaluation, control):
-    """Remove new spots that lie under other spots; return the state and the evaluation without these new spots."""
-    after = absorb_covered(state, evaluation)
-    if after is not state:
-        equations = Equations(state.contact, after.sites, control)
-        evaluation = equations.evaluate(after.sites.approach, evaluation.separation, evaluation.interaction)
-    return after, evaluation
-
-
 def _merge_after_failed_step(state, evaluation, margin, size):
     """Merge overlapping spots because no Newton step succeeds; raise `NotConverged` if there are no such spots.
 
-    If no spots overlap by more than the margin, m, those pairs merge in which one spot covers the centre of the other.
+    If an error of the approaches by the margin, m, can explain every overlap, only those pairs merge in which one spot
+    covers the centre of the other.
     size : error of the equilibrium, in h_rms.
     """
     before = state.with_approach(evaluation.approach)
@@ -172,14 +165,20 @@ def _build_contact_state(state, evaluation, control):
 
 
 def _update_candidates(state, evaluation):
-    """Without adhesion: turn candidates with a positive approach into contacts, and all others into candidates."""
+    """Without adhesion: turn candidates with an approach > 0 into contacts, and contacts with one <= 0 into candidates.
+
+    Log both as events. Asperities that a lost contact covered have no site afterwards.
+    """
     sites, status, site_of_asperity = state.sites, state.sites.status.copy(), state.site_of_asperity.copy()
     made = np.flatnonzero((status == CANDIDATE) & (evaluation.approach > 0))
     status[made] = CONTACT
     site_of_asperity[sites.asperity[made]] = made
     lost = np.flatnonzero((status == CONTACT) & (evaluation.approach <= 0))
     status[lost] = CANDIDATE
-    site_of_asperity[sites.asperity[lost]] = -1
+    freed = np.isin(site_of_asperity, lost)
+    site_of_asperity[freed] = -1
     state = state.with_events(JUMP_IN, sites.position[made], 1, 0.0, sites.asperity[made])
     state = state.with_events(JUMP_OFF, sites.position[lost], 1)
-    return replace(state, sites=replace(sites, status=status), site_of_asperity=site_of_asperity)
+    last_separation = np.where(freed, np.inf, state.last_separation)  # the present approach is not known
+    sites = replace(sites, status=status)
+    return replace(state, sites=sites, site_of_asperity=site_of_asperity, last_separation=last_separation)

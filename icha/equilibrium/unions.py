@@ -1,8 +1,9 @@
 """Coalescence of spots, the splitting of unions on unloading, and new contacts that lie inside other spots.
 
-Two overlapping spots become one spot, a union (`icha.asperity.jkr.JKR.union`). The height of the union is chosen so
-that the union is in equilibrium at the moment of coalescence. New contacts inside other spots are removed, because the
-equations are singular when the edge of one spot passes through the centre of another spot.
+Two overlapping spots become one spot, a union (`icha.asperity.jkr.JKR.union`). At the moment of coalescence, the union
+has the contact area of both spots together. Its height is chosen so that the union is in equilibrium. Its force differs
+from the sum of both forces. New contacts inside other spots are removed, because the equations are singular when the
+edge of one spot passes through the centre of another spot.
 """
 
 from dataclasses import replace
@@ -28,24 +29,28 @@ def merge_overlapping(
     deep : whether only those pairs merge in which one spot covers the centre of the other. On unloading, a pair that
         has split from one union during this path merges again only if `deep` is True.
     """
-    sites, law, period, a = state.sites, state.contact.law, state.contact.asperities.cell, evaluation.a
+    sites, law, cell, a = state.sites, state.contact.law, state.contact.asperities.cell, evaluation.a
     pairs = _select_merging_pairs(state, evaluation, margin, deep)
     if not len(pairs):
         return state
     i, j = pairs.T
     R = sites.radius_of_curvature
     centre, radius, curvature = equivalent_spots(
-        law, sites.position[i], a[i], R[i], sites.position[j], a[j], R[j], period
+        law, sites.position[i], a[i], R[i], sites.position[j], a[j], R[j], cell
     )
     unions = _record_unions(state, pairs, a, radius)
-    state = _log_contacts_of_candidates(state, pairs[sites.status[pairs] == CANDIDATE])
+    # A candidate in a pair makes contact before it becomes part of the union.
+    candidates = pairs[sites.status[pairs] == CANDIDATE]
+    state = state.with_events(JUMP_IN, sites.position[candidates], 1, 0.0, sites.asperity[candidates])
+    site_of_asperity = state.site_of_asperity.copy()
+    site_of_asperity[sites.asperity[candidates]] = candidates
     members = sites.members[i] + sites.members[j]
     new = len(sites) + np.arange(len(pairs))
     index = np.append(np.arange(len(sites)), -1)
     index[pairs] = new[:, None]
     return replace(
         state.with_events(COALESCENCE, centre, members),
-        site_of_asperity=index[state.site_of_asperity],  # -1 takes the last entry
+        site_of_asperity=index[site_of_asperity],  # -1 takes the last entry
         new_unions=new,
         sites=sites.remove(pairs).append(
             law,
@@ -57,7 +62,7 @@ def merge_overlapping(
             union=unions,
             approach=law.approach(radius, curvature),
             status=CONTACT,
-            was_in_contact=True,
+            counts_as_old=True,
         ),
     )
 
@@ -102,19 +107,9 @@ def _record_unions(state, pairs, a, radius):
     offset = periodic_difference(sites.position[j], sites.position[i], state.contact.asperities.cell)
     touching = radius * np.minimum(np.linalg.norm(offset, axis=1) / (a[i] + a[j]), 1.0)
     for k, pair in enumerate(pairs):
-        unions[k] = MergeRecord(
-            radius[k], touching[k], a[pair], {name: getattr(sites, name)[pair] for name in Sites.UNITED}
-        )
+        columns = {name: getattr(sites, name)[pair] for name in Sites.UNITED}
+        unions[k] = MergeRecord(radius[k], touching[k], a[pair], columns)
     return unions
-
-
-def _log_contacts_of_candidates(state, candidates):
-    """Log the jump-in of candidates that become part of unions, given by their site indices; return the new state."""
-    sites, site_of_asperity = state.sites, state.site_of_asperity.copy()
-    asperity = sites.asperity[candidates]
-    site_of_asperity[asperity] = candidates
-    state = state.with_events(JUMP_IN, sites.position[candidates], 1, 0.0, asperity)
-    return replace(state, site_of_asperity=site_of_asperity)
 
 
 def split_unions(state: IterationState, evaluation: Evaluation) -> IterationState:
@@ -141,7 +136,7 @@ def _split_union(state, site, a):
         **union.columns,
         approach=law.approach(contact_radius, union.columns["radius_of_curvature"]),
         status=CONTACT,
-        was_in_contact=True,
+        counts_as_old=True,
         split_number=np.max(sites.split_number) + 1,
     )
     # The approaches of other asperities under the union are not known.
@@ -149,9 +144,14 @@ def _split_union(state, site, a):
     return replace(state, sites=sites, site_of_asperity=site_of_asperity, last_separation=last_separation)
 
 
-def absorb_covered(state: IterationState, evaluation: Evaluation) -> IterationState:
-    """Remove spots that have formed in this search under another spot; the covering spot gets their asperities."""
-    sites, a, interaction, old = state.sites, evaluation.a, evaluation.interaction, state.sites.was_in_contact
+def absorb_new_asperities(state: IterationState, evaluation: Evaluation) -> IterationState:
+    """Remove new sites whose centre lies under a spot that counts as old, or under a larger new spot.
+
+    Sites are new if `Sites.counts_as_old` is False: they are single asperities or candidates. Sites of contact radius
+    zero stay. The covering spot gets the asperities, and their jump-ins are deleted from the log. If a site is removed,
+    the new state also has the approaches of the evaluation; otherwise the same state is returned.
+    """
+    sites, a, interaction, old = state.sites, evaluation.a, evaluation.interaction, state.sites.counts_as_old
     i, j, r = interaction.target, interaction.source, interaction.r
     inside = np.flatnonzero((r < a[j]) & (a[i] > 0) & ~old[i])
     inside = inside[old[j[inside]] | (a[i[inside]] < a[j[inside]])]

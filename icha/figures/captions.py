@@ -29,7 +29,7 @@ def caption_of(name: str) -> str:
 
 
 def count_runs(campaign: xr.DataTree, studies: Sequence[str]) -> str:
-    """Describe how many runs of some studies are missing in a figure, and to how many the model is not applicable.
+    """Describe how many runs are missing in a figure, and to how many drawn runs the model is not applicable.
 
     Returns
     -------

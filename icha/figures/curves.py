@@ -80,7 +80,7 @@ class Curves(NamedTuple):
 def study_curves(campaign: xr.DataTree, study: str, boundary_elements: str | None = None, **changed: object) -> Curves:
     """Return the curves of a study, with boundary elements of the same study or of the study `boundary_elements`.
 
-    `changed` are arguments of `Axes.plot` that replace others for all markers.
+    `changed` are arguments of `Axes.plot` for all markers, which take precedence.
     """
     groups = select.group_by_contact(campaign, select.select_runs(campaign, study, ragged=False))
     dataset = campaign[study].to_dataset()
@@ -236,7 +236,7 @@ def add_legend(figure: Figure, panels: Sequence[Axes], curves: Curves) -> None:
 
 
 def drop_rounding_errors(values: np.ndarray) -> np.ndarray:
-    """Return the values that are larger than rounding errors; a logarithmic axis can show these values."""
+    """Return only the values that are larger than rounding errors, for a logarithmic axis."""
     return values[values > _ROUNDING * values.max(initial=0.0)]
 
 

@@ -1,11 +1,11 @@
 """The declaration of a figure: its options in a configuration, and the files from which it is drawn.
 
 Every figure is a module `fig<number>_<words>` of this folder, with a `DECLARATION` and a function `figure` that draws.
-`icha.figures.registry` finds these modules by their names, so no list of figures exists. When ICHA reads a
-configuration, it imports the modules of all figures. Therefore these modules import libraries for drawing, and modules
-that need xarray, only inside the functions that draw.
+`icha.figures.registry` finds these modules by their names, so no list of figures exists. To read a configuration, ICHA
+imports the modules of all figures. The libraries matplotlib and xarray load slowly. Therefore the modules import these
+libraries only inside functions that draw.
 
-The function `figure` takes the data of the `inputs`, and the `arguments` of the options as keywords. The function
+The arguments of the function `figure` are the data of the `inputs` and the `arguments` of the options. The function
 raises `icha.figures.select.NothingToDraw` if no run in the figure is complete.
 """
 
@@ -31,10 +31,10 @@ Inputs = dict[str, str | list[str]]
 
 
 class FigureOptions(Section):
-    """The section of a figure in a configuration."""
+    """Options of a figure, a section of the configuration."""
 
     def problems(self, campaign: Campaign) -> Iterator[Problem]:
-        """Yield the problems of the options with respect to the campaign, such as a study that does not exist."""
+        """Yield a problem for each option that does not fit the campaign, such as the name of an unknown study."""
         yield from ()
 
     def studies_of(self, campaign: Campaign) -> tuple[str, ...]:
@@ -47,18 +47,18 @@ class FigureOptions(Section):
 
 
 def dataset_only(campaign: Campaign, options: FigureOptions, files: results.ResultFiles) -> Inputs:
-    """Return the campaign dataset, the only input of many figures."""
+    """Return the path of the campaign dataset, the only input of many figures."""
     return {"campaign": files.path(results.DATASET)}
 
 
 def dataset_and_theories(campaign: Campaign, options: StudyFigure, files: results.ResultFiles) -> Inputs:
-    """Return the campaign dataset, and the theories for the first surface of the study."""
+    """Return the paths of the campaign dataset, and of the theories for the first surface of the study."""
     theories = files.path(results.THEORIES, surface=campaign.studies[options.study].surfaces[0])
     return {"campaign": files.path(results.DATASET), "references": theories}
 
 
 def dataset_and_model_error(campaign: Campaign, options: ComparedFigure, files: results.ResultFiles) -> Inputs:
-    """Return the campaign dataset, which gives the colours of the materials, and the model error."""
+    """Return the paths of the campaign dataset, which determines the colours, and of the model error."""
     return {"campaign": files.path(results.DATASET), "model_error": files.path(results.MODEL_ERROR)}
 
 
@@ -69,8 +69,8 @@ class Declaration:
     Parameters
     ----------
     description : what the figure shows, in one line, for authors of configurations.
-    options : class of the section in a configuration; the first line of the docstring of the class is in the schema.
-    inputs : function that returns the input files. `figure` gets the datasets of netCDF files and the paths of others.
+    options : class of the options; the first line of the docstring is the description in the schema.
+    inputs : function that returns paths of input files; ICHA reads netCDF files before `figure` is called.
     holds_topography : True if drawing needs memory for arrays of the size of the surface.
     """
 
@@ -89,7 +89,7 @@ class StudyFigure(FigureOptions):
     study: Name = Field(description="Name of the study that is drawn.")
 
     def studies_of(self, campaign: Campaign) -> tuple[str, ...]:
-        """Return the name of the study, the only one that the figure shows."""
+        """Return the name of the only study that the figure shows."""
         return (self.study,)
 
     def problems(self, campaign: Campaign) -> Iterator[Problem]:
@@ -164,8 +164,8 @@ class SnapshotFigure(StudyFigure):
 class TopographyFigure(StudyFigure):
     """A figure of one topography of a study."""
 
-    surface: Label | None = Field(default=None, description="Surface to show. Default: the first of the study.")
-    seed: Seed | None = Field(default=None, description="Seed to show. Default: the first of the study.")
+    surface: Label | None = Field(default=None, description="Surface to show. Default: the first surface of the study.")
+    seed: Seed | None = Field(default=None, description="Seed to show. Default: the first seed of the study.")
 
 
 class UnloadedFigure(StudyFigure):
@@ -179,11 +179,11 @@ class UnloadedFigure(StudyFigure):
 
 
 class RunFigure(TopographyFigure):
-    """A figure of one run. An option that is left out has the first value in the study."""
+    """A figure of one run. ICHA draws the first run that fits the options, if possible with adhesion."""
 
-    rms_slope: Positive | None = Field(default=None, description="Rms slope to show. Default: the first of the study.")
+    rms_slope: Positive | None = Field(default=None, description="Rms slope to show. Default: the study's first slope.")
     material: Label | None = Field(
-        default=None, description="Material to show. Default: the first one with adhesion, if there is any."
+        default=None, description="Material to show. Default: the first material with adhesion, if any."
     )
 
     def arguments(self, campaign: Campaign) -> dict[str, Any]:
@@ -193,7 +193,7 @@ class RunFigure(TopographyFigure):
         return {name: arguments[name] for name in others} | {"run": tuple(self.run(campaign))}
 
     def run(self, campaign: Campaign) -> RunLabels:
-        """Return the first run with adhesion that fits the options, or the first run that fits if none has adhesion."""
+        """Return the first run that fits the options; a run with adhesion is preferred."""
         model = first_model(campaign.studies[self.study].models)
         wanted = self.model_dump(include=set(RunLabels._fields), exclude_none=True)
         runs = [RunLabels(self.study, model, *contact) for contact in campaign.contacts(self.study)]
@@ -202,10 +202,10 @@ class RunFigure(TopographyFigure):
 
 
 class ComparedFigure(StudyFigure):
-    """A comparison of a study with boundary elements. The study needs both `models`, or an entry of `finite_range`."""
+    """A comparison with boundary elements. The study needs both `models`, or an entry of `finite_range`."""
 
     def study_problems(self, campaign: Campaign, study: Any) -> Iterator[Problem]:
-        """Also yield a problem if the study has no boundary elements at the same loads."""
+        """Also yield a problem if no boundary elements solve the study at the same loads."""
         yield from super().study_problems(campaign, study)
         if campaign.compares_models(self.study) or is_solved_at_finite_range(campaign, self.study):
             return
@@ -219,7 +219,7 @@ def is_solved_at_finite_range(campaign: Campaign, study: str) -> bool:
 
 
 def problems_of_unloading(campaign: Campaign, studies: Mapping[tuple, str]) -> Iterator[Problem]:
-    """Yield a problem for each study that does not exist or does not unload; `studies` are names by location."""
+    """Yield a problem for each of `studies` (names by configuration key) that does not exist or does not unload."""
     for location, name in studies.items():
         yield from unknown(location, name, campaign.studies)
         if name in campaign.studies and not campaign.studies[name].unload:

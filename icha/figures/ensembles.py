@@ -1,4 +1,4 @@
-"""Draw means over seeds, as lines with confidence bands or points with bars; few seeds are drawn one by one."""
+"""Draw means over seeds with confidence bands or bars; if there are few seeds, draw every seed instead."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ _CROSS = {"ls": "none", "marker": "x", "mew": 0.7, "label": FEWER_SEEDS}
 
 
 def draw_members(axes: Axes, x: np.ndarray, members: np.ndarray, look: dict, *, positive: bool, asked: int = 0) -> None:
-    """Draw the mean over the members of an ensemble as a line, with the scatter of several members.
+    """Draw the mean over the members of an ensemble as a line, with a band or lines that show the scatter.
 
     Parameters
     ----------
     x : (k,) float, positions on the x axis.
     members : (members, k) float, values of every member; NaN where a member has no value.
     look : arguments of `Axes.plot` for the line.
-    positive : True for a logarithmic axis: the confidence band is positive, and zeros are left out.
+    positive : True for a logarithmic axis; the confidence band is then positive, and zeros are left out.
     asked : number of requested members; markers of means over fewer members are crossed out.
     """
     mean, known = ensemble(members).mean, np.isfinite(members)
@@ -45,7 +45,7 @@ def draw_members(axes: Axes, x: np.ndarray, members: np.ndarray, look: dict, *, 
 
 
 def _break_lines(known, *rows):
-    """Insert NaN into each row where the set of `known` members, (members, k), changes, to interrupt the line there."""
+    """Insert NaN into each row where other members have values (`known`), so that the line is interrupted there."""
     breaks = 1 + np.flatnonzero((known[:, 1:] != known[:, :-1]).any(axis=0))
     return [np.insert(np.asarray(row, float), breaks, np.nan, axis=-1) for row in rows]
 
@@ -71,7 +71,7 @@ def mark_fewer(
 
 
 def _draw_scatter(axes, x, members, colour, *, positive):
-    """Draw the confidence band of the mean, or every member if they are few; a band does not extend the axes."""
+    """Draw a confidence band, or every member of a small ensemble; the band does not change the limits of the axes."""
     over = ensemble(members)
     if over.count.min(initial=len(members)) < ENOUGH:
         # A single point has no line.
@@ -86,9 +86,9 @@ def _draw_scatter(axes, x, members, colour, *, positive):
 
 
 def join_bins(edges: np.ndarray, contents: np.ndarray, least: float) -> tuple[np.ndarray, np.ndarray]:
-    """Join neighbouring bins until the content of each, summed over all members, is at least `least`.
+    """Join neighbouring bins until the sum over all members is at least `least` in every bin.
 
-    Empty bins at both ends are left out. Bins that remain at the end belong to the last joined bin.
+    Empty bins at both ends are left out. The last joined bin contains the remaining bins.
 
     Parameters
     ----------
@@ -98,7 +98,7 @@ def join_bins(edges: np.ndarray, contents: np.ndarray, least: float) -> tuple[np
 
     Returns
     -------
-    Edges of the joined bins, and contents over bin width (members, joined bins). Both are empty if all bins are empty.
+    Edges of the joined bins; content divided by bin width, array of shape (members, joined bins).
     """
     filled = np.flatnonzero(contents.any(axis=0))
     if not len(filled):
@@ -117,7 +117,7 @@ def join_bins(edges: np.ndarray, contents: np.ndarray, least: float) -> tuple[np
 def draw_points(
     axes: Axes, x: np.ndarray, members: np.ndarray, look: dict, *, positive: bool, asked: int | np.ndarray = 0
 ) -> ErrorbarContainer:
-    """Draw the means of an ensemble as points with confidence bars; if members are few, draw them as dots instead.
+    """Draw the means of an ensemble as points with confidence bars; draw few members as dots without bars.
 
     A line joins neighbouring points only if they are means over the same members.
 
@@ -146,12 +146,12 @@ def draw_points(
 class Points:
     """A line of points in ascending order of x; each point is a mean over seeds.
 
-    Means are over the seeds that all points have. If no seed is common to all points, means are over all seeds.
+    Means are over the seeds that all points have in common, or over all seeds if no seed is common to all points.
 
     Parameters
     ----------
     groups : the runs of each point.
-    quantities : names of the variables along x and y, and of further variables along y.
+    quantities : names of the variables; the first is drawn along x, all others along y.
     factor : factor that converts the values of y to the unit in the figure.
 
     Attributes
@@ -176,16 +176,16 @@ class Points:
 
     @property
     def means(self) -> np.ndarray:
-        """Means over the seeds, (quantities, k)."""
+        """Means over the seeds, an array of shape (quantities, k)."""
         return ensemble(self.members, axis=1).mean
 
     @property
     def counts(self) -> list[int]:
-        """Number of seeds in each mean, (k,)."""
+        """Number of seeds in the mean of each point."""
         return np.isfinite(self.members[0]).sum(axis=0).tolist()
 
     def draw(self, axes: Axes, look: dict, quantity: int = 1) -> ErrorbarContainer:
-        """Draw a quantity, given by its position in `quantities`, against x."""
+        """Draw the variable with index `quantity` in `quantities` against the first variable."""
         return draw_points(axes, self.members[0], self.members[quantity], look, positive=True, asked=self.asked)
 
 
@@ -202,7 +202,7 @@ def points_handles(counts: Iterable[int]) -> dict[str, Line2D]:
 
 
 def _handles(counts, looks):
-    """Return legend entries; `looks` are a text and a look for means over many seeds, then for means over few seeds."""
+    """Return legend entries; the first of `looks` is for means over many seeds, the second for means over few seeds."""
     sizes, found = {int(count) for count in counts if count > 1}, {}
     for enough, (words, look) in zip((True, False), looks.items(), strict=True):
         if group := {size for size in sizes if (size >= ENOUGH) == enough}:

@@ -36,10 +36,10 @@ def draw_errors(
 
     Parameters
     ----------
-    campaign : the campaign dataset, in which the order of materials determines the colours.
-    model_error : `icha.analysis.model_error.model_error` of the campaign.
-    study : name of the study. All entries of the model error that compare runs of the study are drawn.
-    labels : labels of the axes by the names of the variables.
+    campaign : the campaign dataset; the order of the materials in the dataset determines the colours.
+    model_error : the errors of the campaign, from `icha.analysis.model_error.model_error`.
+    study : name of the study; all comparisons of runs of the study are drawn.
+    labels : axis label of each variable, by name of the variable.
     percent : True for relative errors, which are drawn in per cent; False for variables that are never negative.
     """
     curves = _curves(model_error, study, list(labels))
@@ -79,9 +79,9 @@ def draw_errors(
 
 
 def _curves(model_error, study, names) -> dict[tuple[Contact, bool], list[xr.Dataset]]:
-    """Return the errors of a study by contact (material, surface, slope) and whether the asperity model is applicable.
+    """Return the errors of a study by material, surface and slope, and by applicability of the asperity model.
 
-    The errors of one contact come from solutions in the limit of a short range, at finite ranges, or on several grids.
+    A run has several errors if boundary elements solved the run at several ranges of attraction or on several grids.
     """
     found = {}
     for contact, errors in select_errors(model_error, study):
@@ -96,7 +96,7 @@ def _curves(model_error, study, names) -> dict[tuple[Contact, bool], list[xr.Dat
 
 
 def _name(looks, contact, entries, k, *, own_rows):
-    """Return a legend name that distinguishes entry `k` of a contact from the other entries."""
+    """Return the legend name of the errors `entries[k]`, which differs from the names of the other entries."""
     truths = [errors.attrs["truth"] for errors in entries]
     words = [looks.place_name(contact[1:]) if own_rows else looks.name(contact)]
     words += ["at finite range"] if len(set(truths)) > 1 and truths[k] == FINITE_RANGE else []

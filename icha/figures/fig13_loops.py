@@ -92,8 +92,8 @@ def figure(
     Parameters
     ----------
     campaign : the campaign dataset.
-    loops : loading and unloading with boundary elements at finite ranges, if there are any. Only loops on the same
-        topography are shown.
+    loops : datasets of loading and unloading with boundary elements at finite ranges, if there are any. Only loops on
+        the same topography are shown.
     surface, seed : labels of the topography. Default: surface and seed of the first complete run.
     """
     from icha.analysis.model_error import difference_of_contacts
@@ -186,5 +186,5 @@ def _handles(looks, loops, *, marked):
 
 
 def _truth_name(truth):
-    """Return the legend name of boundary elements; files at a finite range have no attribute `contact_model`."""
+    """Return the legend name of boundary elements, in the limit of a short range or at a finite range."""
     return SHORT_RANGE if truth.attrs.get("contact_model") == REFERENCE_MODEL else FINITE_RANGE

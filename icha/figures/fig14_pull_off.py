@@ -87,7 +87,7 @@ def figure(campaign: xr.DataTree, *, study: str, load_studies: Sequence[str] = (
 
 
 def _scale(ax, values):
-    """Choose a y axis that shows all values: logarithmic and linear near zero if they span decades, else linear."""
+    """Set a linear y axis; if values span decades, set a logarithmic axis that is linear near zero."""
     positive = drop_rounding_errors(values)
     if len(positive) and positive.max() > _SPAN * positive.min():
         least = 10.0 ** np.floor(np.log10(positive.min()))

@@ -109,8 +109,8 @@ def fit_line(x: np.ndarray, y: np.ndarray, along: np.ndarray) -> tuple[np.ndarra
 
     Returns
     -------
-    Values of the line at `along`; coefficient of determination; exponent of a power law through the same points, NaN
-    unless all y are positive.
+    Values of the line at `along`; coefficient of determination; exponent of a power law through the same points. The
+    exponent is NaN if a y is not positive.
     """
     from scipy.stats import linregress
 

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 class SnapMapFigure(RunFigure, UnloadedFigure):
-    """A figure of the events of one run. An option that is left out has the first value in the study."""
+    """A figure of the events of one run. ICHA draws the first run that fits the options, if possible with adhesion."""
 
 
 def inputs(campaign: Campaign, options: SnapMapFigure, files: results.ResultFiles) -> Inputs:
@@ -118,7 +118,7 @@ def _draw_counts(ax, events):
 
 
 def _events(run):
-    """Return kind, branch, position (m) and u/h_rms of the events in the first loading and the last unloading."""
+    """Return kind, branch, position in m and separation u/h_rms of events in the first loading and last unloading."""
     steps = run["event_step"].values.astype(int)
     leg = run["leg"].sel(step=steps).values
     shown = (leg == 0) | (leg == unloading_legs(run)[-1]["leg"].values[-1])

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 
 def inputs(campaign: Campaign, options: StudyFigure, files: results.ResultFiles) -> Inputs:
-    """Return the campaign dataset, theories for the first surface, and the model error at finite ranges if any."""
+    """Return paths of the campaign dataset, theories for the first surface, and the model error at finite ranges."""
     found = dataset_and_theories(campaign, options, files)
     if is_solved_at_finite_range(campaign, options.study):
         found["model_error"] = files.path(results.MODEL_ERROR)
@@ -105,7 +105,7 @@ def figure(
 
 
 def _finite_range_curves(model_error, study, looks):
-    """Return the curves of boundary elements at a finite range, which the dataset `model_error` contains."""
+    """Return the curves of boundary elements at a finite range from the dataset `model_error`."""
     found = []
     for contact, errors in select_errors(model_error, study):
         material, surface, slope = contact
@@ -121,9 +121,9 @@ def _finite_range_curves(model_error, study, looks):
 
 
 def _difference(line, truth, points):
-    """Return loads, and relative differences (seeds, loads) in per cent between a curve and boundary elements.
+    """Return loads, and for each seed the differences in per cent between a curve and boundary elements.
 
-    The loads are the loads of the curve within the range of boundary elements. Values of boundary elements are
+    Loads of the curve outside the range of boundary elements are left out. Values of boundary elements are
     interpolated to these loads.
     """
     from icha.analysis.common_loads import at_common_loads, interpolate

@@ -91,11 +91,11 @@ def _finish(left, right, pressures, highest, load):
 
 
 def singular_tail(members: Sequence[tuple[xr.Dataset, int]], lowest: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return p/(E* h'_rms) and the mean P(p) E* h'_rms over snapshots, for tensions that the grid does not resolve.
+    """Return pressures p/(E* h'_rms) and mean densities P(p) E* h'_rms for tensions that the grid does not resolve.
 
-    At a distance x from the edge of contact the tension is K_c/sqrt(2 pi x), with K_c^2 = 2 E* dgamma. With the
-    length L of the edge, the density is P(p) = L K_c^2/(pi |p|^3 A0). The tail reaches from the resolved tension to
-    the pressure `lowest`. Without adhesion, the tail is empty.
+    At a distance x from the edge of contact, the tension is K_c/sqrt(2 pi x), with K_c^2 = 2 E* dgamma. With the
+    length L of the edge, the density is P(p) = L K_c^2/(pi |p|^3 A0). The tail begins at the largest tension that the
+    grid resolves, and ends at the pressure `lowest`. Without adhesion, the tail is empty.
     """
     (run, _), *_ = members
     unit = float(run["contact_modulus"]) * float(run["rms_slope"])
@@ -109,7 +109,7 @@ def singular_tail(members: Sequence[tuple[xr.Dataset, int]], lowest: float) -> t
 
 
 def gap_densities(members: Sequence[tuple[xr.Dataset, int]]) -> tuple[np.ndarray, np.ndarray]:
-    """Return gaps u/h_rms (k,) and densities P(u) h_rms (members, k) of snapshots; bins with few cells are joined."""
+    """Return reduced gaps u/h_rms, and for each snapshot the densities P(u) h_rms; bins with few cells are joined."""
     (first, _), *_ = members
     edges = first["gap_bin_edges"].values / float(first["rms_height"])
     contents = np.array([run["gap_density"].values[at] * float(run["rms_height"]) for run, at in members])
@@ -122,9 +122,9 @@ def gap_densities(members: Sequence[tuple[xr.Dataset, int]]) -> tuple[np.ndarray
 def pressure_densities(
     members: Sequence[tuple[xr.Dataset, int]], *, joined: bool = False
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return pressures p/(E* h'_rms) (k,) and densities P(p) E* h'_rms (members, k) of bins that are not empty.
+    """Return reduced pressures p/(E* h'_rms), and for each snapshot the densities P(p) E* h'_rms.
 
-    With `joined`, bins with few nodes are joined. Boundary elements have few nodes in contact.
+    Empty bins are left out. If `joined` is True, bins with few nodes are joined (boundary elements).
     """
     (first, _), *_ = members
     unit = float(first["contact_modulus"]) * float(first["rms_slope"])

@@ -23,11 +23,11 @@ if TYPE_CHECKING:
 
 
 class MapFigure(SnapshotFigure, RunFigure):
-    """A figure of one snapshot of one run. An option that is left out has the first value in the study."""
+    """A figure of one snapshot. ICHA draws the first run that fits the options, if possible with adhesion."""
 
 
 def inputs(campaign: Campaign, options: MapFigure, files: results.ResultFiles) -> Inputs:
-    """Return the campaign dataset, the surface file, and the same run with boundary elements, if there is one."""
+    """Return the paths of the campaign dataset, of the surface file, and of the same run with boundary elements."""
     run = options.run(campaign)
     found = {"campaign": files.path(results.DATASET), "surface": files.path(results.SURFACE, run)}
     if run.model == DEFAULT_MODEL and REFERENCE_MODEL in campaign.studies[options.study].models:
@@ -118,7 +118,7 @@ def figure(
 def _view(run, at, topography):
     """Return the spots as circles (`wrap_circles`), and the lower left corner and the side of the enlarged window.
 
-    The centre of the window is the largest spot. All lengths are in the unit of the axes.
+    The window is around the largest spot. All lengths are in the unit of the axes.
     """
     from icha.datasets.campaign import spots_of
 
@@ -135,7 +135,7 @@ def _view(run, at, topography):
 
 
 def _draw_boundary_elements(panels, topography, window, heights, beside, covered):
-    """Draw contact regions of boundary elements over the topography, with enlarged spots, and the overlap of models."""
+    """Draw the contact regions of boundary elements, the edges of these regions when enlarged, and the overlap."""
     from matplotlib.colors import LinearSegmentedColormap, to_rgb
     from matplotlib.patches import Patch
 

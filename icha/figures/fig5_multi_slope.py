@@ -64,8 +64,8 @@ def figure(
     ----------
     campaign : the campaign dataset.
     tables : files of measured curves; panel (b) shows only curves with a known rms slope.
-    measurements : for each table: `label`; `columns` (headings of load and area, with factors); `load_unit` (load
-        over p/(E* h'rms)); `material` and `rms_slope`, None if they are not known.
+    measurements : legend `label`, `columns` (headings and factors), `load_unit` (load over p/(E* h'rms)), `material`
+        and `rms_slope` of each table; unknown values are None.
     """
     # Open markers do not hide each other where curves coincide.
     curves = study_curves(campaign, study, boundary_elements, mfc="none")

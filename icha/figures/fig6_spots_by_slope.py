@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 class SlopesFigure(TopographyFigure):
     """A figure of the spots of all slopes, at the same load and at the same area."""
 
-    material: Label | None = Field(default=None, description="Material to show. Default: the first of the study.")
+    material: Label | None = Field(default=None, description="Material to show. Default: the study's first material.")
 
     def study_problems(self, campaign: Campaign, study: Any) -> Iterator[Problem]:
         """Also yield a problem if the study does not have snapshots of both kinds."""
@@ -54,7 +54,7 @@ def figure(
     seed: int | None = None,
     material: str | None = None,
 ) -> Figure:
-    """Draw the spots of all slopes for one surface, seed and material; each defaults to the first of the study."""
+    """Draw the spots of all slopes for one surface, seed and material, by default the first of the study."""
     from matplotlib.patches import Patch
 
     runs = select_by_labels(select_runs(campaign, study), surface=surface, seed=seed, material=material)

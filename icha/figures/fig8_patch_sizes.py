@@ -82,8 +82,8 @@ def patch_density(areas: Sequence[np.ndarray], nominal_area: float) -> tuple[np.
 
     Returns
     -------
-    Patch areas (k,) and densities (members, k). The number of patches in a bin is density times bin width times
-    nominal area.
+    Patch areas (k values), and densities of every member, an array of shape (members, k). The number of patches in a
+    bin is density times bin width times nominal area.
     """
     pooled = np.sort(np.concatenate(areas))
     if not len(pooled):
@@ -96,9 +96,9 @@ def patch_density(areas: Sequence[np.ndarray], nominal_area: float) -> tuple[np.
 
 
 def patches_above(areas: Sequence[np.ndarray], nominal_area: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return patch areas (k,), and the numbers of patches (members, k) per nominal area that are at least as large.
+    """Return patch areas, and for each member the number per nominal area of patches with at least this area.
 
-    The argument `areas` is that of `patch_density`.
+    The parameter `areas` has the same meaning as in `patch_density`.
     """
     pooled = np.sort(np.concatenate(areas))
     # The numbers of patches are evenly spaced on a logarithmic axis, so that the few largest patches are all shown.

@@ -31,7 +31,7 @@ _STATE = ("contact_area_fraction", "reduced_separation")
 
 @in_style
 def figure(campaign: xr.DataTree, *, study: str, kind: str | None = None, target: float | None = None) -> Figure:
-    """Draw the states of all runs of a study at one snapshot against the Tabor parameter."""
+    """Draw contact area and mean separation at one snapshot against the Tabor parameter, for all runs of a study."""
     from icha.analysis.model_error import state_of
     from icha.datasets.campaign import find_snapshot
 
@@ -52,7 +52,7 @@ def figure(campaign: xr.DataTree, *, study: str, kind: str | None = None, target
         elif group.applicable:
             bare.setdefault(contact, []).append(group)
     if not curves:
-        raise NothingToDraw(f"study {study}: no complete run with adhesion, without which no Tabor parameter exists")
+        raise NothingToDraw(f"study {study}: no run with adhesion is complete; the figure needs a surface energy")
 
     dataset = campaign[study].to_dataset()
     contacts = [contact for contact, _ in curves]

@@ -2,8 +2,8 @@
 
 The colour of a marker shows the material. Crosses are results of boundary elements. Closed markers are results of the
 asperity model with adhesion, open markers those without adhesion. The shape of closed and open markers distinguishes
-surfaces and slopes. Many materials, or many surfaces and slopes, have graded colours from dark to bright, and the
-legend names only some of these materials or surfaces.
+surfaces and slopes. If there are many materials, or many surfaces and slopes, colours change gradually from dark to
+bright. The legend then names only some of these lines.
 """
 
 from __future__ import annotations
@@ -66,10 +66,10 @@ class Looks:
 
     Parameters
     ----------
-    campaign : the campaign dataset, in which the order of materials determines the colours.
+    campaign : the campaign dataset; the order of the materials in the dataset determines the colours.
     interfaces : modulus, surface energy and range of attraction of the materials.
     contacts : material, surface and rms slope of every line.
-    by_place : True if colours distinguish places instead of materials. More than `MOST_COLOURS` places have colours.
+    by_place : True if colours distinguish places instead of materials, always so for more than `MOST_COLOURS` places.
     """
 
     def __init__(
@@ -97,16 +97,16 @@ class Looks:
             self._sizes |= {name: max(largest * _NARROWER**rank, _LEAST_SIZE) for rank, name in enumerate(alike)}
 
     def adhesive(self, material: str) -> bool:
-        """Return whether the surface energy of a material is positive."""
+        """Return True if the surface energy of a material is positive."""
         return float(self.interfaces["surface_energy"].sel(material=material)) > 0
 
     def colour(self, contact: Contact) -> str:
-        """Return the colour of a contact; grey if the figure has no line of this material or place."""
+        """Return the colour of a contact; grey if the figure has no line of this material or surface."""
         material, *place = contact
         return self._colours.get(tuple(place) if self.by_place else material, GREY)
 
     def material_colour(self, material: str | None) -> str:
-        """Return the colour of a material; black if the figure does not show the material or has colours for places."""
+        """Return the colour of a material; black if the colours do not show this material."""
         return self._colours.get(material, BLACK)
 
     def look(self, contact: Contact, *, applicable: bool = True) -> dict:
@@ -130,7 +130,7 @@ class Looks:
     def handles(self, **changed: object) -> dict[str, Line2D]:
         """Return the legend entries of materials, surfaces and slopes by name.
 
-        If there are many names, only some have an entry. `changed` are arguments of `Axes.plot` that replace others.
+        If there are many names, only some have an entry. `changed` are arguments of `Axes.plot`, which take precedence.
         """
         material, place = self.materials[0], self.places[0]
         if self.by_place:

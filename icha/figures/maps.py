@@ -63,7 +63,7 @@ def topography_of(run: xr.Dataset, surface: xr.Dataset) -> Topography:
 
 
 def draw_map(axes: Axes, nodes: np.ndarray, side: float, scale: float = 1.0, **look) -> AxesImage:
-    """Draw a map of the values `nodes` (n, n) times `scale` on a periodic grid; for large n, draw means over blocks.
+    """Draw a map of the array `nodes` times `scale` on a periodic grid; for a large array, draw means over blocks.
 
     Nodes are the centres of the cells of the image. The first row and column are repeated at the opposite border.
     """
@@ -75,7 +75,7 @@ def draw_map(axes: Axes, nodes: np.ndarray, side: float, scale: float = 1.0, **l
 
 
 def average_blocks(nodes: np.ndarray, most: int = _MOST_CELLS) -> np.ndarray:
-    """Return means over blocks of nodes, at most `most` blocks along a side; return few nodes unchanged."""
+    """Return means over blocks of nodes, at most `most` blocks along a side; return a small array unchanged."""
     count = min(len(nodes), most)
     if count == len(nodes):
         return nodes
@@ -86,7 +86,7 @@ def average_blocks(nodes: np.ndarray, most: int = _MOST_CELLS) -> np.ndarray:
 
 
 def wrap_circles(x, y, radius, period: float, boundary: str) -> np.ndarray:
-    """Return x, y and radius, (m, 3), of circles and of their periodic images that overlap the cell [0, L)²."""
+    """Return the circles and periodic images that overlap the square [0, L)², an array with columns x, y and radius."""
     steps = (-period, 0.0, period) if boundary == "periodic" else (0.0,)
     shifts = np.array([(dx, dy) for dx in steps for dy in steps])
     centres = np.column_stack([x, y])[:, None, :] + shifts
@@ -96,7 +96,7 @@ def wrap_circles(x, y, radius, period: float, boundary: str) -> np.ndarray:
 
 
 def draw_spots(axes: Axes, circles: np.ndarray, **look) -> None:
-    """Draw contact spots as circles, (m, 3) float of x, y and radius in the units of the axes."""
+    """Draw contact spots as circles; the columns of `circles` are x, y and radius in the unit of the axes."""
     from matplotlib.collections import EllipseCollection
 
     x, y, radius = circles.T

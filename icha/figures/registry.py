@@ -22,7 +22,7 @@ _NUMBERED = re.compile(r"fig(\d+)_")
 
 
 def figure_number(name: str) -> int:
-    """Return the number of a figure, which is part of its name."""
+    """Return the number in the name of a figure."""
     return int(_NUMBERED.match(name)[1])
 
 
@@ -47,7 +47,7 @@ def draw_figure(
 ) -> None:
     """Draw a figure and write it to `png` and `pdf`; if no run in the figure is complete, write a message only.
 
-    The declaration of the figure gives `inputs` and `arguments`.
+    The `inputs` are paths of files. The `arguments` are keyword arguments of the function `figure`.
     """
     from icha.figures.select import NothingToDraw
 
@@ -61,7 +61,7 @@ def draw_figure(
 
 
 def _read(files):
-    """Read netCDF files: return a dataset or tree, or a list for several files; return paths of other files unread."""
+    """Return the content of netCDF files as datasets or trees; return the paths of other files unchanged."""
     from icha.datasets.files import has_groups, read_campaign, read_dataset
 
     if not isinstance(files, str | os.PathLike):

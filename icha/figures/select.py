@@ -1,4 +1,4 @@
-"""Select the runs, snapshots and errors that a figure shows from the datasets of a campaign."""
+"""Select runs, snapshots and errors for a figure from the datasets of a campaign."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def select_runs(
 
     Parameters
     ----------
-    ragged : True if the runs shall include their spots and events, which take long to select.
+    ragged : True to include spots and events of the runs, which takes long.
     model : name of the model. Default: the `shown_model` of the study.
 
     Raises
@@ -139,7 +139,7 @@ def select_complete_run(campaign: xr.DataTree, labels: RunLabels) -> xr.Dataset:
 
 
 def path_steps(run: xr.Dataset) -> xr.Dataset:
-    """Return the steps of the first loading at the targets of the study; targets of rarer kinds are left out."""
+    """Return the steps of the first loading at targets of the study, only of the most frequent kind of target."""
     from icha.datasets.campaign import loading_stops
 
     run = run.isel(step=loading_stops(run).values)
@@ -162,13 +162,13 @@ def unloading_legs(run: xr.Dataset) -> list[xr.Dataset]:
 
 
 class Snapshots(NamedTuple):
-    """Runs that differ only in their seed, and the position of a snapshot of the same state in each run.
+    """Runs that differ only in their seed, and the index of the same snapshot in each run.
 
     Attributes
     ----------
     runs : the runs.
-    members : each run with the position of its snapshot.
-    truths : each boundary-element run with the position of its snapshot; empty if `runs` have boundary elements.
+    members : pairs of a run and the index of the snapshot in this run.
+    truths : the same pairs for runs with boundary elements; empty if `runs` have boundary elements.
     """
 
     runs: ContactRuns
@@ -179,7 +179,7 @@ class Snapshots(NamedTuple):
 def select_snapshots(
     campaign: xr.DataTree, study: str, kind: str | None = None, target: float | None = None
 ) -> list[Snapshots]:
-    """Return the same snapshot of every run on the first surface and slope of a study, with the `shown_model`."""
+    """Return the same snapshot of every run on the first surface and slope of a study, for the `shown_model`."""
     from icha.analysis.model_error import snapshot_if_any
     from icha.datasets.campaign import find_snapshot
 
@@ -250,8 +250,8 @@ ROUNDING = 1e-9
 def select_unloaded_runs(campaign: xr.DataTree, study: str) -> list[tuple[RunLabels, xr.Dataset]]:
     """Return the runs of a study that unload, without spots and events.
 
-    The reduced separation of these runs is the mean separation over the rms height, because the integral of the
-    pressure over the mean separation is the work. On a free square, mean gap and mean separation differ.
+    The reduced separation of these runs is the mean separation divided by the rms height. The integral of the pressure
+    over the mean separation is the work. On a free square, the mean gap is not the mean separation.
 
     Raises
     ------
@@ -305,6 +305,6 @@ def pull_off_step(run: xr.Dataset) -> int | None:
 
 
 def name_model(axes: Axes, campaign: xr.DataTree, studies: Iterable[str]) -> None:
-    """Write the name of the model that figures of some studies show above a panel."""
+    """Write the name of the `shown_model` of the studies above a panel."""
     models = dict.fromkeys(shown_model(campaign[study].to_dataset()) for study in studies)
     axes.set_title(", ".join(MODELS[model].words for model in models), loc="right")

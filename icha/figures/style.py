@@ -91,7 +91,7 @@ def new_figure(width: float, height: float) -> Figure:
 def new_panels(
     height: float, rows: int = 1, columns: int = 2, *, width: float = TWO_COLUMNS, **options: object
 ) -> tuple[Figure, np.ndarray]:
-    """Return a figure and its panels (rows, columns), marked as (a), (b), …; `options` as for `Figure.subplots`."""
+    """Return a figure and an array of panels with the marks (a), (b), …; `options` are those of `Figure.subplots`."""
     figure = new_figure(width, height)
     panels = figure.subplots(rows, columns, squeeze=False, **options)
     for axes, letter in zip(panels.ravel(), ascii_lowercase, strict=False):

@@ -2,14 +2,14 @@
 
 A point force F displaces the half-space by F/(pi E* r). The sum includes all periodic images, and a uniform
 counter-pressure that keeps the mean displacement zero. Ewald's method splits 1/r into two halves. The smooth half,
-erf(alpha r)/r, is summed as a Fourier series with non-uniform FFTs. Each Fourier mode of this half is
+erf(alpha r)/r, is summed as a Fourier series with non-uniform FFTs. Each Fourier mode of the smooth half is
 (2/(E* q)) erfc(q/(2 alpha)), divided by the area of the periodic cell. The short-ranged half, erfc(alpha r)/r, is
-summed over pairs of near points. A point may also have moments of a pressure. The displacement by the k-th moment is
+summed over pairs of close points. A point may also have moments of a pressure. The displacement by the k-th moment is
 proportional to the k-th power of the plane Laplacian, applied to 1/r (`icha.half_space.grid_displacement`).
 
 A single square on a free half-space has no images. The square is placed in a periodic cell of twice its side, in which
-two points of the square are closer to each other than to any image. Then the displacement by images and
-counter-pressure is subtracted (`icha.half_space.free_square`): the sum of F/(pi E* r) over the square remains.
+two points of the square are closer to each other than to any image. Then `icha.half_space.free_square` subtracts the
+displacement by images and counter-pressure. The sum of F/(pi E* r) over the square remains.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ _FLOOR = 0.05
 
 
 def _smooth_kernel(r, alpha):
-    """Return erf(alpha r)/r and its plane Laplacian at distances r >= 0, two arrays."""
+    """Return two arrays: erf(alpha r)/r and its plane Laplacian at distances r >= 0."""
     x = alpha * r
     tiny = x < 0.05
     safe = np.where(tiny, 1.0, r)
@@ -90,7 +90,7 @@ class _SmoothSum:
         self._points = [None, None]
 
     def _set_points(self, which, points):
-        """Set the points (n, 2), m, of plan 0 (sources) or plan 1 (targets), unless these points are already set."""
+        """Set the points of plan 0 (sources) or 1 (targets), an (n, 2) array in m, unless they are already set."""
         if self._points[which] is not points:
             angle = (points * (2 * np.pi / self._period)).astype(self._real)
             self._plans[which].setpts(np.ascontiguousarray(angle[:, 1]), np.ascontiguousarray(angle[:, 0]))
@@ -152,11 +152,11 @@ class Ewald:
         return 0.5 * self.period if self.free else self.period
 
     def bases(self, points):
-        """Return `free_square.basis` of the y and x coordinates of points (n, 2), m; None on a periodic surface."""
+        """Return `free_square.basis` of y and x coordinates; `points` is an (n, 2) array in m. None if periodic."""
         return (basis(points[:, 1], self.period), basis(points[:, 0], self.period)) if self.free else None
 
     def image_displacement(self, sources, targets, moments):
-        """Return the displacement (n,), m, at targets by the images of sources; both arguments come from `bases`."""
+        """Return the displacement in m at targets by the images of sources; both arguments come from `bases`."""
         field = image_field(*sources, moments, self.period, self.contact_modulus)
         by, bx = targets
         return np.einsum("ia,ia->i", by @ field, bx)
@@ -190,13 +190,13 @@ class Ewald:
 
     @cached_property
     def self_displacement(self):
-        """Smooth half at r = 0, a point's own displacement: by a unit force, m/N, and unit second moment, 1/(N m)."""
+        """Smooth half of a point's displacement at r = 0: by a unit force (m/N), by a unit second moment (1/(N m))."""
         value, laplacian = _smooth_kernel(np.zeros(1), self.alpha)
         scale = 1 / (np.pi * self.contact_modulus)
         return scale * value[0], scale * laplacian[0]
 
     def kernels(self, r):
-        """Return the short-ranged displacement at distances r by unit moments k = 0, 1, 2, three arrays.
+        """Return three arrays: short-ranged displacement at distances r by unit moments k = 0, 1, 2.
 
         The arrays are erfc(alpha r)/r, the plane Laplacian of erfc(alpha r)/r, and 1/r^5, all divided by pi E*.
         """
@@ -211,7 +211,7 @@ class Ewald:
         return force, moment, scale * inverse**2 / r
 
     def point_displacement(self, r):
-        """Return the displacement in this Ewald sum at distances r by unit moments k = 0, 1, 2, three arrays."""
+        """Return three arrays: displacement in this Ewald sum at distances r by unit moments k = 0, 1, 2."""
         raised = np.maximum(r, self.floor)
         force, moment = 1 / raised, 1 / raised**3
         fourth = np.where(r <= self.reach, 1 / raised**5, 0.0)
@@ -256,14 +256,14 @@ class PointHalfSpace:
 
     @classmethod
     def at(cls, points, period, contact_modulus, free=False) -> PointHalfSpace:
-        """Return the half-space with points (n, 2), m, in a square of side `period`, m, that is periodic or free."""
+        """Return the half-space with the given points, an (n, 2) array in m; `period` is the side in m."""
         ewald = Ewald.choose(period, contact_modulus, len(points), NEIGHBOURS, free)
         points = np.mod(points, ewald.period)
         found = cKDTree(points, boxsize=ewald.period).query_pairs(ewald.reach, output_type="ndarray")
         return cls._assemble(ewald, points, None, found.max(axis=1), found.min(axis=1))
 
     def extended(self, points) -> PointHalfSpace:
-        """Return the half-space with k more points (k, 2), m, after the present points."""
+        """Return the half-space with additional points, a (k, 2) array in m, after the present points."""
         known, period = len(self.points), self.ewald.period
         points = np.mod(points, period)
         tree = cKDTree(points, boxsize=period)
@@ -275,7 +275,7 @@ class PointHalfSpace:
 
     @classmethod
     def _assemble(cls, ewald, points, before, later, earlier):
-        """Build the half-space from new pairs of points, and from those of another half-space `before`, or None."""
+        """Build the half-space from new pairs of points, and from the pairs of `before` (a half-space or None)."""
         n, known = len(points), 0 if before is None else len(before.points)
         difference = periodic_difference(points[later], points[earlier], ewald.period)
         r = np.sqrt(difference[:, 0] ** 2 + difference[:, 1] ** 2)
@@ -295,7 +295,7 @@ class PointHalfSpace:
         return cls(ewald, points, pairs, near, (loose, loose.T), ewald.bases(points))
 
     def displacement(self, force, moment, fourth):
-        """Return the displacement (n,), m, by forces (N), second (N m^2) and fourth moments (N m^4), all (n,)."""
+        """Return the displacement in m by forces (N), second (N m^2) and fourth moments (N m^4): (n,) arrays."""
         w = self.ewald.smooth(self.points, self.points, force, moment)
         for halves, strength in zip(self.near, (force, moment, fourth), strict=True):
             for half in halves:
@@ -305,7 +305,7 @@ class PointHalfSpace:
         return self._subtract_mean_and_images(w, force, moment)
 
     def approximate_displacement(self, force):
-        """Return the displacement (n,), m, by forces alone, with a relative error of about 1e-3, for linear solves."""
+        """Return the displacement in m by forces alone, with a relative error of about 1e-3: array of shape (n,)."""
         w = self.ewald.loose(self.points, self.points, force)
         for half in self.near_loose:
             w += half @ force

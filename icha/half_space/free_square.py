@@ -21,9 +21,9 @@ _HIGHEST = 6
 
 
 def basis(x, cell: float) -> np.ndarray:
-    """Return the values (n, nodes) of the Lagrange polynomials of the Chebyshev nodes at coordinates x (n,), m.
+    """Return the values of the Lagrange polynomials of the Chebyshev nodes at coordinates x: (n, nodes) array.
 
-    cell : period of the sum, m; x is in [0, cell/2].
+    x : (n,) array, m, in [0, cell/2]; cell : period of the sum, m.
     """
     nodes, weight, _ = _chebyshev()
     distance = np.asarray(x)[:, None] / cell - nodes
@@ -36,7 +36,7 @@ def basis(x, cell: float) -> np.ndarray:
 
 
 def image_field(by, bx, moments, cell: float, contact_modulus: float) -> np.ndarray:
-    """Return the displacement by all images of m spots at the Chebyshev nodes of y and x, (nodes, nodes), m.
+    """Return the displacement in m by all images of m spots at the Chebyshev nodes of y and x: (nodes, nodes) array.
 
     The result includes the uniform displacement that makes the mean of the periodic sum zero.
 
@@ -73,7 +73,7 @@ def _chebyshev():
 
 @lru_cache(maxsize=1)
 def _image_potential_matrix():
-    """Return `image_potential` at every node by a unit source at every node, (nodes^2, nodes^2)."""
+    """Return `image_potential` at every node by a unit source at every node: array of shape (nodes^2, nodes^2)."""
     nodes, _, _ = _chebyshev()
     distance, index = np.unique(np.round(np.abs(nodes[:, None] - nodes), 15), return_inverse=True)
     index = index.reshape(_NODES, _NODES)
@@ -100,10 +100,10 @@ def image_potential(y, x):
 
 
 def mean_displacement(side: float, contact_modulus: float, position, force) -> float:
-    """Return the mean displacement, m, of a square on a free half-space by point forces (n,) at positions (n, 2).
+    """Return the mean displacement in m of a square on a free half-space by n point forces at given positions.
 
-    By reciprocity, a point force causes the mean displacement that a uniform pressure on the square with the same
-    resultant causes at the point. Each of the four rectangles around a point contributes x asinh(y/x) + y asinh(x/y).
+    By reciprocity, a uniform pressure on the square with the same resultant force displaces the point by the same
+    distance. Each of the four rectangles around a point contributes x asinh(y/x) + y asinh(x/y).
     """
     x, y = ([distance, side - distance] for distance in np.clip(position.T, 0.0, side))
     potential = sum(_corner_potential(width, height) for width in x for height in y)
@@ -111,6 +111,6 @@ def mean_displacement(side: float, contact_modulus: float, position, force) -> f
 
 
 def _corner_potential(x, y):
-    """Return the integral of 1/r over a rectangle of sides x, y; r is the distance from one of its corners."""
+    """Return the integral of 1/r over a rectangle of sides x, y; r is the distance from a corner of the rectangle."""
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.where(x > 0, x * np.arcsinh(y / x), 0.0) + np.where(y > 0, y * np.arcsinh(x / y), 0.0)

@@ -7,8 +7,8 @@ half of a large spot must be smooth on the scale of this spot. Therefore spots o
 group has a Fourier series with a different number of modes.
 
 The moments of a spot are M_k = integral of p r^(2k) / (4^k k!^2). Far from the spot, the displacement is the sum over k
-of M_k Lap^k (1/(pi E* r)), with the plane Laplacian Lap. The Fourier transform of this sum is that of a point force of
-the size sum of M_k (-q^2)^k.
+of M_k Lap^k (1/(pi E* r)), with the plane Laplacian Lap. In Fourier space, this sum equals the
+displacement by a point force of magnitude sum of M_k (-q^2)^k.
 """
 
 import math
@@ -44,7 +44,7 @@ _SERIES_LENGTH = 15
 
 
 def row_blocks(grid: int) -> list[slice]:
-    """Divide the rows of a grid into blocks, whose size does not depend on the number of cores; return slices."""
+    """Divide the rows of a grid into slices; the size of the slices does not depend on the number of cores."""
     return blocks(grid, max(_BLOCK // grid, 1))
 
 
@@ -94,7 +94,7 @@ class DisplacementField:
         return on_cores(lambda rows: function(rows, self.rows(rows)), row_blocks(self.grid))
 
     def rows(self, rows: slice) -> np.ndarray:
-        """Return the displacement (rows.stop - rows.start, grid) at the nodes of a range of rows, m."""
+        """Return the displacement in m at the nodes of a range of rows: array of shape (number of rows, grid)."""
         if not len(self.contact_radius):
             return np.zeros((rows.stop - rows.start, self.grid))
         # If the grid is too coarse for the Fourier series, its nodes are selected from a finer grid.
@@ -163,7 +163,7 @@ class DisplacementField:
         return finer, half
 
     def _compute_modes(self, group):
-        """Return the Fourier coefficients (2k + 1, k + 1) of the smooth half of one group of spots, m."""
+        """Return the Fourier coefficients in m of the smooth half of one group: array of shape (2k + 1, k + 1)."""
         highest = math.ceil(_CUT * group.alpha * self._cell / np.pi - 1e-9)
         y, x = (np.ascontiguousarray(self.centres[group.spots, axis]) * (2 * np.pi / self._cell) for axis in (1, 0))
         k = np.arange(-highest, highest + 1) * (2 * np.pi / self._cell)
@@ -216,7 +216,7 @@ class _Group:
 
 
 def smooth_half(y, moments):
-    """Return the sum over k of moments[:, k] Lap^k (erf(x)/x) at y = x^2, (m, n), with the plane Laplacian Lap.
+    """Return the sum over k of moments[:, k] Lap^k (erf(x)/x) at y = x^2, where Lap is the plane Laplacian.
 
     y : (m, n) float, values of (alpha r)^2; moments : (m, 4) float, as in `_Group`.
     """
@@ -284,9 +284,10 @@ _SMOOTH_HALF = _smooth_half_table()
 
 
 def windows(centres, reach: float, grid: int, period: float, rows: slice):
-    """Yield those nodes of some rows that lie in squares of half width `reach`, m, around centres (m, 2), m.
+    """Yield the nodes in some rows that lie in squares around `centres`, an (m, 2) array in m.
 
-    A few of the nodes lie a little outside the square. No node occurs twice for the same centre.
+    The half width of a square is `reach`, m. A few of the nodes lie a little outside the square. No node occurs twice
+    for the same centre.
 
     Yields
     ------

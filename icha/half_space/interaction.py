@@ -59,7 +59,7 @@ class Interaction:
     largest_radius : (n,) float, largest contact radii for which the list of exact pairs is complete, m.
     target, source : (k,) int, exact pairs: at the spot `target`, the displacement by the spot `source` is exact.
     r : (k,) float, distances of these pairs, m.
-    by_moments : three (k,) arrays, displacement by unit moments of the source, replaced by the exact displacement.
+    by_moments : three (k,) arrays, displacement by unit moments of the source, which the exact displacement replaces.
     """
 
     law: JKR
@@ -73,7 +73,7 @@ class Interaction:
 
     @classmethod
     def between(cls, law: JKR, half_space: PointHalfSpace, radius_of_curvature, largest_radius) -> Interaction:
-        """Return the interaction for contact radii up to `largest_radius` (n,), m, with its exact pairs."""
+        """Return the interaction and its exact pairs for contact radii up to `largest_radius`, (n,) array in m."""
         ewald = half_space.ewald
         later, earlier, r = half_space.pairs
         window = _exact_window(largest_radius, ewald)
@@ -94,7 +94,7 @@ class Interaction:
         )
 
     def displacement(self, a):
-        """Return the displacement w (n,) at each spot by all other spots and images for contact radii a (n,), m."""
+        """Return the displacement w at each spot by all other spots and images for radii a, in m."""
         law, R, j = self.law, self.radius_of_curvature, self.source
         moments = law.force(a, R), law.second_moment(a, R), law.fourth_moment(a, R)
         exact = law.displacement(self.r, a[j], R[j])
@@ -103,10 +103,10 @@ class Interaction:
         return self.half_space.displacement(*moments) + np.bincount(self.target, exact, len(a))
 
     def tangent(self, a) -> tuple[Callable, Callable]:
-        """Linearise the displacement at contact radii a (n,), m; changes of spots of radius zero are ignored.
+        """Linearise the displacement at contact radii a, (n,) array in m; ignore changes of spots of radius zero.
 
-        Return two functions that compute changes of the displacement (n,), m, from changes of the radii (n,), m. The
-        first function is exact. The second function has a relative error of about 1e-3 and is several times faster.
+        Return two functions that compute changes of the displacement from changes of the radii, both (n,) arrays in m.
+        The first function is exact. The second function has a relative error of about 1e-3 and is several times faster.
         """
         law, R, half_space = self.law, self.radius_of_curvature, self.half_space
         present = a > 0
@@ -136,7 +136,7 @@ class Interaction:
 def displacement_at(
     law: JKR, period: float, points, position, a, R, ewald: Ewald | None = None, *, free: bool = False
 ) -> np.ndarray:
-    """Return the displacement w (n,), m, of the half-space at n points by m spots, the sum of eq. (9).
+    """Return the displacement w of the half-space at n points by m spots, eq. (9): array of shape (n,) in m.
 
     The displacement is periodic and has zero mean. On a free half-space there are no images, and the mean
     is not zero. At a point under a spot, the displacement by this spot is included.

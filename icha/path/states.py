@@ -13,15 +13,15 @@ class Snapshot(Section):
     """A state whose spots and distributions of gap and pressure are saved. Give exactly one of the four keys."""
 
     reduced_pressure: ReducedPressure | None = Field(  # type: ignore[valid-type]
-        default=None, description="At this reduced pressure p/(E* h'rms)."
+        default=None, description="Reduced pressure p/(E* h'rms) of the state."
     )
     relative_load: Positive | None = Field(
-        default=None, description="At this relative load p/E* = F/(E* A0), independent of the slope of the surface."
+        default=None, description="Relative load p/E* = F/(E* A0) of the state, independent of the surface slope."
     )
     area_fraction: AreaFraction | None = Field(  # type: ignore[valid-type]
-        default=None, description="At this contact area fraction A/A0."
+        default=None, description="Contact area fraction A/A0 of the state."
     )
-    mean_separation: Length | None = Field(default=None, description="At this mean separation, with its unit.")
+    mean_separation: Length | None = Field(default=None, description="Mean separation of the state, with its unit.")
 
     _check = model_validator(mode="after")(exactly_one)
 

@@ -61,7 +61,7 @@ class PowerLaw:
     powers: Mapping[str, float]
 
     def seconds(self, **quantities: float) -> float:
-        """Return the expected time of a job with these quantities, s; quantities without a power have no effect."""
+        """Return the expected time of a job in s from its quantities; quantities without a power have no effect."""
         return self.base + self.scale * math.prod(quantities[name] ** power for name, power in self.powers.items())
 
 
@@ -104,10 +104,10 @@ class Cost:
 
     Attributes
     ----------
-    seconds : time on the job's number of cores, s.
+    seconds : time in s on the number of cores that the job uses.
     memory : largest memory of the job, bytes.
     disk : size of the job's file, bytes.
-    values : size of the values that a run adds to the campaign dataset, part of `disk`, bytes.
+    values : size in bytes of the values that a run adds to the campaign dataset; `disk` includes this size.
     """
 
     seconds: float
@@ -134,7 +134,7 @@ def surface_cost(grid: int) -> Cost:
 
 
 def spots(summits: float, load: float) -> float:
-    """Estimate the number of contact spots at a reduced pressure, to a factor of two for 10 to 200 000 summits."""
+    """Estimate the number of contact spots at a reduced pressure within a factor of 2, for 10 to 200 000 summits."""
     return max(1.0, summits * min(0.6, math.sqrt(load)))
 
 
@@ -148,7 +148,7 @@ class RunSize:
     summit : memory for each summit, bytes.
     maps : size of the compressed maps in the file, for each grid cell and snapshot, bytes.
     sticky : value of U_full/dgamma below which the time of a run is proportional to dgamma/U_full.
-    minutes : time limits of loading only, of a cycle, and of a run on several cores, minutes.
+    minutes : time limits in minutes for loading only, for a cycle, and for a run on several cores.
     """
 
     arrays: int
@@ -213,9 +213,9 @@ def run_cost(
 
 
 def finite_range_cost(nodes: int, *, adhesive: bool, **quantity: float) -> Cost:
-    """Return the expected cost of boundary elements at a finite range; the grid has `nodes` along a side.
+    """Return the expected cost of boundary elements at a finite range, on a grid of `nodes` x `nodes` nodes.
 
-    `quantity` is the reduced pressure `load` of one solution, or the `step` of the mean gap of a loop, in h_rms.
+    The keyword is `load` (reduced pressure) for a solution, or `step` (step of the mean gap in h_rms) for a loop.
     """
     seconds = _law("finite range", adhesive=adhesive, cycle="step" in quantity).seconds(nodes=nodes**2, **quantity)
     return Cost(seconds, WORKFLOW.forked + 20 * _DOUBLE * nodes**2, 40e3 + 0.04 * nodes**2)
@@ -251,9 +251,9 @@ def derived_cost(rule: str, runs: int, disk: float, values: float = 0.0, *, node
 
 
 def correction(pairs: Sequence[tuple[float, float]]) -> float:
-    """Return the factor that corrects expected times, from pairs (expected, measured) of jobs of the same kind, s.
+    """Return the factor that corrects expected times; `pairs` are expected and measured times of similar jobs, s.
 
-    The factor is the median of measured/expected time. With few pairs the factor is closer to 1; without pairs it is 1.
+    The factor is the median of measured/expected time. With few pairs the factor is closer to 1; no pairs give 1.
     """
     if not pairs:
         return 1.0

@@ -1,8 +1,9 @@
-"""Ownership of results: each folder of results belongs to one configuration file; no other file may replace results.
+"""Ownership of results: each folder belongs to one configuration file; no other file may replace its results.
 
-A record in the folder of results contains the path of the configuration file. The path is relative to the parent of
-results/, or to the workflow if the file came with the workflow. So the record stays valid if these folders are moved.
-Results without a record, from older versions, belong to the first file that is run.
+A record in the folder of results contains the path of the configuration file. The recorded path is relative to the
+parent folder of results/. The path of a file that came with the workflow is relative to the folder of the workflow.
+Relative paths keep the record valid if the folders are moved. Results without a record, from older versions, belong to
+the first file that is run.
 """
 
 import os
@@ -54,7 +55,7 @@ def _is_copy(results: Path, file: Path) -> bool:
 
 
 def _record_of(results: Path, file: Path, workflow: Path) -> str:
-    """Return the path of a configuration file in the form in which the record contains it."""
+    """Return the path of a configuration file as the record contains the path."""
     folder = Path(os.path.abspath(results)).parent.parent
     folder, workflow, file = (Path(path).resolve() for path in (folder, workflow, file))
     if file.is_relative_to(workflow) and not file.is_relative_to(folder):

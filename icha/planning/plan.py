@@ -41,7 +41,7 @@ class Item:
     state : state of the file: DONE, TO_DO, CHANGED, FAILED or DAMAGED.
     cost : expected cost of the job.
     threads : number of cores that the job uses.
-    reason : reason why the run failed; empty for other states.
+    reason : reason why the run failed; empty if the run did not fail.
     stage : number of the stage; jobs of a stage start after all jobs of earlier stages.
     """
 
@@ -66,7 +66,7 @@ class Item:
 
     @property
     def work(self) -> float:
-        """Expected work of the job: time multiplied by the number of cores, core-seconds."""
+        """Expected work of the job in core-seconds: time multiplied by the number of cores."""
         return self.cost.seconds * self.threads
 
 
@@ -74,8 +74,8 @@ def plan(campaign: Campaign, results: Path) -> list[Item]:
     """List all files of a campaign, except files of negligible cost, in the order of their computation.
 
     A run is done if its file exists and has the present settings (`config_sha256`). Only Snakemake detects changes of
-    the program. Any other file is done if the file and its inputs exist. A file is damaged if it differs from its
-    checksum (`icha.support.checksums`). Measured times in the folder `results` correct the expected times for this
+    the program. A file that is not a run is done if the file and its inputs exist. A file is damaged if it differs from
+    its checksum (`icha.support.checksums`). Measured times in the folder `results` correct the expected times for this
     machine.
     """
     items = _items(campaign, results)
@@ -95,7 +95,7 @@ def _correction(items: list[Item], results: Path) -> float:
 
 
 def _benchmark(results: Path, item: Item) -> float | None:
-    """Return the measured time of the last job that computed a file, s; None if the time is unknown."""
+    """Return the measured time in s of the last job that computed a file; None if the time is unknown."""
     try:
         lines = (results / job_file(item.path, "benchmarks", ".jsonl")).read_text(encoding="utf-8").splitlines()
         return float(json.loads(lines[-1])["s"])
@@ -209,7 +209,7 @@ def _cost_parameters(settings, rms_slope) -> dict:
 
 
 def run_state(file: Path, sha256: str) -> tuple[str, str]:
-    """Return the state of a run's file, and the reason if the run failed; `sha256` is that of the present settings."""
+    """Return the state of a run's file, and the reason of a failure; `sha256` is the checksum of the settings."""
     import h5py
 
     if not file.is_file():
@@ -247,7 +247,7 @@ def whole_cost(campaign: Campaign, results: Path) -> costs.Cost:
 
 
 def time_on(items: Iterable[Item], cores: int) -> float:
-    """Return the expected time from the call to the end, s, on a number of cores; 0 if no file must be computed.
+    """Return the expected time in s from the call to the end, on `cores` cores; 0 if no file must be computed.
 
     The cores share the work of a stage equally. A stage takes at least the time of its longest job, and at least the
     time for scheduling all jobs one after the other.
@@ -263,14 +263,14 @@ def time_on(items: Iterable[Item], cores: int) -> float:
 
 
 def start_up(items: Collection[Item]) -> float:
-    """Return the time from the call to the first job, s: start and plan of Snakemake, imports."""
+    """Return the time in s from the call to the first job: start of Snakemake, its plan, and imports."""
     if not any(item.to_do for item in items):
         return 0.0
     return WORKFLOW.start + WORKFLOW.planned * len(items)
 
 
 def memory_on(items: Iterable[Item], cores: int, most: float = math.inf) -> float:
-    """Return the largest memory of Snakemake and parallel jobs together, bytes.
+    """Return the largest memory in bytes that Snakemake and its parallel jobs use together.
 
     Parallel jobs together use at most `most` bytes, unless a single job needs more.
     """

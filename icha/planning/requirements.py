@@ -66,13 +66,13 @@ def solver_memory(campaign: Campaign, surface: str, entry: BesideStudy) -> int:
 
 
 def figure_memory(campaign: Campaign, *, holds_topography: bool) -> int:
-    """Return the memory that Snakemake reserves for a figure, MB; `holds_topography`: the figure shows a topography."""
+    """Return the memory that Snakemake reserves for a figure, MB; `holds_topography` is True for a topography."""
     largest = max(campaign.grid(surface) for study in campaign.studies.values() for surface in study.surfaces)
     return _megabytes(1000, max(MAP_ARRAYS.values()) * holds_topography, largest)
 
 
 def run_minutes(campaign: Campaign, case: RunLabels) -> int:
-    """Return the time limit of a run, minutes; the limit is many times the longest measured time of such runs."""
+    """Return the time limit of a run in minutes; the limit is many times the longest measured time of a run."""
     loading, cycle, several_cores = RUN_SIZES[case.model].minutes
     if surface_threads(campaign, case.surface) > 1:
         return several_cores

@@ -67,7 +67,7 @@ def surface_facts(campaign: Campaign, name: str) -> dict[str, float]:
     -------
     Properties of `icha.analysis.validity.VALIDATED`, and three more: `summits` is the number of supported summits,
     `rms_curvature` the rms curvature of profiles (1/m), and `complete_contact_pressure` the pressure for complete
-    contact divided by E*, which is estimated for random surfaces.
+    contact divided by E* (an estimate for random surfaces).
     """
     section = campaign.surfaces[name]
     if isinstance(section, SelfAffineSurface):
@@ -136,7 +136,7 @@ def expected_validity(campaign: Campaign) -> list[Statement]:
 
 
 def _describe_outside(tabor):
-    """Describe the cases with contact spots outside the range of Wu's formula; `tabor` has Tabor parameters by case."""
+    """Describe the cases with contact spots outside the range of Wu's formula; `tabor` has the Tabor parameters."""
     cases = []
     for (material, surface), values in tabor.items():
         if _SMALLEST_TABOR * min(values) < WU_HOLDS_FROM:

@@ -10,9 +10,10 @@ converges to wrong states, so ICHA searches for the mean gap at which the contac
 
 The gap is zero in contact, and attraction acts in a cohesive zone around the contact. In the law of Johnson, Kendall
 and Roberts (JKR) a contact area A lowers the energy by dgamma A. At a finite range the energetic area has the same
-effect. The energetic area is the integral of exp(-u/rho) over the nominal area, which is minus the derivative of the
-energy with respect to dgamma at fixed mean gap. The energetic area is larger than the area of zero gap. As the range
-decreases, both areas tend to the contact area of JKR, the energetic area at a much larger range.
+effect. The energetic area is the integral of exp(-u/rho) over the nominal area. At fixed mean gap, the derivative of
+the energy with respect to dgamma equals minus the energetic area. The energetic area is larger than the area of zero
+gap. As the range decreases, both areas tend to the contact area of JKR. The energetic area approaches this limit at a
+much larger range.
 """
 
 import math
@@ -95,18 +96,18 @@ class NodalState:
 
     @property
     def outside_pressure(self) -> float:
-        """Force outside the contact over the nominal area, Pa; zero or negative."""
+        """Force outside the contact, divided by the nominal area, Pa; zero or negative."""
         return float(self.traction[~self.contact].sum()) / self.contact.size
 
     def energetic_area_fraction(self, material: Material) -> float:
-        """Return the energetic area over the nominal area: the mean of exp(-u/rho), which is 1 in contact."""
+        """Return the energetic area, divided by the nominal area: the mean of exp(-u/rho) over all nodes."""
         raw = np.count_nonzero(self.contact) / self.contact.size
         if material.surface_energy == 0:
             return raw
         return raw - self.outside_pressure * material.interaction_range / material.surface_energy
 
     def stored_energy(self, material: Material) -> float:
-        """Return the elastic energy minus the energy of adhesion, over the nominal area, J/m^2; 0 without interaction.
+        """Return the elastic energy minus the energy of adhesion per nominal area, J/m^2; 0 without interaction.
 
         The elastic energy is half the mean of traction times displacement.
         """
@@ -148,7 +149,7 @@ def finite_range_solution(
     ValueError
         If an argument is out of range, or the grid does not resolve the attraction.
     NotSolved
-        If the solver does not reach its tolerance, or the contact carries the load at no mean gap.
+        If the solver does not reach its tolerance, or if no mean gap gives the load.
     """
     state = contact_state(
         surface, material, reduced_pressure, refinement=refinement, tolerance=tolerance, progress=progress
@@ -176,7 +177,7 @@ def contact_state(
 
 
 def refine(surface: Surface, material: Material, refinement: int) -> Surface:
-    """Return the surface on a finer grid for the solver; raise `ValueError` if this does not resolve the attraction."""
+    """Return the surface on a finer grid for the solver; raise `ValueError` if this grid is still too coarse."""
     surface.require_periodic("the solver for finite ranges")
     fine = surface.refined(REFINEMENT.validate("refinement", refinement))
     if problem := resolution_problem(material, fine.spacing):
@@ -235,7 +236,7 @@ class GapContact:
     """
 
     def __init__(self, fine, material, tolerance, gap=None):
-        """Set up the solver; the first solution starts from `gap`, (n, n), m."""
+        """Set up the solver; the first solution starts from the gaps `gap`, (n, n) array in m."""
         self.fine, self.material = fine, material
         self.solver = _Solver(fine, tamaas.PolonskyKeerRey.gap, tolerance)
         unit = self.solver.unit
@@ -252,7 +253,7 @@ class GapContact:
         self.solves = 0
 
     def start_from(self, gap):
-        """Start the next solution from these gaps (n, n), m."""
+        """Start the next solution from the given gaps, (n, n) array in m."""
         self.solver.model["gap"][:] = np.maximum(gap, 0.0) / self.solver.unit
 
     def solve(self, separation):
@@ -270,7 +271,7 @@ class GapContact:
         )
 
     def _iterate(self, mean):
-        """Iterate to convergence at a mean gap, in h_rms, with checks of the gap in between; return the error."""
+        """Iterate to convergence at a mean gap in h_rms, and check the gap at intervals; return the relative error."""
         iterations = 0
         while iterations < _MAX_ITERATIONS:
             self.solver.solver.max_iter = _OPEN_ITERATIONS if self._is_open() else _TOUCHING_ITERATIONS
@@ -287,7 +288,7 @@ class GapContact:
         return np.min(self.solver.model["gap"]) > 0
 
     def _imbalance(self):
-        """Return the error if no node is in contact: largest difference of traction and attraction over dgamma/rho.
+        """Return the error of a state without contact: largest difference of traction and attraction over dgamma/rho.
 
         Each mode of the traction is E* q/2 times the same mode of the displacement; the mean traction is unknown.
         """
@@ -302,7 +303,7 @@ class GapContact:
 
 
 def _find_gap_at_load(contact, pressure, separation, progress):
-    """Search for the mean gap at which the mean traction is `pressure`, Pa, from a first guess, m; return the state."""
+    """Search from a first guess (m) for the mean gap with the mean traction `pressure` (Pa); return the state."""
     unit = contact.fine.rms_height
     tried: list[tuple[float, float]] = []
     mean_gap = separation / unit
@@ -343,7 +344,7 @@ def _next_gap(tried):
 
 
 def perimeter_correction(contact: np.ndarray) -> tuple[float, float]:
-    """Return the area fraction of a periodic contact map (n, n), corrected for its edges, and the perimeter.
+    """Return the area fraction of a periodic contact map, corrected for errors at contact edges, and the perimeter.
 
     Nodes along the edge overestimate the area by (pi - 1 + ln 2)/24 of the perimeter times the spacing (Yastrebov,
     Anciaux & Molinari 2017, eq. 9). The unit of the perimeter is the grid spacing.

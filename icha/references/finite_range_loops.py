@@ -1,10 +1,11 @@
 """Loading and unloading at a finite range of attraction, with boundary elements, from no contact to no contact.
 
 The mean gap is prescribed, as in a stiff testing machine. Each solution starts from the last solution and therefore
-stays on the same branch until the branch ends. At its end the surfaces jump, and the energy of the jump is lost.
-The work done on the contact is minus the integral of the nominal pressure over the mean gap, by the trapezoidal rule.
-The work differs from the change of the stored energy by the energy that jumps dissipate, and by the error of this rule.
-A step with too large a difference is halved, at most five times. Therefore the position of a jump remains uncertain.
+stays on the same branch until the branch ends. At the end of a branch the surfaces jump, and the jump loses energy. The
+work done on the contact is minus the integral of the nominal pressure over the mean gap, by the trapezoidal rule. The
+work differs from the change of the stored energy by the energy that jumps dissipate, and by the error of the
+trapezoidal rule. If work and change of the energy in a step differ too much, the step is halved, at most five times.
+Therefore the position of a jump remains uncertain.
 """
 
 import math
@@ -59,7 +60,7 @@ def finite_range_loop(
     ----------
     surface, material, refinement, tolerance, seed, progress : as for
         `icha.references.finite_range.finite_range_solution`.
-    largest_reduced_pressure : p/(E* h'_rms) at which unloading begins, positive. A jump may exceed this pressure.
+    largest_reduced_pressure : p/(E* h'_rms) at which unloading begins, positive. A jump may end at a larger pressure.
     separation_step : largest step of the mean gap, in h_rms; a step with a jump is divided into up to 32 smaller steps.
 
     Returns
@@ -93,7 +94,7 @@ class _LoopSolver:
         self.range = material.interaction_range if adhesive else 0.0
 
     def solve_from_undeformed(self, separation):
-        """Return the state at a mean gap, m, starting from the undeformed surfaces."""
+        """Return the state at a mean gap in m; the solver starts from the undeformed surfaces."""
         return self.solve(separation - self.fine.heights, separation)
 
     def is_apart(self, state):
@@ -101,7 +102,7 @@ class _LoopSolver:
         return not state.contact.any() and state.gap.min() >= _APART * self.range
 
     def solve(self, gap, separation):
-        """Return the state at a mean gap, m, starting from the gaps (n, n), m, of another state."""
+        """Return the state at a mean gap in m; the solver starts from the gaps of another state, in m."""
         if self.contact.solves >= _MAX_SOLVES:
             raise NotSolved(
                 f"the loop has not ended after {self.contact.solves} solutions; use a larger separation_step"
@@ -110,7 +111,7 @@ class _LoopSolver:
         return self.contact.solve(separation)
 
     def steps(self, state, separation, halvings=_MAX_HALVINGS):
-        """Yield states from one state to a mean gap, m, in steps that are halved until their work is accurate."""
+        """Yield states from one state to a mean gap in m; steps are halved until their work is accurate."""
         after = self.solve(state.gap, separation)
         if halvings == 0 or self.work_error(state, after) <= self.work_tolerance:
             yield after
@@ -129,7 +130,7 @@ class _LoopSolver:
         return min(abs(_dissipated(records)[0]), _jump_position_error(records)[0])
 
     def total_work_error(self, records):
-        """Return the error of the work of all steps, J/m^2: dissipation in steps without jumps plus errors by jumps."""
+        """Return the work error of all steps in J/m^2: dissipation in steps without jumps plus errors by jumps."""
         dissipated = _dissipated(records)
         jump = dissipated > self.work_tolerance
         return abs(dissipated[~jump].sum()) + _jump_position_error(records)[jump].sum()
@@ -153,7 +154,7 @@ class _LoopSolver:
 
 
 def _load_and_unload(solver, step, target, progress):
-    """Return the records of all states of loading and of unloading, two lists; `target` is the largest load, Pa."""
+    """Return two lists: the states of loading and the states of unloading; `target` is the largest load, Pa."""
     start = float(solver.fine.heights.max()) + _START * solver.range
     last, legs = None, ([], [])
     try:
@@ -175,7 +176,7 @@ def _load_and_unload(solver, step, target, progress):
 
 
 def _load(solver, _, start, step, target):
-    """Yield the states of loading from the mean gap `start`, m, up to the load `target`, Pa, in steps of the gap, m."""
+    """Yield the states of loading from the mean gap `start` (m) to the load `target` (Pa), in steps of the gap."""
     state, count = solver.solve_from_undeformed(start), 0
     yield state
     while state.nominal_pressure < target * (1 - _LOAD_TOLERANCE):
@@ -191,7 +192,7 @@ def _load(solver, _, start, step, target):
 
 
 def _search_load(solver, before, after, target):
-    """Yield states between two states, up to the load, Pa; if the load lies in a jump, the last state is `after`."""
+    """Yield states between two states up to the given load; if the load lies in a jump, the last state is `after`."""
     for _ in range(_MAX_LOAD_SEARCHES):
         share = (target - before.nominal_pressure) / (after.nominal_pressure - before.nominal_pressure)
         separation = before.mean_separation + share * (after.mean_separation - before.mean_separation)
@@ -222,18 +223,18 @@ def _column(records, name):
 
 
 def _work(records):
-    """Return the work of each step between n records by the trapezoidal rule, (n - 1,), J/m^2."""
+    """Return the work of each step between n records in J/m^2, by the trapezoidal rule: array of shape (n - 1,)."""
     pressure = _column(records, "nominal_pressure")
     return -np.diff(_column(records, "mean_separation")) * (pressure[1:] + pressure[:-1]) / 2
 
 
 def _dissipated(records):
-    """Return the work of each step minus the change of the stored energy, (n - 1,), J/m^2."""
+    """Return the work of each step minus the change of the stored energy, in J/m^2: array of shape (n - 1,)."""
     return _work(records) - np.diff(_column(records, "stored_energy"))
 
 
 def _jump_position_error(records):
-    """Return the error of the work of each step if the pressure jumps at one end of the step, (n - 1,), J/m^2."""
+    """Return the work error (J/m^2) of each step if the pressure jumps at an end of the step: (n - 1,) array."""
     return np.abs(np.diff(_column(records, "mean_separation")) * np.diff(_column(records, "nominal_pressure"))) / 2
 
 

@@ -31,8 +31,8 @@ def persson_area(reduced_pressure):
 def corrected_persson_area(reduced_pressure):
     r"""Return the contact area fraction at an array of reduced pressures by Persson's theory, corrected by Xu et al.
 
-    Partial contact has a smaller variance of the pressure than full contact, V = (gamma + (1 - gamma) A/A0) V_full with
-    V_full = (E* h'_rms)^2/4, so that A/A0 = erf(p/sqrt(2 V)) is an equation for A/A0.
+    Partial contact has a smaller variance V of the pressure than full contact: V = (gamma + (1 - gamma) A/A0) V_full
+    with V_full = (E* h'_rms)^2/4. The equation A/A0 = erf(p/sqrt(2 V)) then determines A/A0.
     """
     pressure = np.sqrt(2) * np.asarray(reduced_pressure, float)
     area = np.ones_like(pressure)
@@ -42,10 +42,10 @@ def corrected_persson_area(reduced_pressure):
 
 
 def persson_pressure_density(pressure, reduced_pressure):
-    """Return P(p) over the nominal area at the pressures `pressure`, both in units of E* h'_rms (Persson 2001).
+    """Return the probability density P(p) of the pressure over the nominal area, by Persson (2001).
 
-    P(p) is a Gaussian of standard deviation 1/2 around p*, minus the same Gaussian around -p*. The integral of P(p)
-    over p > 0 is `persson_area`.
+    Pressures are in units of E* h'_rms. P(p) is a Gaussian of standard deviation 1/2 around p*, minus the same Gaussian
+    around -p*. The integral of P(p) over p > 0 is `persson_area`.
     """
     pressure = np.asarray(pressure, float)
     gauss = np.exp(-2 * (pressure - reduced_pressure) ** 2) - np.exp(-2 * (pressure + reduced_pressure) ** 2)
@@ -77,8 +77,8 @@ def persson_stiffness(reduced_pressure, spectrum):
 
         -p du/dp = sqrt(pi) int dq q^2 C(q) w(q) [gamma + 3 (1 - gamma) P^2] exp(-(w p/E*)^2).
 
-    For small pressures -p du/dp is a constant length u0, so that p falls as exp(-u/u0) and the stiffness is p/u0
-    (Persson 2007). The parameters are the same as for `persson_mean_separation`.
+    For small pressures -p du/dp is a constant length u0. Then p is proportional to exp(-u/u0), and the stiffness is
+    p/u0 (Persson 2007). The parameters are the same as for `persson_mean_separation`.
     """
     decay_length = _over_wave_numbers(_share_density, reduced_pressure, spectrum)
     return np.asarray(reduced_pressure, float) / decay_length

@@ -156,7 +156,8 @@ def _mean_power_above(t, n):
 def _sum_over_summits(of_summit, law, reduced_separation, moments):
     """Return the sum over the summits in contact, per area, of a function of contact radius and radius of curvature.
 
-    The variable of integration is the contact radius. The contact radius gives the approach and the height of a summit.
+    The variable of integration is the contact radius. Each contact radius corresponds to one approach, and so to one
+    height of the summit.
     """
     summits = gaussian_summits(moments)
     plane = np.asarray(reduced_separation, float)[..., None] * moments.rms_height

@@ -40,8 +40,8 @@ def reference_dataset(
 
     Parameters
     ----------
-    spectrum : spectrum of the surface. If it is None, as for a measured surface, Persson's theory gives only the area.
-    moments : spectral moments of the surface at any rms slope. If None, theories of separate summits are left out.
+    spectrum : spectrum of the surface, or None. Without a spectrum, Persson's theory gives only the area.
+    moments : spectral moments of the surface at any rms slope. None leaves out theories of separate summits.
     adhesive : materials with adhesion, by rms slope and name; each material has a curve of Fuller & Tabor.
     reduced_pressures : values of p/(E* h'_rms), increasing and positive.
     attrs : additional global attributes.
@@ -131,7 +131,7 @@ def _summit_theories(moments, adhesive):
 
 
 def _published_points(spectrum):
-    """Return published points by Green's function molecular dynamics, if they have this spectrum, by variable name."""
+    """Return published points by Green's function molecular dynamics, for this spectrum, by variable name."""
     gfmd = literature("gfmd_area")
     if spectrum is None:
         return {}

@@ -1,8 +1,8 @@
-"""Write files atomically: a file is complete or does not exist, survives a power cut, and has one owner.
+"""Write files atomically: a file is either complete or missing, also after a power cut.
 
-The latest call of the program owns a folder of results. Jobs of an earlier call may still run on another machine, but
-they cannot complete a result. Before a job moves a file to its final path, it locks the owner's file and checks the
-owner. A new call needs the same lock.
+The latest call of the program owns a folder of results: only jobs of this call may write there. Jobs of an earlier call
+may still run on another machine, but they cannot complete a result. Before a job moves a file to its final path, it
+locks the owner's file and checks the owner. A new call needs the same lock before it becomes the owner.
 """
 
 import fcntl
@@ -26,7 +26,8 @@ def whole_file(path: str | os.PathLike, *, lasting: bool = True) -> Iterator[Pat
     """Provide a temporary path; move the file to `path` if the block succeeds, else remove the temporary file.
 
     The folder of `path` is created if it is missing. The temporary path is unique, so two programs may write the same
-    file. If `lasting` is true, the content is written to the disk before the move, and the new name after the move.
+    file at the same time. If `lasting` is true, the content reaches the disk before the move, and the new name reaches
+    the disk after the move.
 
     Raises
     ------
@@ -62,7 +63,7 @@ def whole_file(path: str | os.PathLike, *, lasting: bool = True) -> Iterator[Pat
 
 
 def move_only_while_owned() -> None:
-    """Make this process a job, which writes results only while the call that started the job owns the results."""
+    """Make this process a job: it may move results only while the call that started it owns the results."""
     global _moving
     _moving = while_owned
 
@@ -100,7 +101,7 @@ def probe_folder(folder: Path) -> OSError | None:
 
 
 def _sync(path: Path) -> None:
-    """Write the content of a file, or the names in a folder, from the cache to the disk; macOS may delay this."""
+    """Write the content of a file, or the names in a folder, from the cache to the disk; macOS may delay the write."""
     descriptor = os.open(path, os.O_RDONLY)
     try:
         os.fsync(descriptor)
@@ -128,7 +129,7 @@ def take_over(file: str | os.PathLike) -> None:
 
 @contextmanager
 def while_owned() -> Iterator[None]:
-    """Prevent other calls from becoming owner during a block; raise `Superseded` if another call is owner already."""
+    """Let no other call become owner during a block; raise `Superseded` if another call is already owner."""
     word, _, file = os.environ.get(_OWNER_VARIABLE, "").partition(" ")
     if not word:
         yield

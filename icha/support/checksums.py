@@ -1,9 +1,9 @@
 """Sidecars: small files that record checksum, settings and inputs of each result.
 
 The sidecar of `results/<campaign>/<path>` is `results/<campaign>/checksums/<path>.json`. A sidecar contains the
-SHA-256, size and modification time of the result, which is a file or folder. A result with the same size and time
-counts as unchanged; otherwise its SHA-256 is computed. Errors of the storage change neither size nor time. A `thorough`
-check computes the SHA-256 of every file and so finds these errors.
+SHA-256, size and modification time of a result (file or folder). A result with the recorded size and time counts as
+unchanged; otherwise ICHA computes its SHA-256. A damaged disk can change the content of a file without a change of size
+and time. A `thorough` check computes the SHA-256 of every file, and so finds errors of the disk.
 
 A sidecar also contains a checksum of the parameters of the job, and the checksums of the job's inputs. An unchanged
 result may still belong to other settings, another program version, or other inputs. If a sidecar exists but its result
@@ -71,7 +71,7 @@ def distrust(results: str | os.PathLike, path: str) -> None:
 def is_whole(results: str | os.PathLike, path: str, *, thorough: bool = False) -> bool:
     """Return whether a result agrees with the checksum in its sidecar; True without a sidecar.
 
-    Unless `thorough` is true, a result with the same size and time counts as whole. If only the time differs, the
+    Unless `thorough` is true, a result with the recorded size and time counts as whole. If only the time differs, the
     sidecar receives the new time. The function returns False if the sidecar cannot be read.
     """
     file = Path(results, path)

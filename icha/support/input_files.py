@@ -1,7 +1,7 @@
 """Check input files from unknown sources: kind of file, memory for reading, dangerous HDF5 files; read CSV tables.
 
-A small file can declare a very large array, or contain a compressed one. Readers compare the declared size with a limit
-(`require_room`), and limit the memory of the libraries that read the file (`bounded_memory`).
+A small file can declare a very large array, or contain a large array in compressed form. Readers compare the declared
+size with a limit (`require_room`), and limit the memory of the libraries that read the file (`bounded_memory`).
 """
 
 import csv
@@ -42,7 +42,7 @@ class TooLarge(RefusedFile):
 
 
 def problem_with_path(path: str | os.PathLike) -> str | None:
-    """Describe why a path is not a readable file; None if it is one. Reading a pipe or device might never end."""
+    """Describe why a path is not a readable file, or return None. Reading a pipe or device might never end."""
     try:
         mode = os.stat(path).st_mode
     except (FileNotFoundError, NotADirectoryError, ValueError):  # ValueError for zero bytes in a path
@@ -70,7 +70,7 @@ def most_memory(file: str | os.PathLike | None = None) -> int:
 
 
 def require_room(needed: float, most: int | None = None) -> None:
-    """Raise `TooLarge` if more memory is `needed` than `most`, both in bytes; `most_memory` is the default."""
+    """Raise `TooLarge` if `needed` bytes of memory exceed `most` bytes; `most_memory` gives the default of `most`."""
     most = most_memory() if most is None else most
     if needed > most:
         raise TooLarge(f"about {formatting.size(needed)}", most)
@@ -111,7 +111,7 @@ def text(attribute: bytes | str | Iterable[bytes | str]) -> str:
 
 
 def refuse_traps(path: str | os.PathLike) -> None:
-    """Raise RefusedFile for an HDF5 file with links to or data in other files, cyclic groups, or too many names.
+    """Raise RefusedFile for an HDF5 file with links or data in other files, cyclic groups, or too many names.
 
     Links to other files could reach any file of this machine. A group with two names may contain itself, which crashes
     the netCDF library. Links to data in the same file are accepted. Files of other formats are not checked.

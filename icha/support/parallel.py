@@ -22,8 +22,8 @@ def cores() -> int:
 def on_cores(function: Callable, items: Iterable) -> list:
     """Apply a function to every item in parallel threads; return the results in the order of the items.
 
-    The results are bitwise the same for any number of cores if the items do not depend on this number. Threads save
-    time if the function mainly runs code of NumPy, SciPy or finufft.
+    The results are bitwise the same for any number of cores if the items do not depend on the number of cores. Threads
+    save time if the function mainly runs code of NumPy, SciPy or finufft.
     """
     items = list(items)
     count = min(cores(), len(items))

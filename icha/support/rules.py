@@ -51,7 +51,7 @@ class FloatRange:
         return f"a number in {self.interval}" + (", where the asperity model holds" if self.model_ends else "")
 
     def validate(self, name: str, value) -> float:
-        """Return a value as a float; raise ValueError, which names the argument, if it is not a number in bounds."""
+        """Return a value as a float; for invalid values, raise ValueError with the name of the argument."""
         unit = "" if self.unit == "1" else f" (in {self.unit})"
         if isinstance(value, bool) or not isinstance(value, numbers.Real):
             raise ValueError(f"{name}: {value!r} is not a number{unit}")
@@ -81,7 +81,7 @@ class IntegerRange:
         return not isinstance(value, bool) and isinstance(value, numbers.Integral) and self.least <= value <= self.most
 
     def validate(self, name: str, value) -> int:
-        """Return a value as an int; raise ValueError, which names the argument, if it is not an integer in bounds."""
+        """Return a value as an int; for invalid values, raise ValueError with the name of the argument."""
         if isinstance(value, bool) or not isinstance(value, numbers.Integral):
             raise ValueError(f"{name}: {value!r} is not an integer")
         if not self.contains(value):

@@ -12,7 +12,7 @@ ENOUGH = 5
 
 
 class Ensemble(NamedTuple):
-    """Statistics over the members of an ensemble. All arrays have the same shape, with NaN where members are too few.
+    """Statistics over the members of an ensemble. All arrays have the same shape; NaN means too few members.
 
     Attributes
     ----------
@@ -30,9 +30,9 @@ class Ensemble(NamedTuple):
     def band(self, *, positive: bool = False) -> tuple[np.ndarray, np.ndarray]:
         """Return the bounds of the confidence interval: m ± c, or m exp(± c/m) for a `positive` quantity of mean m.
 
-        The second form is the confidence interval of ln(m). To first order, the standard error of ln(m) is the standard
-        error of m divided by m (delta method). The bounds are then positive, and tend to m ± c for small c/m. If m is
-        not positive, the bounds are m ± c.
+        The form m exp(± c/m) is the confidence interval of ln(m). To first order, the standard error of ln(m) is the
+        standard error of m divided by m (delta method). The bounds are then positive, and tend to m ± c for small c/m.
+        If m is not positive, the bounds are m ± c.
         """
         above = (self.mean > 0) & positive
         factor = np.exp(np.divide(self.confidence, self.mean, out=np.zeros_like(self.mean), where=above))

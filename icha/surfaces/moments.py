@@ -36,10 +36,10 @@ def cells_per_short_wave(grid: int, summits: float) -> float:
 
 
 def error_of_cells(cells_per_short_wave: float) -> str:
-    """Describe the error of the contact area of boundary elements due to the grid; "" if the error is small.
+    """Describe the error of the contact area by boundary elements on a coarse grid; "" if the error is small.
 
-    Areas were compared with those on grids four times as fine, on random surfaces at p* = 1e-3 and 1e-2. The largest
-    errors were 93 % at 1.1 cells per shortest wave (white noise), 23 % at 2, 15 % at 3 and 11 % at 5 cells.
+    Contact areas of random surfaces at p* = 1e-3 and 1e-2 were compared with areas on grids four times as fine. The
+    largest errors were 93 %, 23 %, 15 % and 11 % for 1.1 (white noise), 2, 3 and 5 cells per shortest wave.
     """
     if cells_per_short_wave >= 0.9 * RESOLVED_CELLS:  # estimates from summits have an error of 10 %
         return ""
@@ -49,12 +49,12 @@ def error_of_cells(cells_per_short_wave: float) -> str:
 
 
 def summit_density(m2: float, m4: float) -> float:
-    """Compute the summits per area of an isotropic Gaussian surface, m4/(6 sqrt(3) pi m2), m^-2 (Nayak 1971)."""
+    """Compute the number of summits per area (m^-2) of an isotropic Gaussian surface, m4/(6 sqrt(3) pi m2)."""
     return m4 / (6 * math.sqrt(3) * math.pi * m2)
 
 
 def self_affine_integral(order: int, start: float, end: float, roll: float, hurst: float) -> float:
-    """Integrate k^order C(k)/C0 from `start` to `end`; C is C0 up to `roll`, and falls as k^(-2 - 2 hurst) above."""
+    """Integrate k^order C(k)/C0 from `start` to `end`; C = C0 below `roll`, and C ~ k^(-2 - 2 hurst) above `roll`."""
 
     def up_to(end):
         flat = min(end, roll) ** (order + 1) / (order + 1)
@@ -73,7 +73,8 @@ def self_affine_full_contact_energy(
     """Compute the elastic energy of full contact per area over E* (m) for a self-affine surface of rms slope 1.
 
     Lengths are in m. The result equals `Surface.full_contact_energy` of surfaces with the same `SelfAffineSpectrum`,
-    but the function needs no heights. It sums over the long waves and integrates the spectrum of the short waves.
+    but the function needs no heights. The function sums over the long waves and integrates the spectrum of the short
+    waves.
     """
     roll, last = period / rolloff_wavelength, period / short_wavelength
     # The wave at the cut-off does not belong to the spectrum, even if `last` is rounded up.
@@ -117,7 +118,7 @@ class SpectralMoments(NamedTuple):
         return (8 / 3 * self.m4) ** 0.5
 
     def scaled_to_rms_slope(self, rms_slope: float) -> SpectralMoments:
-        """Return the moments after all heights are multiplied by the factor that makes the rms slope `rms_slope`."""
+        """Return the moments of the surface with all heights scaled to the rms slope `rms_slope`."""
         factor = (rms_slope / self.rms_slope) ** 2
         return SpectralMoments(*(moment * factor for moment in self))
 

@@ -30,7 +30,7 @@ class SelfAffineSpectrum:
 
     Parameters
     ----------
-    period : L, side of the periodic cell, m; all three lengths must be in [1e-24, 1e9] m.
+    period : L, side of the periodic cell, m; all lengths of a spectrum must be in [1e-24, 1e9] m.
     rolloff_wavelength : 2 pi / q_0, m; at most the period.
     short_wavelength : 2 pi / q_1, the short cut-off, m; less than the roll-off wavelength.
     hurst : H, in (0, 1].
@@ -85,7 +85,8 @@ class SelfAffineSpectrum:
         """Wave vectors (kx, ky) of one half of the band, and their lengths |k|, in units of 2 pi / L.
 
         The wave vectors are sorted by max(|kx|, |ky|). So each mode receives the same random number on every grid and
-        with every short cut-off. A finer surface of the same seed only has additional short waves.
+        with every short cut-off. With the same seed, a finer surface has the same long waves and additional short
+        waves.
         """
         m = math.ceil(self.period / self.short_wavelength)
         kx, ky = np.meshgrid(np.arange(m + 1), np.arange(-m, m + 1))
@@ -100,7 +101,7 @@ class SelfAffineSpectrum:
 
     @cached_property
     def plateau(self) -> float:
-        """Plateau C0 of the spectrum, m^4, with which the modes of the periodic cell have exactly the rms slope."""
+        """Plateau C0 of the spectrum in m^4; the modes of the periodic cell then have exactly the given rms slope."""
         _, _, k, _ = self._band
         q = 2 * np.pi / self.period
         slope2 = 2 * float(np.sum(self._shape(k) * k**2)) * q**4

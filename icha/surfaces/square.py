@@ -4,18 +4,18 @@ import numpy as np
 
 
 def cell_of(period, free):
-    """Return the period of the points of a square, m: its side if it is periodic, twice its side if it is single."""
+    """Return the period (m) of the points of a square: the side if `free` is False, twice the side if True."""
     return 2 * period if free else period
 
 
 def periodic_difference(first, second, period):
-    """Return the difference first - second of coordinates (m, any shape) to the nearest periodic image."""
+    """Return the coordinate differences first - second (m) for the periodic image nearest to `first`."""
     difference = first - second
     return difference - period * np.rint(difference / period)
 
 
 def problem_with_heights(heights: np.ndarray) -> str | None:
-    """Return the problem if an array is not a height map (shape, values not finite, no roughness); else None."""
+    """Return a message if an array has the wrong shape, values that are not finite, or no roughness; else None."""
     if heights.ndim != 2 or heights.shape[0] != heights.shape[1] or heights.shape[0] < 8:
         return f"an array of shape {heights.shape}; expected a square of at least 8 x 8 heights"
     bad = int(np.count_nonzero(~np.isfinite(heights)))

@@ -75,7 +75,7 @@ class Asperities:
     radius_of_curvature : (n,) array, 1/sqrt(kappa1 kappa2), the geometric mean of the principal radii of curvature, m.
     period : side of the square, m.
     free : True for a single square on a half-space, False for one cell of a periodic surface.
-    unsupported_height : (m,) array, m, heights of the unsupported maxima of the spline, which are not asperities.
+    unsupported_height : (m,) array, m, heights of spline maxima that the nodes do not support; no asperities.
     """
 
     position: np.ndarray
@@ -87,7 +87,7 @@ class Asperities:
 
     @property
     def cell(self) -> float:
-        """Period of the positions, m; twice the side for a single square, so that no difference is wrapped."""
+        """Period of the positions in m: the side of a periodic surface, or twice the side of a single square."""
         return cell_of(self.period, self.free)
 
     def __len__(self) -> int:
@@ -115,23 +115,24 @@ def find_summits(surface: Surface) -> Asperities:
 
 
 def locate_summits(surface: Surface) -> Asperities:
-    """Locate the summits of a surface: maxima of a quintic spline, where the curvature is negative-definite.
+    """Locate the summits of a surface, the maxima of a quintic spline through its heights.
 
     A comparison of every node with its neighbours would miss or misplace elongated summits. On a crest oblique to the
-    grid, the highest node can lie several cells away from the summit, or no node is a maximum. Errors of this kind
-    would change the contact area by some per cent from grid to grid. Instead, Newton's method starts from every node
-    whose parabola has its top at a distance of at most one cell. A start counts only if Newton's method converges near
-    its node, because some steps are very long where a principal curvature is nearly zero.
+    grid, the highest node can lie several cells away from the summit, or no node is a maximum. Missed and misplaced
+    summits would change the contact area by some per cent from grid to grid. Therefore Newton's method starts from
+    every node whose local parabola has its top at most one cell away. ICHA ignores a start node if Newton's method
+    converges far from the node. Steps can be very long where a principal curvature is nearly zero.
 
-    The edges of a free square have no maxima, because a crest that crosses an edge has its top outside. The spline
-    continues the heights by point reflection at the edges, and only summits between the outermost nodes count.
+    The edges of a free square have no maxima, because a crest that crosses an edge has its top outside the square.
+    Point reflection continues the heights at the edges of a free square. Only summits between the outermost nodes
+    count.
 
     The spline rises above the surface near steps, pits, single pixels and plateaus. A maximum is a summit only if the
     nodes around it support its height (`_is_supported`).
 
     Returns
     -------
-    Asperities, in the order of the nodes from which they were found; possibly none.
+    Asperities in the order of their start nodes; there may be none.
     """
     spacing, margin = surface.spacing, _MARGIN if surface.free else 0
     heights = surface.heights
@@ -163,12 +164,12 @@ def locate_summits(surface: Surface) -> Asperities:
 
 
 def _is_supported(heights, summit, height):
-    """Return whether the nodes around each summit at `summit` (k, 2), in cells, support its height, (k,) bool.
+    """Return whether the nodes around each of k summits support the height of the summit: (k,) bool array.
 
     Along each axis, a parabola through nodes with second difference -d rises at most d/8 above the higher of two
-    neighbours. The function uses the smaller of the second differences at the two nodes beside the summit, because only
-    one of them is large at the edge of a plateau. Source: the limiter `minmod` of A. Suresh and H. T. Huynh, J. Comput.
-    Phys. 136 (1997) 83-99, doi:10.1006/jcph.1997.5745.
+    neighbouring nodes. The function uses the smaller second difference of the two nodes beside the summit. At the edge
+    of a plateau, only one of both second differences is large. Source: the limiter `minmod` of A. Suresh and H. T.
+    Huynh, J. Comput. Phys. 136 (1997) 83-99, doi:10.1006/jcph.1997.5745.
     """
     grid = len(heights)
     (row, column), (y, x) = np.floor(summit).astype(int).T, np.mod(np.rint(summit).astype(int), grid).T
@@ -182,7 +183,7 @@ def _is_supported(heights, summit, height):
 
 
 def _spline_coefficients(heights):
-    """Compute the coefficients (n, n) of the periodic quintic spline through the heights."""
+    """Compute the coefficients of the periodic quintic spline through the heights: array of shape (n, n)."""
     coefficients = np.empty_like(heights)
     transform = partial(scipy.ndimage.spline_filter1d, order=_DEGREE, axis=1, mode="grid-wrap")
 
@@ -198,7 +199,7 @@ def _spline_coefficients(heights):
 
 
 def _climb(coefficients, node, flat):
-    """Return the positions (k, 2), in cells, of the summits that Newton's method finds from the nodes (m, 2)."""
+    """Return the positions in cells of the summits found by Newton's method from the start nodes: (k, 2) array."""
     grid = len(coefficients)
     at, converged = node.copy(), np.zeros(len(node), dtype=bool)
     moving = np.arange(len(node))
@@ -218,9 +219,10 @@ def _climb(coefficients, node, flat):
 
 
 def _nodes_near_summits(coefficients):
-    """Return the nodes (k, 2) whose Newton step to a maximum is at most one cell, and the least curvature of a summit.
+    """Return the nodes with a Newton step to a maximum of at most one cell, and the least curvature of a summit.
 
-    A node with a smaller curvature counts as flat. The unit of the curvature is metres per squared cell.
+    The nodes are an array of shape (k, 2). A node counts as flat if its curvature is below the least curvature, in
+    metres per squared cell.
     """
     grid = len(coefficients)
 
@@ -247,7 +249,7 @@ def _nodes_near_summits(coefficients):
 
 
 def _spline(coefficients, at):
-    """Return the spline and its derivatives by y, x, yy, yx and xx at points (k, 2) in cells, each (k,)."""
+    """Return the spline and its derivatives by y, x, yy, yx and xx at k points: six arrays of shape (k,)."""
     grid = len(coefficients)
     floor = np.floor(at).astype(int).T
     (ty, tx), nodes = at.T - floor, np.arange(-2, 4)[:, None]
@@ -260,7 +262,7 @@ def _spline(coefficients, at):
 
 
 def _basis(t):
-    """Return value, slope and curvature, each (6, k), of the six quintic B-splines around points t (k,) in [0, 1)."""
+    """Return value, slope and curvature of six quintic B-splines at k points in [0, 1): arrays of shape (6, k)."""
     powers = np.cumprod(np.vstack([np.ones_like(t), np.broadcast_to(t, (_DEGREE, len(t)))]), axis=0)
     return [
         np.einsum("ij,jk->ik", polynomial, powers[: polynomial.shape[1]])
@@ -269,7 +271,7 @@ def _basis(t):
 
 
 def _newton_step(gy, gx, hyy, hyx, hxx, flat):
-    """Return whether the Hessian is negative definite, its determinant, and Newton's step (..., 2), otherwise zero."""
+    """Return whether the Hessian is negative definite, its determinant, and Newton's step (zero if not definite)."""
     determinant = hyy * hxx - hyx**2
     concave = (determinant > flat**2) & (hyy + hxx < 0)
     safe = np.where(concave, -determinant, 1.0)
@@ -306,8 +308,8 @@ def paraboloid_departure(
     -------
     float, the mean of abs(ln(d / (a^2 / 2R))) over the spots, weighted by their areas. Here d is the mean depth of the
     surface below the summit on the circle of radius a. Near the top of an elongated summit, d follows the arithmetic
-    mean of the principal curvatures, not 1/R. The function computes the value with both curvatures and returns the
-    smaller one; 0 if no spot is wider than half a cell.
+    mean of the principal curvatures, not 1/R. The function uses both curvatures in turn and returns the smaller
+    result, or 0 if no spot is wider than half a cell.
     """
     mode = "mirror" if surface.free else "grid-wrap"
     spline = scipy.ndimage.spline_filter(surface.heights, order=3, mode=mode)
@@ -391,7 +393,7 @@ class SummitCoverage:
         return unsupported / max(unsupported + int(np.count_nonzero(self.summit_height > separation)), 1)
 
     def reasons_against(self, separations: Iterable[float]) -> list[str]:
-        """Return the reasons why asperities do not represent the surface at these mean separations (m)."""
+        """Return the reasons why asperities do not represent the surface at the given mean separations (m)."""
         separations = np.unique(list(separations))
         uncovered = max(map(self.uncovered_share, separations), default=0.0)
         unsupported = max(map(self.unsupported_share, separations), default=0.0)

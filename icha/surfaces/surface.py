@@ -108,16 +108,16 @@ class Surface:
         return self.boundary == FREE
 
     def require_periodic(self, purpose: str) -> None:
-        """Raise ValueError if the surface is a free square; the message contains `purpose`, a computation."""
+        """Raise ValueError if the surface is a free square; the message names the computation `purpose`."""
         if self.free:
             raise ValueError(f"boundary: {FREE!r}; {purpose} needs a surface of boundary {PERIODIC!r}")
 
     def by_wave_vector(self, function) -> list:
         """Return the results of `function(k2, count, power)`, called for blocks of all wave vectors except zero.
 
-        Wave vectors are 2 pi/L (kx, ky) with integers kx and ky. k2 = kx^2 + ky^2, (n, m). power: |h_q|^2, m^2, (n, m).
-        count: (m,), 2 in columns whose power is the sum over two opposite wave vectors, else 1. A free square is
-        treated as one cell of a periodic surface.
+        Wave vectors are 2 pi/L (kx, ky) with integers kx and ky. k2 is the array of kx^2 + ky^2, and power the array of
+        |h_q|^2 in m^2. count is 2 in columns where power is the sum over two opposite wave vectors, else 1. A free
+        square is treated as one cell of a periodic surface.
         """
         n = self.grid
         half = np.empty((n, n // 2 + 1), dtype=complex)
@@ -147,7 +147,7 @@ class Surface:
         """Sums of |h_q|^2, q^2 |h_q|^2 and q^4 |h_q|^2 over all wave vectors, in m^2, 1 and m^-2.
 
         The sums equal the mean squares of height, of slope |grad h| and of the Laplacian. A free square has no
-        spectrum; its mean squares are computed at the nodes of a quintic spline.
+        spectrum; a quintic spline gives its mean squares at the nodes.
         """
         if self.free:
             return _mean_squares(self.heights, self.spacing)
@@ -169,10 +169,10 @@ class Surface:
 
     @property
     def rms_curvature(self) -> float:
-        """Root mean square curvature of profiles, sqrt(3/8 sum q^4 |h_q|^2) for an isotropic surface, 1/m.
+        """Root mean square curvature of profiles in 1/m: sqrt(3/8 sum q^4 |h_q|^2) for an isotropic surface.
 
-        In the Contact Mechanics Challenge, the inverse of this curvature is the radius R_c of the Tabor parameter, 60.1
-        nm.
+        The Contact Mechanics Challenge uses the inverse of the rms curvature, 60.1 nm, as the radius R_c in the Tabor
+        parameter.
         """
         return (3 / 8 * self.spectral_moments[2]) ** 0.5
 
@@ -202,7 +202,7 @@ class Surface:
         return -float(full_contact_pressure(self.heights, self.period, free=self.free).min())
 
     def scaled_to_rms_slope(self, rms_slope: float) -> Surface:
-        """Return the surface with all heights multiplied by the factor that makes its rms slope `rms_slope`."""
+        """Return the surface with all heights scaled to the rms slope `rms_slope`."""
         rms_slope = SLOPE.validate("rms_slope", rms_slope)
         factor = rms_slope / self.rms_slope
         scaled = replace(self, heights=self.heights * factor)
@@ -228,7 +228,7 @@ class Surface:
 
 
 def full_contact_pressure(heights: np.ndarray, period: float, *, free: bool = False) -> np.ndarray:
-    """Return the pressure in full contact at zero load, divided by E*, (n, n). In Fourier space p(q) = q E* h(q)/2.
+    """Return the pressure in full contact at zero load, divided by E*: (n, n) array with p(q) = q h(q)/2 for waves q.
 
     Parameters
     ----------
@@ -247,7 +247,7 @@ def full_contact_pressure(heights: np.ndarray, period: float, *, free: bool = Fa
 
 
 def edges_fit(heights: np.ndarray) -> bool:
-    """Return whether opposite edges of the heights (n, n) meet without a step if the surface is periodic."""
+    """Return whether the heights at opposite edges meet without a step when the surface repeats."""
     n = len(heights)
     compared = np.unique(np.linspace(1, n - 3, min(n, _COMPARED_LINES)).astype(int))
     for lines in (heights, heights.T):

@@ -263,7 +263,7 @@ def test_fig9_joins_runs_that_differ_in_range_and_shows_the_adhesionless_one():
     # The range is along the axis, and not in the name.
     assert len(legend(left.figure)) == 2 and not any("range" in name for name in legend(left.figure))
     tree = campaign_tree([(RunLabels("tabor", "asperities", "rough", 1, 1.0, "bare"), runs["bare"])])
-    with pytest.raises(ValueError, match="study tabor: no complete run with adhesion"):
+    with pytest.raises(ValueError, match="study tabor: no run with adhesion is complete"):
         fig9_tabor.figure(tree, study="tabor")
 
 

@@ -32,7 +32,7 @@ RAGGED = ("spot", "event")
 
 
 def index_variable(dim: str, label: str) -> Variable:
-    """Describe `<dim>_<label>`, which gives the position along `label` of the run of each spot or event."""
+    """Describe the variable `<dim>_<label>`: for each spot or event, the index of the run along `label`."""
     long_name = f"position of the {dim}'s run along {label}, from 0"
     return Variable((dim,), "1", long_name, np.int32, {"instance_dimension": label})
 

@@ -1,4 +1,4 @@
-"""Variables of the error of the asperity model; descriptions omit the common dimensions, labels of runs and the load.
+"""Variables of the error of the asperity model; descriptions omit the common dimensions (labels of runs, load).
 
 In the limit of a short range of attraction, contact has a sharp edge. Therefore the raw, the corrected and the
 energetic area of boundary elements are equal in this limit.

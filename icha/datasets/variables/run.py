@@ -15,7 +15,7 @@ def _index_of(dim: str) -> dict[str, str]:
     """Return the attributes of an index variable of an indexed ragged array (CF 1.11, section 9.3.4).
 
     The index variable gives the snapshot of each spot, or the step of each event. The CF attribute `featureType` is
-    left out, because it requires times and places on earth.
+    left out, because this attribute requires times and places on earth.
     """
     return {
         "instance_dimension": dim,

@@ -51,7 +51,7 @@ def read_tables(
     Parameters
     ----------
     name : name of the text file.
-    known : descriptions to which lines without a long name refer. Lines also refer to earlier tables of the file.
+    known : descriptions of variables for lines without a long name, which also use earlier tables.
     attributes : further attributes of variables, by name of the variable.
     texts : texts that replace names in braces in long names.
     """

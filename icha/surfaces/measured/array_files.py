@@ -55,7 +55,7 @@ def _require_room(declared):
 
 
 def read_netcdf(source, settings: Preparation) -> FileContent:
-    """Read heights, unit and size from a netCDF variable: `data`, else `height`, `heights`, `z` or the only map."""
+    """Read heights, unit and size from the netCDF variable `settings.data`, else a usual name or the only map."""
     import netCDF4
 
     with netCDF4.Dataset(source.path) as file:
@@ -98,7 +98,7 @@ def _side(coordinate, count):
 
 
 def read_hdf5(source, settings: Preparation) -> FileContent:
-    """Read heights and unit from an HDF5 dataset: `data`, or the only map; attributes are read as in netCDF.
+    """Read heights and unit from the HDF5 dataset `settings.data`, else from the only map, as in netCDF files.
 
     MATLAB (from version 7.3) stores arrays column by column, so the HDF5 file contains their transpose.
     """
@@ -126,7 +126,7 @@ def read_hdf5(source, settings: Preparation) -> FileContent:
 
 
 def _unpack(dataset):
-    """Read a dataset; apply its scale, offset and fill value as in netCDF; nan where numbers are missing."""
+    """Read a dataset with its scale, offset and fill value as in netCDF; missing numbers become nan."""
     stored, attributes = dataset[...], dataset.attrs
     fills = [each for name in ("_FillValue", "missing_value") for each in np.ravel(attributes.get(name, []))]
     # The fill value 0 is the default of HDF5, so zeros are heights.
@@ -158,7 +158,7 @@ def _is_map(shape):
 def find_maps(shapes: Mapping[Any, tuple[int, ...]]) -> list:
     """Return the names of the arrays that can be maps of heights.
 
-    MATLAB also stores lines and single numbers as two-dimensional arrays. Such arrays count only if the file has no
+    MATLAB also stores vectors and single numbers as two-dimensional arrays. Such arrays count only if the file has no
     other two-dimensional arrays.
     """
     maps = [name for name, shape in shapes.items() if _is_map(shape)]
@@ -212,7 +212,7 @@ def read_instrument(file, settings: Preparation) -> FileContent:
 
 
 def _choose_channel(opened, settings):
-    """Return the channel `data` of the settings, else the default channel, and its name ("" if it is the only map)."""
+    """Return the channel `settings.data` or the default channel, and the name of the channel ("" for an only map)."""
     channels = opened.channels
     names = [channel.name for channel in channels]
     maps = find_maps({k: tuple(channel.nb_grid_pts) for k, channel in enumerate(channels)})

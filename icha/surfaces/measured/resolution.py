@@ -36,7 +36,7 @@ class NoiseFloor:
     ----------
     wavelength : wavelength at which surface and noise have equal power, m; shorter waves are mostly noise.
     rms : rms height of the noise, m.
-    slope_share : share (0 to 1) of the waves shorter than `wavelength` in the mean square slope.
+    slope_share : fraction (0 to 1) of the mean square slope that waves shorter than `wavelength` contribute.
     """
 
     wavelength: float
@@ -95,7 +95,7 @@ class ScanResolution(PreparedTopography):
 
     @property
     def advice(self) -> dict[str, float | int]:
-        """Recommended `cutoff` (m) and `grid` that let the grid resolve the surface; empty if it is resolved."""
+        """Recommended `cutoff` (m) and `grid` that let the grid resolve the surface; empty if none are needed."""
         found = {}
         cutoff, pixel = self.cutoff or 0.0, self.measured.spacing
         if self.noise is not None and cutoff < self.noise.wavelength * (1 - 1e-9):
@@ -133,7 +133,7 @@ def noise_floor(surface: Surface) -> NoiseFloor | None:
     """Find the noise floor at the end of the radial power spectrum of a surface; None if the spectrum has no floor.
 
     The floor is the longest tail of the spectrum whose best power law falls less steeply than 1/q. The power of the
-    floor is the geometric mean of the half of the tail with the shorter waves.
+    floor is the geometric mean of the powers in the short-wave half of the tail.
     """
     q, power, edges = radial_power_spectrum(surface)
     log_q, log_power = np.log(q), np.log(np.maximum(power, np.finfo(float).tiny))

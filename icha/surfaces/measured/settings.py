@@ -38,8 +38,7 @@ class Preparation:
     data : name of the variable, dataset or channel to read; None if the file has only one, or has a default.
     first_axis : "y" or "x", the first axis of arrays whose dimensions have no names.
     height_unit : unit of the heights, m; None for the unit in the file.
-    lateral_unit : unit of the coordinates, m; None for the unit in the file or, if it has none, the unit of the
-        heights.
+    lateral_unit : unit of the coordinates, m; None for the unit in the file, else the unit of the heights.
     size : sides (x, y) of the whole scan, m; None for the size in the file.
     touches_first : "high" or "low": points with high or with low numbers touch the elastic body first.
     missing : treatment of points without a height, "refuse" or "fill".
@@ -47,7 +46,7 @@ class Preparation:
     detrend : trend to remove, "none", "tilt" or "curvature".
     cutoff : nesting index of the S-filter, m; None for no filter.
     taper : width of the strip at each edge in which the window reduces the heights, divided by the side.
-    grid : nodes along a side of the surface; None for the number of the scan.
+    grid : nodes along a side of the surface; None for the number of nodes of the scan.
     columns : numbers, from 1, of the columns x, y and z of a text file; None if the file has only three columns.
     """
 
@@ -98,9 +97,9 @@ def put_y_first(heights: np.ndarray, settings: Preparation) -> np.ndarray:
 
 
 def grid_indices(values: np.ndarray, axis: str) -> tuple[np.ndarray, int, float]:
-    """Return the index (n,) of each coordinate on a regular grid, and the number and distance of the grid lines.
+    """Return the index of each coordinate on a regular grid, and the number and distance of the grid lines.
 
-    Raises UnfitTopography, which names the `axis`, if the coordinates are not on a regular grid.
+    Raises UnfitTopography if the coordinates are not on a regular grid; the message names the `axis`.
     """
     low, high = values.min(), values.max()
     steps = np.diff(np.unique(values))
@@ -121,7 +120,7 @@ def grid_indices(values: np.ndarray, axis: str) -> tuple[np.ndarray, int, float]
 
 
 def choose_name(asked: str | None, names: Sequence[str], usual: Sequence[str], what: str) -> str:
-    """Choose the name of a variable, dataset or channel (`what`): `asked`, else a usual name, else the only name.
+    """Choose a variable, dataset or channel (`what`) by name: `asked`, else a usual name, else the only name.
 
     Raises UnfitTopography if the file does not contain `asked`, or if the choice is not clear.
     """

@@ -252,7 +252,7 @@ def _entries(lines):
 
 
 def _size(sizes, pixels, shape):
-    """Return the sides (x, y) in m, and the sides in an unknown unit; the unavailable ones are None."""
+    """Return the sides (x, y) in m, and the sides in an unknown unit; unavailable sides are None."""
     rows, columns = shape
     for texts, (nx, ny) in ((sizes, (1, 1)), (pixels, (columns, rows))):
         for x, y, in_metres in filter(None, map(_lengths, texts)):

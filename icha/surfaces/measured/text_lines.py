@@ -118,10 +118,10 @@ def are_decimal_between_blanks(text: str) -> bool:
 
 
 def are_halves_of_decimals(rows: list[list[str]]) -> bool:
-    """Return whether columns with digits before decimal commas alternate with columns with digits after them.
+    """Return whether columns alternate between digits before and digits after decimal commas.
 
-    Digits after a comma have no sign, and their number is the same in all rows of a column. Columns of integers have no
-    leading zeros, and their numbers have different lengths.
+    Digits after a comma have no sign. All rows of a column have the same number of such digits. Columns of integers
+    have no leading zeros, and their numbers have different lengths.
     """
     # A row is shorter if its last field is empty.
     width = max(map(len, rows))

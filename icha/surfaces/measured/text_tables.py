@@ -59,7 +59,7 @@ class SourceFile:
 
     @cached_property
     def layout(self) -> Layout | None:
-        """Heading, notation and number of columns of the file; None if it is not a text with numbers."""
+        """Heading, notation and number of columns of the file; None if the file is not a text with numbers."""
         return _find_layout(self.path)
 
     @property
@@ -75,7 +75,7 @@ class SourceFile:
 
     @property
     def values(self) -> np.ndarray:
-        """Numbers in the file, (rows, columns), nan where a number is missing.
+        """Numbers in the file, array of shape (rows, columns); nan where a number is missing.
 
         Raises UnfitTopography if the file has no numbers, a field that is not a number, or rows of different lengths.
         """
@@ -83,7 +83,7 @@ class SourceFile:
 
     @cached_property
     def _table(self):
-        """Numbers in the file, (rows, columns), and the line number (from 1) of each row."""
+        """Numbers in the file, array of shape (rows, columns), and the line number (from 1) of each row."""
         notation, columns = self.table_layout.notation, self.table_layout.columns
         rows, lines = [], []
         with open_text(self.path) as file:
@@ -229,7 +229,7 @@ def drop_coordinates(values: np.ndarray) -> tuple[np.ndarray, tuple[float, float
     heights, steps of the coordinates along x and y (None unless both are in the table), and a remark on removed parts.
 
     Raises UnfitTopography if the first row or column seems to contain coordinates in unequal steps, or the last row or
-    column coordinates in equal steps.
+    column seems to contain coordinates in equal steps.
     """
     heights, steps = values, {}
     for name in ("row", "column"):
@@ -251,7 +251,7 @@ def drop_coordinates(values: np.ndarray) -> tuple[np.ndarray, tuple[float, float
 
 
 def _coordinate_step(table):
-    """Return the step of coordinates in the first line of a table; nan if steps differ, None if it has heights."""
+    """Return the step of coordinates in the first line of a table; nan if steps differ, None for heights."""
     line, others = table[0], table[1:3]
     if len(table) < 3 or len(line) < _FEWEST_COORDINATES or any(_equal_step(each) is not None for each in others):
         return None

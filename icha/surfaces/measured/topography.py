@@ -231,7 +231,7 @@ def resample_to_square_pixels(scan: Scan, settings: Preparation) -> Scan:
 
 
 def _by_cosine_series(heights, axis, step, count):
-    """Evaluate the cosine series along an axis at the centres of `count` new pixels of a width of `step` old pixels."""
+    """Evaluate the cosine series along an axis at the centres of `count` new pixels, each `step` old pixels wide."""
     # Slow to import, and rarely needed.
     from scipy.signal import czt
 
