@@ -158,12 +158,12 @@ class Front:
         """Return the first-order change of the tension for given changes of strength and fraction."""
         return strengths * fraction_change + fraction * strengths_change
 
-    def opening(self, strengths: np.ndarray, fraction: np.ndarray) -> np.ndarray:
-        """Return the gap of cells at the front from their strengths and fractions, in cell sizes."""
+    def law_gap(self, strengths: np.ndarray, fraction: np.ndarray) -> np.ndarray:
+        """Return the gap of cells at the front by the law from their strengths and fractions, in cell sizes."""
         return COMPLIANCE * strengths * (1 - fraction)
 
-    def opening_change(self, strengths_change: np.ndarray, tension_change: np.ndarray) -> np.ndarray:
-        """Return the change of the gap for given changes of strength and tension, in single precision."""
+    def law_gap_change(self, strengths_change: np.ndarray, tension_change: np.ndarray) -> np.ndarray:
+        """Return the change of the gap by the law for given changes of strength and tension, in single precision."""
         return np.float32(COMPLIANCE) * (strengths_change - tension_change)
 
     def intensity(self, fraction: np.ndarray, pressure: np.ndarray, mean_fraction: np.ndarray) -> np.ndarray:

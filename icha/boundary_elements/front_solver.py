@@ -337,9 +337,9 @@ def newton_step(problem: FrontProblem, active: ActiveCells, damping: float) -> t
     local_strengths = front.local_strengths(active.mean_fraction)
     missing = np.where(at_front, front.tension(local_strengths, active.fraction) + active.pressure, 0.0)
     moved = linear.operator.displacement(missing.astype(np.float32))
-    opening = np.where(at_front, front.opening(local_strengths, active.fraction), 0.0)
+    law_gap = np.where(at_front, front.law_gap(local_strengths, active.fraction), 0.0)
     accuracy = float(np.clip(active.residual, *TOLERANCES.linear))
-    change, pressure_change = linear.solve(moved + opening - active.gap, accuracy)
+    change, pressure_change = linear.solve(moved + law_gap - active.gap, accuracy)
     return change, pressure_change - missing
 
 
@@ -418,10 +418,10 @@ class LinearisedFront:
         return pressure, stronger, tension
 
     def _left_side(self, unknowns, operator=None):
-        """Return the left side of the equations: change of displacement minus change of the opening by the law."""
+        """Return the left side of the equations: change of displacement minus change of the gap by the law."""
         pressure, stronger, tension = self._pressures(unknowns)
         result = (operator or self.operator).displacement(pressure)
-        result[self.at_front] -= self.front.opening_change(stronger, self.damping_factor * tension)
+        result[self.at_front] -= self.front.law_gap_change(stronger, self.damping_factor * tension)
         return result
 
     def _approximate_inverse(self, right):

@@ -21,13 +21,13 @@ from icha.support import parallel
 from icha.support.parallel import blocks, on_cores
 
 # Number of cells along a side of a tile; range of the short kernel in cells, which is also the margin of a tile.
-TILE, REACH = 128, 16
-# Spacing of the coarse grid in cells, and order of its splines; their support is at most REACH.
+TILE, RANGE = 128, 16
+# Spacing of the coarse grid in cells, and order of its splines; their support is at most RANGE.
 COARSENING, _ORDER = 4, 4
 _NODES = TILE // COARSENING
 # Ewald parameter a, per cell size. With this value the cut-off part of the short kernel and the error of the coarse
 # grid are both below `error`.
-_ALPHA = 2.3 / REACH
+_ALPHA = 2.3 / RANGE
 # Largest total area of the tiles, divided by the area of the grid, for which tiles are faster than the whole grid; the
 # second value is for grids whose transforms run on several cores.
 _LARGEST_COVER, _LARGEST_COVER_LARGE = 0.6, 1.2
@@ -64,7 +64,7 @@ class TiledGrid:
         """Return the tiles of cells (k,), ascending; None if they would not be faster than the whole grid."""
         if grid % COARSENING:
             return None
-        many = -(-grid // (TILE - 2 * REACH))
+        many = -(-grid // (TILE - 2 * RANGE))
         starts = COARSENING * (np.arange(many + 1) * (grid // COARSENING) // many)
         tile_of = np.searchsorted(starts, np.arange(grid), "right") - 1
         occupied = np.zeros((many, many), dtype=bool)
@@ -73,7 +73,7 @@ class TiledGrid:
         cover = _LARGEST_COVER if grid < parallel.LARGE_GRID else _LARGEST_COVER_LARGE
         if not 0 < len(tiles) * TILE**2 <= cover * grid**2:
             return None
-        corner, coarse = starts[tiles] - REACH, grid // COARSENING
+        corner, coarse = starts[tiles] - RANGE, grid // COARSENING
         sources, targets = _cells_by_tile(cells, grid, corner, starts[tiles + 1] - starts[tiles])
         row, column = ((first[:, None] // COARSENING + np.arange(_NODES)) % coarse for first in corner.T)
         covered = row[:, :, None] * coarse + column[:, None, :]
@@ -84,7 +84,7 @@ class TiledGrid:
         return cls(grid, len(tiles), sources, targets, nodes, number[covered])
 
     def convolve_short(self, values: np.ndarray, modes: np.ndarray) -> np.ndarray:
-        """Convolve values (k,) on the cells with a kernel of range REACH; `modes` are its modes on a tile."""
+        """Convolve values (k,) on the cells with a kernel of range RANGE; `modes` are its modes on a tile."""
         result = np.empty_like(values)
         self._convolve(modes, values, result)
         return result
@@ -152,7 +152,7 @@ def _cells_by_tile(cells, grid, corner, size):
         with_margin = np.stack([_window(number, *at) for at in corner[batch].tolist()])
         without = np.zeros_like(with_margin)
         for source, target, (rows, columns) in zip(with_margin, without, size[batch].tolist(), strict=True):
-            inner = slice(REACH, REACH + rows), slice(REACH, REACH + columns)
+            inner = slice(RANGE, RANGE + rows), slice(RANGE, RANGE + columns)
             target[inner] = source[inner]
         return _numbers_and_positions(with_margin), _numbers_and_positions(without)
 
@@ -201,10 +201,10 @@ def _interpolate(coarse):
 
 @cache
 def _inverse_modes():
-    """Return the Fourier modes on a tile of the inverse kernel q/2, cut off at distance REACH; all exceed 0.03."""
+    """Return the Fourier modes on a tile of the inverse kernel q/2, cut off at distance RANGE; all exceed 0.03."""
     along = scipy.fft.fftfreq(TILE) * TILE
     table = scipy.fft.irfft2(_wave_numbers(TILE) / 2)
-    return scipy.fft.rfft2(np.where(np.hypot(along[:, None], along) <= REACH, table, 0.0)).real.astype(np.float32)
+    return scipy.fft.rfft2(np.where(np.hypot(along[:, None], along) <= RANGE, table, 0.0)).real.astype(np.float32)
 
 
 @cache
@@ -217,7 +217,7 @@ def _displacement_modes(grid):
     modes[0, 0] = at_zero = 2 / (np.sqrt(np.pi) * _ALPHA)
     along = scipy.fft.fftfreq(TILE) * TILE
     table = scipy.fft.irfft2(modes)[np.ix_(along.astype(int), along.astype(int))]
-    near = scipy.fft.rfft2(np.where(np.hypot(along[:, None], along) <= REACH, table, 0.0)).real.astype(np.float32)
+    near = scipy.fft.rfft2(np.where(np.hypot(along[:, None], along) <= RANGE, table, 0.0)).real.astype(np.float32)
 
     coarse = grid // COARSENING
     q = _wave_numbers(coarse) / COARSENING

@@ -7,7 +7,7 @@ from icha import Material, SelfAffineSpectrum
 from icha.boundary_elements import tiles as module
 from icha.boundary_elements.contact import contact_of
 from icha.boundary_elements.half_space import HalfSpace
-from icha.boundary_elements.tiles import REACH, TILE, TiledGrid
+from icha.boundary_elements.tiles import RANGE, TILE, TiledGrid
 from icha.contact.model import PRESSURE
 from icha.support import parallel
 
@@ -24,7 +24,7 @@ def patches(grid, rng, count):
 def test_sums_nearby_are_those_of_cells_one_by_one(grid):
     rng = np.random.default_rng(grid)
     way = np.fft.fftfreq(TILE) * TILE
-    kernel = np.exp(-np.hypot(way[:, None], way) / 5) * (np.hypot(way[:, None], way) < REACH)
+    kernel = np.exp(-np.hypot(way[:, None], way) / 5) * (np.hypot(way[:, None], way) < RANGE)
     cells = patches(grid, rng, 6)
     values = rng.normal(size=len(cells))
     tiles = TiledGrid.of(cells, grid)
@@ -34,7 +34,7 @@ def test_sums_nearby_are_those_of_cells_one_by_one(grid):
     row, column = np.divmod(cells, grid)
     for at in rng.choice(len(cells), 200, replace=False):
         down, right = ((along - along[at] + grid // 2) % grid - grid // 2 for along in (row, column))
-        near = np.maximum(np.abs(down), np.abs(right)) < REACH
+        near = np.maximum(np.abs(down), np.abs(right)) < RANGE
         assert found[at] == pytest.approx(float(np.sum(kernel[down[near], right[near]] * values[near])), abs=1e-12)
 
 
