@@ -48,7 +48,8 @@ class Summits:
         """Find open summits with gap < reach - margin, (k,) bool, and cells away from contact with gap < -margin."""
         gap, touched = state.gap.ravel(), mask_of(state.cells, state.gap.shape).ravel()
         within = (gap[self.cell] - self.above - self.reach < -margin) & ~touched[self.cell]
-        # The surfaces also touch where they overlap without a summit. Neighbours of contact belong to the front solver.
+        # The surfaces also touch where they overlap without a summit; neighbours of contact belong to the front solver.
+        # Overlaps above the displacement error have already joined the contact, so only margin 0 finds such cells.
         touched[state.rim] = True
         return within, np.flatnonzero((gap < -margin) & ~touched)
 
@@ -60,14 +61,14 @@ class Summits:
         Return the cells to close, the cells newly tried, and the number of all cells within reach (also tried ones).
         """
         within, overlapping = self.find_within_reach(state, margin)
-        places = np.union1d(self.cell[within], overlapping)
-        new = places[~tried[places]]
+        candidates = np.union1d(self.cell[within], overlapping)
+        new = candidates[~tried[candidates]]
         jumping = within & ~tried[self.cell]
-        return np.union1d(self.contacts(jumping, state.gap.shape[-1]), new), new, len(places)
+        return np.union1d(self.contacts(jumping, state.gap.shape[-1]), new), new, len(candidates)
 
 
 def solve_adhesive_contact(
-    problem: FrontProblem, summits: Summits, contact: Contact, tolerance: float, *, close: bool = False
+    problem: FrontProblem, summits: Summits, contact: Contact, tolerance: float, *, nearby: bool = False
 ) -> tuple[AdhesiveContact, int]:
     """Solve the adhesive contact at a separation: relax the fronts and close cells within reach of the attraction.
 
@@ -78,12 +79,13 @@ def solve_adhesive_contact(
     problem : the surface, the law of its front, and the separation.
     summits : summits at which contact may form.
     contact : initial contact.
-    tolerance : largest allowed residual of the fronts.
-    close : whether the initial contact is close to equilibrium.
+    tolerance : largest allowed residual of the fronts. Above TOLERANCES.fine, contact forms only where the gap
+        is below the reach by a margin of TOLERANCES.coarse critical openings.
+    nearby : whether the initial contact is near equilibrium; then the coarser stages are skipped.
 
     Returns
     -------
-    The contact, and the number of summits and overlapping cells within reach that stay open.
+    The contact, and the number of summits and overlapping cells within reach (less the margin) that stay open.
 
     Raises
     ------
@@ -92,17 +94,17 @@ def solve_adhesive_contact(
     """
     margin = TOLERANCES.coarse * problem.front.critical_opening
 
-    def relax_locally(state, far):
+    def relax_around(state, far):
         return relax_in_windows(problem.space, problem.front, problem.separation, state, state.gap, far)
 
     stages = [(TOLERANCES.coarse, margin), (TOLERANCES.fine, 0.0), (tolerance, 0.0)]
     if tolerance > TOLERANCES.fine:
         stages[1:] = [(tolerance, margin)]
-    first = len(stages) - 1 if close else 0
+    first = len(stages) - 1 if nearby else 0
     tried, rounds, stage = np.zeros(problem.space.size, dtype=bool), 0, first
     while True:
         residual, distance = stages[stage]
-        solved = relax_front(problem, contact, residual, close=close, relax_locally=relax_locally)
+        solved = relax_front(problem, contact, residual, nearby=nearby, relax_around=relax_around)
         formed, new, within = summits.new_contact(solved, distance, tried)
         if not len(new):
             stage += 1

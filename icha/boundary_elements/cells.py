@@ -57,17 +57,17 @@ def merge_cells(
     )
 
 
-def find_among(places: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Find which `places`, (m,), are in ascending `cells`: (m,) bool, and the indices in `cells` of those found."""
-    index = np.searchsorted(cells, places)
+def find_among(sought: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Find which of `sought`, (m,), are in ascending `cells`: (m,) bool, and the indices in `cells` of those found."""
+    index = np.searchsorted(cells, sought)
     # No cell has the number -1.
-    present = np.append(cells, -1)[index] == places
+    present = np.append(cells, -1)[index] == sought
     return present, index[present]
 
 
-def blocks_around(grid: int, reach: int, cells: np.ndarray) -> np.ndarray:
-    """Return a field of blocks (BLOCK x BLOCK cells), 1 within at least `reach` cells of given cells, 0 elsewhere."""
+def blocks_around(grid: int, distance: int, cells: np.ndarray) -> np.ndarray:
+    """Return a field of blocks (BLOCK x BLOCK cells), 1 within at least `distance` cells of given cells, else 0."""
     occupied = np.zeros(2 * [-(-grid // BLOCK)], np.uint8)
     row, column = np.divmod(cells, grid)
     occupied[row // BLOCK, column // BLOCK] = 1
-    return maximum_filter(occupied, 2 * -(-reach // BLOCK) + 1, mode="wrap")
+    return maximum_filter(occupied, 2 * -(-distance // BLOCK) + 1, mode="wrap")

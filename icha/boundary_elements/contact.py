@@ -78,15 +78,16 @@ class BoundaryElements(FullContactProblem):
     ) -> CellState:
         """Find the next equilibrium from a state: at a mean separation (m), or at the load or area of `control`.
 
-        With `control`, `separation` is the first guess. Fronts move until they are stable, so `let_go` must be 0.
+        With `control`, `separation` is the first guess. `let_go`, the number of patches to detach by force, must be 0:
+        fronts move until they are stable, so unstable patches already detach.
         """
         if let_go:
-            raise NotConverged("boundary elements cannot let go of single patches")
+            raise NotConverged("boundary elements cannot detach single patches by force")
         find = self._leave_full_contact if self.is_full(state) else self._next_equilibrium
         return self.continue_from(find(state, separation, control), state)
 
     def continue_from(self, state: CellState, before: CellState) -> CellState:
-        """Return a state with its history: the history of the state `before`, and the events since that state."""
+        """Return a state with the history of the state `before` and the events between both states."""
         events = self._events(before, state)
         return replace(state, history=(*before.history, events) if len(events) else before.history)
 
@@ -94,7 +95,7 @@ class BoundaryElements(FullContactProblem):
         """Find the next equilibrium from a state that is not full contact; arguments as in `equilibrium`."""
         if control is None:
             closed = separation < self.smallest_gap
-            return self.full_contact(self.closing_pressure) if closed else self._solve(state, separation)
+            return self.full_contact(self.undetermined_pressure) if closed else self._solve(state, separation)
         if not self.adhesive and control.quantity == PRESSURE and control.target > 0 and len(state.cells):
             if control.target >= self.opening_pressure:
                 return self.full_contact(control.target)
@@ -104,7 +105,8 @@ class BoundaryElements(FullContactProblem):
     def _leave_full_contact(self, state, separation, control):
         """Find the next equilibrium from full contact, which opens where tension is largest; see `equilibrium`."""
         if control is None and separation <= 0:
-            return self.full_contact(self.closing_pressure)
+            return self.full_contact(self.undetermined_pressure)
+        # Without control, the pressure first falls to the opening pressure, at any separation. The next call opens.
         if control is None and self.pressure(state) > self.opening_pressure + ROUNDING * self.contact_modulus:
             return self.full_contact(self.opening_pressure)
         if control and control.quantity == PRESSURE and control.target >= self.opening_pressure:
@@ -181,13 +183,13 @@ class BoundaryElements(FullContactProblem):
             return contact
         return contact.apply_step(change, state.rates[1] * distance)
 
-    def _solve(self, state, separation, residual=TOLERANCES.front, *, close=False, same_slopes=False):
+    def _solve(self, state, separation, residual=TOLERANCES.front, *, nearby=False, reuse_slopes=False):
         """Solve the equilibrium at a separation (m), to a residual of the front; options as for `ControlProblem`."""
         if not self.adhesive:
             return self._solve_nonadhesive(state, separation=separation / self.spacing)
         problem = FrontProblem(self.space, self.front, self.topography, separation / self.spacing)
         start = self._predict(state, separation)
-        solved, pending = solve_adhesive_contact(problem, self.summits, start, residual, close=close)
+        solved, pending = solve_adhesive_contact(problem, self.summits, start, residual, nearby=nearby)
         new = CellState(
             separation,
             solved.cells,
@@ -198,7 +200,7 @@ class BoundaryElements(FullContactProblem):
             gap_residual=self._gap_residual(solved),
             pending=pending,
         )
-        if same_slopes and np.array_equal(new.cells, state.cells):
+        if reuse_slopes and np.array_equal(new.cells, state.cells):
             return replace(new, pressure_slope=state.pressure_slope, area_slope=state.area_slope, rates=state.rates)
         return self._with_slopes(new, float(np.clip(residual, *TOLERANCES.linear)))
 
@@ -223,7 +225,9 @@ class BoundaryElements(FullContactProblem):
 
     def _events(self, before, after):
         """Find the jumps, coalescences and splits of patches between two consecutive states."""
-        return patch_events(before, after, self._jump_energy, self.summits.cell, self.space.grid, self.spacing)
+        # Without adhesion, a jump releases no energy.
+        energy = self._energy_of_cells if self.adhesive else lambda state: np.zeros(len(state.cells))
+        return patch_events(before, after, energy, self.summits.cell, self.space.grid, self.spacing)
 
     def _with_slopes(self, state, accuracy):
         """Return the state with its rates, and with the derivatives of nominal pressure and area fraction."""
@@ -245,10 +249,6 @@ class BoundaryElements(FullContactProblem):
         """Return the elastic energy minus the work of adhesion of each cell in contact, (k,), J/m^2."""
         elastic = 0.5 * state.pressure * (self.heights.ravel()[state.cells] - state.separation)
         return elastic - self.law.material.surface_energy * adhesive_areas(state.fraction, state.mean_fraction)
-
-    def _jump_energy(self, state):
-        """Return the energy of each cell, (k,), that a jump of its patch can release, J/m^2; zero without adhesion."""
-        return self._energy_of_cells(state) if self.adhesive else np.zeros(len(state.cells))
 
 
 def contact_of(surface: Surface, material: Material) -> BoundaryElements:

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from icha.boundary_elements.cells import find_among, merge_cells, rim_of
-from icha.boundary_elements.front import average_fractions, bond_compliance
+from icha.boundary_elements.front import COMPLIANCE, average_fractions
 from icha.boundary_elements.half_space import HalfSpace, Operator
 from icha.contact.model import FullContact, NotConverged
 from icha.support.parallel import blocks, on_cores
@@ -64,7 +64,7 @@ class Contact:
     @property
     def bond_compliance(self) -> np.ndarray:
         """Compliance of the bond of each cell, (k,), in cell sizes per E*."""
-        return bond_compliance(self.fraction)
+        return COMPLIANCE * (1 / self.fraction - 1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,6 +149,8 @@ def solve_active_set(
     dtype = np.float32 if tolerance > topography.rounding else float
     keep, gap, before, changing = np.full(len(contact.cells), sticky), None, np.inf, not sticky
     for _ in range(_MAX_CHANGES):
+        if load is None and len(contact.cells) == space.size and (contact.fraction >= 1).all():
+            raise FullContact("the contact covers the whole surface")
         contact = _scale_to_load(space, contact, load)
         if gap is None:
             gap, misfit, separation = _compute_gap(space, topography, contact, separation, load, dtype)
@@ -183,9 +185,7 @@ def solve_active_set(
 
 
 def _scale_to_load(space, contact, load):
-    """Scale the pressures to a given load; without a load, raise `FullContact` if the contact covers the surface."""
-    if load is None and len(contact.cells) == space.size and (contact.fraction >= 1).all():
-        raise FullContact("the contact covers the whole surface")
+    """Return the contact with its pressures scaled to a given load; without a load, return the contact unchanged."""
     if load is None or not len(contact.cells):
         return contact
     scaled = contact.pressure * (load * space.size / np.sum(contact.pressure))
@@ -198,11 +198,11 @@ def _next_active_set(contact, keep, joining, smallest):
     keep : (k,) bool, cells that stay in any case. smallest : pressure below which other cells leave contact.
     Return the new contact and its `keep`; None if nothing changes.
     """
-    closing = (contact.pressure > 0) & (contact.fraction < 1)
+    to_close = (contact.pressure > 0) & (contact.fraction < 1)
     staying = keep | (contact.pressure >= smallest)
-    if not closing.any() and staying.all() and not len(joining):
+    if not to_close.any() and staying.all() and not len(joining):
         return None
-    fraction = np.where(closing, 1.0, contact.fraction)
+    fraction = np.where(to_close, 1.0, contact.fraction)
     cells, *values, keep = merge_cells(
         contact.cells[staying],
         joining,

@@ -35,13 +35,13 @@ _ROW_COMPLIANCE, _BOND_FACTOR = 1.7316, 3.5
 COMPLIANCE = _BOND_FACTOR * _ROW_COMPLIANCE
 # Compliance of a cell at the front in preconditioners: compliance of its bond minus that of the half-space.
 NET_COMPLIANCE = 0.6 * COMPLIANCE
-# Width and reach of the stencil in cells, and weight of the perimeter in the work of adhesion, fitted to JKR patches.
-_WIDTH, _REACH = 1.5, 5
+# Width and radius of the stencil in cells, and weight of the perimeter in the work of adhesion, fitted to JKR patches.
+_WIDTH, _RADIUS = 1.5, 5
 PERIMETER = 0.7
 # Weights of the perimeter and of the width of the front in the reported area, fitted to patches between Hertz and JKR;
 # smallest reported area of a cell, divided by its fraction.
 _EDGE, _FRONT_WIDTH, _SMALLEST_SHARE = 0.236, 1.115, 0.02
-_profile = np.exp(-0.5 * (np.arange(-_REACH, _REACH + 1) / _WIDTH) ** 2)
+_profile = np.exp(-0.5 * (np.arange(-_RADIUS, _RADIUS + 1) / _WIDTH) ** 2)
 STENCIL = _profile / _profile.sum()
 # Rows of the matrix of `neighbour_weights` that are built together.
 _BATCH = 4096
@@ -68,7 +68,7 @@ def neighbour_weights(cells: np.ndarray, shape: tuple[int, ...]) -> csr_array:
     grid, count = shape[-1], len(cells)
     number = np.full(math.prod(shape), -1, np.int32)
     number[cells] = np.arange(count, dtype=np.int32)
-    offset = np.arange(-_REACH, _REACH + 1)
+    offset = np.arange(-_RADIUS, _RADIUS + 1)
     weight = np.outer(STENCIL, STENCIL).astype(np.float32).ravel()
     columns, values, sizes = [], [], []
     for first in range(0, count, _BATCH):
@@ -92,11 +92,6 @@ def adhesive_areas(fraction: np.ndarray, mean_fraction: np.ndarray) -> np.ndarra
     return fraction - PERIMETER * fraction * (1 - mean_fraction)
 
 
-def adhesive_area_gradient(mean_fraction: np.ndarray) -> np.ndarray:
-    """Return the derivative of the sum of `adhesive_areas` with respect to the fraction of each cell."""
-    return 1 - PERIMETER + 2 * PERIMETER * mean_fraction
-
-
 def reported_areas(fraction: np.ndarray, mean_fraction: np.ndarray) -> np.ndarray:
     """Return the contact area of each cell as reported in results, divided by the cell area.
 
@@ -117,43 +112,41 @@ def reported_area_gradient(fraction: np.ndarray, mean_fraction: np.ndarray) -> n
     return np.where(share > _SMALLEST_SHARE, gradient, _SMALLEST_SHARE)
 
 
-def bond_compliance(fraction: np.ndarray) -> np.ndarray:
-    """Return the compliance of the bonds of cells with given fractions, in cell sizes per E*."""
-    return COMPLIANCE * (1 / fraction - 1)
-
-
 @dataclass(frozen=True)
 class Front:
     """Linear cohesive law of cells at the front; other modules use it only through these methods.
 
-    Fraction f, strength s, tension t and opening g of a cell obey t = f s and g = C s (1 - f).
+    Fraction f, strength s, tension t and gap g of a cell obey t = f s and g = C s (1 - f).
 
     Parameters
     ----------
     adhesion_length : dgamma/E*, in cell sizes; zero without adhesion.
-    interface_strength : tension, in E*, at which closed cells open inside the contact.
+    interface_strength : tension, in E*, at which closed cells open inside the contact, where the grid resolves tension.
+        At the front the grid smooths a singular tension, so that the strength s depends on the cell size.
     """
 
     adhesion_length: float
     interface_strength: float = math.inf
 
     @property
-    def strength(self) -> float:
+    def straight_strength(self) -> float:
         """Tension at which a closed cell at a straight edge starts to open, in E*."""
         return float(np.sqrt(2 * self.adhesion_length / COMPLIANCE))
 
     @property
     def critical_opening(self) -> float:
         """Gap g_c at which the tension of a cell at a straight front falls to zero, in cell sizes."""
-        return COMPLIANCE * self.strength
+        return COMPLIANCE * self.straight_strength
 
-    def strengths(self, mean_fraction: np.ndarray) -> np.ndarray:
+    def local_strengths(self, mean_fraction: np.ndarray) -> np.ndarray:
         """Return the tension at which closed cells at the front start to open, in E*; it is lower at convex fronts."""
-        return self.strength * np.sqrt(adhesive_area_gradient(mean_fraction))
+        # Derivative of the sum of `adhesive_areas` with respect to the fraction of each cell.
+        area_gradient = 1 - PERIMETER + 2 * PERIMETER * mean_fraction
+        return self.straight_strength * np.sqrt(area_gradient)
 
     def strength_change(self, strengths: np.ndarray, mean_fraction_change: np.ndarray) -> np.ndarray:
         """Return the first-order change of the strengths for given changes of the mean fractions."""
-        return self.strength**2 * PERIMETER / strengths * mean_fraction_change
+        return self.straight_strength**2 * PERIMETER / strengths * mean_fraction_change
 
     def tension(self, strengths: np.ndarray, fraction: np.ndarray) -> np.ndarray:
         """Return the tension of cells at the front from their strengths and fractions, in E*."""
@@ -175,11 +168,11 @@ class Front:
 
     def intensity(self, fraction: np.ndarray, pressure: np.ndarray, mean_fraction: np.ndarray) -> np.ndarray:
         """Return K/K_c of cells in contact: their tension divided by the tension of the law at the same fraction."""
-        return -pressure / self.tension(self.strengths(mean_fraction), fraction)
+        return -pressure / self.tension(self.local_strengths(mean_fraction), fraction)
 
     def relative_gap(self, gap: np.ndarray, mean_fraction: np.ndarray) -> np.ndarray:
         """Return the gap of open cells divided by the gap at which their tension is zero; below 1 the cells close."""
-        return gap / (COMPLIANCE * self.strengths(mean_fraction))
+        return gap / (COMPLIANCE * self.local_strengths(mean_fraction))
 
     def adhesion_energy(self, fraction: np.ndarray, mean_fraction: np.ndarray) -> float:
         """Return the work of adhesion dgamma times the adhesive area of all cells, in E* times cell size^3."""

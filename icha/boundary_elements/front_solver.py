@@ -50,11 +50,11 @@ class FrontTolerances:
     few : part of the front, 0 to 1.
     displacement : largest error of displacements, divided by the allowed residual of the front.
     moving_displacement : largest error of displacements in the first steps. After a step, the allowed error is
-        residual * min(moving_displacement, max(residual, linear[0])).
+        residual * min(moving_displacement, max(residual, linear[0])), about the residual that a Newton step leaves.
     certain_displacement : error of displacements at which the energies of two similar states can be compared.
     linear : smallest and largest relative error of the linearised equations; between them the error is the residual.
-    damping : damping of the bonds after the first step that raises the energy; twice as large if most of the front
-        is far from equilibrium at the start.
+    damping : smallest damping of the bonds after a step that would raise the energy. At least twice this damping is
+        used from the start if most of the front is far from equilibrium, and always at cells above `coarse`.
     """
 
     front: float = 1e-6
@@ -72,8 +72,8 @@ class FrontTolerances:
 TOLERANCES = FrontTolerances()
 # Smallest error to which displacements are solved, in units of the critical opening.
 _SMALLEST_ERROR = 1e-3 * TOLERANCES.front
-# Largest numbers of steps, of Krylov vectors, of local relaxations between steps; largest damping.
-_MAX_STEPS, _MAX_KRYLOV, _MAX_LOCAL_RELAXATIONS, _LARGEST_DAMPING = 400, 60, 5, 1e8
+# Largest numbers of iterations, of Krylov vectors, of local relaxations between steps; largest damping.
+_MAX_ITERATIONS, _MAX_KRYLOV, _MAX_LOCAL_RELAXATIONS, _LARGEST_DAMPING = 400, 60, 5, 1e8
 # Relative rounding error of the energy, and relative rounding error of the work of a step.
 _ENERGY_ROUNDING, _WORK_ROUNDING = 1e-12, 1e-11
 
@@ -87,6 +87,7 @@ class ActiveCells(Contact):
     gap : (k,), gap of each cell, in cell sizes.
     mean_fraction : (k,), Gaussian average of the fractions around each cell.
     intensity : (k,), stress intensity of each cell divided by the critical stress intensity, K/K_c = sqrt(G/dgamma).
+        For open cells: gap divided by the gap at which the tension vanishes; also below 1 if the cell closes.
     free : (k,) bool, whether the fraction of a cell may change.
     """
 
@@ -130,18 +131,18 @@ def find_active_cells(front: Front, state: AdhesiveContact) -> ActiveCells:
     intensity = front.intensity(state.fraction, state.pressure, state.mean_fraction)
     relative_gap = front.relative_gap(gap[state.rim], state.mean_fraction_rim)
     closed = mask_of(state.cells[state.fraction >= 1], state.gap.shape).ravel()
-    opening = intensity > 1
-    at_edge = ~np.all(closed[adjacent(state.cells[opening], grid)], axis=0) | (state.fraction[opening] < 1)
-    opening[opening] = at_edge | (-state.pressure[opening] > front.interface_strength)
-    closing = relative_gap < 1
+    can_open = intensity > 1
+    at_edge = ~np.all(closed[adjacent(state.cells[can_open], grid)], axis=0) | (state.fraction[can_open] < 1)
+    can_open[can_open] = at_edge | (-state.pressure[can_open] > front.interface_strength)
+    can_close = relative_gap < 1
     cells, fraction, pressure, mean_fraction, intensity, free = merge_cells(
         state.cells,
-        state.rim[closing],
+        state.rim[can_close],
         (state.fraction, 0.0),
         (state.pressure, 0.0),
-        (state.mean_fraction, state.mean_fraction_rim[closing]),
-        (intensity, relative_gap[closing]),
-        (opening | ((intensity < 1) & (state.fraction < 1)), True),
+        (state.mean_fraction, state.mean_fraction_rim[can_close]),
+        (intensity, relative_gap[can_close]),
+        (can_open | ((intensity < 1) & (state.fraction < 1)), True),
     )
     return ActiveCells(cells, fraction, pressure, gap[cells], mean_fraction, intensity, free)
 
@@ -192,9 +193,9 @@ def relax_front(
     contact: Contact,
     tolerance: float,
     *,
-    close: bool = False,
-    max_steps: int | None = None,
-    relax_locally: Callable[[AdhesiveContact, np.ndarray], Contact | None] = lambda state, cells: None,
+    nearby: bool = False,
+    max_iterations: int | None = None,
+    relax_around: Callable[[AdhesiveContact, np.ndarray], Contact | None] = lambda state, cells: None,
 ) -> AdhesiveContact:
     """Move the front of a contact to equilibrium, in steps that lower the energy.
 
@@ -202,34 +203,35 @@ def relax_front(
     ----------
     contact : initial contact; an `AdhesiveContact` must be a solution for the same problem.
     tolerance : largest allowed residual of the front.
-    close : whether the initial contact is close to equilibrium.
-    max_steps : number of steps after which the contact is returned, even if it has not converged.
-    relax_locally : function that relaxes the front of a state around given cells, (m,). The function returns None if
+    nearby : whether the initial contact is near equilibrium.
+    max_iterations : number of iterations after which the contact is returned, even if it has not converged. Each
+        step, failed step, local relaxation and refinement is one iteration.
+    relax_around : function that relaxes the front of a state around given cells, (m,). The function returns None if
         local relaxation would not save time.
 
     Raises
     ------
     NotConverged
-        If no step lowers the energy, or if _MAX_STEPS steps were made without `max_steps`, while the residual is above
+        If no step lowers the energy, or after _MAX_ITERATIONS without `max_iterations`, while the residual is above
         TOLERANCES.stagnation.
     FullContact
         If the contact covers the surface.
     """
-    relaxation = FrontRelaxation(problem, contact, close)
-    for _ in range(max_steps or _MAX_STEPS):
+    relaxation = FrontRelaxation(problem, contact, nearby)
+    for _ in range(max_iterations or _MAX_ITERATIONS):
         active = find_active_cells(problem.front, relaxation.state)
         try:
             if active.residual <= tolerance:
                 if not relaxation.refine(TOLERANCES.displacement * tolerance):
                     return relaxation.state
-            elif not relaxation.relax_locally(active, relax_locally):
+            elif not relaxation.relax_locally(active, relax_around):
                 relaxation.step(active)
         except Stagnation as failure:
             if active.residual > TOLERANCES.stagnation:
                 raise NotConverged(f"{failure} (residual of sqrt(G/dgamma): {active.residual:.1e})") from None
             if not relaxation.refine(_SMALLEST_ERROR):
                 return relaxation.state
-    if max_steps or active.residual <= TOLERANCES.stagnation:
+    if max_iterations or active.residual <= TOLERANCES.stagnation:
         return relaxation.state
     raise NotConverged(f"the front did not converge (residual of sqrt(G/dgamma): {active.residual:.1e})")
 
@@ -249,10 +251,10 @@ class FrontRelaxation:
     local_relaxations : number of local relaxations since the last step of the whole front.
     """
 
-    def __init__(self, problem: FrontProblem, contact: Contact, close: bool):
-        """Solve the elastic contact of the initial contact; `close`: whether this contact is close to equilibrium."""
+    def __init__(self, problem: FrontProblem, contact: Contact, nearby: bool):
+        """Solve the elastic contact of the initial contact; `nearby`: whether this contact is near equilibrium."""
         self.problem, self.damping, self.local_relaxations, self.steps = problem, 0.0, 0, 0
-        self.start = TOLERANCES.certain_displacement if close else TOLERANCES.moving_displacement
+        self.start = TOLERANCES.certain_displacement if nearby else TOLERANCES.moving_displacement
         self.coarsest = self.start
         if not isinstance(contact, AdhesiveContact):
             contact = problem.solve_elastic(contact, self.start)
@@ -269,13 +271,13 @@ class FrontRelaxation:
         self.state = self.problem.solve_elastic(self.state, accuracy)
         return True
 
-    def relax_locally(self, active: ActiveCells, relax: Callable) -> bool:
+    def relax_locally(self, active: ActiveCells, relax_around: Callable) -> bool:
         """Relax the front around cells far from equilibrium; keep the result and return True if the energy is lower."""
         far, few = active.cells_to_relax()
         if not far.any() or self.local_relaxations >= (_MAX_LOCAL_RELAXATIONS if few else 1):
             return False
         self.local_relaxations += 1
-        contact = relax(self.state, active.cells[far])
+        contact = relax_around(self.state, active.cells[far])
         if contact is not None:
             accuracy = min(self.start, 0.1 * TOLERANCES.moving_displacement, self._moving_accuracy(active))
             try:
@@ -301,6 +303,7 @@ class FrontRelaxation:
             self.damping = 2 * TOLERANCES.damping
         self.steps += 1
         change, pressure_change = newton_step(problem, active, self.damping)
+        # The step would raise the energy to first order: the sum of (G/dgamma - 1) df is positive.
         if np.sum((active.intensity**2 - 1) * change) > _WORK_ROUNDING * np.abs(change).sum():
             self._damp(2, active.residual)
             return
@@ -328,13 +331,13 @@ def newton_step(problem: FrontProblem, active: ActiveCells, damping: float) -> t
     """Solve the linearised equations of the front; return the changes of fraction and pressure, (k,) each."""
     front, at_front = problem.front, active.at_front
     # A running front needs shorter steps.
-    local = np.where(np.abs(active.intensity - 1) > TOLERANCES.coarse, max(damping, 2 * TOLERANCES.damping), damping)
-    linear = LinearisedFront(problem.space, front, active, active.mean_fraction, at_front, local)
+    dampings = np.where(np.abs(active.intensity - 1) > TOLERANCES.coarse, max(damping, 2 * TOLERANCES.damping), damping)
+    linear = LinearisedFront(problem.space, front, active, active.mean_fraction, at_front, dampings)
     # First set the tension to that of the law at the present fraction. Then change tension and fraction by the law.
-    strengths = front.strengths(active.mean_fraction)
-    missing = np.where(at_front, front.tension(strengths, active.fraction) + active.pressure, 0.0)
+    local_strengths = front.local_strengths(active.mean_fraction)
+    missing = np.where(at_front, front.tension(local_strengths, active.fraction) + active.pressure, 0.0)
     moved = linear.operator.displacement(missing.astype(np.float32))
-    opening = np.where(at_front, front.opening(strengths, active.fraction), 0.0)
+    opening = np.where(at_front, front.opening(local_strengths, active.fraction), 0.0)
     accuracy = float(np.clip(active.residual, *TOLERANCES.linear))
     change, pressure_change = linear.solve(moved + opening - active.gap, accuracy)
     return change, pressure_change - missing
@@ -343,7 +346,7 @@ def newton_step(problem: FrontProblem, active: ActiveCells, damping: float) -> t
 def rates_with_separation(
     space: HalfSpace, front: Front, contact: Contact, mean_fraction: np.ndarray, accuracy: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the derivatives of fraction and pressure (E*), (k,) each, with respect to the separation in cell sizes."""
+    """Return derivatives of fraction and pressure (E*), (k,), by separation (cells) if no other cells open or close."""
     linear = LinearisedFront(space, front, contact, mean_fraction, contact.fraction < 1, np.zeros(len(mean_fraction)))
     return linear.solve(np.full(len(mean_fraction), -1.0), accuracy)
 
@@ -351,7 +354,8 @@ def rates_with_separation(
 class LinearisedFront:
     """Linearised equations of contact and front, in single precision.
 
-    The unknowns are changes: of the pressure of closed cells, and of strength times fraction of cells at the front.
+    The unknowns are the changes of the pressure of closed cells, and of the fraction of cells at the front. The change
+    of fraction is multiplied by the constant `front.straight_strength`, so that it has the unit of a pressure.
     """
 
     def __init__(
@@ -366,12 +370,12 @@ class LinearisedFront:
         """Linearise at a contact; mean_fraction, at_front and damping are given for each of its cells, (k,)."""
         self.space, self.front, self.cells = space, front, contact.cells
         self.closed, self.at_front = ~at_front, np.flatnonzero(at_front)
-        self.strengths = front.strengths(mean_fraction[self.at_front]).astype(np.float32)
+        self.local_strengths = front.local_strengths(mean_fraction[self.at_front]).astype(np.float32)
         self.fraction = contact.fraction[self.at_front].astype(np.float32)
         self.damping_factor = (1 + damping[self.at_front]).astype(np.float32)
         self.operator = space.restrict_to(contact.cells)
         self.weights = neighbour_weights(contact.cells[self.at_front], space.shape)
-        self.unit = np.float32(front.strength or 1.0)
+        self.straight_strength = np.float32(front.straight_strength or 1.0)
 
     def solve(self, right: np.ndarray, accuracy: float) -> tuple[np.ndarray, np.ndarray]:
         """Solve for the changes of fraction and pressure, (k,) each, with a right-hand side, to a relative accuracy.
@@ -399,16 +403,16 @@ class LinearisedFront:
             raise NotConverged(f"the linear equations of {len(self.cells)} cells have no finite solution")
         pressure, _, _ = self._pressures(solution)
         fraction = np.zeros(len(solution))
-        fraction[self.at_front] = scale * (solution[self.at_front] / self.unit)
+        fraction[self.at_front] = scale * (solution[self.at_front] / self.straight_strength)
         return fraction, scale * pressure.astype(float)
 
     def _pressures(self, unknowns):
         """Convert unknowns to changes of the pressures, (k,), and of the strengths and tensions at the front."""
-        fraction = unknowns[self.at_front] / self.unit
+        fraction = unknowns[self.at_front] / self.straight_strength
         if not len(fraction):
             return unknowns, fraction, fraction
-        stronger = self.front.strength_change(self.strengths, self.weights @ fraction)
-        tension = self.front.tension_change(self.strengths, self.fraction, stronger, fraction)
+        stronger = self.front.strength_change(self.local_strengths, self.weights @ fraction)
+        tension = self.front.tension_change(self.local_strengths, self.fraction, stronger, fraction)
         pressure = unknowns.copy()
         pressure[self.at_front] = -tension
         return pressure, stronger, tension

@@ -79,17 +79,17 @@ class FullContactProblem(MaterialUnits):
         return state.separation == 0 and len(state.cells) == self.heights.size
 
     @property
-    def closing_pressure(self):
-        """Nominal pressure assigned to full contact at an imposed separation, Pa: a value above all targets."""
+    def undetermined_pressure(self):
+        """Nominal pressure for full contact at zero separation, Pa: not determined, so an arbitrary large value."""
         return 10 * max(float(np.abs(self.full_contact_pressure).max()), self.interface_strength)
 
-    def open_weakest(self, separation):
-        """Return a start for the solver: full contact without the cells of lowest pressure, for a mean gap (m)."""
+    def open_weakest(self, mean_gap):
+        """Return full contact, at separation 0, without its weakest cells; `mean_gap` (m) only fixes their number."""
         pressure = self.full_contact_pressure.ravel() - self.full_contact_pressure.min()
         # Around the first gap the tension is the strength of a front, not the tension that opened the gap.
-        pressure -= self.front.strength * self.contact_modulus
-        opening = max(self.front.critical_opening * self.spacing, separation)
-        count = int(min(1 + separation / opening * pressure.size, pressure.size / 2))
+        pressure -= self.front.straight_strength * self.contact_modulus
+        largest_gap = max(self.front.critical_opening * self.spacing, mean_gap)
+        count = int(min(1 + mean_gap / largest_gap * pressure.size, pressure.size / 2))
         # Cells of equal pressure open together, so that a symmetric surface opens symmetrically.
         limit = np.partition(pressure, count - 1)[count - 1] + ROUNDING * self.contact_modulus
         closed = np.flatnonzero(pressure > limit)

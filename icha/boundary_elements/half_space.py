@@ -68,7 +68,7 @@ class HalfSpace:
         cells : (k,) int, loaded cells, ascending.
         pressure : (k,), pressure on these cells, in E*; in single or double precision.
         at : (m,) int, ascending, the cells where the displacement is computed; None for the whole grid.
-        out : array that may be overwritten with the result; None for a new array.
+        out : array that may be overwritten with the result; None for a new array. Small grids do not use it.
         """
         return self.filter(cells, pressure, self.compliance[pressure.dtype], at, out)
 

@@ -37,7 +37,7 @@ class ControlProblem:
     contact : the contact model.
     control : the controlled quantity (nominal pressure or area fraction) and its target.
     solve : function that solves the equilibrium at a separation (m), from a state, to a residual of the front. Options:
-        close, whether the state is close to equilibrium; same_slopes, whether its slopes are reused.
+        nearby, whether the state is near equilibrium; reuse_slopes, whether the slopes of the state are reused.
     events : function that finds the events between two states.
     """
 
@@ -85,13 +85,13 @@ class Bracket:
     Parameters
     ----------
     sign : sign of the target minus the controlled quantity in `before`.
-    same : smallest difference between two separations, m.
+    smallest_difference : smallest difference between two separations, m.
     before : state that has not yet reached the target.
     beyond : state that has passed the target; None before such a state is found.
     """
 
     sign: float
-    same: float
+    smallest_difference: float
     before: CellState
     beyond: CellState | None = None
 
@@ -112,7 +112,7 @@ class Bracket:
                 return separation
             raise NotConverged("the slope predicts no finite separation for the target")
         low, high = sorted((self.before.separation, self.beyond.separation))
-        if high - low < self.same:
+        if high - low < self.smallest_difference:
             raise NotConverged("the contact jumps past the target between two equal separations")
         return separation if low < separation < high else 0.5 * (low + high)
 
@@ -129,47 +129,46 @@ def solve_at_control(problem: ControlProblem, state: CellState, separation: floa
     """
     contact, control = problem.contact, problem.control
     scale = problem.scale(state)
-    same = _SAME_SEPARATION * contact.rms_height
-    whole = bracket = Bracket(np.sign(-problem.error(state)) or 1.0, same, state)
+    smallest_difference = _SAME_SEPARATION * contact.rms_height
+    initial = bracket = Bracket(np.sign(-problem.error(state)) or 1.0, smallest_difference, state)
     if separation <= 0:
         separation = 0.5 * state.separation
     reason = ""
     try:
         for _ in range(_MAX_ATTEMPTS):
-            trial, bracket = bracket_loosely(problem, bracket, separation, scale)
+            trial = find_nearby_state(problem, bracket, separation, scale)
             if abs(problem.error(trial)) <= problem.tolerance(scale) and not contact.adhesive:
                 return trial
-            found, met = iterate_secant(problem, whole, trial, scale)
+            # Loose fronts shift the bracket, so the secant steps begin with the bracket of the initial state.
+            found, met = iterate_secant(problem, initial, trial, scale)
             if met:
                 return found
-            bracket = whole.with_state(found, problem.error(found))
+            bracket = initial.with_state(found, problem.error(found))
             separation = bracket.limit(problem.newton_separation(found))
     except FullContact:
         # The target load is larger than the load at the smallest mean gap.
-        if control.quantity == PRESSURE and whole.sign > 0:
+        if control.quantity == PRESSURE and initial.sign > 0:
             return contact.full_contact(control.target)
         reason = ": the contact closes over the whole surface"
     except NotConverged as failure:
         reason = f": {failure}"
-    raise NotConverged(f"a {control.quantity.replace('_', ' ')} of {control.target:g} is not met from here{reason}")
+    raise NotConverged(f"found no equilibrium at a {control.quantity.replace('_', ' ')} of {control.target:g}{reason}")
 
 
-def bracket_loosely(
-    problem: ControlProblem, bracket: Bracket, separation: float, scale: float
-) -> tuple[CellState, Bracket]:
-    """Find a state close to the target with coarsely relaxed fronts; return this state and the bracket of the target.
+def find_nearby_state(problem: ControlProblem, bracket: Bracket, separation: float, scale: float) -> CellState:
+    """Find a state near the target with coarsely relaxed fronts, within a bracket of the target.
 
     After a trial that passes the target with an event, the next trial starts again from the state before the target.
     """
     contact, start, residual = problem.contact, bracket.before, TOLERANCES.coarse
     control_is_load = problem.control.quantity == PRESSURE
-    close = TOLERANCES.fine * scale if contact.adhesive else problem.tolerance(scale)
+    tolerance = TOLERANCES.fine * scale if contact.adhesive else problem.tolerance(scale)
     trials = _MAX_TRIALS // 2 if contact.adhesive else 2 * _MAX_TRIALS
     for _ in range(trials):
         trial, residual = problem.solve(start, separation, residual), TOLERANCES.fine
         error = problem.error(trial)
-        if abs(error) <= close:
-            return trial, bracket
+        if abs(error) <= tolerance:
+            return trial
         bracket = bracket.with_state(trial, error)
         passed = trial is not bracket.before and len(problem.events(bracket.before, trial))
         start = bracket.before if passed else trial
@@ -182,19 +181,19 @@ def bracket_loosely(
             separation = (1 - _CLOSING) * trial.separation
             if separation < contact.smallest_gap:
                 raise FullContact("the mean gap vanishes")
-    raise NotConverged(f"{trials} trials found no state close to the target")
+    raise NotConverged(f"{trials} trials found no state near the target")
 
 
 def iterate_secant(problem: ControlProblem, bracket: Bracket, trial: CellState, scale: float) -> tuple[CellState, bool]:
-    """Approach the target by secant steps from a close state; return the last state and whether it meets the target."""
+    """Approach the target by secant steps from a state near it; return the last state and whether the target is met."""
     before, error = None, problem.error(trial)
     for _ in range(_MAX_TRIALS):
         separation = bracket.limit(problem.newton_separation(trial, before))
         if separation < problem.contact.smallest_gap:
             raise FullContact("the mean gap vanishes")
         start, before = trial, trial if before is not None or trial.front_residual <= TOLERANCES.front else None
-        same = before is not None and abs(error) < TOLERANCES.linear[0] * scale
-        trial = problem.solve(start, separation, TOLERANCES.front, close=True, same_slopes=same)
+        reuse_slopes = before is not None and abs(error) < TOLERANCES.linear[0] * scale
+        trial = problem.solve(start, separation, TOLERANCES.front, nearby=True, reuse_slopes=reuse_slopes)
         error = problem.error(trial)
         if abs(error) <= problem.tolerance(scale):
             return trial, True

@@ -30,10 +30,10 @@ from icha.support.parallel import blocks, on_cores
 _SIDES, _PIECE = (64, 128, 256), 64
 # Number of cells of the windows that are solved together; they fit in the cache.
 _BATCH = 65_536
-# Largest residual of the front in windows; the whole front is relaxed afterwards.
+# Residual of the front at which a window stops early; the whole front is relaxed afterwards.
 _TOLERANCE = 1e-4
 # Distance from the given cells within which the front may move, in cells; largest total area of the windows, divided by
-# the area of the grid; largest number of steps of the front in a window. Windows that cover little are wider.
+# the area of the grid; largest number of iterations in a window. Windows that cover little are wider.
 _EXTENTS = ((20, 0.05, 60), (4, 0.5, 20))
 
 
@@ -50,23 +50,23 @@ def relax_in_windows(
     Returns
     -------
     The contact with new fractions and pressures in the windows. None if the windows would cover too much of the grid,
-    or if the front converges in none of them.
+    or if the solver fails in all of them.
     """
     for extent in _EXTENTS:
-        reach, cover, max_steps = extent
-        places = Places.around(far, space.grid, reach)
-        if np.sum(places.sides**2) <= cover * space.size:
+        distance, cover, max_iterations = extent
+        regions = Regions.around(far, space.grid, distance)
+        if np.sum(regions.sides**2) <= cover * space.size:
             break
     else:
         return None
-    windows = list(places.windows(space.grid))
+    windows = list(regions.windows(space.grid))
     mean_fraction = average_fractions(space.field(contact.cells, contact.fraction, np.float32)).ravel()
     kernels = {side: window_kernel(space.grid, side) for side in {cells.shape[-1] for cells, _ in windows}}
 
     def relax(window):
         cells, free = window
         small = HalfSpace(cells.shape, *kernels[cells.shape[-1]])
-        return _relax_window(small, front, separation, contact, gap, mean_fraction, cells, free, max_steps)
+        return _relax_window(small, front, separation, contact, gap, mean_fraction, cells, free, max_iterations)
 
     found = on_cores(relax, windows)
     moved = np.zeros(space.size, dtype=bool)
@@ -87,8 +87,8 @@ def relax_in_windows(
     )
 
 
-def _relax_window(small, front, separation, contact, gap, mean_fraction, windows, free, max_steps):
-    """Relax the front in a batch of windows; return the cells in contact, fractions, pressures; None if unconverged."""
+def _relax_window(small, front, separation, contact, gap, mean_fraction, windows, free, max_iterations):
+    """Relax fronts in windows for `max_iterations`; return cells, fractions, pressures, or None if the solver fails."""
     cells = windows[free]
     touching, index = find_among(cells, contact.cells)
     inside = np.flatnonzero(free)[touching]
@@ -101,13 +101,13 @@ def _relax_window(small, front, separation, contact, gap, mean_fraction, windows
     background = mean_fraction[windows] - average_fractions(small.field(inside, start.fraction))
     problem = FrontProblem(small, front, heights, separation, background)
     try:
-        relaxed = relax_front(problem, start, _TOLERANCE, max_steps=max_steps)
+        relaxed = relax_front(problem, start, _TOLERANCE, max_iterations=max_iterations)
     except (NotConverged, FullContact):
         return None
     return windows.ravel()[relaxed.cells], relaxed.fraction, relaxed.pressure
 
 
-class Places(NamedTuple):
+class Regions(NamedTuple):
     """Connected regions of the grid in which the front may move, each with a window.
 
     Parameters
@@ -122,9 +122,9 @@ class Places(NamedTuple):
     sides: np.ndarray
 
     @classmethod
-    def around(cls, far: np.ndarray, grid: int, reach: int) -> Places:
-        """Find the regions of all blocks within `reach` cells of the cells `far`, (m,)."""
-        moving = blocks_around(grid, reach, far)
+    def around(cls, far: np.ndarray, grid: int, distance: int) -> Regions:
+        """Find the regions of all blocks within `distance` cells of the cells `far`, (m,)."""
+        moving = blocks_around(grid, distance, far)
         labels, numbers = np.zeros(moving.shape, int), np.flatnonzero(moving)
         labels.ravel()[numbers], _ = label_patches(numbers, len(moving))
         boxes = _cut(labels, _boxes(labels))

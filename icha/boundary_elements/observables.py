@@ -26,7 +26,7 @@ class PatchObservables:
 
     def of_contact(self) -> dict:
         """Return the largest tension that the grid resolves at a straight edge of contact, Pa."""
-        return {"resolved_tension": self.contact.front.strength * self.contact.contact_modulus}
+        return {"resolved_tension": self.contact.front.straight_strength * self.contact.contact_modulus}
 
     def of_step(self, state: CellState) -> dict:
         """Return the residuals of a state, and the share of touched summits outside the range of Wu's formula."""
@@ -60,7 +60,7 @@ class PatchObservables:
         }
 
     def reasons_against(self, separations: Iterable[float], pressed: CellState | None) -> list[str]:
-        """Return a message if the grid has too few cells per shortest wavelength of the surface, or else no message."""
+        """Return why results may be invalid: too few grid cells for the shortest waves. The arguments are not used."""
         asperities, grid = self.contact.asperities, self.surface.grid
         cells = cells_per_short_wave(grid, len(asperities) + len(asperities.unsupported_height))
         if cells >= LEAST_CELLS_PER_WAVE:

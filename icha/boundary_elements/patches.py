@@ -95,10 +95,10 @@ def label_patches(cells: np.ndarray, grid: int) -> tuple[np.ndarray, int]:
     return numbers[labels.ravel()[cells]], len(roots) - 1
 
 
-def labels_at(places: np.ndarray, cells: np.ndarray, labels: np.ndarray) -> np.ndarray:
-    """Return the patch number at each of the cells `places`, (m,); 0 where there is no contact."""
-    result = np.zeros(len(places), dtype=int)
-    present, index = find_among(places, cells)
+def labels_at(sought: np.ndarray, cells: np.ndarray, labels: np.ndarray) -> np.ndarray:
+    """Return the patch number at each of the cells `sought`, (m,); 0 where there is no contact."""
+    result = np.zeros(len(sought), dtype=int)
+    present, index = find_among(sought, cells)
     result[present] = labels[index]
     return result
 

@@ -1,9 +1,9 @@
 """Displacements of cells in contact on large grids: tiles for short distances, a coarse grid for long distances.
 
-The kernel is split as in `icha.half_space.ewald`: 2/q = (2/q) erf(q/2a) + (2/q) erfc(q/2a). The first term has a short
-range and is summed tile by tile. The second term is smooth and is computed on a coarser grid; splines transfer values
-between the two grids (R. W. Hockney & J. W. Eastwood, Computer Simulation Using Particles, 1988, ch. 8). The inverse of
-the kernel also has a short range. A small contact area needs few tiles, and no Fourier transform of the whole grid.
+The kernel is split as in `icha.half_space.ewald`: 2/q = (2/q) erf(q/2a) + (2/q) erfc(q/2a), in Fourier space. The first
+term has a short range and is summed tile by tile. The second term is smooth and is computed on a coarser grid; splines
+transfer values between both grids (R. W. Hockney & J. W. Eastwood, Computer Simulation Using Particles, 1988, ch. 8).
+The inverse of the kernel also has a short range. So a small contact needs few tiles, and no transform of the grid.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ class TiledGrid:
     grid : number of cells along a side of the grid.
     count : number t of tiles.
     sources : cells inside each tile, including the margin.
-    targets : cells inside each tile, without the margin.
+    targets : cells inside each tile, without the margin: each cell once, for results and for sums on the coarse grid.
     nodes : (m,) int, nodes of the coarse grid inside the tiles, ascending.
     covered : (t, _NODES, _NODES) int, indices in `nodes` of the coarse nodes inside each tile.
     """
@@ -116,8 +116,8 @@ class TiledGrid:
             field = scipy.fft.irfft2(field, s=(TILE, TILE), overwrite_x=True, workers=1)
             if coarse is not None:
                 field += _interpolate(coarse[batch])
-            numbers, places = self.targets.of_batch(batch)
-            result[numbers] = field.ravel()[places]
+            numbers, positions = self.targets.of_batch(batch)
+            result[numbers] = field.ravel()[positions]
 
         on_cores(convolve, blocks(self.count, _BATCH))
 
@@ -135,8 +135,8 @@ class _CellsByTile:
     def field(self, batch, values):
         """Return a batch of tiles, (t, TILE, TILE), filled with the values (k,) of its cells and zeros elsewhere."""
         field = np.zeros((batch.stop - batch.start, TILE, TILE), values.dtype)
-        numbers, places = self.of_batch(batch)
-        field.ravel()[places] = values[numbers]
+        numbers, positions = self.of_batch(batch)
+        field.ravel()[positions] = values[numbers]
         return field
 
 
@@ -154,7 +154,7 @@ def _cells_by_tile(cells, grid, corner, size):
         for source, target, (rows, columns) in zip(with_margin, without, size[batch].tolist(), strict=True):
             inner = slice(REACH, REACH + rows), slice(REACH, REACH + columns)
             target[inner] = source[inner]
-        return _numbers_and_places(with_margin), _numbers_and_places(without)
+        return _numbers_and_positions(with_margin), _numbers_and_positions(without)
 
     try:
         sources, targets = zip(*on_cores(assign, blocks(len(corner), _BATCH)), strict=True)
@@ -171,10 +171,10 @@ def _window(field, row, column):
     return field[np.ix_((row + along) % grid, (column + along) % grid)]
 
 
-def _numbers_and_places(windows):
+def _numbers_and_positions(windows):
     """Return list indices and positions of the cells in tiles (t, TILE, TILE), which contain list index + 1 or 0."""
-    places = np.flatnonzero(windows)
-    return windows.ravel()[places].astype(int) - 1, places
+    positions = np.flatnonzero(windows)
+    return windows.ravel()[positions].astype(int) - 1, positions
 
 
 # Spline of one coarse node, evaluated on the cells around it; splines of all coarse nodes of a tile, on its cells.
@@ -188,7 +188,7 @@ _SPLINES = _SPLINES[_HALF:-_HALF]
 
 # These matrices are small, so that no library computes their products on several threads, which could change rounding.
 def _restrict(field):
-    """Transfer values from the cells of tiles, (t, TILE, TILE), to the coarse nodes, (t, _NODES, _NODES)."""
+    """Distribute values of the cells of tiles to coarse nodes, (t, _NODES, _NODES): transpose of `_interpolate`."""
     rows = (field.reshape(-1, _NODES, TILE) @ _SPLINES).reshape(-1, TILE, _NODES)
     return _SPLINES.T @ rows
 

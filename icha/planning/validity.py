@@ -120,7 +120,7 @@ def expected_validity(campaign: Campaign) -> list[Statement]:
             known[STICKY_HEIGHT] = sticky_rms_height(section.rolloff_wavelength, material)
         if MODELS[case.model].by_cells:
             spacing = campaign.period(case.surface) / campaign.grid(case.surface)
-            tension = Front(material.adhesion_length / spacing).strength * material.contact_modulus
+            tension = Front(material.adhesion_length / spacing).straight_strength * material.contact_modulus
             known |= {RESOLVED: tension, SPACING: spacing}
         cases.append(Case(case.model, case.surface, case.material, known))
         if by_summits and material.surface_energy > 0:

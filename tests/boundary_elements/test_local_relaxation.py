@@ -22,7 +22,7 @@ def test_displacements_in_a_window_are_those_of_the_whole_surface(around):
     rng = np.random.default_rng(1)
     whole = HalfSpace.of(320)
     count = 0
-    for cells, free in module.Places.around(np.flatnonzero(restless), 320, around).windows(320):
+    for cells, free in module.Regions.around(np.flatnonzero(restless), 320, around).windows(320):
         small = HalfSpace(cells.shape, *module.window_kernel(320, cells.shape[-1]))
         pressure = rng.normal(size=np.count_nonzero(free))
         own = np.flatnonzero(free)
@@ -43,7 +43,7 @@ def test_every_cell_near_a_restless_one_may_move_in_one_window_however_wide_the_
     restless = np.zeros((grid, grid), dtype=bool)
     restless[300, :] = restless[100:460, 240] = restless[650, 20] = True
     times = np.zeros(restless.size, int)
-    for cells, free in module.Places.around(np.flatnonzero(restless), grid, 4).windows(grid):
+    for cells, free in module.Regions.around(np.flatnonzero(restless), grid, 4).windows(grid):
         assert cells.shape == free.shape and cells.shape[-1] in (64, 128)
         np.add.at(times, cells[free], 1)
     assert times.max() == 1
