@@ -353,7 +353,7 @@ def _print_checks(campaign, results: Path) -> None:
     files = campaign_files(campaign)
     checks = read_checks(results / files.checks)
     passed = sum(check.passed for check in checks)
-    echo(f"checks:  {passed if passed < len(checks) else 'all'} of {len(checks)} passed: the equations are solved")
+    echo(f"checks:  {passed} of {len(checks)} checks of the solved equations passed")
     echo("Applicability of the models, which is a separate question:")
     with xr.open_datatree(results / files.dataset, engine="netcdf4") as tree:
         _print_validity(statements_on_dataset(tree))

@@ -120,7 +120,7 @@ def test_page_needs_no_other_files(write, tmp_path):
 
 def test_page_shows_parameters_results_and_checks(write):
     text = write()
-    passed = f"all {len(check_campaign(small.tree()))} passed"
+    passed = f"all {len(check_campaign(small.tree()))}</b> checks of the solved equations passed"
     for words in ("Small campaign", "25 MPa", "50 mJ/m²", "2.071 nm", passed, "100 µm", "CC0-1.0"):
         assert words in text, words
     assert "<script>alert" not in text and "&lt;script&gt;alert" in text
@@ -189,7 +189,7 @@ def test_unloaded_runs_have_tables_of_pull_off_and_loss(write):
 def test_statistics_are_of_the_first_loading(write):
     failed = Check("residual", 1e-3, 1e-8, False, "largest equilibrium error over h_rms", "slopes/rough")
     text = write(campaign=cyclic.tree(), checks=[failed])
-    assert "1 of 1 failed" in text and "✗ failed" in text and "slopes/rough" in text
+    assert "1 of 1</b> checks of the solved equations failed" in text and "✗ failed" in text and "slopes/rough" in text
     run, spots = cyclic.run(seed=2, material="soft", between=4), int(small.run(seed=2)["spot_count"][-1])
     assert spots > 0
     row = re.search(
@@ -203,7 +203,7 @@ def test_checks_and_validity_are_separate(write):
     text = write(model_error=compared.errors())
     top = text[: text.index("</header>")]
     # Its surfaces have too few nodes per shortest wave.
-    assert "checks of the results: the equations are solved" in top and ">partly outside</b>" in top
+    assert "</b> checks of the solved equations" in top and ">partly outside</b>" in top
     assert "U_full/dgamma is " in top and 'in this campaign <a href="#error">contact area ' in top
 
 
