@@ -257,7 +257,7 @@ def _writing(folder: str):
 
 
 def _warn(text: str) -> None:
-    """Print a warning, also from `icha run`."""
+    """Print a warning; the live view of `icha run` shows it too."""
     logger.warning(text, extra={"remark": text})
 
 

@@ -166,7 +166,7 @@ def contact_state(
     tolerance: float = DEFAULT_TOLERANCE,
     progress: Callable[[str], None] | None = None,
 ) -> NodalState:
-    """Return the state of a contact under one load at all nodes; the arguments are those of `finite_range_solution`."""
+    """Return the state at all nodes of a contact under one load; the arguments are those of `finite_range_solution`."""
     target = POSITIVE.validate("reduced_pressure", reduced_pressure) * surface.rms_slope * material.contact_modulus
     fine = refine(surface, material, refinement)
     state = _solve_nonadhesive(fine, material, target, TOLERANCE.validate("tolerance", tolerance))
