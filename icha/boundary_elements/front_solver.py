@@ -47,7 +47,7 @@ class FrontTolerances:
     fine : residual below which contact forms wherever the gap is below the reach, and later trials for a load end.
         Cells above it are relaxed locally if they are a smaller part of the front than `few`. Also the relative error
         of a load below which its trials are solved to the final tolerances.
-    few : part of the front, 0 to 1.
+    few : part of the front, or of the grid if cells are open, that counts as few cells, 0 to 1.
     displacement : largest error of displacements, divided by the allowed residual of the front.
     moving_displacement : largest error of displacements in the first steps. After a step, the allowed error is
         residual * min(moving_displacement, max(residual, linear[0])), about the residual that a Newton step leaves.
@@ -166,12 +166,20 @@ class FrontProblem:
 
     def solve_elastic(self, contact: Contact, accuracy: float) -> AdhesiveContact:
         """Call `solve_bonded_contact`; displacement errors are at most `accuracy` times the critical opening."""
-        tolerance = accuracy * self.front.critical_opening
+        tolerance = self._tolerance(accuracy, contact)
         return solve_bonded_contact(self.space, self.topography, self.separation, contact, tolerance, self.background)
+
+    def _tolerance(self, accuracy, contact):
+        """Return the largest error of displacements, in cells: a smaller one if only few cells are open.
+
+        Such a contact is stiff against its mean pressure, so that a small error of displacements is a large one of it.
+        """
+        open_part = 1 - float(np.sum(contact.fraction)) / self.space.size
+        return accuracy * self.front.critical_opening * float(np.clip(open_part / TOLERANCES.few, 1e-3, 1.0))
 
     def is_accurate(self, state: AdhesiveContact, accuracy: float) -> bool:
         """Return whether the displacement errors of a state are at most `accuracy` times the critical opening."""
-        return state.tolerance <= (1 + _WORK_ROUNDING) * accuracy * self.front.critical_opening
+        return state.tolerance <= (1 + _WORK_ROUNDING) * self._tolerance(accuracy, state)
 
     def energy(self, state: AdhesiveContact) -> float:
         """Return the elastic energy minus the work of adhesion, in E* times cell size^3."""
