@@ -8,7 +8,7 @@ from functools import cache
 from pathlib import Path
 
 from icha.configuration.campaign import Campaign
-from icha.configuration.cases import run_settings, run_sha256
+from icha.configuration.cases import campaign_sha256, run_settings, run_sha256
 from icha.configuration.plausibility import energy_ratio
 from icha.contact.models import DEFAULT_MODEL, MODELS
 from icha.datasets import results as results_files
@@ -111,6 +111,9 @@ def _items(campaign, results) -> list[Item]:
         state = _state(results, path)
         if state == DONE and not outdated.isdisjoint(inputs):
             state = TO_DO
+        elif state == DONE and path == files.dataset:
+            # Runs may have been removed from the campaign.
+            state, _ = run_state(results / path, campaign_sha256(campaign))
         items.append(Item(part, rule, path, state, cost, stage=stage))
         if items[-1].to_do:
             outdated.add(path)

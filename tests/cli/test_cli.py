@@ -22,7 +22,7 @@ from icha.analysis.checks import check_campaign, write_checks
 from icha.cli import app
 from icha.cli.live import Progress, View, read_error, read_last_line
 from icha.cli.project import list_campaigns, reports_errors
-from icha.configuration.cases import run_cases, run_sha256
+from icha.configuration.cases import campaign_sha256, run_cases, run_sha256
 from icha.configuration.load import load_configuration
 from icha.datasets.campaign_file import write_campaign
 from icha.datasets.files import read_dataset, write_dataset
@@ -348,6 +348,17 @@ def test_the_states_of_runs_are_distinguished(tiny):
     described = printed("describe", "tiny.yaml", "--runs")
     assert "4 runs, 2 to do" in described and "1 run with other settings" in described
     assert f"failed: runs/{failed.path}.nc: {reason}" in described
+
+
+def test_a_dataset_with_runs_that_are_no_longer_in_the_campaign_is_computed_again(tiny):
+    campaign, results = tiny
+    for case in run_cases(campaign):
+        (results / f"runs/{case.path}.nc").parent.mkdir(parents=True, exist_ok=True)
+        attrs = {"config_sha256": run_sha256(campaign, case)}
+        write_dataset(small.run().assign_attrs(attrs), results / f"runs/{case.path}.nc")
+    for sha256, state in ((campaign_sha256(campaign), DONE), ("0" * 64, CHANGED)):
+        write_campaign(small.runs(), results / "dataset/tiny.nc", attrs={"config_sha256": sha256})
+        assert {item.path: item.state for item in plan(campaign, results)}["dataset/tiny.nc"] == state
 
 
 def test_results_of_another_file_of_the_same_name_are_not_changed(tiny, no_snakemake):
