@@ -141,10 +141,7 @@ def solve_active_set(
     load : nominal pressure, in E*; `contact` must then have at least one cell.
     sticky : whether the cells of the initial contact stay in contact under tension.
 
-    Raises
-    ------
-    FullContact
-        If all cells close at a given separation, which is impossible because the separation is the mean gap.
+    Raise `FullContact` if all cells close at a given separation, which is impossible: the separation is the mean gap.
     """
     dtype = np.float32 if tolerance > topography.rounding else float
     keep, gap, before, changing = np.full(len(contact.cells), sticky), None, np.inf, not sticky
@@ -165,8 +162,9 @@ def solve_active_set(
         changed = _next_active_set(contact, keep, joining, left if dtype is float and not sticky else 0.0)
         if changed is None:
             if left <= tolerance:
-                cells, fraction, pressure = contact.cells, contact.fraction, contact.pressure
-                return ElasticContact(cells, fraction, pressure, gap, separation, misfit, tolerance)
+                return ElasticContact(
+                    contact.cells, contact.fraction, contact.pressure, gap, separation, misfit, tolerance
+                )
             if not left <= LARGEST_REMAINDER * before:
                 if dtype == np.float32 and np.isfinite(left):
                     # Displacements much larger than the heights are rounded more.

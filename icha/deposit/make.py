@@ -68,12 +68,7 @@ def make_deposit(
     folder, archive, results = Path(folder), Path(archive), Path(results)
     files, publication = sorted(files), campaign.deposit_metadata()
     refuse_unknown_failures(read_checks(results / "checks.json"), [each.run for each in publication.known_failures])
-    if changed := [f"  {results / file}" for file in files if not is_whole(results, file, thorough=True)]:
-        listed = "\n".join(changed)
-        raise ValueError(
-            "not published, because these files have changed since their jobs wrote them. Remove these files, and run "
-            f"the campaign again:\n{listed}"
-        )
+    _refuse_changed(results, files)
     staging = folder.with_name(f".{folder.name}.part")
     shutil.rmtree(staging, ignore_errors=True)
     try:
@@ -130,6 +125,16 @@ def refuse_mixed(results: Path, campaign: Campaign, recorded: Mapping[str, str])
         raise ValueError(
             "not published, because these results do not belong together. Remove these files and repeat the command:\n"
             + "\n".join(f"  {results / path}: {why}" for path, why in sorted(wrong.items()))
+        )
+
+
+def _refuse_changed(results, files):
+    """Raise `ValueError` for files that have changed since their jobs wrote them."""
+    if changed := [f"  {results / file}" for file in files if not is_whole(results, file, thorough=True)]:
+        listed = "\n".join(changed)
+        raise ValueError(
+            "not published, because these files have changed since their jobs wrote them. Remove these files, and run "
+            f"the campaign again:\n{listed}"
         )
 
 

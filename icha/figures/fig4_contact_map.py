@@ -86,7 +86,6 @@ def figure(
         beside = state_of(truth, same)
     topography = topography_of(data, surface)
     circles, corner, width = _view(data, at, topography)
-
     fig, panels = new_panels(*(3.35, 1) if beside is None else (6.9, 2))
     whole, enlarged = panels[0, 0], panels[0, 1] if beside is None else panels[1, 0]
     heights = {"cmap": "cividis", "vmin": -topography.highest, "vmax": topography.highest}

@@ -155,16 +155,15 @@ class _Cycle:
             try:
                 target, met = find_first_target(candidates, self.state, state, self.direction)
             except InsideJump as jump:
+                self._keep(state)
                 if jump.target is sent:
                     sent = None
-                    self._keep(state)
                     continue
                 pending.remove(jump.target)
                 if not until_apart:
                     self.progress.skipped.append(jump)
                     if leg:
                         raise self.make_path_error() from None
-                self._keep(state)
                 continue
             except NotConverged as failure:
                 length_limit = self._halve_step(abs(step.separation_change), failure)
@@ -173,8 +172,7 @@ class _Cycle:
             if met is not state:
                 behind = self.direction * (met.separation - self.state.separation) < 0
                 if target and self.contact.path_accuracy.error_controlled_steps and behind:
-                    # The branch after a jump leads back to the target. Load control sends no target after this waypoint
-                    # (it would be lost), because load control visits every state beyond a target.
+                    # The branch after a jump leads back to the target. Load control sends no target after it.
                     yield self._advance(step, state)
                 else:
                     self._keep(state)
@@ -182,8 +180,7 @@ class _Cycle:
             listed = None if target is sent else target
             self.progress.require_valid_state(self.state, met, listed, pending, self.loading)
             # With adhesion the first step is only `event_length` long. The next step may be the longest one.
-            first = leg == 0 and len(visited) == 1
-            self.step_length = self.longest if first else self._choose_next_length(step)
+            self.step_length = self._choose_next_length(step) if leg or len(visited) > 1 else self.longest
             between, length_limit = self._advance(step, met), np.inf
             if self._is_new_station(met.separation, visited[-1]):
                 visited.append(met.separation)
@@ -195,8 +192,7 @@ class _Cycle:
         if self.loading:
             # A reloading adds only separations below all earlier stations.
             lowest = min(self.stations, default=np.inf)
-            new = (separation for separation in [*visited, self.state.separation] if separation < lowest)
-            self.stations = sorted({*self.stations, *new})
+            self.stations = sorted({*self.stations, *(at for at in [*visited, self.state.separation] if at < lowest)})
 
     def _advance(self, step, state):
         """Make the end of a step the present state, and return its waypoint without a target."""

@@ -87,34 +87,14 @@ def write_report(
         """Return the path of a file relative to the folder of the page."""
         return None if target is None else Path(os.path.relpath(target, Path(path).parent)).as_posix()
 
-    checks, surfaces = list(checks), list(surfaces)
-    studies = [summarise_study(campaign, name) for name in campaign.children]
-    errors = list(model_error.children.values()) if model_error is not None else []
-    texts = ";".join(node.attrs.get("references", "") for node in [*campaign.children.values(), *errors])
-    counted = ("asked", "complete", "beyond_model", "failed", "missing")
-    totals = {name: sum(study[name] for study in studies) for name in counted}
     write_page(
         path,
         "report.html",
-        title=campaign.attrs.get("title", "Rough contact campaign"),
-        summary=campaign.attrs.get("summary", ""),
-        attributes=campaign.attrs,
-        studies=studies,
-        totals=totals | {"not_applicable": sum(len(study["not_applicable"]) for study in studies)},
-        validity=statements_on_dataset(campaign),
+        **_content(campaign, list(checks), model_error, list(surfaces)),
         most_rows=MOST_ROWS,
         folded=FOLDED_ROWS,
         paper=MODEL_PAPER.line,
-        checks=worst(checks),
-        check_count=len(checks),
-        failed=[check for check in checks if not check.passed],
-        surfaces=[summarise_surface(surface) for surface in surfaces[:MOST_ROWS]],
-        surface_count=len(surfaces),
-        sources=list_sources(surfaces),
-        spectra=picture_of_spectra(surfaces),
         figures=_pictures(figures, campaign, link),
-        entries=[summarise_errors(node.to_dataset()) for node in errors],
-        references=list(dict.fromkeys(source.strip() for source in texts.split(";") if source.strip())),
         dataset=link(dataset_path),
         results=link(results),
         explorer=link(Path(results, EXPLORER)) if results is not None else None,
@@ -123,6 +103,32 @@ def write_report(
         citations=citations,
         software={name: version(name) for name in (*SOFTWARE, *further_software)},
     )
+
+
+def _content(campaign, checks, model_error, surfaces):
+    """Return what the page says about the campaign, its surfaces and its checks, by the names in the template."""
+    studies = [summarise_study(campaign, name) for name in campaign.children]
+    errors = list(model_error.children.values()) if model_error is not None else []
+    texts = ";".join(node.attrs.get("references", "") for node in [*campaign.children.values(), *errors])
+    counted = ("asked", "complete", "beyond_model", "failed", "missing")
+    totals = {name: sum(study[name] for study in studies) for name in counted}
+    return {
+        "title": campaign.attrs.get("title", "Rough contact campaign"),
+        "summary": campaign.attrs.get("summary", ""),
+        "attributes": campaign.attrs,
+        "studies": studies,
+        "totals": totals | {"not_applicable": sum(len(study["not_applicable"]) for study in studies)},
+        "validity": statements_on_dataset(campaign),
+        "checks": worst(checks),
+        "check_count": len(checks),
+        "failed": [check for check in checks if not check.passed],
+        "surfaces": [summarise_surface(surface) for surface in surfaces[:MOST_ROWS]],
+        "surface_count": len(surfaces),
+        "sources": list_sources(surfaces),
+        "spectra": picture_of_spectra(surfaces),
+        "entries": [summarise_errors(node.to_dataset()) for node in errors],
+        "references": list(dict.fromkeys(source.strip() for source in texts.split(";") if source.strip())),
+    }
 
 
 def _pictures(figures: Sequence[ReportFigure], campaign: xr.DataTree, link) -> list[dict]:
