@@ -181,7 +181,7 @@ def test_the_page_for_readers_has_the_numbers(published):
     residual = max(check.value for check in checks if check.name == "residual")
     assert f"| residual | 1 | {residual:.2g} | 1e-08 |" in page
     computed = sum(path.stat().st_size for name, path in files_of(published).items() if name.split("/")[0] in COMPUTED)
-    ((size, unit),) = re.findall(r"The results take ([\d.]+) (kB|MB) of disk", page)
+    ((size, unit),) = re.findall(r"The computation needs ([\d.]+) (kB|MB) of", page)
     assert float(size) * {"kB": 1e3, "MB": 1e6}[unit] == pytest.approx(computed, rel=6e-3)
     # Every path on the page exists, except pages of a clone.
     for path in re.findall(r"`([\w./-]+)`", page):

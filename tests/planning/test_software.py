@@ -51,5 +51,5 @@ def test_a_campaign_that_needs_it_is_refused_before_anything_is_computed(tmp_pat
     done = subprocess.run(command, cwd=REPOSITORY, env=environment, capture_output=True, text=True)
     assert done.returncode != 0
     assert "boundary_element_loops: needs Tamaas, which is not installed" in done.stderr
-    assert "`make tamaas` installs it" in done.stderr and "Nothing was computed." in done.stderr
+    assert "run `make tamaas` in a clone" in done.stderr and "Nothing was computed." in done.stderr
     assert not list((tmp_path / "results").rglob("*.nc"))
