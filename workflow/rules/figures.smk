@@ -8,11 +8,8 @@ from icha.support.checksums import sha256_of
 
 RESULT_FILES = ResultFiles(CAMPAIGN.name, RESULTS)
 FIGURES = CAMPAIGN.figures.by_name()
-
-
-def figure_inputs(name):
-    """Return the input files of a figure, by the arguments of the function that draws it."""
-    return DECLARATIONS[name].inputs(CAMPAIGN, FIGURES[name], RESULT_FILES)
+# Input files of each figure, by the arguments of the function that draws it.
+FIGURE_INPUTS = {name: DECLARATIONS[name].inputs(CAMPAIGN, options, RESULT_FILES) for name, options in FIGURES.items()}
 
 
 wildcard_constraints:
@@ -21,7 +18,7 @@ wildcard_constraints:
 
 rule figure:
     input:
-        unpack(lambda wildcards: figure_inputs(wildcards.name)),
+        unpack(lambda wildcards: FIGURE_INPUTS[wildcards.name]),
     output:
         png="<results>/figures/{name}.png",
         pdf="<results>/figures/{name}.pdf",
@@ -37,7 +34,7 @@ rule figure:
     params:
         arguments=lambda wildcards: FIGURES[wildcards.name].arguments(CAMPAIGN),
         # Tables of measurements are compared by content, not by time.
-        sha256=lambda wildcards: [sha256_of(Path(table)) for table in figure_inputs(wildcards.name).get("tables", ())],
+        sha256=lambda wildcards: [sha256_of(Path(table)) for table in FIGURE_INPUTS[wildcards.name].get("tables", ())],
         code=lambda wildcards: code_of("draw_figure.py", f"icha.figures.{wildcards.name}"),
     message:
         "Figure {wildcards.name}"
