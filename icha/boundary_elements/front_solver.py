@@ -114,9 +114,9 @@ class ActiveCells(Contact):
     def cells_to_relax(self) -> tuple[np.ndarray, bool]:
         """Find cells far from equilibrium, (k,) bool; also return whether they are a small part of the front."""
         few = TOLERANCES.few * np.count_nonzero(self.at_front)
-        uneasy = self.residuals > TOLERANCES.fine
-        if np.count_nonzero(uneasy) <= few:
-            return uneasy, True
+        unconverged = self.residuals > TOLERANCES.fine
+        if np.count_nonzero(unconverged) <= few:
+            return unconverged, True
         far = self.residuals > TOLERANCES.coarse
         return far, bool(np.count_nonzero(far) <= few)
 
@@ -257,6 +257,7 @@ class FrontRelaxation:
     damping : damping of the bonds in the next step.
     start, coarsest : largest allowed error of displacements in critical openings: at the start, and in the next step.
     local_relaxations : number of local relaxations since the last step of the whole front.
+    steps : number of steps of the whole front.
     """
 
     def __init__(self, problem: FrontProblem, contact: Contact, nearby: bool):

@@ -4,7 +4,7 @@ import json
 import math
 from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 
 from icha.configuration.campaign import Campaign
@@ -104,8 +104,8 @@ def _benchmark(results: Path, item: Item) -> float | None:
 
 
 def _items(campaign, results) -> list[Item]:
-    files = campaign_files(campaign)
-    items = list(_computed_files(campaign, results, files))
+    files, sha256_of_run = campaign_files(campaign), cache(partial(run_sha256, campaign))
+    items = list(_computed_files(campaign, results, files, sha256_of_run))
     outdated = {item.path for item in items if item.to_do}
     for part, rule, path, stage, inputs, cost in _derived_files(campaign, files, items):
         state = _state(results, path)
@@ -113,7 +113,7 @@ def _items(campaign, results) -> list[Item]:
             state = TO_DO
         elif state == DONE and path == files.dataset:
             # Runs may have been removed from the campaign.
-            state, _ = run_state(results / path, campaign_sha256(campaign))
+            state, _ = run_state(results / path, campaign_sha256(campaign, sha256_of_run))
         items.append(Item(part, rule, path, state, cost, stage=stage))
         if items[-1].to_do:
             outdated.add(path)
@@ -124,7 +124,7 @@ def _state(results, path):
     return TO_DO if not (results / path).is_file() else DONE if is_whole(results, path) else DAMAGED
 
 
-def _computed_files(campaign, results, files) -> Iterator[Item]:
+def _computed_files(campaign, results, files, sha256_of_run) -> Iterator[Item]:
     """Yield the files of surfaces, runs, theories and boundary-element solutions at a finite range."""
     summits, run_cost = cache(lambda surface: surface_facts(campaign, surface)["summits"]), cache(costs.run_cost)
     for path, (name, _) in files.surfaces.items():
@@ -132,7 +132,7 @@ def _computed_files(campaign, results, files) -> Iterator[Item]:
         cost, threads = costs.surface_cost(grid), costs.job_threads(grid)
         yield Item("surfaces", "surface", path, _state(results, path), cost, threads)
     for path, case in files.runs.items():
-        state, reason = run_state(results / path, run_sha256(campaign, case))
+        state, reason = run_state(results / path, sha256_of_run(case))
         if not is_whole(results, path):
             state, reason = DAMAGED, ""
         grid = campaign.grid(case.surface)

@@ -65,9 +65,9 @@ def surface_facts(campaign: Campaign, name: str) -> dict[str, float]:
 
     Returns
     -------
-    Properties of `icha.analysis.validity.VALIDATED`, and three more: `summits` is the number of supported summits,
-    `rms_curvature` the rms curvature of profiles (1/m), and `complete_contact_pressure` the pressure for complete
-    contact divided by E* (an estimate for random surfaces).
+    Properties of `icha.analysis.validity.VALIDATED`, and four more: `summits` is the number of supported summits,
+    `rms_curvature` the rms curvature of profiles (1/m), `rms_height` the rms height (m), `complete_contact_pressure`
+    the pressure for complete contact divided by E* (an estimate for random surfaces).
     """
     section = campaign.surfaces[name]
     if isinstance(section, SelfAffineSurface):
@@ -95,6 +95,7 @@ def surface_facts(campaign: Campaign, name: str) -> dict[str, float]:
         "free_edges": float(free),
         "summits": summits,
         "rms_curvature": math.sqrt(moments.m4 / (2 * moments.m2)),
+        RMS_HEIGHT: math.sqrt(moments.m0 / (2 * moments.m2)),
         COMPLETE: complete,
     }
 
@@ -115,8 +116,7 @@ def expected_validity(campaign: Campaign) -> list[Statement]:
         }
         section = campaign.surfaces[case.surface]
         if isinstance(section, SelfAffineSurface):
-            moments = self_affine_moments(*section.lengths_and_hurst)
-            known[RMS_HEIGHT] = case.rms_slope * math.sqrt(moments.m0 / (2 * moments.m2))
+            known[RMS_HEIGHT] = case.rms_slope * facts[RMS_HEIGHT]
             known[STICKY_HEIGHT] = sticky_rms_height(section.rolloff_wavelength, material)
         if MODELS[case.model].by_cells:
             spacing = campaign.period(case.surface) / campaign.grid(case.surface)
