@@ -440,6 +440,8 @@ class LinearisedFront:
         return result
 
 
+# Some processors raise the flag of an invalid value in products of finite matrices (numpy/numpy issue 24067).
+@np.errstate(invalid="ignore")
 def gmres(matrix: Callable, preconditioner: Callable, right: np.ndarray, accuracy: float) -> np.ndarray:
     """Solve linear equations by right-preconditioned GMRES to a relative accuracy, or until _MAX_KRYLOV steps."""
     norm = float(np.linalg.norm(right))
