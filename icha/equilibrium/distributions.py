@@ -29,18 +29,19 @@ def cover_grid(period: float, grid: int, centres, radii, free_square: bool = Fal
 
 
 def gap_distribution(law: JKR, surface: Surface, state: ContactState) -> dict:
-    """Return the distribution P(u) of the local gap u in an equilibrium, as a dictionary with the keys below.
+    """Return the distribution P(u) of the gap u outside the spots, as a dictionary with the keys below.
 
-    If a spot covers part of a grid cell, only the uncovered fraction of the cell is counted. The gap of this fraction
-    is the gap at the node of the cell, or zero if the node lies inside the spot. The last bin includes all larger gaps.
+    Here u is the gap at a point. In other modules of this package, u is the mean separation. If a spot covers part of a
+    grid cell, only the uncovered fraction of the cell is counted. The gap of this fraction is the gap at the node of
+    the cell, or zero if the node lies inside the spot. The last bin includes all larger gaps.
 
     Returns
     -------
     gap_density : (bins,) float, P(u) in the bins of `icha.contact.model.gap_bins`, 1/m.
-    overlap_fraction : fraction of the nominal area with negative gap, where the surfaces overlap in the model.
-    area_beyond_edges : contact area fraction A/A0 minus the fraction of the nominal area that spots cover. The
-        value is not zero if spots reach over the edges of a free square, or if two spots that have split
-        overlap. The sum of the integral of P(u), A/A0 and overlap_fraction is 1 + area_beyond_edges.
+    overlap_fraction : fraction of the nominal area outside the spots where the gap is negative: surfaces overlap there.
+    area_beyond_edges : part of A/A0 that the cells do not count: spot area over the edges of a free square, and the
+        excess over 1 in cells that overlapping spots cover more than once. The sum of the integral of P(u), A/A0
+        and overlap_fraction is 1 + area_beyond_edges.
     """
     edges = gap_bins(surface)
     spots, a = state.spots, state.spots.contact_radius
@@ -48,15 +49,15 @@ def gap_distribution(law: JKR, surface: Surface, state: ContactState) -> dict:
     field = DisplacementField(law, period, grid, spots.position, a, spots.radius_of_curvature, free_square)
 
     def count_cells(rows, w):
-        """Return the uncovered area by bins of the gap, the covered area, and the repeatedly covered area, in cells."""
+        """Return three areas in cells: uncovered in every bin of the gap, covered, and covered more than once."""
         u = w + (state.separation - surface.heights[rows])
         cover, inside = _cover_rows(period, grid, spots.position, a, rows, free_square)
         u[inside] = 0.0
         # Bin 0 contains the negative gaps.
         index = np.where(u < 0, 0, _gap_bin(u, edges) + 1).ravel()
-        cut = np.flatnonzero(cover)
-        hidden = np.bincount(index[cut], weights=np.clip(cover.ravel()[cut], 0.0, 1.0), minlength=len(edges))
-        return np.bincount(index, minlength=len(edges)) - hidden, np.sum(cover), np.sum(np.maximum(cover - 1.0, 0.0))
+        touched = np.flatnonzero(cover)
+        covered = np.bincount(index[touched], weights=np.clip(cover.ravel()[touched], 0.0, 1.0), minlength=len(edges))
+        return np.bincount(index, minlength=len(edges)) - covered, np.sum(cover), np.sum(np.maximum(cover - 1.0, 0.0))
 
     content, covered, twice = zip(*field.map_blocks(count_cells), strict=True)
     content = np.sum(content, axis=0) / grid**2
@@ -69,7 +70,7 @@ def gap_distribution(law: JKR, surface: Surface, state: ContactState) -> dict:
 
 
 def _gap_bin(u, edges):
-    """Return for every gap u the index i of its bin, edges[i] <= u < edges[i + 1]; the last bin has no upper limit."""
+    """Return the bin of every gap u among `edges` from `gap_bins`: bin 0 if u < 0, the last bin above all edges."""
     last = len(edges) - 2
     decade = np.log10(np.maximum(u / edges[1], 1.0))
     index = np.minimum(decade * GAPS_PER_DECADE + 1, last).astype(np.intp)
@@ -83,13 +84,14 @@ def pressure_distribution(law: JKR, surface: Surface, spots: Spots) -> dict:
     """Return the distribution P(p) of the pressure over the nominal area, as a dictionary with the keys below.
 
     P(p) is the sum of an exact formula over all spots and needs no grid. The integral of P(p) is A/A0. The integral of
-    p P(p), computed with the mean pressure of each bin, is F/A0. The last bin ends at 500 E* h'_rms, and includes all
-    larger pressures.
+    p P(p), computed with the mean pressure of each bin, is F/A0. The first bin includes all pressures below its lower
+    edge, because the pressure at the edge of a JKR spot is minus infinity. The last bin includes all pressures above
+    its upper edge, 500 E* h'_rms.
 
     Returns
     -------
     pressure_density : (bins,) float, P(p) in the bins of `icha.contact.model.PRESSURE_BINS`, 1/Pa.
-    pressure_bin_mean : (bins,) float, area-weighted mean pressure of each bin, Pa.
+    pressure_bin_mean : (bins,) float, area-weighted mean pressure of each bin, Pa; 0 for an empty bin.
     """
     edges = PRESSURE_BINS * (law.material.contact_modulus * surface.rms_slope)
     a, R = spots.contact_radius, spots.radius_of_curvature
@@ -100,15 +102,14 @@ def pressure_distribution(law: JKR, surface: Surface, spots: Spots) -> dict:
             # Area of every spot where the pressure is below p, and the force on this area.
             areas, forces = law.pressure_distribution(p, a, R)
             area[k], force[k] = np.sum(areas), np.sum(forces)
-        # The pressure at the edge of a JKR spot is minus infinity, so the first bin includes all lower pressures.
-        area[0] = force[0] = 0.0
+        area[0] = force[0] = 0.0  # the first bin includes all lower pressures
     content, load = np.diff(area), np.diff(force)
     mean = np.divide(load, content, out=np.zeros(len(content)), where=content > 0)
     return {"pressure_density": content / (surface.period**2 * np.diff(edges)), "pressure_bin_mean": mean}
 
 
 def _cover_rows(period, grid, centres, radii, rows, free_square=False):
-    """Return the results of `cover_grid` for a range of rows, given as a slice."""
+    """Return the two results of `cover_grid` for the rows of a slice, each (rows, n)."""
     if free_square:
         # On a square of twice the side, a disc that crosses an edge does not reappear at the opposite edge.
         parts = _cover_rows(cell_of(period, free_square), cell_of(grid, free_square), centres, radii, rows)

@@ -12,7 +12,7 @@ from icha.asperity.material import Material
 from icha.contact.model import AREA_FRACTION, PRESSURE, Control
 from icha.contact.models import DEFAULT_MODEL, MODELS
 from icha.equilibrium.distributions import gap_distribution, pressure_distribution
-from icha.equilibrium.equations import nominal_derivative, nominal_value, radius_slope
+from icha.equilibrium.equations import derivative_by_radius, pressure_or_area_fraction, radius_slope
 from icha.equilibrium.sites import AsperityContact, ContactState, Sites
 from icha.equilibrium.solver import find_equilibrium
 from icha.half_space.free_square import mean_displacement
@@ -48,25 +48,26 @@ class InteractingAsperities(AsperityContact):
     def equilibrium(
         self, state: ContactState, separation: float, control: Control | None = None, *, let_go: int = 0
     ) -> ContactState:
-        """Find the equilibrium at another mean separation (m), load or area; see `ContactModel`."""
+        """Find the equilibrium at another mean separation (m), load or area; see `ContactModel.equilibrium`."""
         return find_equilibrium(self, state, separation, control, let_go=let_go)
 
     def continue_from(self, state: ContactState, before: ContactState) -> ContactState:
-        """Raise `NotImplementedError`: a path calls this method only if the error controls the steps."""
+        """Raise `NotImplementedError`: no path calls this method of a model without `error_controlled_steps`."""
         raise NotImplementedError
 
     def pressure(self, state: ContactState) -> float:
         """Return the force over the nominal area, Pa."""
-        return nominal_value(self, PRESSURE, state.spots.contact_radius, state.spots.radius_of_curvature)
+        return pressure_or_area_fraction(self, PRESSURE, state.spots.contact_radius, state.spots.radius_of_curvature)
 
     def area_fraction(self, state: ContactState) -> float:
         """Return the contact area over the nominal area."""
-        return nominal_value(self, AREA_FRACTION, state.spots.contact_radius, state.spots.radius_of_curvature)
+        spots = state.spots
+        return pressure_or_area_fraction(self, AREA_FRACTION, spots.contact_radius, spots.radius_of_curvature)
 
     def mean_gap(self, state: ContactState) -> float:
-        """Return the mean gap, m; on a periodic surface the mean separation.
+        """Return the mean gap, m: on a periodic surface the mean separation.
 
-        On a free square it is the mean separation plus the mean displacement by point forces at the spots' centres.
+        On a free square, add the mean displacement; each spot acts as a point force at its centre.
         """
         if not self.asperities.free:
             return state.separation
@@ -80,14 +81,14 @@ class InteractingAsperities(AsperityContact):
 
     def stiffness(self, state: ContactState) -> float:
         """Return the contact stiffness -dp/du of the present spots, Pa/m."""
-        return 0.0 - self.slope(PRESSURE, state)
+        return 0.0 - self.slope(PRESSURE, state)  # not -0.0 without contact
 
     def slope(self, quantity: str, state: ContactState) -> float:
-        """Return the derivative of PRESSURE or AREA_FRACTION with respect to the mean separation, without events."""
+        """Return the derivative of PRESSURE or AREA_FRACTION by the mean separation as long as no event occurs."""
         sites, c = state.sites, state.contact_index
         a, R = state.contact_radius[c], sites.radius_of_curvature[c]
         growth = radius_slope(self.law, a, R, sites.approach[c], sites.jump_off_approach[c]) * sites.response[c]
-        return float(np.sum(nominal_derivative(self, quantity, a, R) * growth))
+        return float(np.sum(derivative_by_radius(self, quantity, a, R) * growth))
 
     def stored_energy(self, state: ContactState) -> float:
         """Return the elastic energy minus the energy of adhesion, over the nominal area, J/m^2; zero without contact.
@@ -95,8 +96,8 @@ class InteractingAsperities(AsperityContact):
         The energy of a spot is that of a single JKR contact, plus half its force times the displacement by the other
         spots. The displacement is taken at the centre of a spot, as in eq. (4), although the spot has an area.
         Therefore the interaction of two spots of different size is not exactly reciprocal. Along a path without events,
-        the change of the energy differs from the work done by a fraction of order (a/r)^2 of the interaction energy,
-        where r is the distance of the spots.
+        the change of the energy and the work done are not exactly equal. They differ by about (a/r)^2 times the
+        interaction energy, where r is the distance of the spots.
         """
         spots, law = state.spots, self.law
         a, R = spots.contact_radius, spots.radius_of_curvature
@@ -124,18 +125,17 @@ class AsperityObservables:
         return {}
 
     def of_step(self, state: ContactState) -> dict:
-        """Return residual, number of barred asperities, and fraction of single spots outside the range of eq. (3)."""
+        """Return the residual, the number of barred asperities, and the fraction outside the range of Wu's eq. (3).
+
+        The fraction counts the single spots whose Tabor parameter is below 1. Without adhesion it is 0.
+        """
         law, spots = self.contact.law, state.spots
         verified = law.is_jump_in_verified(spots.radius_of_curvature[spots.members == 1])
-        outside = np.count_nonzero(~verified) / max(len(verified), 1)
-        return {
-            "residual": state.residual,
-            "pending_count": state.barred_count,
-            "outside_wu_fraction": outside if self.contact.adhesive else 0.0,
-        }
+        outside = np.count_nonzero(~verified) / max(len(verified), 1) if self.contact.adhesive else 0.0
+        return {"residual": state.residual, "pending_count": state.barred_count, "outside_wu_fraction": outside}
 
     def of_snapshot(self, state: ContactState) -> dict:
-        """Return the distributions of gap and pressure, and the properties of the spots."""
+        """Return the distributions of gap and pressure, and for every spot its position, radius, area, force etc."""
         law, spots = self.contact.law, state.spots
         return {
             **gap_distribution(law, self.surface, state),
@@ -151,8 +151,10 @@ class AsperityObservables:
         }
 
     def reasons_against(self, separations: Iterable[float], pressed: ContactState | None) -> list[str]:
-        """Return reasons why summits do not represent the surface at the mean separations of the first loading, m.
+        """Return reasons why summits do not represent the surface, as sentences for the user; an empty list if they do.
 
+        At the mean separations (m) of the first loading, peaks may have no summit, or nodes may not support summits.
+        In the state `pressed`, the tops under the spots of single asperities may not be parabolic.
         pressed : state with the largest contact area; None if there is no state.
         """
         reasons = SummitCoverage.of(self.surface, self.contact.asperities).reasons_against(separations)

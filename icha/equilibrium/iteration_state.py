@@ -18,12 +18,13 @@ class IterationState:
     ----------
     contact : contact of the asperities.
     start : equilibrium from which the search starts.
-    unloading : whether the prescribed or guessed separation is larger than that of `start`.
+    unloading : whether the prescribed or first guessed separation is larger than that of `start`.
     sites : table of sites.
     site_of_asperity, last_approach, last_separation, barred_count : as in `ContactState`.
-    released_from : (asperities,) int, site of the union that released an asperity in the last jump-off; -1 for others.
+    released_from : (asperities,) int, site of the union that released an asperity when it broke contact, since the last
+        call of `apply_jump_in`; -1 for other asperities.
     was_released : (asperities,) bool, whether a union has released an asperity during this search.
-    barred : (asperities,) bool, whether an asperity may not make contact, because it broke contact during this search.
+    barred : (asperities,) bool, whether an asperity may not make contact again because it broke contact in this search.
     new_unions : indices of the sites of unions whose heights are not known yet.
     log : events of this search so far, each a row of kind, position, members, energy and asperity.
     """
@@ -43,8 +44,11 @@ class IterationState:
     log: tuple = ()
 
     @classmethod
-    def towards(cls, contact: AsperityContact, state: ContactState, separation: float) -> IterationState:
-        """Start a search from an equilibrium; extrapolate its approaches linearly to a mean separation, m."""
+    def start_search(cls, contact: AsperityContact, state: ContactState, separation: float) -> IterationState:
+        """Start a search from an equilibrium: extrapolate its approaches linearly to a mean separation, m.
+
+        All spots in contact now count as old. The table is compacted, so the indices of sites may change.
+        """
         count, before = len(contact.asperities), state.sites
         sites = replace(
             before,
@@ -68,15 +72,15 @@ class IterationState:
         )
 
     @property
-    def without_site(self) -> np.ndarray:
-        """Mask (asperities,) of the asperities that have no site: no spot or candidate contains or covers them."""
-        without_site = self.site_of_asperity < 0
+    def lacks_site(self) -> np.ndarray:
+        """Mask (asperities,) of the asperities that neither belong to a spot in contact nor are candidates."""
+        lacks_site = self.site_of_asperity < 0
         single = (self.sites.asperity >= 0) & self.sites.present
-        without_site[self.sites.asperity[single]] = False
-        return without_site
+        lacks_site[self.sites.asperity[single]] = False
+        return lacks_site
 
     @property
-    def jumped_in(self) -> list[int]:
+    def asperities_jumped_in(self) -> list[int]:
         """Indices of the asperities that have jumped into contact during this search."""
         return [row[4] for row in self.log if row[0] == JUMP_IN]
 
@@ -85,7 +89,7 @@ class IterationState:
         return replace(self, sites=replace(self.sites, approach=approach))
 
     def with_events(self, kind, position, members, energy=0.0, asperity=-1) -> IterationState:
-        """Return a copy of the state with k more events of one kind in its log.
+        """Return a copy of the state with k more events of one kind at the end of its log.
 
         position : (k, 2) float, m. The other arguments are arrays (k,), or one value for all events.
         """
@@ -93,10 +97,10 @@ class IterationState:
         rows = ((kind, *row) for row in zip(position, *columns, strict=True))
         return replace(self, log=(*self.log, *rows))
 
-    def without_jumps_in(self, asperity) -> IterationState:
+    def delete_jumps_in(self, asperity) -> IterationState:
         """Return a copy of the state whose log does not contain the jump-ins of given asperities (indices)."""
-        dropped = set(asperity.tolist())
-        return replace(self, log=tuple(row for row in self.log if row[0] != JUMP_IN or row[4] not in dropped))
+        deleted = set(asperity.tolist())
+        return replace(self, log=tuple(row for row in self.log if row[0] != JUMP_IN or row[4] not in deleted))
 
     def events(self) -> Events:
         """Return all events of the search so far, in one `Events` object."""

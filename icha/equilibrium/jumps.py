@@ -3,8 +3,11 @@
 Jump-in: an asperity makes contact when its approach reaches the jump-in approach, eq. (3). Without adhesion contact
 forms at an approach of zero and without a jump. Therefore, without adhesion all asperities that may come into contact
 are candidates. The approaches of the candidates are unknowns of the equations, and the solution shows which candidates
-are in contact. Jump-off: a spot past the end of its stable branch breaks contact. If this spot is a union, the union
-releases its asperities. A released asperity stays in contact if it has a stable state.
+are in contact. Jump-off: a spot past jump-off, with an approach below its jump-off approach, breaks contact.
+
+The asperities of a broken spot are freed: each is released or barred. A union releases its asperities. A released
+asperity stays in contact if it has a stable state and is not under a larger new spot. A barred asperity does not make
+contact again in this search.
 """
 
 from dataclasses import replace
@@ -18,35 +21,39 @@ from icha.equilibrium.iteration_state import IterationState
 from icha.equilibrium.sites import CANDIDATE, CONTACT
 from icha.half_space.interaction import displacement_at
 
-# Largest and usual increase of the approach of an asperity out of contact, relative to the decrease of the separation.
+# Largest increase of the approach of an asperity out of contact, divided by the size of the change of the separation.
 _LARGEST_APPROACH_RATE = 3.0
+# Usual increase of this approach, divided by the decrease of the separation.
 _USUAL_APPROACH_RATE = 1.2
 # Jumps of other spots may increase an approach by up to x h_rms + y |delta_off|, where delta_off is the jump-off
 # approach of the bluntest asperity. Each pair contains x and y: the guess during the search, the bound at its end.
 _SUDDEN_GUESS = 0.02, 2.0
 _SUDDEN_BOUND = 1.0, 10.0
-# Spots break contact together if the increases of separation up to their jump-offs differ by at most this fraction.
+# Spots break contact together if the increases of the separation up to their jump-offs differ by at most this fraction.
 _TIE_TOLERANCE = 1e-3
 
 
 def add_candidates(state: IterationState, separation: float) -> IterationState:
-    """Without adhesion: add the asperities that will probably touch at a separation, m, to the sites as candidates."""
+    """Add the asperities that will probably touch at a separation, m, as candidates; used only without adhesion."""
     fall = state.last_separation - separation
-    growth = _USUAL_APPROACH_RATE * fall + _sudden_growth(state.contact, _SUDDEN_GUESS)
-    candidates = np.flatnonzero((state.last_approach + growth > 0) & state.without_site)
+    growth = _USUAL_APPROACH_RATE * fall + _sudden_growth(state.contact, *_SUDDEN_GUESS)
+    candidates = np.flatnonzero((state.last_approach + growth > 0) & state.lacks_site)
     # If an asperity was in contact just before, its approach is not known, but it is small.
     expected = np.where(np.isfinite(fall), state.last_approach + fall, 0.0)
     return _add_sites(state, candidates, CANDIDATE, expected[candidates])
 
 
 def apply_jump_in(state: IterationState, evaluation: Evaluation, margin: float) -> tuple[IterationState, bool]:
-    """Add sites for those asperities whose approach exceeds the jump-in approach by more than a margin, m.
+    """Add sites for the asperities that are ready for contact; return the new state, and whether sites were added.
 
-    The new sites are contacts, or candidates without adhesion. An asperity under a spot becomes part of this spot. An
-    asperity under a larger spot of another new site gets no site now. An asperity that the last jump-off of a union has
-    released stays in contact if its approach exceeds the jump-off approach, and is barred otherwise. This holds only in
-    the first call after the jump-off. If any asperity of the union gets a site, a split of the union is logged. Return
-    the new state, and whether sites were added.
+    An asperity is ready if its approach is at least the jump-in approach plus a margin, m. An asperity that a union has
+    released since the last call is ready if its approach is at least the jump-off approach; otherwise it is barred.
+
+    1. A ready asperity that is barred stays out of contact and is counted in `barred_count`.
+    2. A ready asperity under a spot becomes part of this spot. It does not count as an added site.
+    3. A ready asperity under the larger spot of another ready asperity gets no site in this call.
+    4. Any other ready asperity gets a site: a contact with adhesion, a candidate without adhesion. If a union has
+       released it, a split of the union is logged. Otherwise a jump-in is logged, but not for a candidate.
     """
     contact, law, asperities = state.contact, state.contact.law, state.contact.asperities
     spots = np.flatnonzero((evaluation.a > 0) & state.sites.present)
@@ -65,10 +72,8 @@ def apply_jump_in(state: IterationState, evaluation: Evaluation, margin: float) 
     site_of_asperity[ready[under >= 0]] = spots[under[under >= 0]]
     ready = _largest_of_each_group(state, ready[under < 0])
     source = state.released_from[ready]
-    none = np.full(len(state.released_from), -1)
-    state = replace(
-        state, barred=barred, site_of_asperity=site_of_asperity, barred_count=barred_count, released_from=none
-    )
+    state = replace(state, barred=barred, site_of_asperity=site_of_asperity, barred_count=barred_count)
+    state = replace(state, released_from=np.full(len(barred), -1))
     if not len(ready):
         return state, False
     splits, jumping = np.unique(source[source >= 0]), ready[source < 0]
@@ -81,21 +86,23 @@ def apply_jump_in(state: IterationState, evaluation: Evaluation, margin: float) 
     return _add_sites(state, ready, CONTACT if contact.adhesive else CANDIDATE, state.last_approach[ready]), True
 
 
-def _sudden_growth(contact, reach):
-    """Return the largest increase of an approach by jumps of other spots, m; `reach` is a pair like _SUDDEN_GUESS."""
-    heights, jumps = reach
-    largest_jump = -contact.law.jump_off_approach(np.max(contact.asperities.radius_of_curvature))
-    return heights * contact.rms_height + jumps * largest_jump
+def _sudden_growth(contact, x, y):
+    """Return x h_rms + y |delta_off|, m: guess (_SUDDEN_GUESS) or bound of the growth of an approach by other jumps."""
+    return x * contact.rms_height - y * contact.law.jump_off_approach(np.max(contact.asperities.radius_of_curvature))
 
 
 def _evaluate_approaches(state, evaluation, spots, margin):
-    """Compute the approaches of all asperities that may have reached jump-in; return the state and these indices."""
+    """Compute the approaches of the asperities without site that may have reached jump-in, and store them in the state.
+
+    If `margin` is 0, an upper bound selects these asperities; otherwise a guess selects them, which may miss some.
+    Return the new state, and the indices of the evaluated asperities. `spots` : indices of the sites in contact.
+    """
     contact, asperities, sites = state.contact, state.contact.asperities, state.sites
-    reach = state.last_approach + _LARGEST_APPROACH_RATE * np.abs(state.last_separation - evaluation.separation)
-    reach += _sudden_growth(contact, _SUDDEN_GUESS if margin > 0 else _SUDDEN_BOUND)
-    evaluated = np.flatnonzero((reach >= contact.jump_in_approach) & state.without_site)
+    largest = state.last_approach + _LARGEST_APPROACH_RATE * np.abs(state.last_separation - evaluation.separation)
+    largest += _sudden_growth(contact, *(_SUDDEN_GUESS if margin > 0 else _SUDDEN_BOUND))
+    evaluated = np.flatnonzero((largest >= contact.jump_in_approach) & state.lacks_site)
     points, position = asperities.position[evaluated], sites.position[spots]
-    a, R, ewald = evaluation.a[spots], sites.radius_of_curvature[spots], sites.half_space.ewald.once
+    a, R, ewald = evaluation.a[spots], sites.radius_of_curvature[spots], sites.half_space.ewald.for_one_sum
     w = displacement_at(contact.law, asperities.period, points, position, a, R, ewald)
     last_approach, last_separation = state.last_approach.copy(), state.last_separation.copy()
     last_approach[evaluated] = asperities.height[evaluated] - evaluation.separation - w
@@ -104,7 +111,7 @@ def _evaluate_approaches(state, evaluation, spots, margin):
 
 
 def _largest_of_each_group(state, jumping):
-    """Return those jumping asperities (indices) whose centres are not under a larger spot of another one of them."""
+    """Return those jumping asperities (indices) whose centres will not lie under the larger spot of another one."""
     asperities = state.contact.asperities
     position = asperities.position[jumping]
     a = state.contact.law.contact_radius(state.last_approach[jumping], asperities.radius_of_curvature[jumping])
@@ -113,7 +120,7 @@ def _largest_of_each_group(state, jumping):
 
 
 def _add_sites(state, asperity, status, approach):
-    """Return the state with new sites for k asperities (indices); `status` is one value, approaches are (k,), m."""
+    """Return the state with new sites for k asperities (indices); only contacts are entered in `site_of_asperity`."""
     if not len(asperity):
         return state
     asperities, site_of_asperity = state.contact.asperities, state.site_of_asperity
@@ -136,11 +143,12 @@ def _add_sites(state, asperity, status, approach):
 
 
 def apply_jump_off(state: IterationState, evaluation: Evaluation, margin: float) -> IterationState:
-    """Break the contact of all spots whose approach is below the jump-off approach by more than a margin, m.
+    """Break the contact of the spots whose approach is below the jump-off approach by more than a margin, m.
 
-    If spots that do not count as old (`Sites.counts_as_old`) are past jump-off, even by less than the margin, no other
-    spot breaks contact: the other spots may be stable afterwards. Without adhesion only unions break contact here, when
-    the margin is 0, because a single asperity with a negative approach exerts no force. Return the new state.
+    As long as a new spot (`Sites.counts_as_old` is False) is past jump-off, even by less than the margin, no old spot
+    breaks contact: the old spots may be stable without the new one. Without adhesion, only unions break contact here,
+    and only if the margin is 0. A single asperity with a negative approach needs no jump-off, because it exerts no
+    force. Return the new state.
     """
     sites = state.sites
     breaking = sites.status == CONTACT
@@ -154,38 +162,38 @@ def apply_jump_off(state: IterationState, evaluation: Evaluation, margin: float)
     return _break_contact(state, breaking) if breaking.any() else state
 
 
-def break_closest_to_jump_off(state: IterationState, separation: float, let_go: int) -> IterationState:
-    """Break the contact of the `let_go` spots closest to jump-off, and of spots equally close; return the new state.
+def break_closest_to_jump_off(state: IterationState, separation: float, count: int) -> IterationState:
+    """Break the contact of the `count` spots closest to jump-off, and of spots equally close; return the new state.
 
     The closest spots are those that reach jump-off after the smallest increase of the separation, as their responses
-    predict. All approaches are reset to the start of the search, because this increase is counted from there.
+    predict. This increase is counted from the start of the search, so all approaches are reset to their values there.
 
     separation : mean separation to which the search has extrapolated the approaches, m.
-    let_go : at most the number of spots in contact.
+    count : number of spots to break, not larger than the number of spots in contact.
     """
     sites = state.sites
     approach = sites.approach - sites.response * (separation - state.start.separation)
-    rate = np.maximum(-sites.response, 1e-3)
+    rate = np.maximum(-sites.response, 1e-3)  # a spot that moves away from jump-off counts as slow
     rise = np.where(sites.status == CONTACT, (approach - sites.jump_off_approach) / rate, np.inf)
-    last = np.partition(rise, let_go - 1)[let_go - 1]
+    last = np.partition(rise, count - 1)[count - 1]
     return _break_contact(state.with_approach(approach), rise <= last * (1 + _TIE_TOLERANCE))
 
 
 def _break_contact(state, breaking):
     """Break the contact of the spots where the mask `breaking` (n,) is True, and log their jump-offs.
 
-    A union releases its asperities, each at most once during a search. All other asperities in broken spots are barred:
-    they may not make contact again at this separation. If an asperity has jumped in during this search, its jump-in is
-    removed from the log, and no jump-off is logged.
+    A union releases its asperities, including those that it only covers, each at most once during a search. All other
+    asperities in broken spots are barred. For an asperity that has jumped in during this search, no jump-off is logged;
+    its jump-in is deleted from the log.
     """
     sites, law = state.sites, state.contact.law
-    new = np.isin(sites.asperity, state.jumped_in) & breaking
+    new = np.isin(sites.asperity, state.asperities_jumped_in) & breaking
     spots = np.flatnonzero(breaking & ~new)
     R = sites.radius_of_curvature[spots]
     energy = law.energy(law.jump_off_radius(R), R)
-    state = state.without_jumps_in(sites.asperity[new])
+    state = state.delete_jumps_in(sites.asperity[new])
     state = state.with_events(JUMP_OFF, sites.position[spots], sites.members[spots], energy)
-    # Asperities without a site have the index -1 and take the appended value False.
+    # For asperities without a site, -1 selects the appended value False.
     freed = np.append(breaking, False)[state.site_of_asperity]
     released = np.append(breaking & (sites.asperity < 0), False)[state.site_of_asperity] & ~state.was_released
     return replace(

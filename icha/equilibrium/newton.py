@@ -14,7 +14,7 @@ from scipy.sparse.linalg import LinearOperator, gmres
 
 from icha.contact.model import NotConverged
 from icha.contact.models import DEFAULT_MODEL, MODELS
-from icha.equilibrium.equations import Equations, Evaluation, nominal_derivative, radius_slope
+from icha.equilibrium.equations import Equations, Evaluation, derivative_by_radius, radius_slope
 from icha.equilibrium.sites import CONTACT
 
 # Largest number of trials of a Newton step; each trial after the first one halves the step.
@@ -32,15 +32,16 @@ _KRYLOV = 50
 _LARGEST_CHANGE = 0.2
 # Contact radius, in jump-off radii, below which a step towards jump-off changes the radius instead of the approach.
 _NEAR_JUMP_OFF = 1.5
-# A spot past jump-off returns to contact only if its distance from jump-off is less than this fraction of its error.
+# A spot past jump-off returns to contact only if its distance from jump-off is below this fraction of its error.
 _PAST_JUMP_OFF = 0.2
 
 
 def newton_step(equations: Equations, evaluation: Evaluation, size: float) -> tuple[Evaluation, bool, bool]:
-    """Take one Newton step, halved until the error is smaller than `size`, the `error_size` before the step.
+    """Take one Newton step; halve it until it lowers `size`, the `error_size` before the step, by enough.
 
-    If no step with the approximate matrix reduces the error, the exact matrix is used. Return the evaluation after the
-    step, or the old evaluation if all steps fail; whether the error is smaller; and whether the matrix was exact.
+    The error must fall by at least 10 % after the full step, 5 % after half the step, and so on. If eight trials with
+    the approximate matrix fail, eight with the exact matrix follow. Return the evaluation after the step (the old one
+    if all trials fail), whether a trial succeeded, and whether the exact matrix was needed.
     """
     for exact in (False, True):
         step, separation_step = _solve_step(equations, evaluation, exact)
@@ -51,14 +52,16 @@ def newton_step(equations: Equations, evaluation: Evaluation, size: float) -> tu
             new = equations.evaluate(approach, separation, evaluation.interaction)
             if equations.error_size(new) < (1 - 0.1 * fraction) * size:
                 return new, True, exact
+            # If the trial has set up a new interaction, for larger radii, later trials use it too.
             evaluation = replace(evaluation, interaction=new.interaction)
     return evaluation, False, True
 
 
 def solve_response(equations: Equations, evaluation: Evaluation) -> np.ndarray:
-    """Return the response x = d(delta)/du of the approach of every site to the mean separation, (n,).
+    """Return the response x = d(delta)/du of the approach of every site to the mean separation, (n,); -1 if removed.
 
-    The response solves (1 + W' da/d(delta)) x = -1, where W' = dw/da is the derivative of the displacements.
+    The response solves (1 + W' da/d(delta)) x = -1, where W' = dw/da is the derivative of the displacements. Repeated
+    solves correct x, with the approximate matrix and then with the exact one. Raise `NotConverged` if these fail.
     """
     sites = equations.sites
     response = np.full(len(sites), -1.0)
@@ -79,18 +82,18 @@ def solve_response(equations: Equations, evaluation: Evaluation) -> np.ndarray:
 def _linearise(equations, evaluation):
     """Linearise the displacements at the m present sites as functions of their approaches.
 
-    Return the indices of these sites and their da/d(delta), both (m,), and two functions. Both functions return the
-    changes of the displacements (m,) for given changes of the approaches (m,): one is exact, the other approximate.
+    A spot past jump-off that returns to contact is treated as if it were at jump-off, on the stable branch. Return the
+    indices of the present sites and their da/d(delta), both (m,), and two functions. Both functions return the changes
+    of the displacements (m,) for given changes of the approaches (m,): the first exactly, the second approximately.
     """
     sites = equations.sites
     present = np.flatnonzero(sites.present)
     a, R = evaluation.a[present], sites.radius_of_curvature[present]
     jump_off_approach = sites.jump_off_approach[present]
-    # A spot past jump-off that returns to contact is treated as if it were at jump-off, on the stable branch.
     returns = _returns_to_contact(sites, evaluation)[present] & equations.contact.adhesive
     approach = np.where(returns, jump_off_approach, evaluation.approach[present])
     slope = radius_slope(equations.contact.law, a, R, approach, jump_off_approach)
-    tangent, approximate_tangent = evaluation.interaction.tangent(evaluation.a)
+    tangents = evaluation.interaction.tangent(evaluation.a)
 
     def radius_change(x):
         """Return the changes of all contact radii (n,) for changes x of the approaches (m,)."""
@@ -98,17 +101,15 @@ def _linearise(equations, evaluation):
         change[present] = slope * x
         return change
 
-    def exact(x):
-        return tangent(radius_change(x))[present]
-
-    def approximate(x):
-        return approximate_tangent(radius_change(x))[present]
-
+    exact, approximate = (lambda x, tangent=tangent: tangent(radius_change(x))[present] for tangent in tangents)
     return present, slope, exact, approximate
 
 
 def _solve_step(equations, evaluation, exact):
-    """Return the Newton step by the exact or approximate matrix: changes of approaches (n,) and separation, m."""
+    """Return the Newton step by the exact or approximate matrix: changes of approaches (n,) and separation, m.
+
+    If the separation is given, its change is 0; if load or area is given, its change is at most _LARGEST_CHANGE h_rms.
+    """
     contact, sites, control = equations.contact, equations.sites, equations.control
     present, slope, exact_product, approximate_product = _linearise(equations, evaluation)
     product, tolerance = (exact_product, _EXACT_TOLERANCE) if exact else (approximate_product, _LINEAR_TOLERANCE)
@@ -121,7 +122,7 @@ def _solve_step(equations, evaluation, exact):
     # separation. The unknowns are the differences from this prediction, so that the matrix is close to the identity.
     last = sites.response[present]
     R = sites.radius_of_curvature[present]
-    gradient = slope * nominal_derivative(contact, control.quantity, evaluation.a[present], R)
+    gradient = slope * derivative_by_radius(contact, control.quantity, evaluation.a[present], R)
     rate = float(np.sum(gradient * last))
     if rate == 0:
         raise NotConverged("no contact radius changes with the separation, so the load or area cannot be reached")
@@ -139,13 +140,17 @@ def _solve_step(equations, evaluation, exact):
 
 
 def _take_step(equations, evaluation, step):
-    """Return the approaches (n,) after a Newton step (n,), m, which is modified for spots near jump-off.
+    """Return the approaches (n,) after a Newton step (n,), m, which is modified for three kinds of spots.
 
-    Near jump-off the radius changes as the square root s of the distance from jump-off, the approach minus the jump-off
-    approach. The equations are smooth functions of the radius. Therefore a step towards jump-off is taken as a step of
-    the radius. A spot far past jump-off returns at most to jump-off. For a spot a little past jump-off, s solves the
-    equation s^2 + c s = L. Here L is the new distance if the displacement remained the same, and c s is the change of
-    the displacement. The Newton step neglects s^2, so that its distance s_N^2 gives c = L/s_N.
+    The modifications apply only with adhesion. They use that the equations are smooth functions of the contact radius,
+    which changes near jump-off as s, the square root of delta - delta_off.
+
+    1. A spot in contact with a radius below 1.5 jump-off radii and a step towards jump-off: the step is taken in the
+       radius. If the radius reaches its lowest value, the jump-off radius, the approach falls by the rest of the step.
+    2. A spot far past jump-off: the approach rises at most to jump-off.
+    3. A spot a little past jump-off that returns to contact (`_returns_to_contact`): s solves s^2 + c s = L. Here L is
+       the new value of delta - delta_off if the displacement remained the same, and c s is the change of the
+       displacement. The Newton step gives s_N, which neglects s^2. Therefore c = L/s_N.
     """
     approach = evaluation.approach + step
     if not equations.contact.adhesive:
@@ -162,8 +167,7 @@ def _take_step(equations, evaluation, step):
     R, a = sites.radius_of_curvature[close], evaluation.a[close]
     stable = np.maximum(evaluation.approach, jump_off_approach)[close]
     change = radius_slope(law, a, R, stable, jump_off_approach[close]) * step[close]
-    # If the radius reaches its lowest value, the approach changes by the rest of the step, or by the same fraction of
-    # minus the error if this is lower.
+    # The rest of the step is a fraction of the step, or the same fraction of minus the error if this is lower.
     rest_fraction = 1 - np.minimum((lowest - a) / np.where(change < 0, change, -1.0), 1.0)
     reached = law.approach(np.maximum(a + change, lowest), R)
     approach[close] = reached + np.where(change < 0, rest_fraction * np.minimum(step, -evaluation.error)[close], 0.0)
@@ -176,7 +180,7 @@ def _take_step(equations, evaluation, step):
 
 
 def _returns_to_contact(sites, evaluation):
-    """Return a mask (n,) of the spots that are a little past jump-off and whose error moves them back into contact."""
+    """Return a mask (n,) of the spots that are a little past jump-off and that their error moves back into contact."""
     excess = sites.jump_off_approach - evaluation.approach
     return (sites.status == CONTACT) & (excess >= 0) & (excess < -_PAST_JUMP_OFF * evaluation.error)
 

@@ -20,8 +20,8 @@ class AsperityContact(MaterialUnits):
     Attributes
     ----------
     law : law of one spot.
-    asperities : summits of the surface, n of them.
-    rms_height : rms height of the surface, the unit of the errors of an equilibrium, m.
+    asperities : summits of the surface.
+    rms_height : rms height of the surface, the unit in which the errors of an equilibrium are given, m.
     rms_slope : rms slope of the surface.
     """
 
@@ -32,7 +32,7 @@ class AsperityContact(MaterialUnits):
 
     @cached_property
     def jump_in_approach(self) -> np.ndarray:
-        """Approaches at which the n asperities jump into contact, (n,), m."""
+        """Approaches at which the asperities jump into contact, (asperities,), m."""
         return self.law.jump_in_approach(self.asperities.radius_of_curvature)
 
     @property
@@ -43,7 +43,7 @@ class AsperityContact(MaterialUnits):
 
 # Status of a site: in contact, candidate for contact (only without adhesion), or removed.
 CONTACT, CANDIDATE, REMOVED = 1, 2, 3
-# The half-space is set up again if the number of sites has grown by the factor, or this fraction of them is removed.
+# The half-space is set up again if the number of sites has grown by this factor, or this fraction of sites is removed.
 _GROWTH = 1.5
 _REMOVED_FRACTION = 0.25
 
@@ -57,7 +57,7 @@ class MergeRecord:
     union_radius : contact radius of the union when the spots united, m.
     touching_radius : contact radius of the union below which the two spots would no longer overlap, m.
     contact_radius : (2,) float, contact radii of the two spots, m.
-    columns : other properties of the two spots, two values for each name in `Sites.UNITED`.
+    columns : other properties of the two spots: for each name in `Sites.UNITED` an array of two rows.
     """
 
     union_radius: float
@@ -66,7 +66,7 @@ class MergeRecord:
     columns: dict[str, np.ndarray]
 
     def asperities(self) -> list[list[int]]:
-        """Return the indices of all asperities in the first spot and in the second spot, as two lists."""
+        """Return two lists: the asperities (indices) that united to the first spot, and those of the second spot."""
         return [
             [index] if union is None else [each for spot in union.asperities() for each in spot]
             for index, union in zip(self.columns["asperity"].tolist(), self.columns["union"], strict=True)
@@ -81,18 +81,19 @@ class Sites:
     ----------
     position : (n, 2) float, positions of the asperities, or the centres of unions, m.
     height, radius_of_curvature : (n,) float, heights and radii of curvature of asperities and unions, m.
-    jump_off_approach : (n,) float, approaches at which the spots jump out of contact, m.
+    jump_off_approach : (n,) float, approaches below which the spots have no stable state and break contact, m.
     asperity : (n,) int, index of the asperity; -1 for a union.
-    members : (n,) int, number of asperities that united to this spot, without those that the spot only covers.
+    members : (n,) int, number of asperities that united to this spot; asperities that it only covers do not count.
     union : (n,) object, `MergeRecord` of a union; None for other sites.
     split_number : (n,) int, the same number for the two spots from one split of a union; -1 for other sites.
     status : (n,) int, CONTACT, CANDIDATE or REMOVED.
     approach : (n,) float, last known approach of each site, m.
     response : (n,) float, derivative of the approach with respect to the mean separation.
-    counts_as_old : (n,) bool, True for spots in contact before the present search for equilibrium, for unions, and for
-        spots from a split; False for candidates, and for single asperities added to the table in this search.
+    counts_as_old : (n,) bool, True for spots that were in contact when the present search began, for unions, and for
+        spots from a split: they absorb every new site under them. False for candidates, and for single asperities
+        added to the table in this search.
     half_space : elastic half-space with a point at every site.
-    arranged : number of sites when the half-space was set up for the last time.
+    sites_at_setup : number of sites when the half-space was set up for the last time.
     """
 
     position: np.ndarray
@@ -108,9 +109,9 @@ class Sites:
     response: np.ndarray
     counts_as_old: np.ndarray
     half_space: PointHalfSpace
-    arranged: int
+    sites_at_setup: int
 
-    # Columns of the two spots of a union that its `MergeRecord` contains.
+    # Columns of this table that a `MergeRecord` contains for the two spots of a union.
     UNITED = ("position", "height", "radius_of_curvature", "asperity", "members", "union")
 
     def __len__(self) -> int:
@@ -125,7 +126,7 @@ class Sites:
         arrays: dict = {name: np.empty(0, types.get(name, float)) for name in _ARRAYS} | {"position": np.empty((0, 2))}
         modulus = law.material.contact_modulus
         half_space = PointHalfSpace.at(arrays["position"], asperities.period, modulus, asperities.free)
-        return cls(**arrays, half_space=half_space, arranged=0)
+        return cls(**arrays, half_space=half_space, sites_at_setup=0)
 
     @property
     def present(self) -> np.ndarray:
@@ -133,7 +134,7 @@ class Sites:
         return self.status != REMOVED
 
     def append(self, law: JKR, *, status, counts_as_old, split_number=-1, **more) -> Sites:
-        """Return a table with k more sites.
+        """Return a table with k more sites; the response of each is -1 at first.
 
         status, counts_as_old, split_number : one value for all new sites.
         more : position, height, radius_of_curvature, asperity, members, union and approach, arrays of k rows.
@@ -148,42 +149,43 @@ class Sites:
         }
         arrays = {name: np.concatenate([getattr(self, name), more[name]]) for name in _ARRAYS}
         if not len(self):
-            return self._arrange(arrays)
-        return Sites(**arrays, half_space=self.half_space.extended(more["position"]), arranged=self.arranged)
+            return self._set_up(arrays)
+        half_space = self.half_space.extended(more["position"])
+        return Sites(**arrays, half_space=half_space, sites_at_setup=self.sites_at_setup)
 
     def remove(self, which) -> Sites:
-        """Return a table in which given sites have the status REMOVED; `which` is a mask (n,) or indices."""
+        """Return a table of the same length in which some sites are REMOVED; `which` is a mask (n,) or indices."""
         status = self.status.copy()
         status[which] = REMOVED
         return replace(self, status=status)
 
     def compact(self) -> tuple[Sites, np.ndarray | None]:
-        """Delete removed sites and set up the half-space again, if over a quarter are removed or many sites are new.
+        """Delete removed sites and set up the half-space again, if over a quarter are removed or over a third are new.
 
-        Many means that the table has grown by over a half since the last set-up. Return the table, and the new index of
-        every site, (n + 1,) int: -1 for removed sites, and -1 as the last value. If nothing is done, the index is None.
+        Sites are new if they were added after the last set-up. Return the table, and the new index of every site,
+        (n + 1,) int: -1 for removed sites, and -1 as last value. If nothing is done, return this table and None.
         """
         removed = self.status == REMOVED
-        if len(self) <= _GROWTH * self.arranged and np.count_nonzero(removed) <= _REMOVED_FRACTION * len(self):
+        if len(self) <= _GROWTH * self.sites_at_setup and np.count_nonzero(removed) <= _REMOVED_FRACTION * len(self):
             return self, None
         present = np.flatnonzero(~removed)
         index = np.full(len(self) + 1, -1)
         index[present] = np.arange(len(present))
-        return self._arrange({name: getattr(self, name)[present] for name in _ARRAYS}), index
+        return self._set_up({name: getattr(self, name)[present] for name in _ARRAYS}), index
 
-    def _arrange(self, arrays):
+    def _set_up(self, arrays):
         """Return a table of these columns with a new half-space, whose near field suits the number of sites."""
         ewald = self.half_space.ewald
         half_space = PointHalfSpace.at(arrays["position"], ewald.side, ewald.contact_modulus, ewald.free)
-        return Sites(**arrays, half_space=half_space, arranged=len(arrays["height"]))
+        return Sites(**arrays, half_space=half_space, sites_at_setup=len(arrays["height"]))
 
 
-_ARRAYS = tuple(name for name in Sites.__match_args__ if name not in ("half_space", "arranged"))
+_ARRAYS = tuple(name for name in Sites.__match_args__ if name not in ("half_space", "sites_at_setup"))
 
 
 @dataclass(frozen=True, eq=False)
 class Spots:
-    """Properties of contact spots, each a single asperity or a union.
+    """Columns of the table of sites for the m spots in contact, each a single asperity or a union.
 
     Attributes
     ----------
@@ -213,12 +215,13 @@ class ContactState:
     separation : mean separation u, m.
     sites : table of sites, n of them.
     contact_radius : (n,) float, contact radius of each site, zero out of contact, m.
-    site_of_asperity : (asperities,) int, site to which an asperity belongs: its own spot, a union that contains it, or
-        a spot that covered it when it came into contact; -1 for an asperity out of contact.
+    site_of_asperity : (asperities,) int, site in contact to which an asperity belongs: its own spot, a union that
+        contains it, or a spot that covered it when it came into contact; -1 for an asperity out of contact, also if it
+        has a site as a candidate.
     last_approach : (asperities,) float, approach of an asperity out of contact at its last evaluation, m.
     last_separation : (asperities,) float, mean separation at this evaluation, m; inf if the approach is not known.
-    residual : largest error of the equilibrium, in h_rms.
-    barred_count : number of asperities beyond their jump-in approach that stay out of contact, because they have broken
+    residual : largest error of the equations of equilibrium, in h_rms.
+    barred_count : number of asperities above their jump-in approach that stay out of contact, because they have broken
         contact at this separation.
     history : events of the path up to this state, one `Events` for each equilibrium with events.
     """

@@ -1,7 +1,7 @@
 """Search for the equilibrium of all contact spots at a given mean separation, load or contact area.
 
-The search alternates Newton steps and events. Newton steps solve the equations for the present spots. Events change the
-spots: jumps into and out of contact, coalescence of spots, and on unloading splits of unions.
+The search alternates Newton steps and rounds of events. Newton steps solve the equations for the present spots. Events
+change the spots: jumps into and out of contact, coalescence of spots, and on unloading splits of unions.
 """
 
 import hashlib
@@ -12,25 +12,25 @@ import numpy as np
 
 from icha.contact.model import AREA_FRACTION, JUMP_IN, JUMP_OFF, Control, FullContact, NotConverged
 from icha.contact.models import RESIDUAL_TOLERANCE
-from icha.equilibrium.equations import Equations, Evaluation, nominal_value
+from icha.equilibrium.equations import Equations, Evaluation, pressure_or_area_fraction
 from icha.equilibrium.iteration_state import IterationState
 from icha.equilibrium.jumps import add_candidates, apply_jump_in, apply_jump_off, break_closest_to_jump_off
 from icha.equilibrium.newton import newton_step, solve_response
 from icha.equilibrium.sites import CANDIDATE, CONTACT, AsperityContact, ContactState
 from icha.equilibrium.unions import absorb_new_asperities, merge_overlapping, set_union_heights, split_unions
 
-# Error in h_rms below which the search applies events. If the condition of an event is exceeded by less than ten times
-# the error, the event waits until the equations are solved.
+# Error in h_rms below which the search applies events. An event waits until the equations are solved if its condition
+# is exceeded by less than _EVENT_MARGIN times the error.
 _EVENT_TOLERANCE = 3e-4
 _EVENT_MARGIN = 10.0
-# Largest number of Newton steps between two events, and of all steps with the exact matrix. If more are needed, the
-# step of the path is too long.
+# Largest number of Newton steps between two rounds of events, and largest number of steps with the exact matrix in the
+# whole search. If more are needed, the step of the path is too long.
 _MAX_NEWTON_STEPS = 60
 _MAX_EXACT_STEPS = 4
-# Largest number of rounds of events: a surface with many equal summits may need many. Largest number of rounds that
-# lead to the same spots: unions that form and split again and again have no equilibrium.
+# Largest number of rounds of events; a surface with many equal summits may need many. Largest number of rounds that
+# lead to the same spots; unions that form and split again and again have no equilibrium.
 _MAX_ROUNDS, _MAX_RETURNS = 1000, 10
-# Distance, in periods, up to which two spots count as the same.
+# Distance, in periods, up to which spots of two rounds count as the same spot.
 _SAME_PLACE = 1e-6
 # Contact area fraction above which the model of spots has no meaning.
 _FULL_CONTACT = 0.5
@@ -41,14 +41,15 @@ def find_equilibrium(
 ) -> ContactState:
     """Find the equilibrium at another mean separation, load or contact area, starting from an equilibrium.
 
-    Parameters and errors are those of `icha.contact.model.ContactModel.equilibrium`; the `let_go` spots break contact
-    before the first Newton step. When the equations are nearly solved, all events that are due are applied. The search
-    ends when the equations are solved and no event is due.
+    Parameters and errors are those of `icha.contact.model.ContactModel.equilibrium`: with a `control`, `separation` is
+    only the first guess; `let_go` is the number of spots that are made to break contact before the first Newton step.
+    When the equations are nearly solved, all events that are due are applied. If no Newton step reduces the error,
+    overlapping spots merge. The search ends when the equations are solved and no event is due.
 
-    An asperity that has broken contact may not make contact again at this separation; `barred_count` counts the
-    asperities that this rule keeps out of contact.
+    An asperity that has broken contact may not make contact again in this search; `barred_count` counts the asperities
+    that this rule keeps out of contact.
     """
-    state = IterationState.towards(contact, start, separation)
+    state = IterationState.start_search(contact, start, separation)
     if not contact.adhesive:
         state = add_candidates(state, separation)
     if let_go:
@@ -63,22 +64,20 @@ def find_equilibrium(
             evaluation = equations.evaluate(state.sites.approach, evaluation.separation, evaluation.interaction)
         size = equations.error_size(evaluation)
         # With the weight 1, a relative error of the load counts as much as the same error of the approaches in h_rms.
-        closeness = equations.error_size(evaluation, 1.0)
-        margin = _EVENT_MARGIN * closeness * contact.rms_height
+        loose_size = equations.error_size(evaluation, 1.0)
+        margin = _EVENT_MARGIN * loose_size * contact.rms_height
         changed = False
         if size <= RESIDUAL_TOLERANCE:
             state, changed = apply_events(state, evaluation, 0.0)
             if not changed:
                 return _build_contact_state(state, evaluation, control)
-        elif closeness <= _EVENT_TOLERANCE and not wait:
+        elif loose_size <= _EVENT_TOLERANCE and not wait:
             state, changed = apply_events(state, evaluation, margin)
-            wait = not changed
+            wait = not changed  # look for events again when the equations are solved
         if not changed:
-            if steps == _MAX_NEWTON_STEPS:
-                raise NotConverged(f"equilibrium error still {size:.2e} h_rms after {steps} Newton steps")
-            if exact_steps == _MAX_EXACT_STEPS:
-                steps_taken = f"{exact_steps} Newton steps with the exact matrix"
-                raise NotConverged(f"equilibrium error still {size:.2e} h_rms after {steps_taken}")
+            if steps == _MAX_NEWTON_STEPS or exact_steps == _MAX_EXACT_STEPS:
+                taken = f"{steps} Newton steps; steps with the exact matrix: {exact_steps}"
+                raise NotConverged(f"equilibrium error still {size:.2e} h_rms after {taken}")
             evaluation, smaller, exact = newton_step(equations, evaluation, size)
             exact_steps += exact
             if smaller:
@@ -88,23 +87,24 @@ def find_equilibrium(
         equations = Equations(contact, state.sites, control)
         evaluation = equations.evaluate(state.sites.approach, evaluation.separation, evaluation.interaction)
         state, evaluation = set_union_heights(state, evaluation)
-        _count_round(state, visited)
+        _check_events_end(state, visited)
         steps, wait = 0, False
 
 
 def apply_events(state: IterationState, evaluation: Evaluation, margin: float) -> tuple[IterationState, bool]:
-    """Apply all jumps and unions whose conditions are exceeded by more than a margin, m, and on unloading all splits.
+    """Apply a round of events: jump-offs, jump-ins, coalescences and, on unloading, splits.
 
-    Return the new state, and whether there was any event. Raise `FullContact` if half the nominal area is in contact.
+    An event occurs if its condition is exceeded by more than a margin, m. Splits need no margin. Return the new state,
+    and whether there was any event. Raise `FullContact` if more than half the nominal area is in contact.
     """
     contact = state.contact
-    area = nominal_value(contact, AREA_FRACTION, evaluation.a, state.sites.radius_of_curvature)
+    area = pressure_or_area_fraction(contact, AREA_FRACTION, evaluation.a, state.sites.radius_of_curvature)
     if area > _FULL_CONTACT:
         raise FullContact(f"the contact area reached {area:.2f} of the nominal area, above the limit {_FULL_CONTACT}")
     before = state = state.with_approach(evaluation.approach)
     state = apply_jump_off(state, evaluation, margin)
     changed = state is not before
-    # Without adhesion the probable contacts are already candidates. Others are added when the equations are solved.
+    # Without adhesion, probable contacts are already candidates. Others are added when the equations are solved.
     if contact.adhesive or margin == 0:
         state, jumped = apply_jump_in(state, evaluation, margin)
         changed |= jumped
@@ -115,8 +115,8 @@ def apply_events(state: IterationState, evaluation: Evaluation, margin: float) -
     return state, changed or state is not before
 
 
-def _count_round(state, visited):
-    """Count in `visited` how often events have led to the same spots; raise `NotConverged` if events do not end."""
+def _check_events_end(state, visited):
+    """Count this round in `visited`; raise `NotConverged` after too many rounds, or too many with the same spots."""
     sites = state.sites
     places = np.rint(sites.position[sites.status == CONTACT] / (_SAME_PLACE * state.contact.asperities.period))
     checksum = hashlib.sha256(np.sort(places @ (1.0, 2 / _SAME_PLACE)).tobytes()).digest()
@@ -127,11 +127,11 @@ def _count_round(state, visited):
 
 
 def _merge_after_failed_step(state, evaluation, margin, size):
-    """Merge overlapping spots because no Newton step succeeds; raise `NotConverged` if there are no such spots.
+    """Merge overlapping spots because no Newton step succeeds, and return the new state.
 
-    If an error of the approaches by the margin, m, can explain every overlap, only those pairs merge in which one spot
-    covers the centre of the other.
-    size : error of the equilibrium, in h_rms.
+    Merge the pairs that overlap more than an error of the approaches by the margin, m, can cause. If there are none,
+    merge the pairs in which one spot covers the centre of the other. If there are none, raise `NotConverged`.
+    size : error of the equilibrium, in h_rms, for the message.
     """
     before = state.with_approach(evaluation.approach)
     state = merge_overlapping(before, evaluation, margin)
@@ -144,7 +144,10 @@ def _merge_after_failed_step(state, evaluation, margin, size):
 
 
 def _build_contact_state(state, evaluation, control):
-    """Build the `ContactState` at the end of a search, with the responses of the sites."""
+    """Build the `ContactState` at the end of a search, with the responses of the sites.
+
+    Without adhesion, `_update_candidates` then decides which sites are in contact, and logs the changes.
+    """
     contact, history = state.contact, state.start.history
     response = solve_response(Equations(contact, state.sites, control), evaluation)
     if not contact.adhesive:
@@ -165,9 +168,9 @@ def _build_contact_state(state, evaluation, control):
 
 
 def _update_candidates(state, evaluation):
-    """Without adhesion: turn candidates with an approach > 0 into contacts, and contacts with one <= 0 into candidates.
+    """Turn candidates with an approach > 0 into contacts, and contacts with an approach <= 0 into candidates.
 
-    Log both as events. Asperities that a lost contact covered have no site afterwards.
+    Used only without adhesion. Log both as events. Asperities that a lost contact covered have no site afterwards.
     """
     sites, status, site_of_asperity = state.sites, state.sites.status.copy(), state.site_of_asperity.copy()
     made = np.flatnonzero((status == CANDIDATE) & (evaluation.approach > 0))

@@ -18,26 +18,19 @@ from icha.equilibrium.sites import CANDIDATE, CONTACT, MergeRecord, Sites
 from icha.surfaces.square import periodic_difference
 
 
-def merge_overlapping(
-    state: IterationState, evaluation: Evaluation, margin: float = 0.0, *, deep: bool = False
-) -> IterationState:
+def merge_overlapping(state: IterationState, evaluation: Evaluation, margin=0.0, *, deep=False) -> IterationState:
     """Replace pairs of overlapping spots by unions; each spot merges with at most one other. Return the new state.
 
-    Parameters
-    ----------
-    margin : error of the approaches, m; two spots merge only if this error cannot explain their overlap.
-    deep : whether only those pairs merge in which one spot covers the centre of the other. On unloading, a pair that
-        has split from one union during this path merges again only if `deep` is True.
+    margin : error of the approaches, m; two spots merge only if they overlap more than this error can cause.
+    deep : whether only those pairs merge in which one spot covers the centre of the other. It also matters for two
+        spots from the split of one union: on unloading, they merge again only if `deep` is True.
     """
     sites, law, cell, a = state.sites, state.contact.law, state.contact.asperities.cell, evaluation.a
     pairs = _select_merging_pairs(state, evaluation, margin, deep)
     if not len(pairs):
         return state
-    i, j = pairs.T
-    R = sites.radius_of_curvature
-    centre, radius, curvature = equivalent_spots(
-        law, sites.position[i], a[i], R[i], sites.position[j], a[j], R[j], cell
-    )
+    (i, j), position, R = pairs.T, sites.position, sites.radius_of_curvature
+    centre, radius, curvature = equivalent_spots(law, position[i], a[i], R[i], position[j], a[j], R[j], cell)
     unions = _record_unions(state, pairs, a, radius)
     # A candidate in a pair makes contact before it becomes part of the union.
     candidates = pairs[sites.status[pairs] == CANDIDATE]
@@ -68,7 +61,7 @@ def merge_overlapping(
 
 
 def set_union_heights(state: IterationState, evaluation: Evaluation) -> tuple[IterationState, Evaluation]:
-    """Set the heights of new unions so that these are in equilibrium; return state and evaluation with the heights."""
+    """Set the heights of new unions so that their errors are zero; return the new state and evaluation."""
     if not len(state.new_unions):
         return state, evaluation
     height = state.sites.height.copy()
@@ -101,7 +94,7 @@ def _select_merging_pairs(state, evaluation, margin, deep):
 
 
 def _record_unions(state, pairs, a, radius):
-    """Return a `MergeRecord` for every pair (k, 2); `a`, `radius`: contact radii of spots (n,) and unions (k,), m."""
+    """Return a `MergeRecord` for each of k pairs; `a` and `radius`: contact radii of sites (n,) and unions (k,), m."""
     unions = np.full(len(pairs), None)
     sites, (i, j) = state.sites, pairs.T
     offset = periodic_difference(sites.position[j], sites.position[i], state.contact.asperities.cell)
@@ -114,7 +107,7 @@ def _record_unions(state, pairs, a, radius):
 
 def split_unions(state: IterationState, evaluation: Evaluation) -> IterationState:
     """Split every union whose contact radius is below the radius at which its two spots would just touch."""
-    a, sites = evaluation.a, state.sites
+    a, sites = evaluation.a, state.sites  # the evaluation lacks sites that were added in this round
     touching = np.array([0.0 if union is None else union.touching_radius for union in sites.union[: len(a)]])
     split = np.flatnonzero((sites.status[: len(a)] == CONTACT) & (a < touching))
     for site in split.tolist():
@@ -123,7 +116,11 @@ def split_unions(state: IterationState, evaluation: Evaluation) -> IterationStat
 
 
 def _split_union(state, site, a):
-    """Replace a union by its two spots, with radii reduced by the same factor as the radius of the union, now a, m."""
+    """Replace a union by its two spots, log the split, and return the new state; `a` is the radius of the union, m.
+
+    Each spot gets its radius at coalescence, reduced by the same factor as the radius of the union since then. Both
+    spots get the same `split_number`. Asperities that the union only covered are out of contact afterwards.
+    """
     sites, law, union = state.sites, state.contact.law, state.sites.union[site]
     contact_radius = union.contact_radius * (a / union.union_radius)
     merged = state.site_of_asperity == site
@@ -148,8 +145,8 @@ def absorb_new_asperities(state: IterationState, evaluation: Evaluation) -> Iter
     """Remove new sites whose centre lies under a spot that counts as old, or under a larger new spot.
 
     Sites are new if `Sites.counts_as_old` is False: they are single asperities or candidates. Sites of contact radius
-    zero stay. The covering spot gets the asperities, and their jump-ins are deleted from the log. If a site is removed,
-    the new state also has the approaches of the evaluation; otherwise the same state is returned.
+    zero stay. The covering spots get the asperities, and the jump-ins of these asperities are deleted from the log. If
+    a site is removed, the new state also has the approaches of the evaluation; otherwise the same state is returned.
     """
     sites, a, interaction, old = state.sites, evaluation.a, evaluation.interaction, state.sites.counts_as_old
     i, j, r = interaction.target, interaction.source, interaction.r
@@ -160,12 +157,12 @@ def absorb_new_asperities(state: IterationState, evaluation: Evaluation) -> Iter
     inside = inside[np.argsort((a[j] - r)[inside], kind="stable")]
     i, j = i[inside], j[inside]
     site_of_asperity = state.site_of_asperity.copy()
-    site_of_asperity[sites.asperity[i]] = i
+    site_of_asperity[sites.asperity[i]] = i  # a candidate is not yet entered
     index = np.append(np.arange(len(sites)), -1)
     index[i] = j  # the spot that covers a site deepest is the last one and replaces the others
     while np.any(index[index] != index):  # a covering spot may itself be covered by a larger spot
         index = index[index]
-    state = state.without_jumps_in(sites.asperity[np.unique(i)])
+    state = state.delete_jumps_in(sites.asperity[np.unique(i)])
     return replace(
         state,
         sites=replace(sites.remove(i), approach=evaluation.approach),

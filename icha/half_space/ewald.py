@@ -179,8 +179,8 @@ class Ewald:
         )
 
     @cached_property
-    def once(self):
-        """Split with a smaller near field, for a sum whose pairs are used only once."""
+    def for_one_sum(self):
+        """Split with a smaller near field, for pairs of points that are used in only one sum."""
         return replace(self, reach=self.reach * np.sqrt(NEIGHBOURS_ONCE / NEIGHBOURS))
 
     @cached_property
