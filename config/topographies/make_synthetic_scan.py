@@ -1,7 +1,7 @@
-"""Make `synthetic_scan.txt`, a made-up measurement for examples and tests: nobody has measured it.
+"""Make `synthetic_scan.txt`, a computed topography that examples and tests use like a measured scan.
 
-It has what measurements have: it is not periodic and not square, lies askew, is bent, bears a scratch, and lacks some
-points. Run as `python config/topographies/make_synthetic_scan.py`; the same bytes come out every time.
+The scan has typical defects of measurements: it is neither periodic nor square, it is tilted and curved, it has a
+scratch, and some points are missing. `python config/topographies/make_synthetic_scan.py` always writes the same bytes.
 """
 
 from pathlib import Path
@@ -19,7 +19,7 @@ HEADING = """\
 
 
 def scan() -> np.ndarray:
-    """Heights (ROWS, COLUMNS) in m, nan where there is none."""
+    """Return the heights (ROWS, COLUMNS) of the scan, m; nan at missing points."""
     spectrum = SelfAffineSpectrum(
         period=256 * PIXEL, rolloff_wavelength=32e-6, short_wavelength=4e-6, hurst=0.8, rms_slope=0.15
     )
@@ -36,7 +36,7 @@ def scan() -> np.ndarray:
 
 
 def write(path: Path) -> None:
-    """Write the scan as text, to 0.1 nm."""
+    """Write the scan to a text file, with heights rounded to 0.1 nm."""
     lines = (" ".join("nan" if np.isnan(h) else f"{h * 1e9:.1f}" for h in row) for row in scan())
     with whole_file(path) as temporary:
         temporary.write_text(HEADING + "\n".join(lines) + "\n", encoding="utf-8")
