@@ -1,4 +1,4 @@
-"""Captions of the figures, and sentences that count missing or marked runs of a figure."""
+"""Captions of the figures, and sentences with the numbers of runs that are missing in a figure or drawn pale."""
 
 from __future__ import annotations
 
@@ -29,11 +29,9 @@ def caption_of(name: str) -> str:
 
 
 def count_runs(campaign: xr.DataTree, studies: Sequence[str]) -> str:
-    """Describe how many runs are missing in a figure, and to how many drawn runs the model is not applicable.
+    """Return sentences for the end of a caption, with the number of missing runs and of runs that are drawn pale.
 
-    Returns
-    -------
-    Sentences for the end of a caption; "" if all runs are complete and the asperity model is applicable to all runs.
+    The text is empty if all runs are complete and the asperity model is applicable to all of them.
     """
     from icha.datasets.variables.campaign import COMPLETE, COMPUTED_RUNS, FAILED_CHECKS, INCOMPLETE, MISSING
 
@@ -46,9 +44,10 @@ def count_runs(campaign: xr.DataTree, studies: Sequence[str]) -> str:
         asked = np.count_nonzero(np.isin(status, (*COMPUTED_RUNS, MISSING)))
         for words, states in (("did not complete", (INCOMPLETE, MISSING)), ("failed their checks", (FAILED_CHECKS,))):
             if count := np.count_nonzero(np.isin(status, states)):
-                found.append(f"{count} of {asked} runs{suffix} {words}: see Failed runs.")
+                found.append(f"{count} of {asked} runs{suffix} {words}; see the section Failed runs.")
         if "applicability" in study:  # not in campaigns of earlier versions
             reasons = study["applicability"].transpose(*LABELS).values[status == COMPLETE]
             for reason, count in Counter(filter(None, map(str, reasons))).items():
-                found.append(f"{count} {'run is' if count == 1 else 'runs are'} marked{suffix}: {reason}.")
+                runs = f"{count} run{'' if count == 1 else 's'}{suffix}"
+                found.append(f"The asperity model is not applicable to {runs}: {reason}.")
     return " ".join(found)

@@ -80,7 +80,7 @@ class Curves(NamedTuple):
 def study_curves(campaign: xr.DataTree, study: str, boundary_elements: str | None = None, **changed: object) -> Curves:
     """Return the curves of a study, with boundary elements of the same study or of the study `boundary_elements`.
 
-    `changed` are arguments of `Axes.plot` for all markers, which take precedence.
+    `changed` are arguments of `Axes.plot` that replace the usual arguments of all markers.
     """
     groups = select.group_by_contact(campaign, select.select_runs(campaign, study, ragged=False))
     dataset = campaign[study].to_dataset()
@@ -218,11 +218,11 @@ def _draw_crosses(axes, line, points):
 
 
 def _draw_unloading(panels, line):
-    """Draw the unloading of every run of a line at compressive loads, without a change of the limits of the axes."""
+    """Draw the unloading of every run of a line at compressive loads; the limits of the axes do not change."""
     for leg in [leg for run in line.runs.by_seed.values() for leg in select.unloading_legs(run)]:
         for axes, points in panels.items():
             load, values = points(leg)
-            # Loads just before separation are arbitrarily small, so that the line has no effect on the axes.
+            # Loads just before separation are arbitrarily small, so the line must not affect the limits of the axes.
             pressed = np.where(load > 0, load, np.nan)
             axes.add_artist(legend_handle(pressed, values, color=line.look["mec"], **_UNLOADING))
             axes.plot([], [], color=GREY, label="unloading", **_UNLOADING)

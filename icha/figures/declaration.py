@@ -5,8 +5,8 @@ Every figure is a module `fig<number>_<words>` of this folder, with a `DECLARATI
 imports the modules of all figures. The libraries matplotlib and xarray load slowly. Therefore the modules import these
 libraries only inside functions that draw.
 
-The arguments of the function `figure` are the data of the `inputs` and the `arguments` of the options. The function
-raises `icha.figures.select.NothingToDraw` if no run in the figure is complete.
+The function `figure` has two kinds of arguments: data from the files in `inputs`, and the `arguments` of the options.
+The function raises `icha.figures.select.NothingToDraw` if no run in the figure is complete.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ from icha.datasets.labels import RunLabels
 from icha.path.states import Snapshot
 from icha.support.values import Label, Name, Positive, Problem, Section, Seed, list_names, unknown
 
-# The class `icha.configuration.campaign.Campaign`, which modules of this folder must not import.
+# Stands for the class `icha.configuration.campaign.Campaign`, which modules of this folder must not import.
 Campaign = Any
 _NOT_UNLOADED = "is not unloaded; expected a study with `unload: true`"
-# Paths of files by the names of the arguments of `figure`: one path, or a list of paths.
+# For each argument of `figure` that is read from files: one path, or a list of paths.
 Inputs = dict[str, str | list[str]]
 
 
@@ -93,7 +93,7 @@ class StudyFigure(FigureOptions):
         return (self.study,)
 
     def problems(self, campaign: Campaign) -> Iterator[Problem]:
-        """Yield a problem if the study does not exist; otherwise yield `study_problems`."""
+        """Yield a problem if the study does not exist; otherwise yield the problems from `study_problems`."""
         yield from unknown(("study",), self.study, campaign.studies)
         if self.study in campaign.studies:
             yield from self.study_problems(campaign, campaign.studies[self.study])
@@ -121,11 +121,11 @@ class TruthFigure(StudyFigure):
     )
 
     def studies_of(self, campaign: Campaign) -> tuple[str, ...]:
-        """Return the names of the study and of the study `boundary_elements`."""
+        """Return the name of the study, and the name of the study with boundary elements if it is another study."""
         return tuple(dict.fromkeys(filter(None, (self.study, self.boundary_elements))))
 
     def problems(self, campaign: Campaign) -> Iterator[Problem]:
-        """Also yield a problem if the study `boundary_elements` does not exist or lacks runs with boundary elements."""
+        """Also yield a problem if `boundary_elements` names a study that does not exist or has no such runs."""
         yield from super().problems(campaign)
         if self.boundary_elements is None:
             return
@@ -179,7 +179,7 @@ class UnloadedFigure(StudyFigure):
 
 
 class RunFigure(TopographyFigure):
-    """A figure of one run. ICHA draws the first run that fits the options, if possible with adhesion."""
+    """A figure of one run. ICHA draws the first run that fits the options, if possible a run with adhesion."""
 
     rms_slope: Positive | None = Field(default=None, description="Rms slope to show. Default: the study's first slope.")
     material: Label | None = Field(
@@ -202,7 +202,7 @@ class RunFigure(TopographyFigure):
 
 
 class ComparedFigure(StudyFigure):
-    """A comparison with boundary elements. The study needs both `models`, or an entry of `finite_range`."""
+    """A comparison with boundary elements. The study needs both models, or an entry of `finite_range`."""
 
     def study_problems(self, campaign: Campaign, study: Any) -> Iterator[Problem]:
         """Also yield a problem if no boundary elements solve the study at the same loads."""

@@ -1,4 +1,4 @@
-"""Draw means over seeds with confidence bands or bars; if there are few seeds, draw every seed instead."""
+"""Draw means over seeds. With many seeds, bands or bars show the scatter; with few seeds, every seed is drawn."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def draw_members(axes: Axes, x: np.ndarray, members: np.ndarray, look: dict, *, 
 
 
 def _break_lines(known, *rows):
-    """Insert NaN into each row where other members have values (`known`), so that the line is interrupted there."""
+    """Interrupt lines with NaN between means over different members; `known` is True where a member has a value."""
     breaks = 1 + np.flatnonzero((known[:, 1:] != known[:, :-1]).any(axis=0))
     return [np.insert(np.asarray(row, float), breaks, np.nan, axis=-1) for row in rows]
 
@@ -88,7 +88,7 @@ def _draw_scatter(axes, x, members, colour, *, positive):
 def join_bins(edges: np.ndarray, contents: np.ndarray, least: float) -> tuple[np.ndarray, np.ndarray]:
     """Join neighbouring bins until the sum over all members is at least `least` in every bin.
 
-    Empty bins at both ends are left out. The last joined bin contains the remaining bins.
+    Empty bins at both ends are left out. The last joined bin also contains the remaining bins.
 
     Parameters
     ----------
@@ -146,7 +146,7 @@ def draw_points(
 class Points:
     """A line of points in ascending order of x; each point is a mean over seeds.
 
-    Means are over the seeds that all points have in common, or over all seeds if no seed is common to all points.
+    Means are over the seeds that all points have in common. If there is no such seed, means are over all seeds.
 
     Parameters
     ----------

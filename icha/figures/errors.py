@@ -19,12 +19,12 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-# Largest number of lines of one material with which all materials share a panel.
+# All materials share a panel if each material has at most this number of lines.
 _MOST_LINES = 2
-# Ratio of the drawn loads of neighbouring points at the same load, so that their bars do not hide each other.
+# Points at the same load are drawn side by side, with this ratio of their positions, so that no bar hides another one.
 _APART = 1.025
-# Ratio by which the load axis extends beyond the loads, and smallest ratio of the end to the middle of the load axis,
-# which leaves room for a tick label.
+# The load axis extends beyond all loads by the factor _MARGIN. The end of the axis is at least _LEAST_REACH times the
+# middle of the axis, which leaves room for a tick label.
 _MARGIN, _LEAST_REACH = 1.2, 1.6
 
 
@@ -81,7 +81,7 @@ def draw_errors(
 def _curves(model_error, study, names) -> dict[tuple[Contact, bool], list[xr.Dataset]]:
     """Return the errors of a study by material, surface and slope, and by applicability of the asperity model.
 
-    A run has several errors if boundary elements solved the run at several ranges of attraction or on several grids.
+    A run has several errors if there are boundary elements at several ranges of attraction or on several grids.
     """
     found = {}
     for contact, errors in select_errors(model_error, study):
@@ -96,7 +96,7 @@ def _curves(model_error, study, names) -> dict[tuple[Contact, bool], list[xr.Dat
 
 
 def _name(looks, contact, entries, k, *, own_rows):
-    """Return the legend name of the errors `entries[k]`, which differs from the names of the other entries."""
+    """Return a legend name of the errors `entries[k]` that differs from the names of the other entries."""
     truths = [errors.attrs["truth"] for errors in entries]
     words = [looks.place_name(contact[1:]) if own_rows else looks.name(contact)]
     words += ["at finite range"] if len(set(truths)) > 1 and truths[k] == FINITE_RANGE else []

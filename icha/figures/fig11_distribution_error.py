@@ -1,4 +1,4 @@
-"""Fig. 11: errors of the distributions of pressure and gap and of the contact map, against load."""
+"""Fig. 11: errors of three results against load: pressure distribution, gap distribution and contact map."""
 
 from __future__ import annotations
 

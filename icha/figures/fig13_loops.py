@@ -27,7 +27,7 @@ class LoopsFigure(TruthFigure, TopographyFigure, UnloadedFigure):
 
 
 def inputs(campaign: Campaign, options: LoopsFigure, files: results.ResultFiles) -> Inputs:
-    """Return the campaign dataset, and files with boundary elements at a finite range, if there are any."""
+    """Return the paths of the campaign dataset and of files with boundary elements at a finite range, if any."""
     loops = [
         files.path(results.LOOP, ContactLabels(label, *contact))
         for label, entry in campaign.boundary_element_loops.items()
@@ -43,9 +43,9 @@ DECLARATION = Declaration(
     inputs=inputs,
 )
 
-# Largest number of loops with which all slopes share a panel.
+# All slopes share a panel if there are at most this number of loops.
 _MOST_LOOPS = 4
-# Largest ratio of tension to pressure at which an inset enlarges the tension.
+# An inset enlarges the tension if the largest tension is smaller than the largest pressure times this factor.
 _SMALL_TENSION = 0.25
 # Largest pressure in the inset, divided by the largest tension.
 _REACH = 1.4

@@ -44,7 +44,7 @@ DECLARATION = Declaration(
     description="Pull-off pressure against rms slope, and against the largest load.", options=PullOffFigure
 )
 
-# Largest ratio of the largest to the smallest value for which the axis is linear.
+# The axis is linear if the ratio of the largest to the smallest value is at most this number.
 _SPAN = 30.0
 _LINE = {"lw": 0.9}
 # Variable on the y axis.
@@ -53,7 +53,7 @@ _Y = "pull_off_pressure"
 
 @in_style
 def figure(campaign: xr.DataTree, *, study: str, load_studies: Sequence[str] = ()) -> Figure:
-    """Draw the mean pull-off pressure over the seeds against slope, and against the largest load of the path."""
+    """Draw the pull-off pressure (mean over the seeds) against slope, and against the largest load of the path."""
     load_studies = list(dict.fromkeys(load_studies))
     by_slope = select_detached_lines(campaign, [study], along_slopes=True)
     by_load = select_detached_lines(campaign, load_studies)

@@ -50,9 +50,9 @@ PARTS = {
 # Smallest number of points of a fit, because a straight line passes through any two points.
 _LEAST_POINTS = 3
 _FIT_POINTS = 100
-# The axes are logarithmic if the ratio of the largest to the smallest value exceeds this number for area and loss.
+# The axes are logarithmic if the ratio of the largest to the smallest value exceeds this number, for both axes.
 _SPAN = 30.0
-# Smallest part of the loss, as a fraction of all parts, that has an entry in the legend.
+# A part of the loss has an entry in the legend if it is at least this fraction of the sum of all parts.
 _LEAST_SHARE = 1e-6
 # Opacity of the bars of runs for which the asperity model is not applicable.
 _PALE = 0.35
@@ -60,7 +60,7 @@ _PALE = 0.35
 
 @in_style
 def figure(campaign: xr.DataTree, *, studies: Sequence[str]) -> Figure:
-    """Draw the mean loss over the seeds for runs with adhesion, and the parts of the loss by cause."""
+    """Draw the loss of runs with adhesion (mean over the seeds), and the parts of this loss by cause."""
     from matplotlib.patches import Patch
 
     studies = list(dict.fromkeys(studies))

@@ -23,11 +23,11 @@ if TYPE_CHECKING:
 
 
 class SnapMapFigure(RunFigure, UnloadedFigure):
-    """A figure of the events of one run. ICHA draws the first run that fits the options, if possible with adhesion."""
+    """A figure of jumps and unions in one run: the first run that fits the options, if possible with adhesion."""
 
 
 def inputs(campaign: Campaign, options: SnapMapFigure, files: results.ResultFiles) -> Inputs:
-    """Return the campaign dataset, and the surface file of the run."""
+    """Return the paths of the campaign dataset and of the surface file of the run."""
     return {"campaign": files.path(results.DATASET), "surface": files.path(results.SURFACE, options.run(campaign))}
 
 
@@ -40,8 +40,8 @@ DECLARATION = Declaration(
 
 
 _RED = (0.9, 0.0, 0.05)
-# For each kind of event: name in the legend, branch whose events the map shows, and look of the marks. Events in which
-# spots form or unite are black, events in which spots break or separate are red. Other colours stand for materials.
+# For each kind of event: name in the legend, branch whose events the map shows, and look of the marks. Marks are black
+# if spots form or unite, and red if spots break or separate. Other colours stand for materials.
 _KINDS = {
     "jump_in": ("spot formed", "loading", {"marker": "o", "mfc": BLACK, "mec": BLACK}),
     "jump_off": ("spot broken", "unloading", {"marker": "o", "mfc": "none", "mec": _RED}),

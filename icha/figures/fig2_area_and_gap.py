@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 
 def inputs(campaign: Campaign, options: StudyFigure, files: results.ResultFiles) -> Inputs:
-    """Return paths of the campaign dataset, theories for the first surface, and the model error at finite ranges."""
+    """Return the paths of the campaign dataset, the theories, and the model error if the study has finite ranges."""
     found = dataset_and_theories(campaign, options, files)
     if is_solved_at_finite_range(campaign, options.study):
         found["model_error"] = files.path(results.MODEL_ERROR)
@@ -45,11 +45,11 @@ DECLARATION = Declaration(
 
 # Height of the lower panels, which show differences, divided by the height of the upper panels.
 _LOWER = 0.42
-# Largest relative difference of equal loads of two models, which reach a load within different tolerances.
+# Loads of two models count as equal up to this relative difference, because each model has its own load tolerance.
 _SAME_LOAD = 1e-6
 # Ticks of the separation axis if the axis spans less than two decades.
 _SEPARATIONS = (0.05, 0.1, 0.2, 0.3, 0.5, 0.7, 1, 1.5, 2, 3, 5)
-# Function that returns the points of a run, and symbol of the quantity.
+# Each entry has two parts: the function that returns the points of a run, and the symbol of the quantity.
 _QUANTITIES = ((curves.area_points, "A"), (curves.gap_points, r"\bar{u}"))
 
 
@@ -69,7 +69,7 @@ def figure(
     if solved := _finite_range_curves(model_error, study, shown.looks):
         shown.crosses.extend(solved)
         shown.handles[FINITE_RANGE] = model_handle(FINITE_RANGE, ms=8)
-    # Solutions in the limit of a short range come first and are preferred, because finite ranges only bound this limit.
+    # Solutions at a finite range are used only if there are none in the limit of a short range, which they only bound.
     truths = {truth.runs.contact: truth for truth in reversed(shown.crosses)}
     compared = [(line, truths[line.runs.contact]) for line in shown.lines if line.runs.contact in truths]
     fig, axes = new_panels(4.5, 2, sharex=True, height_ratios=(1, _LOWER)) if compared else new_panels(3.3)
@@ -123,8 +123,8 @@ def _finite_range_curves(model_error, study, looks):
 def _difference(line, truth, points):
     """Return loads, and for each seed the differences in per cent between a curve and boundary elements.
 
-    Loads of the curve outside the range of boundary elements are left out. Values of boundary elements are
-    interpolated to these loads.
+    Loads of the curve outside the load range of boundary elements are left out. Values of boundary elements are
+    interpolated to the remaining loads.
     """
     from icha.analysis.common_loads import at_common_loads, interpolate
 

@@ -29,13 +29,13 @@ DECLARATION = Declaration(
 _LEAST_CELLS = 100
 # Smallest number of nodes in a bin of P(p) of boundary elements, which have few nodes in contact.
 _LEAST_NODES = 25
-# Largest number of markers of boundary elements.
+# Approximate number of markers on a line of boundary elements.
 _BESIDE_MARKERS = 14
 
 
 @in_style
 def figure(campaign: xr.DataTree, *, study: str, kind: str | None = None, target: float | None = None) -> Figure:
-    """Draw mean distributions over the seeds, for every material on the first surface and slope of a study."""
+    """Draw distributions (means over the seeds) for every material on the first surface and slope of a study."""
     from icha.analysis.model_error import state_of
 
     lines = select_snapshots(campaign, study, kind, target)
@@ -124,7 +124,7 @@ def pressure_densities(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return reduced pressures p/(E* h'_rms), and for each snapshot the densities P(p) E* h'_rms.
 
-    Empty bins are left out. If `joined` is True, bins with few nodes are joined (boundary elements).
+    Empty bins are left out. If `joined` is True (for boundary elements), bins with few nodes are joined.
     """
     (first, _), *_ = members
     unit = float(first["contact_modulus"]) * float(first["rms_slope"])

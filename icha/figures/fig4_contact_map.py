@@ -23,11 +23,11 @@ if TYPE_CHECKING:
 
 
 class MapFigure(SnapshotFigure, RunFigure):
-    """A figure of one snapshot. ICHA draws the first run that fits the options, if possible with adhesion."""
+    """A figure of one snapshot. ICHA draws the first run that fits the options, if possible a run with adhesion."""
 
 
 def inputs(campaign: Campaign, options: MapFigure, files: results.ResultFiles) -> Inputs:
-    """Return the paths of the campaign dataset, of the surface file, and of the same run with boundary elements."""
+    """Return the paths of the campaign dataset, the surface file, and the same run with boundary elements, if any."""
     run = options.run(campaign)
     found = {"campaign": files.path(results.DATASET), "surface": files.path(results.SURFACE, run)}
     if run.model == DEFAULT_MODEL and REFERENCE_MODEL in campaign.studies[options.study].models:
@@ -39,8 +39,8 @@ DECLARATION = Declaration(
     description="Contact spots over the topography.", options=MapFigure, inputs=inputs, holds_topography=True
 )
 
-# Side of the surface over the side of the enlarged window. The window is halved again while it is wider than
-# _WIDEST_IN_RADII mean radii of the spots, and while its half has at least _LEAST_CELLS cells a side.
+# _ZOOM is the side of the surface divided by the side of the enlarged window. A window that is wider than
+# _WIDEST_IN_RADII mean radii of the spots is halved, as long as half the window has at least _LEAST_CELLS cells a side.
 _ZOOM = 4
 _WIDEST_IN_RADII = 40
 _LEAST_CELLS = 64
@@ -134,7 +134,7 @@ def _view(run, at, topography):
 
 
 def _draw_boundary_elements(panels, topography, window, heights, beside, covered):
-    """Draw the contact regions of boundary elements, the edges of these regions when enlarged, and the overlap."""
+    """Draw the contact regions of boundary elements, the edges of these regions in the window, and the overlap."""
     from matplotlib.colors import LinearSegmentedColormap, to_rgb
     from matplotlib.patches import Patch
 

@@ -37,7 +37,7 @@ class SlopesAndMaterialsFigure(TruthFigure):
 
 
 def inputs(campaign: Campaign, options: SlopesAndMaterialsFigure, files: results.ResultFiles) -> Inputs:
-    """Return the campaign dataset, and the tables of measurements that belong to the study, if there are any."""
+    """Return the paths of the campaign dataset and of the tables of measurements that belong to the study, if any."""
     tables = [measurement.path for measurement in options.measurements(campaign)]
     return {"campaign": files.path(results.DATASET)} | ({"tables": tables} if tables else {})
 
@@ -64,8 +64,8 @@ def figure(
     ----------
     campaign : the campaign dataset.
     tables : files of measured curves; panel (b) shows only curves with a known rms slope.
-    measurements : legend `label`, `columns` (headings and factors), `load_unit` (load over p/(E* h'rms)), `material`
-        and `rms_slope` of each table; unknown values are None.
+    measurements : for each table, the legend `label`, the `columns` (headings and factors), the `load_unit` (load
+        divided by reduced pressure), the `material` and the `rms_slope`; unknown values are None.
     """
     # Open markers do not hide each other where curves coincide.
     curves = study_curves(campaign, study, boundary_elements, mfc="none")

@@ -54,7 +54,7 @@ def figure(
     seed: int | None = None,
     material: str | None = None,
 ) -> Figure:
-    """Draw the spots of all slopes for one surface, seed and material, by default the first of the study."""
+    """Draw the spots of all slopes for one surface, seed and material; the defaults are those of the first run."""
     from matplotlib.patches import Patch
 
     runs = select_by_labels(select_runs(campaign, study), surface=surface, seed=seed, material=material)

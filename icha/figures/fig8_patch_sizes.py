@@ -34,7 +34,7 @@ _CURVE_POINTS = 300
 
 @in_style
 def figure(campaign: xr.DataTree, *, study: str, kind: str | None = None, target: float | None = None) -> Figure:
-    """Draw mean numbers of patches by size over the seeds, for every material on a study's first surface and slope."""
+    """Draw numbers of patches by size (means over seeds), for every material on a study's first surface and slope."""
     lines = select_snapshots(campaign, study, kind, target)
     each_look, looks = snapshot_looks(campaign, study, lines)
     fig, [(left, right)] = new_panels(3.1, sharex=True)
@@ -96,7 +96,7 @@ def patch_density(areas: Sequence[np.ndarray], nominal_area: float) -> tuple[np.
 
 
 def patches_above(areas: Sequence[np.ndarray], nominal_area: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return patch areas, and for each member the number per nominal area of patches with at least this area.
+    """Return patch areas, and for each member the number of patches with at least this area, per nominal area.
 
     The parameter `areas` has the same meaning as in `patch_density`.
     """

@@ -36,15 +36,15 @@ ASPERITIES_NAME = MODELS["asperities"].words
 MODEL_MARKERS = {ASPERITIES_NAME: "o", SHORT_RANGE: "+", FINITE_RANGE: "1"}
 UNLOADING_MARKERS = {SHORT_RANGE: "x", FINITE_RANGE: "2"}
 BRANCH_DASHES = {"loading": "-", "unloading": (0, (4, 2))}
-# Look of lines of boundary elements that are drawn beside lines of asperities.
+# Look of lines of boundary elements in figures that also have lines of the asperity model.
 TRUTH_LINE = {"ls": (0, (3, 2)), "lw": 0.8, "ms": 5, "mew": 0.8, "zorder": 5}
 
 # Largest number of materials, or of surfaces and slopes, with distinct colours. A larger number has graded colours.
 MOST_COLOURS = len(COLOURS)
-# Largest number of lines of normal width in a figure; more lines are thin.
+# In a figure with more than this number of lines, all lines are thin.
 FEW_LINES = 6
-# Marker sizes in points, and line width over marker size. Curves without adhesion are widest, and the curve of each
-# material is narrower than that of the previous material, so that curves that coincide are all visible.
+# Marker sizes in points, and line width divided by marker size. Curves without adhesion are widest, and the curve of
+# each material is narrower than the curve of the previous material. Thus all curves are visible where they coincide.
 _BARE_SIZE, _ADHESIVE_SIZE, _LEAST_SIZE, _NARROWER = 6.0, 4.6, 1.8, 0.75
 _LINE_WIDTH = 0.22
 # End of the range of graded colours (0 dark, 1 bright); brighter colours are invisible on white.
@@ -69,7 +69,7 @@ class Looks:
     campaign : the campaign dataset; the order of the materials in the dataset determines the colours.
     interfaces : modulus, surface energy and range of attraction of the materials.
     contacts : material, surface and rms slope of every line.
-    by_place : True if colours distinguish places instead of materials, always so for more than `MOST_COLOURS` places.
+    by_place : True if colours distinguish places instead of materials. Beyond `MOST_COLOURS` places, they always do.
     """
 
     def __init__(
@@ -130,7 +130,7 @@ class Looks:
     def handles(self, **changed: object) -> dict[str, Line2D]:
         """Return the legend entries of materials, surfaces and slopes by name.
 
-        If there are many names, only some have an entry. `changed` are arguments of `Axes.plot`, which take precedence.
+        If there are many names, only some have an entry. `changed` are arguments of `Axes.plot` that replace others.
         """
         material, place = self.materials[0], self.places[0]
         if self.by_place:
@@ -143,7 +143,7 @@ class Looks:
             found = {self.material_name(each): self.look((each, *place)) | changed for each in some_of(self.materials)}
             grey = {"ls": "none", "color": GREY, "mfc": "white", "mew": 0.9, "ms": 5}
             found |= {self.place_name(each): grey | {"marker": marker} for each, marker in self._markers.items()}
-            found.pop("", None)  # surface and slope of figures that have a single one
+            found.pop("", None)  # in a figure with a single surface and slope, their name is empty
         return {name: legend_handle(**look) for name, look in found.items()}
 
     def material_name(self, material: str) -> str:

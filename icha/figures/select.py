@@ -60,7 +60,7 @@ def group_by_contact(campaign: xr.DataTree, runs: Iterable[tuple[RunLabels, xr.D
 def select_runs(
     campaign: xr.DataTree, study: str, *, ragged: bool = True, model: str | None = None
 ) -> list[tuple[RunLabels, xr.Dataset]]:
-    """Return all complete runs of a study with a model.
+    """Return all complete runs of a study that use one model.
 
     Parameters
     ----------
@@ -102,7 +102,7 @@ def is_applicable(run: xr.Dataset) -> bool:
 
 
 def shown_model(study: xr.Dataset) -> str:
-    """Return the model that figures of a study show: the asperity model, or the first model of a study without it."""
+    """Return the model that figures of a study show: the asperity model, or else the first model of the study."""
     return first_model(study["model"].values.tolist())
 
 
@@ -122,7 +122,7 @@ def select_by_labels(
         value = present[0] if value is None else value
         if value not in present:
             complete = ", ".join(map(str, dict.fromkeys(present)))
-            raise NothingToDraw(f"no run of {name} {value} is complete; complete runs have {name}: {complete}")
+            raise NothingToDraw(f"no complete run has {name} {value}; complete runs have {name} {complete}")
         runs = [(labels, run) for labels, run in runs if getattr(labels, name) == value]
     return runs
 
@@ -139,7 +139,7 @@ def select_complete_run(campaign: xr.DataTree, labels: RunLabels) -> xr.Dataset:
 
 
 def path_steps(run: xr.Dataset) -> xr.Dataset:
-    """Return the steps of the first loading at targets of the study, only of the most frequent kind of target."""
+    """Return the steps of the first loading at targets of the study that are of the most frequent kind."""
     from icha.datasets.campaign import loading_stops
 
     run = run.isel(step=loading_stops(run).values)
@@ -168,7 +168,7 @@ class Snapshots(NamedTuple):
     ----------
     runs : the runs.
     members : pairs of a run and the index of the snapshot in this run.
-    truths : the same pairs for runs with boundary elements; empty if `runs` have boundary elements.
+    truths : the same pairs for runs with boundary elements; empty if `runs` are already runs with boundary elements.
     """
 
     runs: ContactRuns
@@ -250,8 +250,8 @@ ROUNDING = 1e-9
 def select_unloaded_runs(campaign: xr.DataTree, study: str) -> list[tuple[RunLabels, xr.Dataset]]:
     """Return the runs of a study that unload, without spots and events.
 
-    The reduced separation of these runs is the mean separation divided by the rms height. The integral of the pressure
-    over the mean separation is the work. On a free square, the mean gap is not the mean separation.
+    The reduced separation of these runs is the mean separation divided by the rms height, because the work is the
+    integral of the pressure over the mean separation. The mean gap of a free square differs from the mean separation.
 
     Raises
     ------

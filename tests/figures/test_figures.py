@@ -202,7 +202,7 @@ def test_fig5_draws_measurements_over_the_curves(tmp_path):
 
 
 def test_values_that_the_campaign_lacks_are_named_with_those_it_has():
-    with pytest.raises(NothingToDraw, match="no run of material steel is complete; complete runs have material: soft"):
+    with pytest.raises(NothingToDraw, match="no complete run has material steel; complete runs have material soft"):
         fig6_spots_by_slope.figure(small.tree(), study="slopes", material="steel")
 
 

@@ -265,7 +265,7 @@ def test_means_over_remaining_seeds_have_their_number_and_no_confidence(write, p
     assert row[-2].split("<br>")[0] == f"{mean} ({low} … {high})"
     assert "loss below zero" in section(text, "failures", "not-applicable")
     assert "seed 2" in section(text, "not-applicable", "studies")
-    assert "runs failed their checks: see Failed runs." in text
+    assert "runs failed their checks; see the section Failed runs." in text
 
 
 @pytest.mark.parametrize(
