@@ -36,7 +36,7 @@ def overlapping_pairs(position, a, first, second, r):
 
 
 def disjoint_pairs(pairs):
-    """Select the pairs of spots that share no spot with an earlier selected pair."""
+    """Select pairs in their order: each pair that shares no spot with a pair selected before."""
     taken, chosen = set(), []
     for i, j in pairs.tolist():
         if i not in taken and j not in taken:
@@ -61,8 +61,8 @@ def covering_spot(points, position, a, period, larger_than=None):
     ----------
     points : (k, 2) float, positions of the points, m.
     position, a : (m, 2) and (m,) float, centres and contact radii of the spots, m.
-    larger_than : (k,) float, contact radii of the points, m, if the points are the spots themselves. Then only a larger
-        spot covers a point; if two spots are equal, the first spot covers the second.
+    larger_than : (k,) float, contact radii of the points, m, only if the points are the centres of the spots. Then only
+        a larger spot covers a point; if two spots are equal, the first spot covers the second.
     """
     covering = np.full(len(points), -1)
     if not len(points) or not len(position):
@@ -76,5 +76,5 @@ def covering_spot(points, position, a, period, larger_than=None):
         inside &= (a[j] > larger_than[i]) | ((a[j] == larger_than[i]) & (j < i))
     i, j, depth = i[inside], j[inside], depth[inside]
     order = np.lexsort((-j, depth))
-    covering[i[order]] = j[order]  # the deepest cover is the last one and replaces the others
+    covering[i[order]] = j[order]  # the spot that covers a point deepest comes last and replaces the others
     return covering

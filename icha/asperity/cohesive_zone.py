@@ -1,16 +1,16 @@
 """Resolution of the attraction on a grid: the cohesive zone around an adhesive contact must not be shorter than a cell.
 
 The traction at a gap u is (dgamma/rho) exp(-u/rho). Two dimensionless numbers show whether a grid resolves this
-traction: the grid spacing over the length of the cohesive zone; and the distance over which a single node jumps into
-contact, relative to the range rho (A. Wang, Y. Zhou and M. H. Müser, Lubricants 9 (2021) 17,
-doi:10.3390/lubricants9020017).
+traction. The first is the grid spacing divided by the length of the cohesive zone. The second is the distance over
+which a single node jumps into contact, divided by the range rho. Source: A. Wang, Y. Zhou and M. H. Müser, Lubricants 9
+(2021) 17, doi:10.3390/lubricants9020017.
 """
 
 import math
 
 from icha.asperity.material import Material
 
-# Smallest strength number at which nodes jump into contact one at a time, so that the grid is refused.
+# Strength number from which nodes jump into contact one at a time. Such a grid is refused.
 MAX_STRENGTH_NUMBER = 0.5
 
 
@@ -22,7 +22,7 @@ def longest_spacing(material: Material) -> float:
 
 
 def strength_number(material: Material, spacing: float) -> float:
-    """Return sqrt(dgamma dx/E*)/rho for a grid of spacing dx, m: the jump of a single node over the range rho."""
+    """Return sqrt(dgamma dx/E*)/rho for a spacing dx, m: the distance of the jump of a single node, divided by rho."""
     return math.sqrt(material.adhesion_length * spacing) / material.interaction_range
 
 
@@ -37,8 +37,8 @@ def resolution_problem(material: Material, spacing: float) -> str | None:
     if spacing <= longest_spacing(material) and strength_number(material, spacing) < MAX_STRENGTH_NUMBER:
         return None
     return (
-        f"a range of {material.interaction_range:.4g} m is not resolved by a grid of spacing {spacing:.4g} m: "
-        f"sqrt(dgamma dx/E*)/range is {strength_number(material, spacing):.3g}, which must be less than "
-        f"{MAX_STRENGTH_NUMBER:g}, and the spacing may be {longest_spacing(material):.3g} m at most; expected a range "
+        f"a range of {material.interaction_range:.4g} m is not resolved by a grid of spacing {spacing:.4g} m. "
+        f"sqrt(dgamma dx/E*)/range is {strength_number(material, spacing):.3g} and must be less than "
+        f"{MAX_STRENGTH_NUMBER:g}; the spacing must not exceed {longest_spacing(material):.3g} m. Use a range "
         f"above {shortest_range(material, spacing):.4g} m, or a finer grid"
     )

@@ -1,4 +1,4 @@
-"""Energy of full contact, and pressure at which contact is complete. Energy and pressure indicate stickiness.
+"""Energy of full contact, which shows whether a surface is sticky, and pressure at which contact is complete.
 
 In full contact the pressure p(q) = q E* h(q)/2 flattens the wave h(q) of wave number q. Source: B. N. J. Persson and
 E. Tosatti, J. Chem. Phys. 115 (2001) 5597-5610, doi:10.1063/1.1398300.
@@ -6,8 +6,8 @@ E. Tosatti, J. Chem. Phys. 115 (2001) 5597-5610, doi:10.1063/1.1398300.
 
 import math
 
-# Values of U_full/dgamma below which full contact has a lower energy than no contact, and below which a high pull-off
-# tension is expected.
+# Below the first value of U_full/dgamma, full contact has a lower energy than no contact. Below the second value, high
+# pull-off tensions are expected.
 FULL_CONTACT_BELOW, HIGH_PULL_OFF_BELOW = 1.0, 2.0
 MEANING = (
     f"below {FULL_CONTACT_BELOW:g} full contact has the lower energy; below about {HIGH_PULL_OFF_BELOW:g} high "
@@ -16,7 +16,7 @@ MEANING = (
 
 
 def full_contact_energy_ratio(full_contact_energy: float, contact_modulus: float, surface_energy: float) -> float:
-    """Return the elastic energy of full contact over the work of adhesion, U_full/dgamma; infinite without adhesion.
+    """Return the ratio U_full/dgamma of elastic energy of full contact to work of adhesion; infinite without adhesion.
 
     full_contact_energy : U_full/E* of the surface (`icha.surfaces.surface.Surface.full_contact_energy`), m.
     contact_modulus, surface_energy : E*, Pa, and dgamma, J/m^2.
@@ -25,11 +25,11 @@ def full_contact_energy_ratio(full_contact_energy: float, contact_modulus: float
 
 
 def gaussian_complete_pressure(waves: float) -> float:
-    """Estimate the pressure over E* h'_rms at which contact with a Gaussian surface is complete without adhesion.
+    """Estimate the pressure, in E* h'_rms, at which contact with a Gaussian surface without adhesion is complete.
 
     The estimated pressure compensates the largest tension of full contact at zero load. This tension is the largest of
-    about 2 pi waves^2 independent values with the standard deviation E* h'_rms/2. `waves` is the side of the surface
-    over the shortest wavelength. For five spectra, the mean of five surfaces differed from this estimate by 0 to 9 %.
+    about 2 pi waves^2 independent values with the standard deviation E* h'_rms/2. `waves` is the side of the surface,
+    divided by the shortest wavelength. For five spectra, the mean of five surfaces was within 9 % of this estimate.
     """
     return math.sqrt(2 * math.log(2 * math.pi * waves**2)) / 2
 

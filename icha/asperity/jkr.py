@@ -61,8 +61,8 @@ class JKR:
     def contact_radius(self, approach, R):
         """Solve eq. (2) for its larger (stable) root a, m; below the jump-off approach return the jump-off radius.
 
-        With a = A x^2, A = (gamma R^2/E*)^(1/3), eq. (2) is the convex quartic x^4 - sqrt(2 pi) x - d = 0. Newton's
-        method descends to the larger root from above.
+        With a = A x^2, A = (gamma R^2/E*)^(1/3) and d = delta R/A^2, eq. (2) is x^4 - sqrt(2 pi) x - d = 0, a convex
+        quartic. Newton's method descends to the larger root from above.
         """
         approach, R = np.broadcast_arrays(np.asarray(approach, float), np.asarray(R, float))
         if self.material.surface_energy == 0:
@@ -151,7 +151,7 @@ class JKR:
         return value
 
     def second_moment(self, a, R):
-        """Return 1/4 of the integral of p r^2 over the spot, N m^2: the strength of the second term of its far field.
+        """Return 1/4 of the integral of p r^2 over the spot, N m^2: the strength of the second far-field term.
 
         The mean of r^2 is 2a^2/5 for Hertz's pressure and 2a^2/3 for the pressure of a flat punch.
         """
@@ -162,7 +162,7 @@ class JKR:
         return a * (self.repulsive_force(a, R) / 2 - self.adhesive_force(a) * (3.5 / 6))
 
     def fourth_moment(self, a, R):
-        """Return 9/64 of the integral of p r^4 over the spot, N m^4: the strength of the third term of its far field.
+        """Return 9/64 of the integral of p r^4 over the spot, N m^4: the strength of the third far-field term.
 
         The mean of r^4 is 8a^4/35 for Hertz's pressure and 8a^4/15 for the pressure of a flat punch.
         """
@@ -208,8 +208,8 @@ class JKR:
     def union(self, a_i, R_i, a_j, R_j):
         """Return contact radius (m), radius of curvature (m) and position of the centre of the union of two spots.
 
-        a^2 = a_i^2 + a_j^2 and R^2 = R_i^2 + R_j^2. The centre is the centroid of the cap volumes pi a^4/(4R). The
-        position of the centre is a fraction of the distance from the first spot to the second.
+        a^2 = a_i^2 + a_j^2 and R^2 = R_i^2 + R_j^2. The centre is the centroid of the cap volumes pi a^4/(4R). Its
+        position is given as a fraction of the distance from the first spot to the second.
         """
         volume_i, volume_j = a_i**4 / R_i, a_j**4 / R_j
         return np.hypot(a_i, a_j), np.hypot(R_i, R_j), volume_j / (volume_i + volume_j)
@@ -221,7 +221,7 @@ def wu_gap(tabor_parameter: np.ndarray | float) -> np.ndarray | float:
 
 
 class MaterialUnits:
-    """Base class of a contact: properties that depend only on the law of a spot and the rms slope of the surface."""
+    """Base class of contacts: properties that depend only on the law of a spot and the rms slope of the surface."""
 
     law: JKR
     rms_slope: float

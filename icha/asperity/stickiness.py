@@ -12,18 +12,17 @@ REPULSIVE_AREA_SLOPE = 2.0
 def stickiness(moments: SpectralMoments, material: Material) -> float:
     r"""Return the ratio of the attractive to the repulsive force in contact; above 1 the surface is sticky.
 
-    L. Pastewka and M. O. Robbins, PNAS 111 (2014) 3298-3303, doi:10.1073/pnas.1320846111. The mean repulsive
-    pressure on the contact area A is h' E*/kappa with kappa = 2. Around the contact, the attractive stress is dgamma/r
-    where the gap is less than the range r of attraction. Hertz's gap beside a contact of mean diameter d = 4 h'/h''
-    gives the attractive area
+    L. Pastewka and M. O. Robbins, PNAS 111 (2014) 3298-3303, doi:10.1073/pnas.1320846111. The mean repulsive pressure
+    on the contact area A is h' E*/kappa with kappa = 2. Around the contact, the attractive stress is dgamma/r where the
+    gap is less than the range r of attraction. Hertz's gap beside a contact of mean diameter d = 4 h'/h'' gives the
+    attractive area
 
         A_att/A = pi [3 h'' r/(16 h'^2)]^(2/3).
 
-    Here h' is the rms slope and h'' the rms Laplacian. In the paper the ratio is called
-    kappa/kappa_att. The ratio exceeds 1 if the criterion for sticking in the paper is met,
-    (h' r E*/(kappa dgamma)) [h' d/(4 r)]^(2/3) < pi (3/16)^(2/3) = 1.03. The criterion is valid for an attraction of so
-    short a range that A_att is small compared with A: J. M. Monti, A. Sanner and L. Pastewka, Tribol. Lett. 69 (2021),
-    doi:10.1007/s11249-021-01454-6. Without adhesion the ratio is 0.
+    Here h' is the rms slope and h'' the rms Laplacian. In the paper the ratio is called kappa/kappa_att. It exceeds 1
+    if the paper's criterion for sticking is met, (h' r E*/(kappa dgamma)) [h' d/(4 r)]^(2/3) < pi (3/16)^(2/3) = 1.03.
+    The criterion is valid if the range is so short that A_att is small compared with A: J. M. Monti, A. Sanner and
+    L. Pastewka, Tribol. Lett. 69 (2021), doi:10.1007/s11249-021-01454-6. Without adhesion the ratio is 0.
 
     moments : spectral moments of the surface at its actual rms slope.
     """
@@ -36,8 +35,8 @@ def sticky_rms_height(longest_wavelength: float, material: Material) -> float:
     r"""Return the rms height, m, below which a random surface is sticky according to the bearing area model (BAM).
 
     M. Ciavarella, Meccanica 53 (2018) 241-250, doi:10.1007/s11012-017-0701-6. Here u is the mean separation, h the rms
-    height, beta = 1/2 and q_L = 2 pi/lambda_L. The attraction acts where the gap is less than the range,
-    with the nominal pressure p_a = dgamma/(sqrt(2 pi) h) exp(-u^2/(2 h^2)). The contact repels with Persson's pressure
+    height, beta = 1/2 and q_L = 2 pi/lambda_L. Attraction acts where the gap is less than the range; its nominal
+    pressure is p_a = dgamma/(sqrt(2 pi) h) exp(-u^2/(2 h^2)). The nominal pressure of repulsion is that of Persson,
     p_r = (3/(8 beta)) q_L h E* exp(-u/(beta h)). The ratio p_a/p_r is largest at u = h/beta, where p_a exceeds p_r if
 
         h^2 < e^2/(sqrt(2 pi) 3 pi/2) lambda_L dgamma/E* = 0.63 lambda_L dgamma/E*.
