@@ -1,8 +1,8 @@
 """Checkpoints: save each equilibrium of a contact, so that an interrupted run can resume.
 
 The name of a checkpoint depends on all earlier solves and on their order. If a path is repeated after an interruption,
-it loads exactly the same equilibria up to the interruption. A different path loads only the first equilibria, up to the
-first difference between both paths.
+it loads exactly the same equilibria up to the interruption. A different path loads the equilibria only up to the first
+difference between both paths.
 """
 
 from __future__ import annotations
@@ -34,8 +34,8 @@ class CheckpointedContact:
     contact : `icha.contact.model.ContactModel`.
     of : text that identifies the contact.
     folder : folder of the checkpoints, one file each.
-    packed : function that returns arrays by name for a new state and the state before the new state.
-    unpacked : function that returns the new state for these arrays and the state before the new state.
+    packed : function of a new state and the state before it; it returns arrays by name, to be saved.
+    unpacked : function of these arrays and the state before; it returns the new state.
     """
 
     contact: Any

@@ -57,7 +57,7 @@ class Events:
     kind : (k,) int8, JUMP_IN: a spot forms. JUMP_OFF: a spot or a union breaks contact. COALESCENCE: two spots unite.
         SPLIT: a union becomes two spots again.
     position : (k, 2) float, m.
-    members : (k,) int, number of first contacts, or asperities, that are united in the spot.
+    members : (k,) int, number of asperities united in the spot; with boundary elements, number of summits in the spot.
     energy : (k,) float, energy that a jump would release if the spot were alone, J; zero for unions and splits.
     """
 
@@ -104,7 +104,7 @@ def events_between(before: State, after: State) -> Events:
 
 
 class ContactModel(Protocol):
-    """Contact of one surface and one material; a path computes each equilibrium from the last equilibrium.
+    """Contact of one surface and one material. A path computes each equilibrium from the equilibrium before.
 
     Attributes
     ----------
@@ -139,11 +139,11 @@ class ContactModel(Protocol):
         ----------
         separation : mean separation, or its first guess if there is a `control`, m.
         control : load or area that is prescribed instead of the separation.
-        let_go : number of spots to separate before the search; the spots closest to jump-off are separated first.
+        let_go : number of spots that are made to break contact before the search: those closest to jump-off.
         """
 
     def continue_from(self, state: State, before: State) -> State:
-        """Return a state with the history of the state `before` and the events between both states.
+        """Return `state` with a new history: the history of `before`, then the events between both states.
 
         A path uses this method only if `path_accuracy.error_controlled_steps` is True.
         """
@@ -164,20 +164,20 @@ class ContactModel(Protocol):
         """Return the contact stiffness -dp/du of the present spots, Pa/m."""
 
     def slope(self, quantity: str, state: State) -> float:
-        """Return the derivative of PRESSURE or AREA_FRACTION with respect to the mean separation, without events."""
+        """Return the derivative of PRESSURE or AREA_FRACTION by the mean separation as long as no event occurs."""
 
     def stored_energy(self, state: State) -> float:
         """Return elastic energy minus energy of adhesion per nominal area, J/m^2; zero without contact."""
 
     def is_unstable(self, state: State) -> bool:
-        """Return whether a spot approaches as the surfaces move apart, which happens only on an unstable branch."""
+        """Return whether a spot is on an unstable branch: its approach grows while the surfaces move apart."""
 
     def observables(self, surface: Surface) -> Observables:
         """Return the object that computes the values that a run records of its states."""
 
 
 class Observables(Protocol):
-    """Values that a run records of a contact, by the names of its variables (`icha.datasets.variables.run`)."""
+    """Values that a run records of a contact, each by the name of a variable in `icha.datasets.variables.run`."""
 
     def of_contact(self) -> dict[str, Any]:
         """Return the values that are the same in all states."""
@@ -189,7 +189,7 @@ class Observables(Protocol):
         """Return the distributions of gap and pressure in a state, and the properties of its spots."""
 
     def reasons_against(self, separations: Iterable[float], pressed: State | None) -> list[str]:
-        """Return the reasons why the model does not represent the surface in the first loading.
+        """Return reasons (sentences for the user) why the model does not represent the surface in the first loading.
 
         Parameters
         ----------

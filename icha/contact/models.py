@@ -14,8 +14,8 @@ RESIDUAL_TOLERANCE = 1e-9
 # With adhesion a load is the difference of repulsion and attraction. If the load is less than this fraction of the
 # repulsion, the error of the load is relative to this fraction of the repulsion.
 SMALLEST_LOAD = 1e-4
-# Largest error of a prescribed area without adhesion if contact is counted in whole cells: in cells, and relative to
-# the area.
+# Error of a prescribed area, without adhesion, if contact is counted in whole cells. It must be below both values: the
+# first is in cells, the second is a fraction of the area.
 AREA_TOLERANCE_CELLS, AREA_TOLERANCE_PART = 2.0, 0.1
 
 
@@ -56,9 +56,8 @@ class PathAccuracy:
     ----------
     event : step length, in h_rms, up to which an event in the step counts as located.
     loss : largest error of the work of one step with events, relative to `StepAccuracy.energy_scale`.
-    balance : largest difference between work and change of energy in a long step without events, relative to the same
-        scale.
-    tension : largest relative error of the largest tension between two equilibria without an event.
+    balance : largest difference of work and energy change in a long step without events, relative to the same scale.
+    tension : largest relative error of the largest tension in a step without events.
     least_work : smallest energy to which `loss` is relative, J/m^2.
     error_controlled_steps : if True, the error of the work of each step decides the length of the next step, because
         the pressure may jump without an event. If False, each step may be twice as long as the last one.
@@ -86,12 +85,12 @@ class Model:
     folder : folder for the runs of this model, with a slash at the end; empty for the default model.
     variables : variables that only runs of this model have: dimensions, unit, long name and type by name.
     stiffness_error : largest relative error of the contact stiffness.
-    by_summits : whether summits represent the surface. Spots then unite by a rule, which may cost or gain some energy.
+    by_summits : whether summits represent the surface. If so, spots unite by a rule, which may lose or gain energy.
     by_cells : whether contact is counted in cells of the grid; runs then contain a map of the contact.
     periodic_only : whether the model cannot press a square with free edges.
     least_cells : smallest valid number of grid cells per shortest wavelength; 0 for no limit.
     accuracy : accuracy with which a path resolves its events.
-    resumable : whether a run saves checkpoints, by the function `resumable(contact, folder)` of `module`.
+    resumable : whether a run saves checkpoints; if so, `module` contains a function `resumable(contact, folder)`.
     """
 
     words: str
@@ -112,7 +111,7 @@ class Model:
 
 _WU = "J.-J. Wu, J. Phys. D: Appl. Phys. 43 (2010) 415303"
 _MAP = ("snapshot", "row", "column")
-# Model of runs without a model name, and model with which other models are compared.
+# The first model applies to runs without a model name. Other models are compared with the second model.
 DEFAULT_MODEL, REFERENCE_MODEL = "asperities", "boundary_elements"
 # Models by their names in configurations, in files and in `icha.simulate`.
 MODELS = {
@@ -175,5 +174,5 @@ def model_of(attributes: Mapping[str, str]) -> Model:
 
 
 def first_model(models: Iterable[str]) -> str:
-    """Return the model that comes first in `MODELS`, for a figure or text that shows only one of several models."""
+    """Return the one of several models that comes first in `MODELS`, for a figure or text that shows only one."""
     return min(models, key=list(MODELS).index)
