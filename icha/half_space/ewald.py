@@ -26,17 +26,17 @@ from scipy.special import erf, erfc
 from icha.half_space.free_square import basis, image_field
 from icha.surfaces.square import cell_of, periodic_difference
 
-# Value of alpha r at which both halves of the Ewald sum are cut off, erfc(4.3) = 1.2e-9, and tolerance of the FFTs.
+# Value of alpha r at which both halves of the Ewald sum are cut off, erfc(4.3) = 1.2e-9. Tolerance of the FFTs.
 _CUT = 4.3
 _NUFFT_TOLERANCE = 1e-9
-# Cut-off and tolerance of the approximate sum that linear solves use, erfc(2.75) = 1e-4.
+# The same two values for the approximate sum that linear solves use, erfc(2.75) = 1e-4.
 _LOOSE_CUT = 2.75
 _LOOSE_NUFFT_TOLERANCE = 1e-4
-# Mean number of points in the near field of a point, if its pairs are used in many sums, and if they are used once.
+# Mean number of points in the near field of a point: first for pairs that are used in many sums, then for one sum only.
 NEIGHBOURS = 60
 NEIGHBOURS_ONCE = 20
-# Distance, in mean spacings of the points, below which the fields of the moments are constant. The fields are singular
-# at r = 0, and exact displacements replace them close to r = 0.
+# Distance, in mean spacings of the points, below which the fields of the moments are set constant. The true fields are
+# singular at r = 0, and exact displacements replace the constant values.
 _FLOOR = 0.05
 
 
@@ -84,7 +84,7 @@ class _SmoothSum:
         self._unit = float(green.max())
         self._green = (green / self._unit).astype(self._real)
         self._laplacian = -q2 * self._green
-        # With one thread the order of summation, and with it every bit of the result, is fixed.
+        # With one thread, the order of summation is fixed, and therefore every bit of the result.
         options = {"eps": tolerance, "nthreads": 1, "upsampfac": 1.25, "dtype": self._dtype.name}
         self._plans = [finufft.Plan(kind, q2.shape, isign=sign, **options) for kind, sign in ((1, -1), (2, 1))]
         self._points = [None, None]
@@ -118,7 +118,7 @@ class _SmoothSum:
 
 @dataclass(frozen=True, eq=False)
 class Ewald:
-    """Split of the sum over images into a smooth and a short-ranged half.
+    """Split of the sum over all images into a smooth half and a short-ranged half.
 
     Attributes
     ----------
@@ -152,11 +152,11 @@ class Ewald:
         return 0.5 * self.period if self.free else self.period
 
     def bases(self, points):
-        """Return `free_square.basis` of y and x coordinates; `points` is an (n, 2) array in m. None if periodic."""
+        """Return `free_square.basis` of the y and the x coordinates of points, (n, 2) array in m; None if periodic."""
         return (basis(points[:, 1], self.period), basis(points[:, 0], self.period)) if self.free else None
 
     def image_displacement(self, sources, targets, moments):
-        """Return the displacement in m at targets by the images of sources; both arguments come from `bases`."""
+        """Return the displacement (m) at targets by the images of sources; `bases` returns both arguments."""
         field = image_field(*sources, moments, self.period, self.contact_modulus)
         by, bx = targets
         return np.einsum("ia,ia->i", by @ field, bx)
@@ -235,10 +235,10 @@ class PointHalfSpace:
     ----------
     ewald : split of the sum.
     points : (n, 2) float, positions, m.
-    pairs : near pairs of points as three arrays (later, earlier, distance), each pair once.
+    pairs : near pairs of points, each pair once: arrays of the later point, the earlier point, and their distance, m.
     near : matrices of the short-ranged displacement by unit moments k = 0, 1, 2: for each k an (n, n) lower triangular
         matrix and its transpose.
-    near_loose : (n, n) lower triangular matrix for unit forces alone and its transpose, with a relative error of 1e-3.
+    near_loose : the same two matrices for unit forces (k = 0), with a relative error of 1e-3.
     bases : `Ewald.bases` of the points; None on a periodic surface.
     """
 
@@ -256,7 +256,7 @@ class PointHalfSpace:
 
     @classmethod
     def at(cls, points, period, contact_modulus, free=False) -> PointHalfSpace:
-        """Return the half-space with the given points, an (n, 2) array in m; `period` is the side in m."""
+        """Return the half-space with these points, (n, 2) array in m; `period` is the side of the square, m."""
         ewald = Ewald.choose(period, contact_modulus, len(points), NEIGHBOURS, free)
         points = np.mod(points, ewald.period)
         found = cKDTree(points, boxsize=ewald.period).query_pairs(ewald.reach, output_type="ndarray")
@@ -295,7 +295,7 @@ class PointHalfSpace:
         return cls(ewald, points, pairs, near, (loose, loose.T), ewald.bases(points))
 
     def displacement(self, force, moment, fourth):
-        """Return the displacement in m by forces (N), second (N m^2) and fourth moments (N m^4): (n,) arrays."""
+        """Return the displacement (m) by forces (N), second moments (N m^2) and fourth moments (N m^4), all (n,)."""
         w = self.ewald.smooth(self.points, self.points, force, moment)
         for halves, strength in zip(self.near, (force, moment, fourth), strict=True):
             for half in halves:
@@ -305,7 +305,7 @@ class PointHalfSpace:
         return self._subtract_mean_and_images(w, force, moment)
 
     def approximate_displacement(self, force):
-        """Return the displacement in m by forces alone, with a relative error of about 1e-3: array of shape (n,)."""
+        """Return the displacement (m) by forces alone, (n,), with a relative error of about 1e-3."""
         w = self.ewald.loose(self.points, self.points, force)
         for half in self.near_loose:
             w += half @ force

@@ -13,8 +13,8 @@ from scipy.special import erf, erfc
 
 # Number of Chebyshev nodes along a side; the relative error of the displacement by images is 2e-14.
 _NODES = 18
-# Ewald sum in `image_potential`: parameter alpha, in 1/cell; and cut-offs of its halves, in cells and in modes, where
-# terms are below 2e-17.
+# Ewald sum in `image_potential`: parameter alpha, in 1/cell; cut-off of the short-ranged half, in cells; and highest
+# mode of the smooth half. The omitted terms are below 2e-17.
 _ALPHA = 3.0
 _REACH = 3
 _HIGHEST = 6
@@ -36,7 +36,7 @@ def basis(x, cell: float) -> np.ndarray:
 
 
 def image_field(by, bx, moments, cell: float, contact_modulus: float) -> np.ndarray:
-    """Return the displacement in m by all images of m spots at the Chebyshev nodes of y and x: (nodes, nodes) array.
+    """Return the displacement (m) at the Chebyshev nodes of y and x by all images of m spots: (nodes, nodes) array.
 
     The result includes the uniform displacement that makes the mean of the periodic sum zero.
 
@@ -100,10 +100,10 @@ def image_potential(y, x):
 
 
 def mean_displacement(side: float, contact_modulus: float, position, force) -> float:
-    """Return the mean displacement in m of a square on a free half-space by n point forces at given positions.
+    """Return the mean displacement (m) of a square on a free half-space by n point forces at given positions.
 
-    By reciprocity, a uniform pressure on the square with the same resultant force displaces the point by the same
-    distance. Each of the four rectangles around a point contributes x asinh(y/x) + y asinh(x/y).
+    By reciprocity, the mean displacement by one force is the displacement of its point if the force is spread uniformly
+    over the square. Each of the four rectangles between point and corners contributes x asinh(y/x) + y asinh(x/y).
     """
     x, y = ([distance, side - distance] for distance in np.clip(position.T, 0.0, side))
     potential = sum(_corner_potential(width, height) for width in x for height in y)

@@ -1,14 +1,14 @@
 """Displacement of the half-space at all nodes of a grid, and the nodes around every spot.
 
 The sum over spots and images is split as in `icha.half_space.ewald`: a smooth half by its Fourier series, and a
-short-ranged half in a window around every spot. The time depends on the total area of the windows. Farther than five
-radii from a spot, four moments of the pressure represent the spot, so that small spots have small windows. The smooth
-half of a large spot must be smooth on the scale of this spot. Therefore spots of similar size form groups, and every
-group has a Fourier series with a different number of modes.
+short-ranged half in a window around every spot. The computing time depends on the total area of the windows. Farther
+than five radii from a spot, four moments of the pressure represent the spot, so that small spots have small windows.
+The smooth half of a large spot must be smooth on the scale of this spot. Therefore spots of similar size form groups,
+and every group has a Fourier series with a different number of modes.
 
 The moments of a spot are M_k = integral of p r^(2k) / (4^k k!^2). Far from the spot, the displacement is the sum over k
-of M_k Lap^k (1/(pi E* r)), with the plane Laplacian Lap. In Fourier space, this sum equals the
-displacement by a point force of magnitude sum of M_k (-q^2)^k.
+of M_k Lap^k (1/(pi E* r)), with the plane Laplacian Lap. In Fourier space, this sum is the displacement by a point
+force that depends on q: the sum of M_k (-q^2)^k.
 """
 
 import math
@@ -26,7 +26,7 @@ from icha.half_space.free_square import basis, image_field
 from icha.support.parallel import blocks, on_cores
 from icha.surfaces.square import cell_of
 
-# Value of alpha r at which both halves of the Ewald sum are cut off, erfc(4.6) = 8e-11, and tolerance of the FFTs.
+# Value of alpha r at which both halves of the Ewald sum are cut off, erfc(4.6) = 8e-11. Tolerance of the FFTs.
 _CUT = 4.6
 _NUFFT_TOLERANCE = 1e-12
 # Distance from a spot, in contact radii, beyond which four moments represent the spot. The error is then 1e-8 of the
@@ -35,10 +35,10 @@ _WINDOW = 5.0
 _MOMENTS = 4
 # Ratio of the widths of windows of neighbouring groups of spots.
 _LADDER = math.sqrt(2)
-# Number of nodes in a block of rows, and in the windows that are evaluated together, so that both fit into the cache.
+# Number of nodes in a block of rows. Number of nodes in windows that are evaluated together. Both fit into the cache.
 _BLOCK = 2**19
 _BATCH = 2**15
-# Value of (alpha r)^2 below which the smooth half is a power series, and number of terms of that series.
+# Value of (alpha r)^2 below which the smooth half is computed as a power series. Number of terms of this series.
 _SERIES_BELOW = 0.25
 _SERIES_LENGTH = 15
 
@@ -52,8 +52,8 @@ def row_blocks(grid: int) -> list[slice]:
 class DisplacementField:
     """Displacement w of the half-space at the nodes of a regular grid by m spots: the sum of eq. (9).
 
-    The displacement is periodic and has zero mean. On a free half-space there are no images, and the mean
-    is not zero. At a node under a spot, the displacement by this spot is included.
+    The displacement is periodic and has zero mean. On a free half-space there are no images, and the mean is not zero.
+    At a node under a spot, the displacement by this spot is included.
 
     Attributes
     ----------
@@ -94,10 +94,10 @@ class DisplacementField:
         return on_cores(lambda rows: function(rows, self.rows(rows)), row_blocks(self.grid))
 
     def rows(self, rows: slice) -> np.ndarray:
-        """Return the displacement in m at the nodes of a range of rows: array of shape (number of rows, grid)."""
+        """Return the displacement (m) at the nodes of a range of rows: array of shape (number of rows, grid)."""
         if not len(self.contact_radius):
             return np.zeros((rows.stop - rows.start, self.grid))
-        # If the grid is too coarse for the Fourier series, its nodes are selected from a finer grid.
+        # If the grid is too coarse for the Fourier series, a finer grid is used, which contains all nodes of the grid.
         finer, half = self._smooth_half
         nodes = np.arange(rows.start, rows.stop) * finer
         w = scipy.fft.irfft(half[nodes], n=finer * self._nodes, axis=1, norm="forward", workers=1)[:, ::finer]
@@ -163,16 +163,15 @@ class DisplacementField:
         return finer, half
 
     def _compute_modes(self, group):
-        """Return the Fourier coefficients in m of the smooth half of one group: array of shape (2k + 1, k + 1)."""
+        """Return the Fourier coefficients (m) of the smooth half of one group: array of shape (2k + 1, k + 1)."""
         highest = math.ceil(_CUT * group.alpha * self._cell / np.pi - 1e-9)
         y, x = (np.ascontiguousarray(self.centres[group.spots, axis]) * (2 * np.pi / self._cell) for axis in (1, 0))
         k = np.arange(-highest, highest + 1) * (2 * np.pi / self._cell)
         q2 = k[:, None] ** 2 + k[None, highest:] ** 2
         strength, factor = np.zeros(q2.shape, dtype=complex), np.ones(q2.shape)
         for even, odd in group.moments.T.reshape(-1, 2, len(group.spots)):
-            # Two moments are transformed together, as real and imaginary parts. In the spectrum c the part with
-            # c(-k) = conj c(k) belongs to the first moment. With one thread the order of summation is fixed, and
-            # with it every bit of the result.
+            # Two moments are transformed together, as real and imaginary parts. In the spectrum c, the part with
+            # c(-k) = conj c(k) belongs to the first moment. One thread fixes the order of summation.
             c = finufft.nufft2d1(y, x, even + 1j * odd, (len(k), len(k)), eps=_NUFFT_TOLERANCE, isign=-1, nthreads=1)
             mirrored = np.conj(c[::-1, ::-1])[:, highest:]
             c = c[:, highest:]
@@ -254,9 +253,8 @@ def _smooth_half_table():
     The columns are the coefficients of (1) the factor of erf(x)/x, y^0 to y^-3, (2) the factor of exp(-y), y^-3 to y^2,
     and (3) the power series of the whole function, from y^0.
 
-    Lap^k (erf(x)/x) = (d_k y^-k) erf(x)/x - exp(-y) g_k(y) with Laurent polynomials g_k. In the plane
-    Lap y^j = 4 j^2 y^(j-1); therefore d_(k+1) = (2k+1)^2 d_k. The derivative of erf, 2/sqrt(pi) exp(-y), gives the
-    recurrence for g_k below.
+    Lap^k (erf(x)/x) = (d_k y^-k) erf(x)/x - exp(-y) g_k(y) with Laurent polynomials g_k. In the plane, Lap y^j is
+    4 j^2 y^(j-1), so that d_(k+1) = (2k+1)^2 d_k. The derivative of erf, 2/sqrt(pi) exp(-y), gives the rule for g_k.
     """
     multipole = np.zeros((_MOMENTS, _MOMENTS))
     gauss = np.zeros((_MOMENTS, 2 * _MOMENTS - 2))
@@ -286,8 +284,7 @@ _SMOOTH_HALF = _smooth_half_table()
 def windows(centres, reach: float, grid: int, period: float, rows: slice):
     """Yield the nodes in some rows that lie in squares around `centres`, an (m, 2) array in m.
 
-    The half width of a square is `reach`, m. A few of the nodes lie a little outside the square. No node occurs twice
-    for the same centre.
+    The half width of a square is `reach`, m. Some nodes lie a little outside. No node occurs twice for one centre.
 
     Yields
     ------

@@ -24,7 +24,7 @@ _WINDOW_OF_MOMENTS = 16.0
 
 
 def _find_distant_pairs(tree, position, radius, ewald):
-    """Return targets, sources and distances of the pairs beyond the near field that need an exact displacement.
+    """Return targets, sources and distances of the pairs outside the near field that need an exact displacement.
 
     tree : search tree of the targets; position, radius : (m, 2) and (m,), centres and contact radii of the sources, m.
     """
@@ -59,7 +59,7 @@ class Interaction:
     largest_radius : (n,) float, largest contact radii for which the list of exact pairs is complete, m.
     target, source : (k,) int, exact pairs: at the spot `target`, the displacement by the spot `source` is exact.
     r : (k,) float, distances of these pairs, m.
-    by_moments : three (k,) arrays, displacement by unit moments of the source, which the exact displacement replaces.
+    by_moments : three (k,) arrays, displacements by unit moments of the source; the exact displacements replace them.
     """
 
     law: JKR
@@ -118,7 +118,7 @@ class Interaction:
         counts = np.flatnonzero(present[self.source])
         j, r, target = self.source[counts], self.r[counts], self.target[counts]
         fields = [moment[j] * field[counts] for moment, field in zip(moments, self.by_moments, strict=True)]
-        # Exact derivatives at the pairs, minus those by the forces alone and by all moments.
+        # Exact derivatives at the pairs, minus the derivatives by forces alone; and minus those by all moments.
         beyond_forces = law.displacement_derivative(r, a[j], R[j]) - fields[0]
         beyond_moments = beyond_forces - fields[1] - fields[2]
 
@@ -138,8 +138,8 @@ def displacement_at(
 ) -> np.ndarray:
     """Return the displacement w of the half-space at n points by m spots, eq. (9): array of shape (n,) in m.
 
-    The displacement is periodic and has zero mean. On a free half-space there are no images, and the mean
-    is not zero. At a point under a spot, the displacement by this spot is included.
+    The displacement is periodic and has zero mean. On a free half-space there are no images, and the mean is not zero.
+    At a point under a spot, the displacement by this spot is included.
 
     Parameters
     ----------
