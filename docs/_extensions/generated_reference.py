@@ -77,7 +77,7 @@ def campaign_variables() -> str:
     of_runs = RUN | CYCLE | LOOP
     own = {name: variable for name, variable in study.variables.items() if name not in of_runs}
     shared = {
-        name: ", ".join(dim for dim in study[name].dims if dim not in of_runs[name].dims) or "nothing"
+        name: ", ".join(dim for dim in study[name].dims if dim not in of_runs[name].dims) or "none"
         for name in of_runs
         if name in study and name not in study.dims and not {"spot", "event"} & set(study[name].dims)
     }
@@ -86,8 +86,8 @@ def campaign_variables() -> str:
     for name, along in shared.items():
         if along not in everything:
             fewer.setdefault(along, []).append(f"`{name}`")
-    lines = [f"- along {along}: {', '.join(names)}" for along, names in fewer.items()]
-    return _table(_rows_of(own)) + "\nAlong fewer than the five labels:\n\n" + "\n".join(lines) + "\n"
+    lines = [f"- {along}: {', '.join(names)}" for along, names in fewer.items()]
+    return _table(_rows_of(own)) + "\nVariables with only some of these dimensions:\n\n" + "\n".join(lines) + "\n"
 
 
 def comparison_variables() -> str:
