@@ -51,7 +51,7 @@ def file_attributes(
     programs : names of the Python packages that computed the content; the installed versions are added.
     sources : names and versions of the programs that computed the content. Default: the installed `programs`.
     references : publications of the methods.
-    keywords : keywords besides those that all files have.
+    keywords : further keywords, in addition to those of all files.
     """
     source = "; ".join([*sources] or [f"{name} {version(name)}" for name in programs])
     found = {

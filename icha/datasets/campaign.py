@@ -1,4 +1,4 @@
-"""Build the campaign dataset, which arranges the runs of every study along labels, and select runs and snapshots."""
+"""Build the campaign dataset, with arrays of the runs of each study along labels, and select its runs and snapshots."""
 
 import tempfile
 from collections.abc import Collection, Iterable, Mapping
@@ -41,7 +41,7 @@ def campaign_tree(
 
 
 def run_labels(tree: xr.DataTree) -> list[RunLabels]:
-    """List the labels of all runs in a campaign dataset, also incomplete ones, in the order of the dataset."""
+    """List the labels of all runs in a campaign dataset, including incomplete runs, in the order of the dataset."""
     found = []
     for study, node in tree.children.items():
         found += runs_of_status(node.to_dataset(), study, COMPUTED_RUNS)
@@ -120,7 +120,7 @@ def variables_of_run(tree: xr.DataTree, labels: RunLabels | tuple) -> tuple[dict
         if ended_early and variable.ndim == 0 and variable.dtype.kind == "f" and np.isnan(variable.values):
             continue  # a run that ended early lacks this variable
         if variable.dtype.kind == "f" and variable.encoding.get("dtype") == np.dtype("int32"):
-            # An integer that some runs lack is a float in the campaign dataset.
+            # If some runs lack an integer variable, xarray reads the variable as floats.
             variable = xr.Variable(variable.dims, variable.values.astype(np.int32), variable.attrs)
         if ended_early and name in ("snapshot", "spot_snapshot"):
             # Renumber the snapshots of the run, because other runs of the study may have more snapshots.

@@ -1,8 +1,8 @@
 """Write the campaign dataset run by run, so that only a few numbers of each run stay in memory.
 
-ICHA reads one run after the other and appends the values of the run to a temporary file. The sizes of all arrays, the
-snapshots and the lengths of texts stay in memory, because ICHA needs them before it writes the first run. Then ICHA
-reads the temporary file in the order of the dataset, one block of neighbouring runs at a time.
+First, ICHA reads one run after the other and appends its values to a temporary file. The sizes of all arrays, the
+snapshots and the lengths of texts stay in memory, because ICHA needs this information before it writes the first run.
+Then ICHA reads the temporary file in the order of the dataset, and writes one block of neighbouring runs at a time.
 """
 
 import itertools
@@ -34,23 +34,23 @@ from icha.datasets.variables.campaign import CAMPAIGN, RAGGED, index_variable
 from icha.datasets.variables.run import FURTHER
 from icha.support.atomic_files import whole_file
 
-# Largest number of runs in a block, and of values of each variable in a block, which then takes some megabytes.
+# Largest number of runs in a block, and largest number of values of a variable. A block needs some megabytes of memory.
 _RUNS_IN_BLOCK = 256
 VALUES_IN_BLOCK = 2**18
 _VALUES_IN_CHUNK = 2**16
-# Largest relative difference between values of several runs that count as equal.
+# Values that must be the same for several runs count as equal up to this relative difference.
 _SAME = 1e-9
 
 _LAYOUT = (
-    "Variables of the runs along model, surface, seed, rms_slope and material. Spots and events of all runs are ragged "
-    "arrays along spot and event, in this order of the runs. Each variable with the attribute instance_dimension gives "
-    "the position of each spot or event along that dimension, from 0. These positions identify run and snapshot."
+    "Variables of the runs along model, surface, seed, rms_slope and material. Spots and events are ragged arrays "
+    "along spot and event, with one run after the other in the order of the labels. A variable with the attribute "
+    "instance_dimension gives, for each spot or event, the position of its run or snapshot along this dimension."
 )
 _OWN_SLOPES = {"comment": "each surface has different slopes, in ascending order along the dimension rms_slope"}
 _STUDIES = "The runs of every study, with one group for each study."
 # Attribute of the root of the file, which has no variables.
 _ACCESS = (
-    "The data are in the groups, one for each study: {0}. With Python's xarray: "
+    "The file has one group for each study: {0}. To open a group with Python's xarray, use "
     "xarray.open_datatree(FILE)['{1}'].to_dataset(), or xarray.open_dataset(FILE, group='{1}')"
 )
 
@@ -80,7 +80,7 @@ class Column(NamedTuple):
         return padded
 
     def slots(self, snapshots: list[int], values: np.ndarray) -> tuple[list[int] | slice, ...]:
-        """Return the indices of a run's values along `dims`; `snapshots` are those of the snapshots in the file."""
+        """Return the indices of a run's values along `dims`; `snapshots` are the indices of the run's snapshots."""
         sizes = zip(self.dims, values.shape, strict=False)
         return tuple(snapshots if dim == "snapshot" else slice(0, size) for dim, size in sizes)
 
@@ -182,7 +182,7 @@ def _storage(sizes, block, along, dims, width):
     if along != LABELS:
         block = _block(sizes, along, math.prod(shape))
     chunk = (*block, *shape) if along else tuple(min(size, _VALUES_IN_CHUNK) for size in shape)
-    # Each block is written at once, so that a cache of more than one block has no advantage.
+    # Each block is written at once, so a cache of more than one block has no advantage.
     return COMPRESSION | {"chunksizes": chunk, "chunk_cache": 8 * math.prod(chunk)}
 
 
@@ -197,7 +197,7 @@ def _block(sizes, along, values):
 
 
 def _why_lacking(study, name):
-    """Return the attribute `missing`, which names models without the variable; {} if all models have it."""
+    """Return the attribute `missing`, which names models without the variable; {} if all models have the variable."""
     owners = [model for model, names in FURTHER.items() if name in names]
     lacking = [model for model in study.known["model"] if owners and model not in owners]
     return {"missing": f"in runs with the model {' or '.join(lacking)}"} if lacking else {}
@@ -217,9 +217,9 @@ def write_campaign(
 
     Parameters
     ----------
-    runs : pairs of the labels of a run (study, model, surface, seed, rms_slope, material) and the dataset or path of
-        the run. Names keep the order of the design; seeds and slopes are sorted. A run is incomplete if its attribute
-        `incomplete` states the reason, or if it lacks snapshots of its study.
+    runs : for each run, a pair: labels (study, model, surface, seed, rms_slope, material), and dataset or path. In the
+        file, names have the order of the design; seeds and slopes are sorted. A run counts as incomplete if it has the
+        attribute `incomplete`, or if it lacks a snapshot that another run of its study has.
     path : the file to write. A file appears only when it is complete. The same runs give the same bytes.
     design : labels of all runs of the campaign. Default: the labels in `runs`. Other combinations of these labels have
         the status `not_in_design`.
@@ -229,8 +229,8 @@ def write_campaign(
     Raises
     ------
     ValueError
-        If a run is given twice, is not in the design, or was computed with other settings than expected; if a value
-        that several runs share differs between them; if a file cannot be read. The message names the run.
+        If a run is given twice, is not in the design, or was computed with other settings than expected; if runs differ
+        in a value that must be the same for them; if a file cannot be read. The message names the run.
     """
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -241,7 +241,7 @@ def write_campaign(
             names = [study.name for study in studies]
             described = combine_attributes("Campaign of rough contacts", _STUDIES, COLLECTED, origins)
             file.setncatts(described | {"comment": _ACCESS.format(", ".join(names), names[0])} | dict(attrs))
-            # Writing is faster if all variables are defined before: see icha.datasets.files.
+            # Writing is faster if all variables are defined first: see icha.datasets.files.
             groups = [define_group(file.createGroup(study.name), study, attrs) for study in studies]
             for group in groups:
                 _write(group, spool)
@@ -315,7 +315,7 @@ def _write_ragged(
 
 
 def _put_shared(name: str, column: Column, known: np.ndarray, index: tuple, values: np.ndarray, run: RunLabels) -> None:
-    """Store a run's values of a variable that several runs share; values of earlier runs must be equal and are kept."""
+    """Store the values of a variable that is the same for several runs; raise ValueError if an earlier run differs."""
     present = known[index]
     unknown = present == column.fill
     equal = present == values if values.dtype.kind == "S" else abs(present - values) <= _SAME * abs(values)

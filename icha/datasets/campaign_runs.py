@@ -1,4 +1,4 @@
-"""Read the runs of a campaign one by one, and arrange them along the axes of the campaign dataset."""
+"""Read the runs of a campaign one by one, and arrange the runs along the dimensions of the campaign dataset."""
 
 from __future__ import annotations
 
@@ -91,7 +91,7 @@ class Entry(NamedTuple):
 
     @property
     def extent(self) -> tuple[bool, int]:
-        """True if the run reached its end, and the number of steps; the run with the largest pair has all variables."""
+        """Sort key: True if the run reached its end, and number of steps; the largest run has all variables."""
         return self.status not in _ENDED_EARLY, self.sizes.get("step", 0)
 
 
@@ -251,7 +251,7 @@ def _arrange_study(name: str, found: dict[RunLabels, Entry], design: list[RunLab
     position = _positions(axes, design)
     # The order of the design replaces the order in which the runs were given.
     entries = [found[labels] for labels in position if labels in found]
-    # One run of every model that has all variables of the model.
+    # For every model, one run that has all variables of the model.
     samples = [
         _sample(max(of_model, key=lambda entry: entry.extent).source)
         for model in axes["model"]
@@ -329,7 +329,7 @@ def _sizes(entries: list[Entry], dim: str) -> np.ndarray:
 def _snapshots(entries: list[Entry]) -> dict[tuple[bytes, float], int]:
     """Assign a number to each snapshot of a study; kind and target identify a snapshot.
 
-    Runs may reach their targets in different orders, for instance a load before an area, and an area before a load.
+    Runs may reach their targets in different orders: one run a load before an area, another run this area first.
     """
     longest = max(entries, key=lambda entry: entry.extent)
     known = dict.fromkeys(itertools.chain(longest.snapshots, *(entry.snapshots for entry in entries)))

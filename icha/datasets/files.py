@@ -3,8 +3,8 @@
 A file never appears before it is complete. The same values always give the same bytes. All values are finite, except
 values of missing runs and values after the last step of a run.
 
-Files of runs contain many small variables. The netCDF library is slow if a program defines and writes variables by
-turns. Therefore ICHA defines all variables before it writes the first one.
+Files of runs contain many small variables. The netCDF library is slow if a program alternates between defining and
+writing variables. Therefore ICHA defines all variables before it writes the first one.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ def write_dataset(data: xr.Dataset | xr.DataTree, path: str | os.PathLike) -> No
     for group, dataset in nodes.items():
         _refuse_values_not_finite(dataset, f"{path}" if group == "/" else f"{path}, group {group}")
     with whole_file(path) as temporary, netCDF4.Dataset(temporary, "w") as file:
-        # Every variable is written completely, so that filling it before would waste time.
+        # Every variable is written completely, so filling it with missing values first would waste time.
         file.set_fill_off()
         defined = [
             variable

@@ -35,12 +35,12 @@ _OTHERS = {
 _REFUSED = re.compile("user|host|mail|date|time")
 # Largest relative difference due to rounding between values that must be equal.
 _ROUNDING = 1e-9
-# Possible units of targets: a length, or none for other quantities and for mixed targets.
+# Units that targets may have: m for lengths, 1 for other quantities and for targets of several kinds.
 _UNITS_OF_TARGETS = dict.fromkeys(("step_target", "snapshot_target"), ("1", "m"))
 
 
 class UnknownFile(ValueError):
-    """A file that has no documented format, or is not a readable netCDF file."""
+    """A file that ICHA does not write, or that is not a readable netCDF file."""
 
 
 # Variables of a study: variables that list the runs, and variables along the steps of every run.
@@ -52,7 +52,7 @@ _STUDY = {name: CAMPAIGN_TABLE[name] for name in ("status", "step_count", "failu
 
 
 def identify_file(path: str | os.PathLike) -> tuple[str, xr.Dataset | xr.DataTree]:
-    """Return the kind and the content of a file; the kind is RUN, SURFACE, CAMPAIGN or an undocumented kind.
+    """Return the kind and the content of a file; the kind is RUN, SURFACE, CAMPAIGN or a kind from `_OTHERS`.
 
     Raises
     ------

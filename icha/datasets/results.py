@@ -23,8 +23,8 @@ EXPLORER = "explore.html"
 RUN_TIMES = "run_times.tsv"
 CONFIGURATION = "config.used.yaml"
 DEPOSIT = "publish/{campaign}-{version}"
-# Smallest number of values of compressed arrays. For smaller arrays, the chunks of compressed arrays need as much space
-# as compression saves (docs/reference/dataset.md, "Compression").
+# Arrays with fewer values are not compressed, because the chunks of a compressed array would need as much space as
+# compression saves (docs/reference/dataset.md, "Compression").
 LEAST_COMPRESSED = 1024
 # Numbers of values of compressed arrays. Larger arrays are heights of surfaces. Compression of heights would save only
 # a sixth of the space, and take 13 s for 8192 x 8192 nodes.
@@ -56,6 +56,6 @@ def job_file(path: str, kind: str, ending: str) -> str:
     kind, ending : folder and file extension, `logs` and `.log`, or `benchmarks` and `.jsonl`.
     """
     folder, _, rest = path.partition("/")
-    # Each kind of reference solution has a folder; the theories of the surfaces have none.
+    # Each kind of reference solution has a folder in `references`; the files of theories are directly in `references`.
     job = rest if folder == "references" and "/" in rest else path
     return f"{kind}/{job.rpartition('.')[0]}{ending}"

@@ -4,24 +4,24 @@ import numpy as np
 
 from icha.datasets.variables.terms import Variable, bin_table, read_tables
 
-# Complete runs are results. A run with failed checks has all its values, but they must not be used.
+# Complete runs are results. The file of a run with failed checks contains values, but these values must not be used.
 COMPLETE, INCOMPLETE, MISSING, NOT_IN_DESIGN, FAILED_CHECKS, BEYOND_MODEL = range(6)
 STATUS_MEANINGS = ("complete", "incomplete", "missing", "not_in_design", "failed_checks", "beyond_the_model")
 # Attribute of a run that gives the reason for the status.
 STATUS_ATTRIBUTES = {INCOMPLETE: "incomplete", BEYOND_MODEL: "beyond_model", FAILED_CHECKS: "failed_checks"}
 # Status of runs that have a file.
 COMPUTED_RUNS = (COMPLETE, INCOMPLETE, FAILED_CHECKS, BEYOND_MODEL)
-# Status of runs whose first loading is a result. A run that left the range of its model has the loading up to there.
+# Status of runs whose first loading is a result. If the path leaves the range of the model, the loading ends there.
 LOADED_RUNS = (COMPLETE, BEYOND_MODEL)
 
 _ATTRIBUTES = {
     "status": {
         "flag_values": np.arange(len(STATUS_MEANINGS), dtype=np.int8),
         "flag_meanings": " ".join(STATUS_MEANINGS),
-        "comment": "values that a run, or all runs of its model, do not have are filled with _FillValue",
+        "comment": "where a run, or every run of a model, lacks a variable, the value is _FillValue",
     },
     "step_count": {
-        "comment": "from position step_count on along step, numbers are filled with _FillValue and texts are empty"
+        "comment": "at positions step_count and higher along step, numbers are _FillValue and texts are empty"
     },
 }
 CAMPAIGN = read_tables("campaign.txt", attributes=_ATTRIBUTES)[""]

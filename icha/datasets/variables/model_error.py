@@ -1,4 +1,4 @@
-"""Variables of the error of the asperity model; descriptions omit the common dimensions (labels of runs, load).
+"""Variables of the error of the asperity model. The dimensions that all variables have (labels, load) are not listed.
 
 In the limit of a short range of attraction, contact has a sharp edge. Therefore the raw, the corrected and the
 energetic area of boundary elements are equal in this limit.

@@ -51,7 +51,7 @@ def read_tables(
     Parameters
     ----------
     name : name of the text file.
-    known : descriptions of variables for lines without a long name, which also use earlier tables.
+    known : descriptions for lines without a long name. Such a line may also refer to an earlier table of the file.
     attributes : further attributes of variables, by name of the variable.
     texts : texts that replace names in braces in long names.
     """
@@ -93,7 +93,7 @@ def bin_table(quantity: str, units: str, over: str = "") -> Table:
     units : unit of the edges.
     over : name of the reference by which the quantity is divided; "" if it is not divided.
     """
-    over = f" over {over}" if over else ""
+    over = f" divided by {over}" if over else ""
     bins, inside = f"{quantity}_bin", f"{quantity} in the bin{over}"
     middle = {"bounds": f"{bins}_bounds", "comment": "middle of the bin"}
     return {
