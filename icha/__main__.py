@@ -13,8 +13,8 @@ def main() -> None:
         if not missing.name or missing.name.partition(".")[0] == __package__:
             raise
         sys.exit(
-            f"Error: {missing.name} is not installed. Commands need more packages than the library. Install them with "
-            "pip install 'icha[workflow]'"
+            f"Error: {missing.name} is not installed. The command `icha` needs this package; the library does not. "
+            "Install all packages of the command with pip install 'icha[workflow]'"
         )
 
 

@@ -51,19 +51,19 @@ from icha.surfaces.moments import height_statistics, slope_anisotropy, spectral_
 from icha.surfaces.summits import SummitCoverage, locate_summits
 from icha.surfaces.surface import Surface
 
-# Largest relative excess of a contact area over its limit that errors of the equilibria can cause.
+# A contact area may exceed its limit by this fraction, because equilibria have small errors.
 _AREA_TOLERANCE = 1e-6
 # Largest mean separation of a snapshot, in h_rms. Contact forms at much smaller separations.
 _HIGHEST_SNAPSHOT = 20.0
-# Kind of the snapshot of the largest tension on unloading.
+# Kind of the snapshot at the largest tension during unloading.
 PULL_OFF = "pull_off"
 _STICKINESS_PAPER = "L. Pastewka and M. O. Robbins, PNAS 111 (2014) 3298-3303, doi:10.1073/pnas.1320846111 (stickiness)"
 
 
 class ConvergenceError(RuntimeError):
-    """Error: the path could not be followed to its end, or it leaves the range of the model.
+    """Error: the path could not be computed to its end, for example because it leaves the range of the model.
 
-    `dataset` contains the targets that were reached, and the reason as attribute `incomplete` or `beyond_model`.
+    `dataset` contains the targets that were reached; its attribute `incomplete` or `beyond_model` states the reason.
     """
 
     def __init__(self, message: str, dataset: xr.Dataset):
@@ -92,10 +92,10 @@ def simulate(
     ----------
     surface : rough surface, scaled to its final rms slope.
     material : contact modulus, work of adhesion, range of attraction and flaws of the contact.
-    path : loads, areas or separations to reach, and the snapshots to store with distributions and spots.
+    path : loads, areas or separations to reach; at some of these targets, spots and distributions are stored.
     model : "asperities" or "boundary_elements". Boundary elements are slower, use the limit of a short range of
         attraction, and need a periodic surface.
-    seed : number that is recorded in the dataset; -1 for a surface without a seed.
+    seed : seed of the surface, which is recorded in the dataset; -1 for a surface without a seed.
     progress : function that is called with a line of text at every target.
     kept : folder of checkpoints (`icha.contact.checkpoints`), only with boundary elements. If a call was interrupted, a
         call with the same arguments resumes from the checkpoints.
@@ -103,10 +103,10 @@ def simulate(
     Returns
     -------
     xarray.Dataset with dimensions step, snapshot, gap_bin, pressure_bin and spot; every variable has units and a long
-    name. On a path that continues after the first loading, all equilibria are steps, and there is a dimension event.
-    Boundary elements also have dimensions row and column. The attribute `contact_model` names the model.
-    `applicability` gives the reasons why the model is not applicable to this contact, or is empty.
-    `failed_checks` lists the checks that the run fails (`icha.checks.run.check_run`); it is absent if all checks pass.
+    name. If the path continues after the first loading, all its equilibria are steps, and there is a dimension
+    event (jumps, unions and splits of spots). Runs with boundary elements also have dimensions row and column. The
+    attribute `contact_model` names the model. `applicability` states why the model is not applicable, or is empty.
+    `failed_checks` lists the checks that the run fails (`icha.checks.run.check_run`), and is absent if all checks pass.
 
     Warns
     -----
@@ -142,7 +142,7 @@ def _compute(solver, surface, material, path, model, seed, progress, kept):
 
     solver : module of the model; all other arguments are those of `simulate`.
     """
-    # With one thread for linear algebra the order of sums, and so every bit of the result, is the same on all machines.
+    # With one thread, linear algebra adds in a fixed order, so every bit of the result is the same on all machines.
     with threadpool_limits(1):
         contact = solver.contact_of(surface, material)
         observables = contact.observables(surface)
@@ -213,19 +213,19 @@ def _dataset(surface, material, path, name, seed, record, summits, reasons, of_c
 def asperity_applicability(
     full_contact_energy_ratio: float, summit_reasons: Sequence[str] = (), contact_area_fraction: float = 0.0
 ) -> str:
-    """Return a text with the reasons why the asperity model is not applicable, or an empty text if it is applicable.
+    """Return the reasons why the asperity model is not applicable, as text; the text is empty if the model applies.
 
     Parameters
     ----------
-    full_contact_energy_ratio : elastic energy of full contact over the work of adhesion; infinite without adhesion.
+    full_contact_energy_ratio : elastic energy of full contact divided by work of adhesion; infinite without adhesion.
     summit_reasons : reasons why the summits do not represent the surface.
     contact_area_fraction : largest contact area fraction A/A0 of the run.
     """
     reasons = []
     if full_contact_energy_ratio < FULL_CONTACT_BELOW:
         reasons.append(
-            f"full contact has the lower energy (U_full/dgamma = {full_contact_energy_ratio:.3g}, less than "
-            f"{FULL_CONTACT_BELOW:g})"
+            f"full contact has a lower energy than no contact (U_full/dgamma = {full_contact_energy_ratio:.3g}, less "
+            f"than {FULL_CONTACT_BELOW:g})"
         )
     reasons += summit_reasons
     if contact_area_fraction > MAX_AREA_FRACTION * (1 + _AREA_TOLERANCE):
@@ -236,12 +236,12 @@ def asperity_applicability(
 def _check_arguments(surface, material, path, by_summits):
     """Raise `ValueError` for arguments of the wrong type, and for targets out of range on this surface.
 
-    by_summits : whether summits represent the surface in the model; loads and areas then have lower limits.
+    by_summits : whether summits represent the surface in the model; such a model limits loads and areas.
     """
     for name, value, kind in (("surface", surface, Surface), ("material", material, Material), ("path", path, Path)):
         if not isinstance(value, kind):
             raise ValueError(f"{name}: expected an icha.{kind.__name__}, got a {type(value).__name__}")
-    # Loading may end at the limit of the asperity model, but the first target must be within the limit.
+    # Loading may end early at the limit of the asperity model, but the first target must be within the limit.
     limited = (path.targets[0], *path.turning_points) if by_summits else ()
     for target in (*path.targets, *path.turning_points):
         if target in limited and target.kind in ASPERITY_RANGES and target.value > 0:
@@ -274,9 +274,9 @@ class _PathRecord:
     failure : reason why the path ends early; empty for a complete path.
     beyond_model : whether the path ends early because it leaves the range of the model.
     steps, snapshots : for every step and snapshot, a dictionary of values by variable name.
-    events : events of every step.
-    unattributed : loss that is not attributed to any kind of event, J/m^2.
-    pressed : state of the first loading with the largest contact area.
+    events : events of every step: jumps in and out of contact, coalescence and splitting of spots.
+    unattributed : energy loss that is not attributed to any kind of event, J/m^2.
+    pressed : state with the largest contact area during the first loading.
     """
 
     failure: str = ""
@@ -289,7 +289,7 @@ class _PathRecord:
 
 
 def _count_uphill_jumps_in(record: _PathRecord) -> int:
-    """Return the number of jumps into contact that cost energy according to spot law or energy balance."""
+    """Return the number of jumps into contact that cost energy, by the law of a spot or by the energy balance."""
     gained = np.diff([step["dissipated_by_jump_in"] for step in record.steps], prepend=0.0) < 0
     return sum(
         int(np.count_nonzero((events.kind == JUMP_IN) & ((events.energy < 0) | uphill)))
@@ -300,7 +300,7 @@ def _count_uphill_jumps_in(record: _PathRecord) -> int:
 def _record_path(contact, observables, path, reachable, progress) -> _PathRecord:
     """Follow a path and return the record of its steps, snapshots and events.
 
-    reachable : path without targets above the range of the model. The record ends before the first missing target.
+    reachable : path without the targets outside the range of the model. The record ends before the first of them.
     """
     left_out = [target for target in path.targets if target not in reachable.targets]
     remaining = len(reachable.targets)
@@ -327,13 +327,13 @@ def _record_path(contact, observables, path, reachable, progress) -> _PathRecord
                 record.pressed, largest = state, step["contact_area_fraction"]
             if waypoint.target.snapshot:
                 record_snapshot(waypoint.target, state, index)
-            # The largest tension of the last leg.
+            # Keep the state of largest tension of the last leg (a leg ends at a turning point of the path).
             tension = waypoint.leg, -step["nominal_pressure"]
             if weakest is None or tension > weakest[0]:
                 weakest = tension, state, index
             remaining -= waypoint.target in reachable.targets
             if left_out and not remaining:
-                raise BeyondModel(f"before {left_out[0].describe()}, outside the range of the model")
+                raise BeyondModel(f"before {left_out[0].describe()}, which is outside the range of the model")
         if path.unload:
             record_snapshot(Target(PULL_OFF, 0.0), *weakest[1:])
     except NotConverged as error:
@@ -342,7 +342,7 @@ def _record_path(contact, observables, path, reachable, progress) -> _PathRecord
 
 
 def _require_finite(values: dict) -> dict:
-    """Return the values; raise `NotConverged` if a value is not finite, except the stiffness of full contact."""
+    """Return the values; raise `NotConverged` if a value is not finite. The stiffness of full contact is infinite."""
     for name, value in values.items():
         numbers = np.asarray(value)
         if name == "contact_stiffness" and np.isposinf(numbers).all():
@@ -353,7 +353,7 @@ def _require_finite(values: dict) -> dict:
 
 
 def _step_values(contact: ContactModel, waypoint: Waypoint) -> dict:
-    """Return the values of an equilibrium that all contact models have, by variable name."""
+    """Return those values of an equilibrium that exist in all contact models, by variable name."""
     state, target, balance = waypoint.state, waypoint.target, waypoint.balance
     pressure = contact.pressure(state)
     row = {
@@ -409,7 +409,7 @@ def _describe_targets(table: Table, path: Path) -> Table:
 
 
 def _target_unit(kinds: set[str], named_by: str) -> dict:
-    """Return the unit of targets of given kinds, and a comment on the kinds in m if the units differ."""
+    """Return the unit of targets of given kinds; if their units differ, also a comment that names the kinds in m."""
     metres = kinds.intersection(IN_METRES)
     if not metres or metres == kinds:
         return {"units": "m" if metres else "1"}

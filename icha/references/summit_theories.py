@@ -122,8 +122,8 @@ def fuller_tabor_pressure(reduced_separation, moments: SpectralMoments, material
 def separation_at(quantity: Callable, value, moments: SpectralMoments, *arguments):
     """Return the reduced separations at which quantity(separation, moments, *arguments) has the values `value`.
 
-    The quantity must decrease with the separation. Raise `ValueError` if a value is not positive, or if its separation
-    is farther than 10 standard deviations from the mean summit height.
+    The quantity must decrease with the separation. Raise `ValueError` if a value is not positive, or if the separation
+    for a value is farther than 10 standard deviations from the mean summit height.
     """
     summits = gaussian_summits(moments)
     middle, reach = summits.mean_height / moments.rms_height, _FARTHEST_PLANE * summits.deviation / moments.rms_height
@@ -134,7 +134,7 @@ def separation_at(quantity: Callable, value, moments: SpectralMoments, *argument
     ends = [float(quantity(end, moments, *arguments)) for end in (low, high)]
     if value.size and not (value.max() <= ends[0] and value.min() >= ends[1]):
         raise ValueError(
-            f"{value.min():g} to {value.max():g} is out of reach of the summits; expected {ends[1]:g} to {ends[0]:g}"
+            f"{value.min():g} to {value.max():g} exceeds the range of the theory; expected {ends[1]:g} to {ends[0]:g}"
         )
 
     def root(wanted):
