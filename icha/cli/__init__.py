@@ -42,8 +42,8 @@ def icha(
     `icha new NAME` writes the file of a new campaign. `icha describe NAME` prints what the campaign will compute.
     `icha run NAME` computes the campaign.
 
-    Exit status: 0 on success, 1 if a job, a check or a file has failed, 2 if the command line or the configuration is
-    invalid.
+    Exit status: 0 on success, 1 if a job or a check has failed or a file has problems, 2 if the command line or the
+    configuration is invalid.
     """
 
 

@@ -1,4 +1,4 @@
-"""The command `icha check`: check the format of files, and whether their results obey identities of the physics."""
+"""The command `icha check`: check the format of files, and whether their results satisfy physical identities."""
 
 from pathlib import Path
 from typing import Annotated
@@ -12,10 +12,10 @@ from icha.support.formatting import format_count, printable
 def check(
     files: Annotated[list[Path], typer.Argument(help="Runs, surfaces, campaign datasets or other results.")],
 ) -> None:
-    """Check the variables, units and attributes of files, and whether results obey identities of the physics.
+    """Check the variables, units and attributes of files, and whether results satisfy physical identities.
 
-    The command prints all problems of all files. Exit status: 0 if no file has problems, 1 if a file has problems, 2 if
-    ICHA cannot read a file.
+    One such identity: the areas of all spots add up to the contact area. The command prints all problems of all files.
+    Exit status: 0 if no file has problems, 1 if a file has problems, 2 if ICHA cannot read a file.
     """
     from icha.datasets.format import CAMPAIGN, RUN, SOLUTION, SURFACE, UnknownFile, identify_file
 
@@ -46,7 +46,7 @@ def check(
 
 
 def _problems(kind, data) -> tuple[list[str], int]:
-    """Return the problems of a file, and the number of checks that its results have undergone."""
+    """Return the problems of a file, and the number of checks of the results."""
     from icha.analysis.checks import COMPLETED, check_campaign, check_solution
     from icha.checks.run import check_run
     from icha.datasets.format import RUN, SOLUTION, SURFACE, problems_with_file

@@ -20,7 +20,7 @@ from icha.support import formatting
 from icha.support.formatting import format_count, printable
 
 TOKEN = "ZENODO_TOKEN"
-MOST_PROBLEMS = 100  # problems that are printed for a damaged deposit
+MOST_PROBLEMS = 100  # largest number of problems that are printed for a damaged deposit
 
 Deposit = Annotated[Path, typer.Argument(help="Folder of a deposit, or its zip.", show_default=False)]
 
@@ -28,8 +28,8 @@ Deposit = Annotated[Path, typer.Argument(help="Folder of a deposit, or its zip."
 def verify(deposit: Deposit, large: Large = False) -> None:
     """Verify that a deposit contains all its files with the right checksums, and no other files.
 
-    Other problems are file names that lead outside the deposit, links, devices, and zip files that unpack to far more
-    than their size. A zip is unpacked into a temporary folder. No code of the deposit is executed.
+    The command also reports file names that lead outside the deposit, links, devices, and a zip whose content is far
+    larger than the zip. A zip is unpacked into a temporary folder. No code of the deposit is executed.
 
     Exit status: 0 if the deposit is intact, 1 if the deposit is damaged (the command prints the first hundred
     problems), 2 if the file or folder does not exist.
@@ -75,16 +75,16 @@ def reproduce(
     only: Annotated[
         list[str] | None,
         option(
-            "Only this run and the surface that it needs; may be repeated. Either study/surface/seed1/slope1/material, "
-            "or `smallest`: the complete run with the least data.",
+            "Compute only this run and its surface; may be repeated. RUN is study/surface/seed1/slope1/material, or "
+            "`smallest` for the complete run with the least data.",
             metavar="RUN",
         ),
     ] = None,
     folder: Annotated[
         Path | None,
         option(
-            "Folder for the new results; a later command with the same folder continues. Default: a temporary folder, "
-            "which is removed if everything is reproduced."
+            "Folder for the new results; repeat the command with the same folder to continue. Default: a temporary "
+            "folder, which is removed if everything is reproduced."
         ),
     ] = None,
     cores: Cores = None,
@@ -94,9 +94,9 @@ def reproduce(
     """Compute the results of a deposit again and compare every number with the published number.
 
     The command verifies the deposit and does not change it. The installed ICHA computes the configuration of the
-    deposit. ICHA and its packages must have the same versions as for the deposit. No code of the deposit is executed.
-    The command reports each variable as identical, within tolerance, or different. With `--only smallest` the command
-    takes some minutes.
+    deposit. The installed versions of ICHA and its packages must be those that made the deposit. No code of the deposit
+    is executed. The command reports each variable as identical, within tolerance, or different. With `--only smallest`
+    the command takes some minutes.
 
     Exit status: 0 if all variables are identical or within tolerance, 1 if a variable differs or the computation
     fails or is stopped, 2 if the deposit is damaged or missing, or cannot be computed again.
@@ -142,18 +142,18 @@ def _introduce(deposit: Path, original: Path, folder: Path | None) -> None:
     if differences := other_versions(original):
         raise RerunError(
             "was made with other versions than those installed; expected the same versions. Run `make environment` in "
-            "a clone of that version, or in a copy of the deposit's source:\n" + "\n".join(differences)
+            "a clone of the deposit's version, or in a copy of the deposit's source:\n" + "\n".join(differences)
         )
     echo(f"program:    the installed ICHA {version('icha')}; nothing in the deposit is executed")
     echo(f"writes to:  {shorten_path(folder) if folder else 'a temporary folder'}")
 
 
 def _run(project: Path, targets: list[str], cores: int | None, anyway: bool) -> int:
-    """Compute targets of the configuration in a folder with the installed workflow; return the exit status."""
+    """Compute targets of the configuration in the folder `project`; return the exit status."""
     from icha.datasets.results import CONFIGURATION
     from icha.support.program import own_workflow
 
-    # A clone above the working directory would replace the installed workflow.
+    # In a working directory inside a clone, `run` would use the workflow of the clone, not the installed workflow.
     with contextlib.chdir(own_workflow()):
         try:
             run(str(project / CONFIGURATION), targets, cores=cores, folder=project, anyway=anyway)
@@ -172,15 +172,15 @@ def _print_comparison(comparison) -> bool:
         echo("different: not everything is reproduced", fg="red")
         return False
     if comparison.verdict == IDENTICAL:
-        echo(f"identical: {files}, every value", fg="green")
+        echo(f"identical: every value in {files}", fg="green")
     else:
-        echo(f"within tolerance: {files}, every value to {TOLERANCE:g}", fg="green")
+        echo(f"within tolerance: every value in {files} agrees within {TOLERANCE:g}", fg="green")
     return True
 
 
 def upload(
     deposit: Annotated[
-        Path, typer.Argument(help="Zip of a deposit, or its folder with the zip beside it.", show_default=False)
+        Path, typer.Argument(help="Zip of a deposit, or the folder from which the zip was made.", show_default=False)
     ],
     url: Annotated[
         str, typer.Option(help="Server with Zenodo's deposit API, such as sandbox.zenodo.org for tests.")
@@ -188,18 +188,18 @@ def upload(
     draft: Annotated[
         int | None,
         option(
-            "Continue this draft, for example after a failed upload; files in the draft are not sent again.",
+            "Continue this draft, for example after a failed upload; files that are complete are not sent again.",
             metavar="ID",
         ),
     ] = None,
     yes: Annotated[bool, typer.Option("--yes", "-y", help="Do not ask for confirmation.")] = False,
     large: Large = False,
 ) -> None:
-    """Send a deposit to Zenodo as a draft, after you have confirmed what is sent.
+    """Send a deposit to Zenodo as a draft, after your confirmation.
 
-    The command verifies the deposit and prints what it will send. It sends the zip, README.md and
-    ro-crate-metadata.json, with the title, authors and licence of the deposit. You can inspect, change and publish the
-    draft on its page at Zenodo. The environment variable ZENODO_TOKEN must contain a token with the scopes
+    The command verifies the deposit, prints what will be sent, and asks for confirmation. It sends the zip, README.md
+    and ro-crate-metadata.json, with the title, authors and licence of the deposit. You can inspect, change and publish
+    the draft on its page at Zenodo. The environment variable ZENODO_TOKEN must contain a token with the scopes
     deposit:write and deposit:actions.
 
     Exit status: 0 if all files were sent, 1 if not all files were sent, 2 if the deposit cannot be sent.
@@ -214,7 +214,7 @@ def upload(
         server = Zenodo(address, _token(address))
         with _intact(archive, large) as folder:
             metadata = read_zenodo_metadata(folder)
-            # Zenodo has reserved such a DOI for one draft, and all files of the deposit contain it.
+            # Zenodo reserves a DOI of this form for one draft, and the deposit contains this DOI.
             reserved = re.fullmatch(r"10\.\d+/zenodo\.(\d+)", str(metadata.get("doi")))
             if reserved and int(reserved[1]) != draft:
                 raise UserError(
@@ -229,7 +229,7 @@ def upload(
             echo("\n".join(f"{name + ':':<11}{printable(value or 'none')}" for name, value in rows.items()))
             if not yes and not sys.stdin.isatty():
                 raise UserError("cannot ask for confirmation without a terminal; nothing was sent. Use --yes")
-            if not yes and not confirm("Send it?"):
+            if not yes and not confirm("Send the deposit?"):
                 echo("Nothing was sent.")
                 raise typer.Exit(FAILED)
             _send(server, files, metadata, draft)
@@ -242,7 +242,7 @@ def _token(address: str) -> str:
     if not re.fullmatch(r"[!-~]+", token):
         raise UserError(
             f"the environment variable {TOKEN} is {'not a token' if token else 'not set'}; expected a token with the "
-            "scopes deposit:write and deposit:actions. Create one on "
+            "scopes deposit:write and deposit:actions. Create a token on "
             f"{address}/account/settings/applications/tokens/new/"
         )
     return token
@@ -262,7 +262,7 @@ def _send(server, files, metadata, number) -> None:
             if name in sums:
                 server.remove(draft, name)
             else:
-                echo(f"{name}: another file of the draft, not changed")
+                echo(f"{name}: a file of the draft that is not in the deposit; not changed")
         # Metadata are sent before the files because the server reports errors in metadata at once.
         server.describe(draft, metadata)
         for path in files:
@@ -281,7 +281,7 @@ def _send(server, files, metadata, number) -> None:
             server_option = "" if server.address == ZENODO else f" --url {server.address}"
             echo(
                 f"A draft remains: {draft.page}\n"
-                f"To continue it:  icha upload {shorten_path(files[0])}{server_option} --draft {draft.number}",
+                f"To continue:     icha upload {shorten_path(files[0])}{server_option} --draft {draft.number}",
                 err=True,
             )
         raise typer.Exit(FAILED) from None

@@ -1,4 +1,4 @@
-"""The command `icha describe`: print what a campaign computes, which results exist, and the cost of the others."""
+"""The command `icha describe`: print what a campaign computes, which results exist, and the cost of further results."""
 
 import statistics
 import sys
@@ -27,11 +27,11 @@ from icha.support.formatting import format_count, printable_lines
 
 def describe(
     config: Config = None,
-    runs: Annotated[bool, typer.Option("--runs", help="List every file, not only the sums.")] = False,
+    runs: Annotated[bool, typer.Option("--runs", help="List every file, not only totals.")] = False,
     cores: Cores = None,
     folder: Folder = None,
 ) -> None:
-    """Print what a campaign computes, which results exist, and the expected time, memory and disk space of the others.
+    """Print what a campaign computes, which results exist, and the time, memory and disk space of further results.
 
     The command computes nothing. Times are estimates, usually right within a factor of two. If some runs are done, the
     estimates use the times of these runs. A run counts as done if its file was made with the present settings;
@@ -45,7 +45,7 @@ def describe(
 
 
 def _print_scans(campaign) -> None:
-    """Print the descriptions of the measured surfaces that are used by studies."""
+    """Print the descriptions of the measured surfaces that studies use."""
     from icha.configuration.cases import run_cases
     from icha.configuration.surfaces import MeasuredSurface
     from icha.contact.models import MODELS
@@ -66,7 +66,7 @@ def _print_scans(campaign) -> None:
 
 
 def print_plan(path: Path, campaign, workflow: Path, home: Path, cores: int, *, runs=False, profile=None) -> None:
-    """Print what a campaign computes, which results exist, the cost of the others, and reasons that prevent a run.
+    """Print what a campaign computes, which results exist, the cost of further results, and what prevents a run.
 
     Parameters
     ----------
@@ -155,7 +155,7 @@ def _print_sums(console, items) -> None:
     further = start_up(items) + WORKFLOW.job * sum(item.to_do for item in items)
     headings = ("files", "done", "failed", "to do", "each", "core time", "memory", "disk")
     for heading, footer in zip(headings, cells(items, further), strict=True):
-        # In a narrow terminal, names are wrapped and numbers are not.
+        # In a narrow terminal, only names are wrapped, not numbers.
         table.add_column(heading, footer="" if heading == "each" else footer, justify="right", no_wrap=True)
     for kind in dict.fromkeys(item.part for item in items):
         table.add_row(kind, *cells([item for item in items if item.part == kind]))
@@ -174,9 +174,9 @@ def _print_cost(console, items, cores: int, damaged) -> None:
         disk = formatting.size(sum(item.cost.disk for item in items))
         console.print(
             f"{format_count(len(runs), 'run')}, {sum(item.to_do for item in runs)} to do: about [bold]{time}[/] and "
-            f"{memory} of memory on {format_count(cores, 'core')}; {disk} of disk for all results."
+            f"{memory} of memory on {format_count(cores, 'core')}; {disk} of disk space for all results."
         )
     else:
         console.print(f"{format_count(len(runs), 'run')}; all results exist.")
     if changed := sum(item.state == "changed" for item in runs):
-        console.print(f"{format_count(changed, 'run')} with other settings: will be computed again.")
+        console.print(f"{format_count(changed, 'run')} made with other settings: will be computed again.")

@@ -12,7 +12,7 @@ from icha.support.formatting import format_count
 def explore(
     results: Annotated[Path, typer.Argument(help="Folder of a campaign's results: results/<campaign>.")],
     output: Annotated[
-        Path | None, option("The page. Default: explore.html in the folder of results.", "--output", "-o")
+        Path | None, option("File of the page. Default: explore.html in the folder of results.", "--output", "-o")
     ] = None,
     study: Annotated[list[str] | None, option("Only this study; may be repeated.")] = None,
     surface: Annotated[list[str] | None, option("Only this surface; may be repeated.")] = None,
@@ -24,7 +24,7 @@ def explore(
 
     On the page, choose a contact and a model, and move a slider along the path. The page shows the spots or patches on
     the topography, the state on the curves, and the distributions. The page is one HTML file and needs no network. If
-    the page is too small for all contacts, the command prints how many contacts are omitted.
+    the page with all contacts would exceed the largest size, contacts are omitted and the command prints their number.
     """
     from icha.datasets.results import EXPLORER
     from icha.deposit.verify import CHECKSUMS

@@ -1,4 +1,4 @@
-"""Progress of a running campaign: events of Snakemake update it, and a view prints it to a terminal or a file."""
+"""Progress of a running campaign. Events of Snakemake update the progress; a view prints it to a terminal or file."""
 
 import threading
 import time
@@ -22,8 +22,8 @@ from icha.support.formatting import printable
 PRIOR_SECONDS = 5.0
 # Expected core-seconds of a job that the plan does not list. Such a job writes a few lines.
 DEFAULT_SECONDS = 0.1
-MOST_JOBS = 8  # running jobs in the live view
-MOST_ERROR_LINES = 3  # lines of the error of a failed job in the view
+MOST_JOBS = 8  # largest number of running jobs that the view lists
+MOST_ERROR_LINES = 3  # largest number of lines that the view prints for the error of a failed job
 
 
 @dataclass
@@ -58,7 +58,7 @@ class Progress:
 
     Attributes
     ----------
-    expected : for the path of each output file, the rule of its job and the expected core-seconds of the job.
+    expected : by the path of an output file, the rule of the job that writes the file, and the expected core-seconds.
     clock : function that returns the present time, s.
     total : number of jobs of each rule.
     running : running jobs, by their number in Snakemake.
@@ -85,7 +85,7 @@ class Progress:
         with self.lock:
             match event["event"]:
                 case "run_info":
-                    # Rules of targets have no job of their own: they collect files of other rules.
+                    # Rules of targets compute nothing: they only collect files of other rules.
                     self.total = {name: n for name, n in event["stats"].items() if name not in (*TARGETS, "total")}
                     self.started = self.started or self.clock()
                 case "resources_info" if event.get("cores") or event.get("nodes"):
@@ -168,7 +168,7 @@ def _complete_lines(job: JobRecord, folder: Path) -> list[str]:
 
 
 def read_error(job: JobRecord, folder: Path) -> list[str]:
-    """Return the reason of a failed job: the lines of its log from the last line that begins with `Error:`.
+    """Return why a job failed: the lines of its log, from the last line that begins with `Error:` to the end.
 
     The list is empty if no line begins with `Error:`, for example because the job was killed.
     """
@@ -186,7 +186,7 @@ def read_last_line(job: JobRecord, folder: Path) -> str:
 
 
 class View:
-    """View of the jobs: a table that is updated in a terminal, or one line for each finished job in a file.
+    """View of the jobs: in a terminal, a table that is updated; in a file, one line for each finished job.
 
     Parameters
     ----------

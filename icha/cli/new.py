@@ -12,14 +12,14 @@ from icha.cli.project import CAMPAIGNS, UserError, echo, find_workflow, list_cam
 from icha.cli.scans import describe_scan, read_measured_section
 
 TEMPLATE = Path(__file__).parent / "templates/campaign.yaml"
-# Explanations of the keys of a configuration: the first file is for editors, the second for readers.
+# Explanations of the keys of a configuration: a schema for text editors, and a page for readers.
 SCHEMA, README = Path("workflow/schemas/config.schema.json"), Path("config/README.md")
 
 
 def new(
     name: Annotated[str, typer.Argument(help="Name of the campaign: lower-case letters, digits, `_`, `-`.")],
     measured: Annotated[
-        Path | None, option("File of a measured topography; keys that the file determines are filled in.")
+        Path | None, option("File of a measured topography; the command fills in keys that the file determines.")
     ] = None,
     data: Annotated[
         str | None,
@@ -30,7 +30,7 @@ def new(
         bool, typer.Option("--boundary-elements", help="Add runs with boundary elements.")
     ] = False,
 ) -> None:
-    """Write the file of a new campaign with comments, config/campaigns/NAME.yaml, and print the next commands.
+    """Write the commented file of a new campaign, config/campaigns/NAME.yaml, and print the next commands.
 
     The campaign runs without changes. For a measured topography, fill in the keys that the command lists. The command
     also prints the number of summits of the topography, whether its spectrum ends in noise, and recommended keys.
@@ -43,7 +43,7 @@ def new(
     if not re.fullmatch(NAME_PATTERN, name) or name.startswith("-"):
         raise UserError(f"{name!r} is not a valid name; expected lower-case letters, digits, '_' and '-'")
     if file.exists():
-        raise UserError(f"{shorten_path(file)} exists already; choose another name, or remove it")
+        raise UserError(f"{shorten_path(file)} exists already; choose another name, or remove the file")
     if name in list_campaigns():
         raise UserError(f"{name} is the campaign of {shorten_path(list_campaigns()[name])}; choose another name")
     if data is not None and measured is None:
@@ -63,7 +63,7 @@ def new(
     echo(f"{shorten_path(file)} written")
     if section is not None:
         _print_section(section)
-    echo(f"next:  icha describe {name}    print what it computes\n       icha run {name}         compute it")
+    echo(f"next:  icha describe {name}    print the plan\n       icha run {name}         compute the campaign")
 
 
 def _schema() -> Path:
@@ -79,7 +79,7 @@ def _schema() -> Path:
 
 
 def _print_section(section: dict) -> None:
-    """Print the description of a scan, and the keys that the user has to fill in."""
+    """Print the description of a scan, and the keys that the user must fill in."""
     to_scale = not section["to_fill_in"].keys() - {"boundary"}
     for line in describe_scan(section["name"], section["scan"], to_scale=to_scale):
         echo(line)

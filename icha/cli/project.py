@@ -37,7 +37,7 @@ Cores = Annotated[int | None, option("Number of cores to use. Default: 2.", "--c
 Folder = Annotated[
     Path | None,
     option(
-        "Folder that contains results/. Default: the clone, or the working directory.",
+        "Folder that contains results/. Default: the clone of ICHA, or outside a clone the working directory.",
         "--directory",
         "-d",
         resolve_path=True,
@@ -46,7 +46,7 @@ Folder = Annotated[
 
 
 def echo(text: object = "", *, err: bool = False, **style) -> None:
-    """Print text, to standard error if `err` is true; `style` as in `typer.style`, such as `fg="red"`."""
+    """Print text; if `err` is true, print to standard error. `style` is passed to `typer.style`, such as `fg="red"`."""
     typer.secho(printable_lines(text), err=err, **style)
 
 
@@ -97,12 +97,12 @@ def find_workflow() -> Path:
 
 
 def list_campaigns() -> dict[str, Path]:
-    """Return the configuration files of the project and of ICHA by the names of their campaigns.
+    """Return the configuration files of the project and of ICHA, by the name of the campaign.
 
-    The default file, config/config.yaml, has the name that is written in this file.
+    This name is the file name without .yaml. For the default file, config/config.yaml, the file contains the name.
     """
     files: dict[str, Path] = {}
-    for folder in (find_workflow(), project()):  # the project's files replace shipped ones of the same name
+    for folder in (find_workflow(), project()):  # files of the project replace files of ICHA with the same name
         default = folder / DEFAULT
         text = default.read_text(encoding="utf-8", errors="replace") if default.is_file() else ""
         if name := re.search(r"^name: *([\w-]+)", text, re.MULTILINE):

@@ -39,8 +39,8 @@ from icha.support import formatting
 from icha.support.formatting import format_count
 
 STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-MOST_LINES = 12  # lines that are printed of the reason of a failure
-# Snakemake always prints these lines, before the reason why it ends.
+MOST_LINES = 12  # largest number of lines that are printed for the reason of a failure
+# Lines that every call of Snakemake prints; the reason of an error follows after these lines.
 PREAMBLE = r"Using workflow specific profile|Assuming unrestricted|host: |Building DAG of jobs|total +\d+$"
 
 
@@ -50,7 +50,7 @@ def run(
         list[str] | None,
         typer.Argument(
             metavar="[TARGET]...",
-            help=f"Results to make: {', '.join(TARGETS)}, or a file. Default: all. After `--`: options of Snakemake.",
+            help=f"Results to make: {', '.join(TARGETS)}, or a file. Default: all. Options of Snakemake follow `--`.",
             show_default=False,
         ),
     ] = None,
@@ -77,7 +77,7 @@ def run(
 
     workflow = find_workflow()
     targets = list(targets or [])
-    # `icha run figures` and `icha run -- --forceall` name no configuration.
+    # The first argument of `icha run figures` and `icha run -- --forceall` is not a configuration.
     if config is not None and (config.startswith("-") or (config in TARGETS and not Path(config).is_file())):
         config, targets = None, [config, *targets]
     path = find_configuration(config)
@@ -155,7 +155,7 @@ def _refuse_if_too_large(items, targets: list[str], cores: int, results: Path, p
 
 
 def _dry_run(command: list[str], workflow: Path) -> str:
-    """Let Snakemake plan without jobs; return the numbers of jobs that would run, or print its error and exit."""
+    """Let Snakemake plan only; return the numbers of jobs that would run. After an error, print the error and exit."""
     done = subprocess.run(command, cwd=workflow, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
     if done.returncode == 0:
         return _planned_jobs(done.stdout)
@@ -179,7 +179,7 @@ def _planned_jobs(output: str) -> str:
 
 
 def _reason_in(output: str) -> list[str]:
-    """Return why Snakemake stopped although no job failed: the last lines after its plan, without tracebacks."""
+    """Return why Snakemake stopped without a failed job: the end of its output after the plan, without tracebacks."""
     lines = [line for line in output.splitlines() if line.strip()]
     preamble = [number for number, line in enumerate(lines) if re.match(PREAMBLE, line)]
     lines = lines[preamble[-1] + 1 :] if preamble else lines
@@ -209,10 +209,10 @@ _REPEAT_STOP = 15.0
 
 
 def _run_snakemake(command: list[str], workflow: Path, log: Path, progress, view) -> tuple[int, bool]:
-    """Run Snakemake with its events passed to `progress` and `view`; return its status, and whether it was stopped."""
+    """Run Snakemake and pass events to `progress` and `view`; return the exit status, and whether it was stopped."""
     stopped = []
     reading, writing = os.pipe()
-    # The plugins of this workflow precede installed ones.
+    # The plugins of this workflow replace installed plugins of the same name.
     modules = [str(workflow / "workflow/plugins"), *filter(None, [os.environ.get("PYTHONPATH")])]
     environment = os.environ | {"ICHA_EVENTS": str(writing), "PYTHONPATH": os.pathsep.join(modules)}
     if sys.platform == "linux":
@@ -237,7 +237,7 @@ def _run_snakemake(command: list[str], workflow: Path, log: Path, progress, view
             with contextlib.suppress(ProcessLookupError):
                 os.killpg(process.pid, number)
 
-        # Ignored signals, as under nohup or in the background of a script, remain ignored.
+        # Signals that are already ignored, for example under nohup, remain ignored.
         signals = [number for number in STOP_SIGNALS if signal.getsignal(number) is not signal.SIG_IGN]
         handlers = {number: signal.signal(number, stop) for number in signals}
         try:
@@ -250,7 +250,7 @@ def _run_snakemake(command: list[str], workflow: Path, log: Path, progress, view
                 if status is None and stopped:
                     # Snakemake can miss a signal that arrives while it starts a job.
                     os.killpg(process.pid, stopped[-1])
-            # A process that a job left running may hold the pipe open.
+            # A process that outlives its job may hold the pipe open.
             listener.join(timeout=2)
         finally:
             for number, handler in handlers.items():
@@ -282,7 +282,7 @@ def _print_outcome(status: int, stopped: bool, progress, campaign, folder: Path,
     results = folder / "results" / campaign.name
     ended = progress.ended_count
     if status == 0:
-        log.unlink(missing_ok=True)  # Snakemake has its own copy
+        log.unlink(missing_ok=True)  # Snakemake has written the same log
     if status == 0 and progress.started is None:
         echo("Nothing to do: all requested results exist and are up to date.")
     elif ended:
@@ -290,7 +290,7 @@ def _print_outcome(status: int, stopped: bool, progress, campaign, folder: Path,
         echo(f"{len(progress.done)} of {format_count(progress.job_count, 'job')} done in {duration}")
     _print_failures(status, stopped, progress, campaign, folder, log)
     if status and results.is_dir() and (reason := probe_folder(results)):
-        # The logs are in this folder, too, so the jobs may have been unable to report the error.
+        # The logs of the jobs are in the same folder, so the jobs may have been unable to report the error.
         echo(
             f"cannot write to {shorten_path(results)}: {reason.strerror}. Solve this problem and repeat the command",
             fg="red",
@@ -302,7 +302,7 @@ def _print_outcome(status: int, stopped: bool, progress, campaign, folder: Path,
         _print_failure(heading, _reason_in(log.read_text(encoding="utf-8", errors="replace")), fg="red")
     elif status and progress.job_count > ended:
         echo(f"{format_count(progress.job_count - ended, 'job')} not run, because they need results of failed jobs")
-    if ended or not status:  # otherwise the existing files are those of an earlier call
+    if ended or not status:  # otherwise the files are from an earlier call
         files = {"figures": "figures", "dataset": f"dataset/{campaign.name}.nc", "report": "report.html"}
         for name, file in files.items():
             if (results / file).exists():
@@ -328,7 +328,7 @@ def _print_failures(status: int, stopped: bool, progress, campaign, folder: Path
         for job in failed:
             # The message of the job "Verdict on the checks" repeats the runs without a result.
             reason = [line for line in read_error(job, folder) if not any(line.startswith(path) for path in incomplete)]
-            unknown = f"it ended without a message, perhaps because memory was exhausted; see {job.log or log}"
+            unknown = f"the job ended without a message, perhaps for lack of memory; see {job.log or log}"
             _print_failure(f"  {job.title}", reason or [unknown], bold=True)
             if job.log:
                 echo(f"    log: {shorten_path(folder / job.log)}")
@@ -343,7 +343,7 @@ def _print_failure(heading: str, lines: list[str], **style) -> None:
 
 
 def _print_checks(campaign, results: Path) -> None:
-    """Print how many checks of the results passed, and whether the models are applicable to the campaign."""
+    """Print how many checks of the results have passed, and whether the models are applicable to the campaign."""
     import xarray as xr
 
     from icha.analysis.checks import read_checks

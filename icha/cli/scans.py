@@ -17,9 +17,9 @@ from icha.support.input_files import problem_with_path
 if TYPE_CHECKING:
     from icha.contact.models import Model
 
-# Largest fraction of filled points without a warning. For more filled points another measurement is recommended.
+# Fraction of filled points above which a warning recommends another measurement.
 MOST_FILLED = 0.05
-# Values in m with which ICHA can read a file that lacks these keys; examples of values that the user fills in.
+# For keys that the file lacks: values in m that let ICHA read the file, and examples of what the user fills in.
 GUESSES = {"height_unit": 1e-9, "size": (1e-4, 1e-4)}
 EXAMPLES = {"height_unit": "nm", "lateral_unit": "um", "size": "[90 um, 90 um]"}
 
@@ -41,19 +41,19 @@ def describe_scan(name: str, scan, *, to_scale: bool = True, models: Iterable[Mo
 def _reading(scan) -> Iterator[str]:
     """Yield lines on the format of the file, on points without a height, and on opposite edges that do not fit."""
     share = formatting.share(scan.filled, scan.points)
-    filled = f"{format_count(scan.filled, 'point')} without height filled ({share} of all points)"
-    array = f", `data: {printable(scan.data)}` of several" if scan.data else ""
+    filled = f"heights of {format_count(scan.filled, 'point')} interpolated ({share} of all points)"
+    array = f", `data: {printable(scan.data)}`, one of several" if scan.data else ""
     yield f"read as {scan.format}{array}, {filled if scan.filled else 'all points have a height'}"
     yield scan.reading.partition(", ")[2]
     if scan.filled > MOST_FILLED * scan.points:
         yield (
-            f"warning: more than {100 * MOST_FILLED:.0f} % of the points are filled by interpolation, which is smooth; "
-            "measure again, or `crop` an area with fewer missing points"
+            f"warning: more than {100 * MOST_FILLED:.0f} % of the heights are interpolated and too smooth; measure "
+            "again, or `crop` an area with fewer missing points"
         )
     if not scan.edges_fit:
         yield (
-            "warning: `boundary: periodic`, but opposite edges differ by much more than neighbouring nodes, so the "
-            "surface has a step there; use `boundary: window`, `mirror` or `free`"
+            "warning: `boundary: periodic`, but opposite edges differ by much more than neighbouring nodes; there is a "
+            "step at the edges; use `boundary: window`, `mirror` or `free`"
         )
 
 
@@ -84,7 +84,7 @@ def _resolution(scan, to_scale: bool, models: list[Model]) -> Iterator[str]:
     if error and any(model.by_cells for model in models):
         yield (
             f"boundary elements have about {scan.cells_per_short_wave:.2g} nodes per shortest wave, which causes an "
-            f"error of {error} in areas; recommended: {RESOLVED_CELLS}, by a longer `cutoff` or a finer `grid`"
+            f"error of {error} in areas; recommended: {RESOLVED_CELLS} nodes, with a longer `cutoff` or a finer `grid`"
         )
 
 
@@ -153,9 +153,9 @@ def read_measured_section(path: Path, data: str | None, folder: Path) -> dict[st
     if "height_unit" not in missing:
         points += f", heights from {np.nanmin(scan.heights) * 1e6:.4g} um to {np.nanmax(scan.heights) * 1e6:.4g} um"
     lines.append(points)
-    lines += [f"{key}:        # to fill in, since the file lacks it: such as {EXAMPLES[key]}" for key in missing]
+    lines += [f"{key}:        # to fill in (not in the file), for example {EXAMPLES[key]}" for key in missing]
     if gaps:
-        lines.append(f"missing: fill                # {gaps} points have no height; `refuse` makes that an error")
+        lines.append(f"missing: fill                # {gaps} points have no height; with `refuse`, this is an error")
     advice = {} if missing else format_advice(resolution.advice)
     name = re.sub("[^a-z0-9_-]+", "_", path.stem.lower()).strip("_") or "measured"
     missing["boundary"] = "what surrounds the scan: free, window, mirror or periodic"
@@ -186,5 +186,5 @@ def _load(path: Path, data: str | None):
     elif "height_unit" in missing:
         # Coordinates without a unit have the unit of the heights, which is unknown too.
         if load_scan(path, Preparation("auto", "free", data, **guessed, lateral_unit=1.0)).size != scan.size:
-            missing["lateral_unit"] = "is missing, and the file does not contain it; default: that of the heights"
+            missing["lateral_unit"] = "is missing, and the file does not contain it; default: unit of the heights"
     return scan, guessed, missing

@@ -9,7 +9,7 @@ from icha.cli.project import UserError, echo
 from icha.datasets.attributes import reasons_not_applicable, why_no_result
 from icha.support.formatting import format_count, format_quantity, printable
 
-MOST_ROWS = 12  # rows of the table of steps
+MOST_ROWS = 12  # largest number of rows in the table of steps
 CURVES = {"contact_area_fraction": "A/A0", "reduced_pressure": "p*", "reduced_separation": "u/h_rms"}
 COLUMNS = ("reduced_pressure", "contact_area_fraction", "reduced_separation", "spot_count")
 
@@ -67,7 +67,7 @@ def _print_run(run, file: Path) -> None:
     for label, values in curves.items():
         echo(f"{label:>10} {values.min():.3g} to {values.max():.3g}")
     if "gap/h_rms" in curves:
-        echo("          u: mean separation from the half-space far away; gap: mean gap between the surfaces")
+        echo("          u: from the mean plane to the undeformed half-space; gap: mean gap between the surfaces")
     if "hysteresis_loss" in run:
         tension = format_quantity(-float(run["pull_off_pressure"]), "Pa")
         echo(f"pull-off: {tension} of tension; loss {float(run['hysteresis_loss']):.3g} J/m²")
@@ -126,7 +126,7 @@ def _print_campaign(tree, file: Path) -> None:
             echo(f"  model not applicable to {format_count(reasons.total(), 'run')}: {first}", fg="red")
         if "failure" in study:
             failure = study["failure"].transpose(*LABELS).values
-            # A run beyond its model has not failed: its loading up to the limit of the model is a result.
+            # A run that reaches the limit of its model has not failed: the loading up to the limit is a result.
             failed = study["status"].transpose(*LABELS).values != BEYOND_MODEL
             for index in zip(*((failure != "") & failed).nonzero(), strict=True):
                 labels = ", ".join(map(str, labels_at(study, index, LABELS)))

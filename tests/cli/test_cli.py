@@ -208,7 +208,7 @@ def test_data_names_one_of_several_arrays_of_a_measured_file(project):
             file.createVariable(name, "f8", ("row", "column"))[:] = rough_heights() * 1e9
             file[name].units = "nm"
     # A usual name is taken, printed, and written into the configuration.
-    assert "read as netcdf, `data: z` of several" in printed("new", "mine", "--measured", "my.nc")
+    assert "read as netcdf, `data: z`, one of several" in printed("new", "mine", "--measured", "my.nc")
     assert yaml.safe_load((CAMPAIGNS / "mine.yaml").read_text())["surfaces"]["my"]["data"] == "z"
 
 
@@ -229,14 +229,14 @@ def test_many_filled_points_and_edges_that_do_not_fit_are_reported(project):
     heights[20:45, 10:40] = np.nan
     write_scan("scan.txt", heights[:48, :48], "10 um")
     written = printed("new", "mine", "--measured", "scan.txt")
-    assert "scan: read as matrix, 750 points without height filled (33 % of all points)" in written
+    assert "scan: read as matrix, heights of 750 points interpolated (33 % of all points)" in written
     assert "opposite edges" not in written
-    assert "scan: warning: more than 5 % of the points are filled" in written
+    assert "scan: warning: more than 5 % of the heights are interpolated" in written
     file = CAMPAIGNS / "mine.yaml"
     for boundary, warning in (("periodic", True), ("window", False)):
         file.write_text(re.sub("boundary: .*", f"boundary: {boundary}  # to fill in", file.read_text()))
         described = printed("describe", "mine")
-        assert "filled (33 % of all points)" in described
+        assert "interpolated (33 % of all points)" in described
         assert ("warning: `boundary: periodic`, but opposite edges differ" in described) == warning
 
 
@@ -269,7 +269,7 @@ def test_a_scan_is_analysed_before_anything_is_computed(project):
     described = output("describe", "mine")
     assert f"recommended: `cutoff: {cutoff}`" in described
     summits = [int(re.search(r"(\d+) summits?, ", each)[1]) for each in (written, described)]
-    few = r"scan: boundary elements have about (\S+) nodes per shortest wave, .* recommended: 8, by a longer"
+    few = r"scan: boundary elements have about (\S+) nodes per shortest wave, .* recommended: 8 nodes, with"
     assert 1 < float(re.search(few, described)[1]) < 8
     # Uncommenting the recommended key is enough; the noise of the scan remains, its summits do not.
     file.write_text(text.replace("# cutoff: ", "cutoff: "))
@@ -346,7 +346,7 @@ def test_the_states_of_runs_are_distinguished(tiny):
         assert states[f"runs/{case.path}.nc"] == state
     assert failed_runs(campaign, results) == {failed.path: reason}
     described = printed("describe", "tiny.yaml", "--runs")
-    assert "4 runs, 2 to do" in described and "1 run with other settings" in described
+    assert "4 runs, 2 to do" in described and "1 run made with other settings" in described
     assert f"failed: runs/{failed.path}.nc: {reason}" in described
 
 

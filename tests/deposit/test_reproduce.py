@@ -125,7 +125,7 @@ def test_what_is_the_same_is_identical_and_leaves_nothing_behind(ending, deposit
     folder = deposit()
     before = {path: path.stat().st_mtime_ns for path in folder.rglob("*")}
     status, output = reproduce(folder.with_name(folder.name + ending), "--cores", "3", "--anyway")
-    assert status == 0 and "identical: 4 files, every value" in output, output
+    assert status == 0 and "identical: every value in 4 files" in output, output
     assert f"program:    the installed ICHA {version('icha')}; nothing in the deposit is executed" in output
     ((_, targets, cores, anyway),) = computed
     assert (targets, cores, anyway) == (["all"], 3, True)
@@ -134,7 +134,7 @@ def test_what_is_the_same_is_identical_and_leaves_nothing_behind(ending, deposit
 
 
 @pytest.mark.parametrize(
-    ("factor", "status", "message"), [(1 + 1e-9, 0, "within tolerance: 4"), (1.001, 1, "different:")]
+    ("factor", "status", "message"), [(1 + 1e-9, 0, "within tolerance: every value in 4"), (1.001, 1, "different:")]
 )
 def test_differences_are_listed_by_variable(factor, status, message, deposit, reproduce, computed, tmp_path):
     computed.factor = factor
@@ -148,7 +148,7 @@ def test_single_runs(deposit, reproduce, computed, tmp_path):
     packed = deposit()
     for only, runs in ((["smallest"], [SOFT]), ([HARD, f"runs/{SOFT}.nc"], [HARD, SOFT])):
         status, output = reproduce(packed, *(f"--only={each}" for each in only), "--folder", tmp_path / "again")
-        assert status == 0 and f"identical: {len(runs) + 1} files" in output, output  # and the surface of both
+        assert status == 0 and f"every value in {len(runs) + 1} files" in output, output  # and the surface of both
         assert computed[-1][1] == [f"results/tiny/runs/{run}.nc" for run in runs]
     status, output = reproduce(packed, "--only", "load/plate/seed3/slope1/soft")
     assert status == 2 and "has no such run; expected smallest, or one of its 2 runs" in output and HARD in output
