@@ -14,8 +14,7 @@ def stickiness(moments: SpectralMoments, material: Material) -> float:
 
     L. Pastewka and M. O. Robbins, PNAS 111 (2014) 3298-3303, doi:10.1073/pnas.1320846111. The mean repulsive pressure
     on the contact area A is h' E*/kappa with kappa = 2. Around the contact, the attractive stress is dgamma/r where the
-    gap is less than the range r of attraction. Hertz's gap beside a contact of mean diameter d = 4 h'/h'' gives the
-    attractive area
+    gap is less than the range r. Hertz's gap beside a contact of mean diameter d = 4 h'/h'' gives the attractive area
 
         A_att/A = pi [3 h'' r/(16 h'^2)]^(2/3).
 
