@@ -82,16 +82,10 @@ class Interaction:
         by_earlier, by_later = r <= window[earlier], r <= window[later]
         distant = _find_distant_pairs(half_space.tree, half_space.points, largest_radius, ewald)
         r = np.concatenate([r[by_earlier], r[by_later], distant[2]])
-        return cls(
-            law,
-            half_space,
-            radius_of_curvature,
-            largest_radius,
-            np.concatenate([later[by_earlier], earlier[by_later], distant[0]]),
-            np.concatenate([earlier[by_earlier], later[by_later], distant[1]]),
-            r,
-            ewald.point_displacement(r),
-        )
+        target = np.concatenate([later[by_earlier], earlier[by_later], distant[0]])
+        source = np.concatenate([earlier[by_earlier], later[by_later], distant[1]])
+        by_moments = ewald.point_displacement(r)
+        return cls(law, half_space, radius_of_curvature, largest_radius, target, source, r, by_moments)
 
     def displacement(self, a):
         """Return the displacement w at each spot by all other spots and images for radii a, in m."""
