@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 if TYPE_CHECKING:
-    # `icha.surfaces.surface` imports SciPy, which takes time; commands that only need moments should not wait for it.
+    # `icha.surfaces.surface` imports SciPy, which takes time. Commands that need only moments should not wait.
     from icha.surfaces.surface import Surface
 
 
@@ -36,7 +36,7 @@ def cells_per_short_wave(grid: int, summits: float) -> float:
 
 
 def error_of_cells(cells_per_short_wave: float) -> str:
-    """Describe the error of the contact area by boundary elements on a coarse grid; "" if the error is small.
+    """Describe the error of the contact area that boundary elements compute on a coarse grid; "" if it is small.
 
     Contact areas of random surfaces at p* = 1e-3 and 1e-2 were compared with areas on grids four times as fine. The
     largest errors were 93 %, 23 %, 15 % and 11 % for 1.1 (white noise), 2, 3 and 5 cells per shortest wave.
@@ -70,11 +70,10 @@ def self_affine_integral(order: int, start: float, end: float, roll: float, hurs
 def self_affine_full_contact_energy(
     period: float, rolloff_wavelength: float, short_wavelength: float, hurst: float
 ) -> float:
-    """Compute the elastic energy of full contact per area over E* (m) for a self-affine surface of rms slope 1.
+    """Compute the elastic energy of full contact of a self-affine surface of rms slope 1, divided by area and E*, m.
 
     Lengths are in m. The result equals `Surface.full_contact_energy` of surfaces with the same `SelfAffineSpectrum`,
-    but the function needs no heights. The function sums over the long waves and integrates the spectrum of the short
-    waves.
+    but needs no heights. The function sums over the long waves and integrates the spectrum of the short waves.
     """
     roll, last = period / rolloff_wavelength, period / short_wavelength
     # The wave at the cut-off does not belong to the spectrum, even if `last` is rounded up.
@@ -137,7 +136,7 @@ def height_statistics(surface: Surface) -> tuple[float, float]:
 
 
 def slope_anisotropy(surface: Surface) -> float:
-    """Compute the largest rms slope of profiles in any direction, divided by the smallest.
+    """Compute the ratio of the largest to the smallest rms slope of profiles, among all directions.
 
     The ratio is 1 for isotropic surfaces and infinite for straight grooves. Both slopes come from the principal values
     of the slope tensor; each cell between four nodes contributes one slope.
@@ -151,7 +150,7 @@ def slope_anisotropy(surface: Surface) -> float:
 
 
 def radial_power_spectrum(surface: Surface) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Compute the radial power spectrum: mean power C of the wave vectors in each ring of similar length.
+    """Compute the radial power spectrum: the mean power C of the wave vectors in each ring around the origin.
 
     The integral of C over the plane of wave vectors is the mean square height. The first ten rings are 2 pi/L wide; the
     width of the others is a tenth of their wave number. The last ring ends at the largest circle in the grid of wave

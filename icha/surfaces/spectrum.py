@@ -1,8 +1,7 @@
 """Self-affine spectra with roll-off, and random surfaces with such a spectrum (Violano & Afferrante, eq. PSD).
 
 C(q) = C0 for q_L <= q < q_0, C0 (q/q_0)^(-2(1+H)) for q_0 <= q < q_1, and 0 elsewhere; q_L = 2 pi / L. By convention,
-the integral of C over the plane of wave vectors is h_rms^2. So each mode of the periodic cell has the power |h_q|^2 =
-C(q) (2 pi/L)^2.
+the integral of C over the plane of wave vectors is h_rms^2. So a mode of the cell has |h_q|^2 = C(q) (2 pi/L)^2.
 """
 
 import math
@@ -84,9 +83,8 @@ class SelfAffineSpectrum:
     def _band(self):
         """Wave vectors (kx, ky) of one half of the band, and their lengths |k|, in units of 2 pi / L.
 
-        The wave vectors are sorted by max(|kx|, |ky|). So each mode receives the same random number on every grid and
-        with every short cut-off. With the same seed, a finer surface has the same long waves and additional short
-        waves.
+        The wave vectors are sorted by max(|kx|, |ky|). Therefore each mode gets the same random number on every grid
+        and with every short cut-off: with the same seed, a finer surface has the same long waves, and more short ones.
         """
         m = math.ceil(self.period / self.short_wavelength)
         kx, ky = np.meshgrid(np.arange(m + 1), np.arange(-m, m + 1))
@@ -121,8 +119,7 @@ class SelfAffineSpectrum:
         ----------
         grid : nodes along a side; fewer than 2 per shortest wavelength raise an error, fewer than 4 cause a warning.
         seed : seed of the random phases, a non-negative integer.
-        amplitudes : "fixed" (every seed has the rms height and slope of the spectrum), or "gaussian" (random
-            amplitudes).
+        amplitudes : "fixed" (every seed has the rms height and slope of the spectrum), or "gaussian" (random).
 
         Returns
         -------

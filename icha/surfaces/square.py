@@ -4,7 +4,7 @@ import numpy as np
 
 
 def cell_of(period, free):
-    """Return the period (m) of the points of a square: the side if `free` is False, twice the side if True."""
+    """Return the period of sums over a square of side `period`: its side, or twice its side if `free` is True."""
     return 2 * period if free else period
 
 

@@ -18,13 +18,13 @@ from icha.surfaces.surface import Surface
 # Degree of the spline. A quintic spline reproduces a parabola exactly; the influence of a node falls by a factor of
 # 0.43 per cell. At eight cells per wavelength, the second derivatives of a sine have an error of 4e-4.
 _DEGREE = 5
-# Weights of the coefficients of five nodes in value, slope and curvature of the quintic spline at the middle node.
+# Weights with which the coefficients of five nodes give value, slope and curvature of the spline at the middle node.
 _VALUE = np.array([1.0, 26.0, 66.0, 26.0, 1.0]) / 120
 _SLOPE = np.array([-1.0, -10.0, 0.0, 10.0, 1.0]) / 24
 _CURVATURE = np.array([1.0, 2.0, -6.0, 2.0, 1.0]) / 6
 
-# Quintic B-splines of the six nodes around a point, as polynomials of its distance t from the third node (rows: nodes;
-# columns: powers of t), and their first and second derivatives.
+# Quintic B-splines of the six nodes around a point, as polynomials of the distance t of the point from the third node:
+# rows are nodes, columns are powers of t. The first and second derivatives of these polynomials follow.
 _BASIS = np.array(
     [
         [1.0, -5.0, 10.0, -10.0, 5.0, -1.0],
@@ -45,7 +45,7 @@ _MAX_NEWTON_STEPS = 30
 _CONVERGED = 1e-9
 _FARTHEST = 1.5
 _SAME_SUMMIT = 1e-3
-# Largest rise of a supported summit above the nodes around it, divided by the rise of a parabola with their second
+# Largest rise of a supported summit above the nodes around it, divided by the rise of a parabola with the same second
 # differences. On smooth random surfaces (H 0.8, six seeds of 128 x 128 nodes) 99.5 % of the summits have a ratio below
 # 0.91 with 12 nodes per shortest wave, 1.09 with 8, 1.16 with 6 and 1.69 with 5; 98 % are below 1.78 with 4 nodes.
 _MAX_RISE = 1.8
@@ -58,9 +58,9 @@ _MARGIN = 32
 # Number of rows or columns of the grid, and number of points between nodes, in memory at a time.
 _LINES = 16
 _POINTS = 4096
-# Asperities represent a surface if at most this share of the load is on peaks without a summit, and if the nodes do not
-# support at most this share of the summits. Smooth random surfaces with at least 5 nodes per shortest wave stay below
-# 0.1 (`tests/surfaces`).
+# Asperities represent a surface if two shares are not larger than this value: the share of the load on peaks without a
+# summit, and the share of the summits that the nodes do not support. On smooth random surfaces with at least 5 nodes
+# per shortest wave, both shares are below 0.1 (`tests/surfaces`).
 MAX_SHARE = 0.1
 
 
@@ -75,7 +75,7 @@ class Asperities:
     radius_of_curvature : (n,) array, 1/sqrt(kappa1 kappa2), the geometric mean of the principal radii of curvature, m.
     period : side of the square, m.
     free : True for a single square on a half-space, False for one cell of a periodic surface.
-    unsupported_height : (m,) array, m, heights of spline maxima that the nodes do not support; no asperities.
+    unsupported_height : (m,) array, m, heights of maxima of the spline that the nodes do not support; not asperities.
     """
 
     position: np.ndarray
@@ -124,8 +124,7 @@ def locate_summits(surface: Surface) -> Asperities:
     converges far from the node. Steps can be very long where a principal curvature is nearly zero.
 
     The edges of a free square have no maxima, because a crest that crosses an edge has its top outside the square.
-    Point reflection continues the heights at the edges of a free square. Only summits between the outermost nodes
-    count.
+    Point reflection continues the heights at these edges, and only summits between the outermost nodes count.
 
     The spline rises above the surface near steps, pits, single pixels and plateaus. A maximum is a summit only if the
     nodes around it support its height (`_is_supported`).
@@ -168,7 +167,7 @@ def _is_supported(heights, summit, height):
 
     Along each axis, a parabola through nodes with second difference -d rises at most d/8 above the higher of two
     neighbouring nodes. The function uses the smaller second difference of the two nodes beside the summit. At the edge
-    of a plateau, only one of both second differences is large. Source: the limiter `minmod` of A. Suresh and H. T.
+    of a plateau, only one of the two second differences is large. Source: the limiter `minmod` of A. Suresh and H. T.
     Huynh, J. Comput. Phys. 136 (1997) 83-99, doi:10.1006/jcph.1997.5745.
     """
     grid = len(heights)
@@ -219,7 +218,7 @@ def _climb(coefficients, node, flat):
 
 
 def _nodes_near_summits(coefficients):
-    """Return the nodes with a Newton step to a maximum of at most one cell, and the least curvature of a summit.
+    """Return the nodes whose Newton step to a maximum is at most one cell long, and the least curvature of a summit.
 
     The nodes are an array of shape (k, 2). A node counts as flat if its curvature is below the least curvature, in
     metres per squared cell.
@@ -286,7 +285,7 @@ def _newton_step(gy, gx, hyy, hyx, hxx, flat):
 LARGEST_DEPARTURE = 0.3
 # Directions around a summit in which the surface is compared with its paraboloid.
 _DIRECTIONS = 16
-# Radius of a spot, in cells, below which the interpolated surface equals its paraboloid.
+# Radius of a spot, in cells, below which the interpolated surface equals the paraboloid of the summit.
 _SMALLEST_SPOT = 0.25
 # Smallest ratio of the depth around a summit to the depth of its paraboloid; it replaces all smaller ratios.
 _LEAST_DROP = 1e-2
@@ -308,8 +307,8 @@ def paraboloid_departure(
     -------
     float, the mean of abs(ln(d / (a^2 / 2R))) over the spots, weighted by their areas. Here d is the mean depth of the
     surface below the summit on the circle of radius a. Near the top of an elongated summit, d follows the arithmetic
-    mean of the principal curvatures, not 1/R. The function uses both curvatures in turn and returns the smaller
-    result, or 0 if no spot is wider than half a cell.
+    mean of the principal curvatures, not 1/R. The function compares d with both curvatures and returns the smaller
+    result. It returns 0 if no spot is wider than half a cell.
     """
     mode = "mirror" if surface.free else "grid-wrap"
     spline = scipy.ndimage.spline_filter(surface.heights, order=3, mode=mode)
@@ -393,7 +392,7 @@ class SummitCoverage:
         return unsupported / max(unsupported + int(np.count_nonzero(self.summit_height > separation)), 1)
 
     def reasons_against(self, separations: Iterable[float]) -> list[str]:
-        """Return the reasons why asperities do not represent the surface at the given mean separations (m)."""
+        """Return reasons (sentences) why asperities do not represent the surface at these mean separations (m)."""
         separations = np.unique(list(separations))
         uncovered = max(map(self.uncovered_share, separations), default=0.0)
         unsupported = max(map(self.unsupported_share, separations), default=0.0)

@@ -36,8 +36,8 @@ _MISFIT = 3.0
 # The ratio is 1.03 for a symmetric dome, whose opposite edges meet without a step.
 _STEP = 1.1
 MISFIT_OF_EDGES = (
-    f"boundary: {PERIODIC!r}, but heights differ by much more between opposite edges than between neighbouring nodes; "
-    f"there is a step at the edges; use boundary={FREE!r}, or icha.read_scan for a measured surface"
+    f"boundary: {PERIODIC!r}, but there is a step at the edges: heights differ much more between opposite edges than "
+    f"between neighbouring nodes. Use boundary={FREE!r}, or icha.read_scan for a measured surface"
 )
 
 
@@ -87,7 +87,7 @@ class Surface:
         object.__setattr__(self, "heights", heights)
         if self.boundary not in (PERIODIC, FREE):
             raise ValueError(f"boundary: {self.boundary!r} must be one of {PERIODIC}, {FREE}")
-        # `icha describe` reports the step for surfaces that this package makes.
+        # Only surfaces that users make cause the warning. `icha describe` reports the step for other surfaces.
         caller = sys._getframe(2).f_globals.get("__name__", "")
         if not self.free and not caller.startswith(("icha.", "dataclasses")) and not edges_fit(heights):
             warnings.warn(MISFIT_OF_EDGES, EdgeWarning, stacklevel=3)
@@ -130,8 +130,7 @@ class Surface:
         def along_y(columns):
             modes = scipy.fft.fft(half[:, columns], axis=0, norm="forward", workers=1)
             power = modes.real**2 + modes.imag**2
-            # The half spectrum contains one of two opposite wave vectors, except in the first column and, on even
-            # grids, the last.
+            # Of two opposite wave vectors, only the first column and, on even grids, the last one contain both.
             kx = np.arange(columns.start, columns.stop)
             count = np.where((kx > 0) & (2 * kx < n), 2.0, 1.0)
             power *= count
@@ -171,8 +170,7 @@ class Surface:
     def rms_curvature(self) -> float:
         """Root mean square curvature of profiles in 1/m: sqrt(3/8 sum q^4 |h_q|^2) for an isotropic surface.
 
-        The Contact Mechanics Challenge uses the inverse of the rms curvature, 60.1 nm, as the radius R_c in the Tabor
-        parameter.
+        The Contact Mechanics Challenge uses the inverse, R_c = 60.1 nm, as the radius in the Tabor parameter.
         """
         return (3 / 8 * self.spectral_moments[2]) ** 0.5
 
@@ -181,7 +179,7 @@ class Surface:
         """Elastic energy of full contact per nominal area, divided by E*: U_full/E* = 1/4 sum q |h_q|^2, m.
 
         In full contact the pressure q E* h_q/2 flattens a wave of amplitude h_q. A free square counts as a quarter of a
-        periodic surface: the square and its mirror images, without steps at the edges.
+        periodic surface that consists of the square and its mirror images: it has no steps at the edges.
         """
         if not self.free:
             sums = self.by_wave_vector(lambda k2, _, power: float(np.sum(np.sqrt(k2) * power)))
@@ -197,7 +195,7 @@ class Surface:
         """Nominal pressure, divided by E*, at which a surface without adhesion is in complete contact.
 
         This pressure equals the largest tension in full contact at zero load. A free square counts as a quarter of a
-        periodic surface: the square and its mirror images.
+        periodic surface that consists of the square and its mirror images.
         """
         return -float(full_contact_pressure(self.heights, self.period, free=self.free).min())
 

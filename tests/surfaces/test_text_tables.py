@@ -157,7 +157,7 @@ def test_a_corner_without_a_number_is_refused(tmp_path):
 @pytest.mark.parametrize("place", [(1, 0), (0, 1)])
 def test_unequal_coordinates_are_asked_about(tmp_path, place):
     along = [f"{k**1.2:.3f}" for k in range(GRID)]
-    with refused("path", r"as coordinates do; expected.*Remove the"):
+    with refused("path", r"seem to be coordinates; expected.*Remove the"):
         read(written(tmp_path, text(with_coordinates(along, *place, ""))))
 
 
@@ -276,7 +276,7 @@ def test_what_is_given_instead_of_what_the_file_says_is_printed(tmp_path):
     heading = ["Unit: um", "Scan size: 10 um x 10 um"]
     reading = read(written(tmp_path, text(rows(), " ", heading), "scan.txt")).reading
     assert "24 rows x 24 columns" in reading and "pixels of 500 nm x 500 nm" in reading
-    assert "its size 10 um x 10 um and its unit of heights 1 um" in reading
+    assert "the size 10 um x 10 um and the unit of heights 1 um" in reading
 
 
 # --- two hundred tables, damaged at random -------------------------------------------------------------------------

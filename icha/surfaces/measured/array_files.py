@@ -21,7 +21,7 @@ from icha.surfaces.measured.settings import (
 
 # Number of copies of an array, as floats, in memory while the array is read.
 _COPIES = 3
-# Formats without a signature: any file of a certain length fits, so the ending of the file name must identify them.
+# Formats without a signature: any file of a certain length fits, so the ending of the file name must name the format.
 _WITHOUT_SIGNATURE = ("hgt", "nms")
 # Formats that do not identify an instrument. SurfaceTopography reads any text with numbers as `asc`, and then drops
 # fields that are not numbers.
@@ -55,7 +55,7 @@ def _require_room(declared):
 
 
 def read_netcdf(source, settings: Preparation) -> FileContent:
-    """Read heights, unit and size from the netCDF variable `settings.data`, else a usual name or the only map."""
+    """Read heights, unit and size from a netCDF variable: `settings.data`, else one of a usual name or the only map."""
     import netCDF4
 
     with netCDF4.Dataset(source.path) as file:
@@ -98,7 +98,7 @@ def _side(coordinate, count):
 
 
 def read_hdf5(source, settings: Preparation) -> FileContent:
-    """Read heights and unit from the HDF5 dataset `settings.data`, else from the only map, as in netCDF files.
+    """Read heights and unit from an HDF5 dataset: `settings.data`, else the only map.
 
     MATLAB (from version 7.3) stores arrays column by column, so the HDF5 file contains their transpose.
     """
@@ -174,7 +174,7 @@ def _unit_of(attributes):
 
 
 def open_instrument(path: Path):
-    """Open a file with SurfaceTopography; return None if SurfaceTopography does not know the format."""
+    """Open a file with SurfaceTopography; return None if SurfaceTopography does not support the format."""
     from SurfaceTopography import open_topography
     from SurfaceTopography.Exceptions import CannotDetectFileFormat
 
@@ -212,7 +212,7 @@ def read_instrument(file, settings: Preparation) -> FileContent:
 
 
 def _choose_channel(opened, settings):
-    """Return the channel `settings.data` or the default channel, and the name of the channel ("" for an only map)."""
+    """Return the channel `settings.data` or the default channel, and its name ("" if the file has only one map)."""
     channels = opened.channels
     names = [channel.name for channel in channels]
     maps = find_maps({k: tuple(channel.nb_grid_pts) for k, channel in enumerate(channels)})

@@ -19,8 +19,8 @@ from icha.surfaces.moments import (
 from icha.surfaces.summits import Asperities, SummitCoverage, locate_summits
 from icha.surfaces.surface import FREE, PERIODIC, Surface, edges_fit
 
-# Exponent x of the steepest power law q^x of a noise floor, and smallest ratio of its last to its first wave number.
-# The spectrum of a self-affine surface falls at least as q^-2; the spectrum of uncorrelated noise is flat.
+# A noise floor falls less steeply than q^x, where x is the first value; its last wave number is at least the second
+# value times its first. A self-affine spectrum falls at least as q^-2; the spectrum of uncorrelated noise is flat.
 _FLOOR_FALLS, _FLOOR_SPANS = -1.0, 1.3
 # Power of a noise floor, divided by the largest power, below which the floor is a rounding error.
 _ROUNDING = 1e-20
@@ -46,7 +46,7 @@ class NoiseFloor:
 
 @dataclass(frozen=True, eq=False)
 class ScanResolution(PreparedTopography):
-    """A prepared scan, and the same scan before its short waves were filtered.
+    """A prepared scan, and the same scan before the filter of short waves.
 
     Attributes
     ----------
@@ -145,8 +145,7 @@ def noise_floor(surface: Surface) -> NoiseFloor | None:
     if floor < _ROUNDING * power.max():
         return None
     above = np.flatnonzero(power > 2 * floor)
-    # Interpolate the logarithms of the power between ring k and the next ring; if there is only noise, take the longest
-    # wave.
+    # Interpolate the logarithm of the power between ring k and the next one. If all is noise, take the longest wave.
     k = above[-1] if len(above) else 0
     limit = q[k]
     if len(above) and k + 1 < len(q):

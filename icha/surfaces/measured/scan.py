@@ -24,7 +24,7 @@ READERS = {
     "fourier": read_fourier,
     "instrument": read_instrument,
 }
-# Libraries of the readers. They are imported before the memory is limited, so that the libraries do not count.
+# Libraries of the readers, imported before the memory is limited, so that the memory of a library does not count.
 _LIBRARIES = {"netcdf": "netCDF4", "hdf5": "h5py", "instrument": "SurfaceTopography"}
 
 
@@ -89,9 +89,9 @@ def load_scan(path: Path, settings: Preparation) -> Scan:
         )
     replaced = []
     if settings.size and found.size and not np.allclose(settings.size, found.size, rtol=1e-3, atol=0):
-        replaced.append(f"its size {' x '.join(map(formatting.length, found.size))}")
+        replaced.append(f"the size {' x '.join(map(formatting.length, found.size))}")
     if settings.height_unit and found.unit and not np.isclose(settings.height_unit, found.unit, rtol=1e-3, atol=0):
-        replaced.append(f"its unit of heights {formatting.length(found.unit)}")
+        replaced.append(f"the unit of heights {formatting.length(found.unit)}")
     rows, columns = found.heights.shape
     pixel = f"{formatting.length(size[0] / columns)} x {formatting.length(size[1] / rows)}"
     reading = [
@@ -100,7 +100,7 @@ def load_scan(path: Path, settings: Preparation) -> Scan:
         f"pixels of {pixel}, {' x '.join(formatting.length(float(side)) for side in size)} in all",
         f"heights in {formatting.length(unit)}",
         found.remark,
-        f"the file has, and you replace, {' and '.join(replaced)}" if replaced else "",
+        f"the settings replace {' and '.join(replaced)} of the file" if replaced else "",
     ]
     format_ = f"{name} ({found.format})" if name == "instrument" else name
     steps = ("; ".join(filter(None, reading)),)
@@ -122,7 +122,7 @@ def read_height_map(path: str | Path, metres_per_unit: float) -> np.ndarray:
     """
     path = Path(path)
     kind, data = ("netcdf", "height") if path.suffix == ".nc" else ("npy", None)
-    # The configuration contains the size, as `period`.
+    # The size here has no effect: the configuration contains the size as `period`.
     return load_scan(path, Preparation(kind, "periodic", data, height_unit=metres_per_unit, size=(1.0, 1.0))).heights
 
 

@@ -12,7 +12,7 @@ from icha.support.values import conversion_factor
 WINDOW, MIRROR = "window", "mirror"
 # Message for a file of one profile.
 LINE_SCAN = "is a line scan, one profile of {} points; expected a topography, with heights over x and y"
-# Largest difference of two equal coordinates, as a fraction of their range; text contains rounded numbers.
+# Largest difference of coordinates that count as equal, divided by the range of coordinates; numbers may be rounded.
 _ROUNDING = 1e-6
 # Largest distance of a coordinate from its grid line, in steps.
 _OFF_GRID = 0.05
@@ -38,7 +38,7 @@ class Preparation:
     data : name of the variable, dataset or channel to read; None if the file has only one, or has a default.
     first_axis : "y" or "x", the first axis of arrays whose dimensions have no names.
     height_unit : unit of the heights, m; None for the unit in the file.
-    lateral_unit : unit of the coordinates, m; None for the unit in the file, else the unit of the heights.
+    lateral_unit : unit of the coordinates, m; None for the unit in the file or, without it, the unit of the heights.
     size : sides (x, y) of the whole scan, m; None for the size in the file.
     touches_first : "high" or "low": points with high or with low numbers touch the elastic body first.
     missing : treatment of points without a height, "refuse" or "fill".

@@ -76,7 +76,7 @@ class _Heading:
 
 
 def format_of_text(file: SourceFile) -> str:
-    """Find the format of a text file by its columns; "instrument" if it is from an instrument or has no numbers."""
+    """Find the format of a text file by its columns; "instrument" for a text of an instrument or without numbers."""
     layout = file.layout
     if layout is not None and _titles(layout):
         return "xyz"
@@ -106,7 +106,7 @@ def read_matrix(file: SourceFile, settings: Preparation) -> FileContent:
 
 
 def _as_instrument_file(file, settings):
-    """Read a text with SurfaceTopography; None without a unit, or if heights differ from the numbers in the file."""
+    """Read a text with SurfaceTopography; None if it finds no unit, or heights not proportional to the numbers."""
     try:
         found = read_instrument(file, settings)
     except Exception:  # SurfaceTopography raises many types of errors for texts of other formats
@@ -154,7 +154,7 @@ def _titles(layout):
 
     Returns
     -------
-    Name and unit (m, or None) of every column. The list is empty unless exactly one column is x, one is y and one is z.
+    Name and unit (m, or None) of every column. The list is empty unless x, y and z are each the title of one column.
     """
     if not layout.heading:
         return []
@@ -195,7 +195,7 @@ def _mark_missing(heights, heading):
 def _read_heading(lines: Sequence[str], shape: tuple[int, int], decimal_comma: bool, settings: Preparation) -> _Heading:
     """Read units, size and missing heights from the heading of a table of this shape (rows, columns).
 
-    Raises UnfitTopography if the settings have no size, and a comma in the size may be decimal or separate thousands.
+    Raises UnfitTopography if the settings have no size and the heading has one with an ambiguous comma.
     """
     entries, sides = _entries(lines), _image_sides(lines)
     if {"ncols", "nrows", "cellsize"} <= entries.keys():
@@ -264,7 +264,7 @@ def _size(sizes, pixels, shape):
 
 
 def _lengths(text):
-    """Return the lengths x and y in a text, and True if they are in m, False if their unit is unknown; else None."""
+    """Return two lengths x and y from a text, and whether their unit is known (then in m); None without lengths."""
     if not (found := _LENGTHS.match(text)):
         return None
     x, y, units = _number(found[1]), _number(found[3] or found[1]), (found[2] or found[4], found[4] or found[2])
@@ -331,8 +331,7 @@ def _wave_numbers(q, settings):
         k = q
     else:
         unit = np.min(np.abs(q)[np.abs(q) > 1e-9 * largest])
-        # The unit from the longest wave has only the digits in the file; the unit from the shortest wave is more
-        # accurate.
+        # The unit from the longest wave has few digits in the file; the unit from the shortest wave has more.
         k = np.rint(q * (np.max(np.abs(np.rint(q / unit))) / largest))
         if np.max(np.abs(q * (np.max(np.abs(k)) / largest) - k)) > 0.01:
             raise _not_waves("expected wave vectors that are multiples of the smallest one")

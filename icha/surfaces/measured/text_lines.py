@@ -22,7 +22,7 @@ _NAN = re.compile(r"[-+]?(1\.#(ind|qnan|snan)\d*|nan\(.*\))|\*+", re.IGNORECASE)
 # An exponent of double precision in Fortran, such as 1.5D-3.
 _FORTRAN = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)[dD][-+]?\d+")
 _DECIMAL_COMMA = re.compile(r"[-+]?\d+,\d+([eE][-+]?\d+)?$")
-# A number with three digits after a comma, where the comma may be decimal or separate thousands.
+# A number with three digits after a comma. The comma may be a decimal sign, or it may separate thousands.
 AMBIGUOUS_COMMA = re.compile(r"[-+]?[1-9]\d{0,2},\d{3}")
 _QUOTED = re.compile(r"\"[^\"]*\"")
 # A number, with any separator of thousands.
@@ -120,8 +120,8 @@ def are_decimal_between_blanks(text: str) -> bool:
 def are_halves_of_decimals(rows: list[list[str]]) -> bool:
     """Return whether columns alternate between digits before and digits after decimal commas.
 
-    Digits after a comma have no sign. All rows of a column have the same number of such digits. Columns of integers
-    have no leading zeros, and their numbers have different lengths.
+    Digits after a comma have no sign, and their number is the same in all rows of a column. This may also hold for
+    columns of integers. Evidence of decimals is a leading zero after a comma, or a different length before a comma.
     """
     # A row is shorter if its last field is empty.
     width = max(map(len, rows))

@@ -19,7 +19,7 @@ from icha.surfaces.measured.text_lines import (
     strip_remark,
 )
 
-# Number of characters and of lines at the beginning of a file that must contain the first line of numbers.
+# The first line of numbers must lie within this number of characters, and within this number of lines.
 _BEGINNING, _LONGEST_HEADING = 2**20, 1000
 # A line with at least this number of fields, most of them numbers, counts as a damaged row, not as titles of columns.
 _FEWEST_FIELDS = 8
@@ -226,7 +226,7 @@ def drop_coordinates(values: np.ndarray) -> tuple[np.ndarray, tuple[float, float
 
     Returns
     -------
-    heights, steps of the coordinates along x and y (None unless both are in the table), and a remark on removed parts.
+    heights, steps of the coordinates along x and y (None unless the table has both), and a remark on removed parts.
 
     Raises UnfitTopography if the first row or column seems to contain coordinates in unequal steps, or the last row or
     column seems to contain coordinates in equal steps.
@@ -239,7 +239,7 @@ def drop_coordinates(values: np.ndarray) -> tuple[np.ndarray, tuple[float, float
         if uneven or (last is not None and not np.isnan(last)):
             raise UnfitTopography(
                 "path",
-                f"has a {'first' if uneven else 'last'} {name} of numbers that rise or fall as coordinates do; "
+                f"has a {'first' if uneven else 'last'} {name} of numbers that seem to be coordinates; "
                 f"expected heights on a regular grid. Remove the {name}, or interpolate the heights. If all numbers "
                 "are heights, save them as a .npy file",
             )

@@ -33,8 +33,7 @@ _ROUNDING = 1e-9
 _FLAT = 1e-13
 # Largest relative difference of the two sides of a square pixel.
 SQUARE = 1e-3
-# Standard deviation of the filter's weights, divided by the nesting index: alpha/sqrt(2 pi), alpha = sqrt(ln 2/pi) (ISO
-# 16610-61).
+# Standard deviation of the filter, divided by the nesting index: alpha/sqrt(2 pi), alpha = sqrt(ln 2/pi), ISO 16610-61.
 DEVIATION = math.sqrt(math.log(2) / 2) / math.pi
 # Smallest nesting index, in pixels, at which the filter has the transmission of the standard.
 LEAST_PIXELS = 4
@@ -79,8 +78,7 @@ def prepared_topography(path: str | os.PathLike, preparation: Mapping) -> Prepar
     Raises
     ------
     UnfitTopography
-        If the file or a setting does not fit. The attribute `key` is the setting; the message gives reason and
-        expectation.
+        If the file or a setting does not fit. The attribute `key` names the setting.
     """
     file, settings = Path(path), Preparation(**preparation)
     scan = load_scan(file, settings)
@@ -215,8 +213,7 @@ def resample_to_square_pixels(scan: Scan, settings: Preparation) -> Scan:
     """Resample a scan to square pixels, whose side is the shorter side of the original pixels.
 
     Heights along the longer side of the pixels are interpolated by a cosine series. The series keeps all measured waves
-    and their rms slope, and adds no wave shorter than two pixels. `treat_edges` resamples periodic scans by their
-    Fourier series.
+    and their rms slope, and adds no wave shorter than two pixels. This function leaves periodic scans to `treat_edges`.
     """
     dx, dy = scan.pixel
     if settings.boundary == PERIODIC or abs(dx / dy - 1) <= SQUARE:
