@@ -19,7 +19,7 @@ from icha.asperity.cohesive_zone import resolution_problem
 from icha.asperity.material import Material
 from icha.configuration.surfaces import SURFACE_KINDS, MaterialSection
 from icha.contact.models import DEFAULT_MODEL, MODELS
-from icha.path.states import AreaFraction, ReducedPressure, Snapshot
+from icha.path.snapshots import AreaFraction, ReducedPressure, Snapshot
 from icha.path.targets import (
     ASPERITY_RANGES,
     DEFAULT_STEP,

@@ -20,7 +20,7 @@ from pydantic import Field
 from icha.contact.models import REFERENCE_MODEL, first_model
 from icha.datasets import results
 from icha.datasets.labels import RunLabels
-from icha.path.states import Snapshot
+from icha.path.snapshots import Snapshot
 from icha.support.values import Label, Name, Positive, Problem, Section, Seed, list_names, unknown
 
 # Stands for the class `icha.configuration.campaign.Campaign`, which modules of this folder must not import.

@@ -1,9 +1,10 @@
 """Cycles of loading and unloading: all equilibria of a path that continues after the first loading.
 
 On unloading every spot follows its stable branch until it jumps off. Unloading ends at complete separation or at a
-turning point. Unloading visits the separations of the loading again, so that both curves can be compared. The visited
-separations are called stations. Close to an event that changes the pressure, the steps become so short that the energy
-lost in the event is known accurately.
+turning point. Later legs visit separations of the first loading again, so that their curves can be compared, and errors
+of the integration cancel in compression. These separations are called stations. Close to an event that changes the
+pressure (see `energy_balance`), steps become so short that the energy lost in the event is known accurately. With
+`path_accuracy.error_controlled_steps`, the error of the work of each step decides the length of the next one.
 """
 
 from __future__ import annotations
@@ -84,7 +85,7 @@ def follow_cycle(
 
 @dataclass(eq=False)
 class _Cycle:
-    """State of a contact on a cyclic path, and the values that determine the length of the next step.
+    """Position on a cyclic path, and the values that determine the length of the next step.
 
     Attributes
     ----------
@@ -92,14 +93,14 @@ class _Cycle:
     longest : longest step of the separation, m.
     progress : record of the path.
     state : last equilibrium.
-    step_length : length of the next trial step where no station and no equilibrium of `ahead` lies ahead, m.
+    step_length : length of the next trial step, m, if `ahead` is empty and no station follows in this direction.
     accuracy : sums over all steps so far, and the accuracy that further steps need.
     leg : number of the leg, even on loading and odd on unloading.
-    event_at : end of the shortest trial step that contains the next event, as direction times separation, m; inf if no
-        event is known, and always with error-controlled steps.
-    ahead : with error-controlled steps, equilibria at the ends of trial steps that were too long, the next one last.
-    longest_part : longest step so far of those into which the last trial step is divided, m.
-    stations : separations visited on loading, which unloading will visit again, ascending, m.
+    event_at : direction times separation at the end of the shortest trial step that contained the next event, m; inf if
+        no event is known, and always with error-controlled steps.
+    ahead : with error-controlled steps, equilibria found at the ends of too long trial steps; the nearest is last.
+    longest_part : longest accepted step since the last trial step began, m; a trial step that is too long is divided.
+    stations : separations of the loading that all later legs, in both directions, visit again, ascending, m.
     """
 
     contact: ContactModel
@@ -121,7 +122,7 @@ class _Cycle:
 
     @property
     def event_length(self) -> float:
-        """Step length, m, up to which an event in the step counts as located."""
+        """Longest step in which an event counts as located, m: `path_accuracy.event` times h_rms."""
         return self.contact.path_accuracy.event * self.contact.rms_height
 
     @property
@@ -138,8 +139,10 @@ class _Cycle:
     ) -> Generator[Waypoint, TargetFunction | None, None]:
         """Follow one leg to all its targets or, with `until_apart`, to complete separation; yield all waypoints.
 
-        At the end of a loading leg, the separations that it visited become stations. A target inside a jump is kept in
-        `progress.skipped` in leg 0, raises an error at once in later legs, and is left out with `until_apart`.
+        A target inside a jump is kept in `progress.skipped` in leg 0, and raises an error at once in later legs. With
+        `until_apart` it is left out. Without `until_apart`, raise `NotConverged` if the surfaces separate before the
+        last target. At the end of a loading leg, the separations that it visited become stations if they are far enough
+        apart (`_is_new_station`). A reloading adds only separations below all earlier stations.
         """
         self.leg, self.event_at, self.longest_part = leg, np.inf, 0.0
         self.ahead.clear()
@@ -172,14 +175,14 @@ class _Cycle:
             if met is not state:
                 behind = self.direction * (met.separation - self.state.separation) < 0
                 if target and self.contact.path_accuracy.error_controlled_steps and behind:
-                    # The branch after a jump leads back to the target. Load control sends no target after it.
+                    # The branch after a jump leads back to the target. A target that is sent here is ignored.
                     yield self._advance(step, state)
                 else:
                     self._keep(state)
                 step = Step.between(self.contact, self.state, met)
             listed = None if target is sent else target
             self.progress.require_valid_state(self.state, met, listed, pending, self.loading)
-            # With adhesion the first step is only `event_length` long. The next step may be the longest one.
+            # The path starts with a step of only `event_length` with adhesion; the next step may be the longest one.
             self.step_length = self._choose_next_length(step) if leg or len(visited) > 1 else self.longest
             between, length_limit = self._advance(step, met), np.inf
             if self._is_new_station(met.separation, visited[-1]):
@@ -190,12 +193,11 @@ class _Cycle:
                     self.progress.record_target(listed.target, met)
             sent = yield between if target is None else Waypoint(target.target, met, leg, step)
         if self.loading:
-            # A reloading adds only separations below all earlier stations.
             lowest = min(self.stations, default=np.inf)
             self.stations = sorted({*self.stations, *(at for at in [*visited, self.state.separation] if at < lowest)})
 
     def _advance(self, step, state):
-        """Make the end of a step the present state, and return its waypoint without a target."""
+        """Make the end of a step the present state, and return its waypoint of kind BETWEEN."""
         self.accuracy.add(step, state)
         self.progress.record_equilibrium(state, self.loading)
         self.state = state
@@ -211,12 +213,13 @@ class _Cycle:
         """Find the next equilibrium by a step so short that its work is known; return the equilibrium and the step.
 
         The step is halved until the solver finds an equilibrium. Then the step is halved until its work and its largest
-        tension are known accurately enough, or until its event is located. An event is located if the step is at most
-        `event_length` long, or if the step starts at most `event_length` before `event_at`. If the tension has a new
-        maximum within the step, the step ends at the maximum. With error-controlled steps, the ends of steps that were
-        too long are tried again as ends of later steps.
+        tension are known accurately enough, or until its event is located. An event is located in a step of at most
+        `event_length`. It is also located in a step that starts at most `event_length` before `event_at`: equilibria
+        have errors, so that an event may happen in a long step and not in a short one. If the tension has a new maximum
+        within the step, the step ends at the maximum. With error-controlled steps, the ends of steps that were too long
+        are kept in `ahead`, and are tried again as ends of later steps.
 
-        length : largest length of the first trial step, m; the step to an equilibrium of `ahead` may be shorter.
+        length : largest length of the first trial step, m. It ends at the next state of `ahead` if that is closer.
         """
         start, accuracy, keeps = self.state, self.accuracy, self.contact.path_accuracy.error_controlled_steps
         ahead = None
@@ -230,12 +233,11 @@ class _Cycle:
                 length = self._halve_step(length, failure)
                 continue
             step = Step.between(self.contact, start, state)
-            # Because equilibria have errors, an event may happen in a long step and not in a short one.
             passed = step.may_change_pressure and self.direction * start.separation + self.event_length >= self.event_at
             located = length <= self.event_length or passed
             if located or (accuracy.is_work_known(state, step) and accuracy.is_tension_known(start, state, step)):
                 if ahead is not None and abs(step.loss) > accuracy.allowed_work_error(step):
-                    ahead = None  # after a loss of energy, the equilibrium is found from the present state
+                    ahead = None  # After a loss, the present state may lead to another equilibrium, so solve again.
                     continue
                 if step.may_change_pressure:
                     self.event_at = np.inf
@@ -254,11 +256,12 @@ class _Cycle:
     def _find_equilibrium(self, separation, length, ahead=None):
         """Find the equilibrium at a separation, m, at the end of a step of a given length, m.
 
-        If the state `ahead` is given, this state is the equilibrium, and only its events are found. On unloading the
-        spots together may lose their equilibrium before any single spot has reached its own jump-off. If this
-        happens in a very short step, the spot closest to jump-off breaks contact. If there is still no equilibrium, the
-        two, four, … spots closest to jump-off break contact, while so many spots exist. When the surfaces move apart,
-        an unstable equilibrium counts as none. Raise `NotConverged` if there is no equilibrium.
+        If the state `ahead` is given, this state is the equilibrium, and only its events are found. On unloading with
+        adhesion, the spots together may lose their equilibrium before any single spot has reached its own jump-off. If
+        this happens in a step shorter than `CLOSE_TO_A_JUMP` h_rms, the spot closest to jump-off is made to break
+        contact. If there is still no equilibrium, the two, four, … spots closest to jump-off are, while so many spots
+        exist. On unloading, an unstable equilibrium counts as none, unless spots were made to break contact. Raise the
+        first `NotConverged` if there is no equilibrium.
         """
         contact, start = self.contact, self.state
         if ahead is not None:
@@ -284,11 +287,11 @@ class _Cycle:
         return length
 
     def _choose_next_length(self, step):
-        """Return the value of `step_length` after a step, m; at most `longest`.
+        """Return the value of `step_length` after a step, m, at most `longest`; update `longest_part`.
 
-        Without error-controlled steps it doubles. With them it does not change while equilibria lie ahead. After the
-        last one of these, it is twice the longest of the steps into which the last trial step was divided. If the last
-        of these steps is the longest, as in a trial step that was not divided, it doubles only if the error allows it.
+        Without error-controlled steps it doubles. With them it does not change until `ahead` is empty: then the last
+        trial step is complete, and the value is twice `longest_part`. If the last step is itself the longest part, the
+        value is `longest_part` when twice this length would make the error of the work too large.
         """
         if not self.contact.path_accuracy.error_controlled_steps:
             return min(self.longest, 2 * self.step_length)
@@ -310,9 +313,9 @@ class _Cycle:
         return self.state.separation >= highest
 
     def _is_new_station(self, separation, last_visited):
-        """Return whether a separation, m, is far enough from the last visited one to become a station later.
+        """Return whether a separation, m, is far enough from `last_visited`, the last one kept, to become a station.
 
-        Without this minimum distance, all the short steps around an event would become stations.
+        With adhesion, all the short steps around an event would otherwise become stations.
         """
         contact = self.contact
         between = self.longest / 64 if contact.adhesive else SAME_SEPARATION * contact.rms_height

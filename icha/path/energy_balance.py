@@ -1,5 +1,6 @@
-"""Energy balance of a path: the work of every step, the stored energy, and the losses in jumps and unions.
+"""Energy balance of a path: the work of every step, the stored energy, and the losses in events.
 
+An event is a jump of a spot into or out of contact, the coalescence of two spots to a union, or the split of a union.
 Between two events the stored energy changes by the work done. An event changes the stored energy at constant
 separation, and the released energy is lost. Over a closed path the losses of all events add up to the area of
 the hysteresis loop in a diagram of pressure against separation.
@@ -31,11 +32,12 @@ def event_error(du, pressure_jump):
 
 
 def integration_error(du, slope, end_slope):
-    """Return the estimated error of the work of a step without events, J/m^2."""
+    """Return the estimated error of the work of a step without events, J/m^2: half of a term of `Step.between`."""
     return du**2 * abs(end_slope - slope) / 24
 
 
-# If the loss of a step exceeds this fraction of its work, jumps cause the loss, and not the error of the interaction.
+# If the loss of a step exceeds this fraction of its work, jumps cause the loss. A smaller loss may be an error of the
+# interaction, which in the asperity model is not exactly reciprocal between spots of different size.
 _CERTAIN_LOSS = 0.1
 
 
@@ -44,6 +46,7 @@ def _extrapolate_to_full_contact(du, p, q, slope, end_slope):
 
     Full contact is infinitely stiff: its pressure does no work, and jumps when the last gap closes or the first gap
     opens. The pressure in full contact is replaced by an extrapolation along the tangent at the other end of the step.
+    If both ends are full contact, the pressures stay, and the error is 0.
     """
     if np.isinf(slope) and np.isinf(end_slope):
         return p, q, 0.0, 0.0, 0.0
@@ -63,7 +66,8 @@ class Step:
     stored : change of the stored energy, J/m^2.
     pressure_jump : change of the pressure that the stiffnesses at both ends do not explain, Pa.
     integration_error : estimated error of the work by the numerical integration, without events, J/m^2.
-    may_change_pressure : whether there are events that may change the pressure; without adhesion only unions or splits.
+    may_change_pressure : whether there are events in which the pressure may jump; without adhesion these are only
+        coalescences and splits.
     events : events of the step.
     """
 
@@ -79,8 +83,9 @@ class Step:
     def between(cls, contact: ContactModel, before: State, after: State) -> Step:
         """Return the step from one state to the next.
 
-        The work is the integral of the cubic polynomial that has the pressures and stiffnesses of both states. If both
-        stiffnesses are equal and the pressure jumps in the middle of the step, this work is exact.
+        The work is the integral of the cubic polynomial that has the pressures and stiffnesses of both states. If the
+        stiffness is constant, it is exact also for a jump of the pressure in the middle of the step. For a step from or
+        to full contact see `_extrapolate_to_full_contact`.
         """
         events = events_between(before, after)
         du = after.separation - before.separation
@@ -113,21 +118,21 @@ class Step:
 
     @property
     def event_error(self) -> float:
-        """Largest error of the work, J/m^2, because the events may happen anywhere in the step; 0 without events."""
+        """Largest error of the work by events anywhere in the step, J/m^2; 0 if `may_change_pressure` is False."""
         return event_error(self.separation_change, self.pressure_jump) if self.may_change_pressure else 0.0
 
     @property
     def work_error(self) -> float:
         """Largest error of the work, J/m^2, if the pressure may jump anywhere in the step even without an event.
 
-        It is the larger one of the errors by such a jump and by the integration. It is at most the loss, because the
-        work is the change of the stored energy, which is exact, if no energy is lost.
+        It is the larger one of the errors by such a jump and by the integration, but at most the computed loss. Because
+        the stored energy is exact, the computed loss of a step that loses no energy is the error of the work.
         """
         jump_error = event_error(self.separation_change, self.pressure_jump)
         return min(max(jump_error, self.integration_error), abs(self.loss))
 
     def reference_loss(self, contact: ContactModel) -> float:
-        """Return the sum of the absolute reference losses (see `EnergyBalance.add_step`) of all events, J/m^2."""
+        """Return the sum of the absolute reference losses (see `EnergyBalance.add_step`) of all jumps, J/m^2."""
         return float(np.abs(self.events.energy).sum()) / contact.area
 
 
@@ -141,7 +146,7 @@ class EnergyBalance:
     jump_in, jump_off : losses by jumps into and out of contact.
     coalescence : loss by the coalescence of spots and by the splitting of unions.
     load_jump : loss by jumps at constant load, which happen only under load control.
-    unattributed : all other losses, due to errors of the integration, and to the interaction, which is not reciprocal.
+    unattributed : all other losses, due to errors of the integration, and to the interaction (see `_CERTAIN_LOSS`).
     """
 
     work: float = 0.0
@@ -154,17 +159,15 @@ class EnergyBalance:
     def add_step(self, contact: ContactModel, step: Step) -> EnergyBalance:
         """Return the balance after one more step.
 
-        Every jump has a reference loss: the energy that it would release if its spot were alone. If no spots have
-        united or split in the step, the whole loss is attributed to jumps in one of two cases: the loss is within a
-        factor of two of the sum of the reference losses, or the loss is more than a tenth of the work. Jumps in and
-        jumps off then share the loss in proportion to their reference losses. In all other steps, or if the reference
-        losses of both kinds of jump have different signs, each kind of jump has its reference loss. The rest is a loss
-        by coalescence if spots have united or split, and otherwise unattributed.
+        Every jump has a reference loss: the energy that it would release if its spot were alone.
+        1. Step without coalescence and split. The jumps have the whole loss if it is within a factor of two of the sum
+           of the reference losses, or if its absolute value is more than a tenth of the work. Jumps in and jumps off
+           share the loss in proportion to their reference losses, which must not have different signs.
+        2. Any other step. Jumps in and jumps off have their reference losses. The rest of the loss is attributed to
+           coalescence if the step has a coalescence or split; otherwise it is unattributed.
         """
-        events, united = step.events, step.has_union
-        jump_in, jump_off = (
-            float(events.energy[events.kind == kind].sum()) / contact.area for kind in (JUMP_IN, JUMP_OFF)
-        )
+        energy, kinds, united = step.events.energy, step.events.kind, step.has_union
+        jump_in, jump_off = (float(energy[kinds == kind].sum()) / contact.area for kind in (JUMP_IN, JUMP_OFF))
         ratio = step.loss / ((jump_in + jump_off) or np.inf)
         certain = 0.5 < ratio < 2 or abs(step.loss) > _CERTAIN_LOSS * abs(step.work)
         if not united and ratio and certain and jump_in * jump_off >= 0:
@@ -197,7 +200,7 @@ class Waypoint:
     state : state of the contact.
     leg : number of the leg of the path: 0 for the first loading, 1 for the first unloading, and so on.
     step : step from the previous equilibrium of the path under separation control; None on a path that is not cyclic,
-        up to first contact, and where a jump at constant load ends exactly at its load.
+        up to first contact, and at the end of a jump at constant load if this load is met exactly.
     balance : energy balance from first contact to this waypoint; only on a cyclic path.
     """
 
@@ -228,7 +231,10 @@ def summarise_loop(
     summit_pull_off_pressure: float,
     unattributed: float,
 ) -> dict[str, float]:
-    """Return pull-off, detachment (last contact) and losses of a loop that ends without contact, by variable name.
+    """Return the values of a loop that ends without contact, by the names of the variables of a run.
+
+    The values are pull-off, detachment (last state with contact), losses, largest area and largest reduced pressure.
+    Values divided by a quantity of adhesion are 0 without adhesion.
 
     Parameters
     ----------

@@ -29,9 +29,9 @@ def follow(contact: ContactModel, path: Path, report: Callable[[str], None] | No
     ------
     NotConverged
         If an equilibrium is not found even with short steps, if the path makes no progress, if the model is not valid
-        in a state of the path, or if the surfaces separate before a turning point. Also if a target lies inside a jump:
-        at a turning point at once, and on the first loading after the other targets have been met. On the last
-        unloading, targets inside jumps are left out without an error.
+        in a state of the path, if the surfaces separate before a turning point, or if a leg starts beyond its turning
+        point. Also if a target lies inside a jump: at a turning point at once, and on the first loading after the other
+        targets have been met. On the last unloading, targets inside jumps are left out without an error.
     """
     longest = path.max_step * contact.rms_height
     record = PathProgress(contact, len(path.targets), longest, report)
@@ -59,42 +59,42 @@ def select_load_control(
 
     The cycle is under separation control. Where its pressure falls on loading or rises on unloading, load control
     cannot follow the curve of pressure against separation. The state then jumps at constant pressure to the next state
-    of the curve with the same pressure, or to the last state of the path if there is no such state. The states in
-    between are left out; the history of the state after the jump contains their events. To find this state exactly, its
-    pressure is sent to the cycle as an additional target. If the pressure of the curve jumps past this value, the jump
-    ends at the next state of the curve, and its work is still computed with the pressure before the jump.
+    of the curve with the same pressure, or to the last state of the path if there is no such state. To find this state
+    exactly, its pressure is sent to the cycle as an additional target. If the pressure of the curve skips this value,
+    the jump ends at the next state of the curve with another pressure; its work is still computed with the pressure
+    before the jump. The states inside a jump are left out, but `State.history` keeps their events.
 
     Parameters
     ----------
     contact : contact of the cycle.
     cycle : generator of the waypoints under separation control; it accepts additional targets (`generator.send`).
     """
-    visited: State | None = None
+    last_visited: State | None = None
     left_out: Waypoint | None = None
-    landing: TargetFunction | None = None
+    load_target: TargetFunction | None = None
     balance = EnergyBalance()
-    level = 0.0
+    load = 0.0
     while True:
         try:
-            waypoint = cycle.send(landing)
+            waypoint = cycle.send(load_target)
         except StopIteration:
             break
         state = waypoint.state
         pressure = contact.pressure(state)
-        advances = pressure >= level if waypoint.loading else pressure <= level
+        advances = pressure >= load if waypoint.loading else pressure <= load
         # If two targets have the same load, rounding may make the load of the second target slightly smaller.
-        advances |= waypoint.target.kind != BETWEEN and abs(pressure - level) <= SAME_EXCESS * abs(level)
-        landed = landing is not None and waypoint.target is landing.target
+        advances |= waypoint.target.kind != BETWEEN and abs(pressure - load) <= SAME_EXCESS * abs(load)
+        landed = load_target is not None and waypoint.target is load_target.target
         # The first state is always visited, because a jump can only start from a visited state.
-        if visited is not None and not advances and not landed:
+        if last_visited is not None and not advances and not landed:
             left_out = waypoint
-            landing = landing or TargetFunction(Target(REDUCED_PRESSURE, level / contact.pressure_unit), contact)
+            load_target = load_target or TargetFunction(Target(REDUCED_PRESSURE, load / contact.pressure_unit), contact)
             continue
-        if visited is not None and left_out is not None:
-            balance = balance.add_load_jump(contact, visited, state, level)
+        if last_visited is not None and left_out is not None:
+            balance = balance.add_load_jump(contact, last_visited, state, load)
         elif waypoint.step is not None:
             balance = balance.add_step(contact, waypoint.step)
         yield replace(waypoint_between_targets(state, waypoint.leg) if landed else waypoint, balance=balance)
-        visited, left_out, landing, level = state, None, None, pressure
-    if visited is not None and left_out is not None:
-        yield replace(left_out, balance=balance.add_load_jump(contact, visited, left_out.state, level))
+        last_visited, left_out, load_target, load = state, None, None, pressure
+    if last_visited is not None and left_out is not None:
+        yield replace(left_out, balance=balance.add_load_jump(contact, last_visited, left_out.state, load))

@@ -40,8 +40,8 @@ class PathProgress:
     report : function that is called with each line of a report; None for no reports.
     reached : number of targets of the first loading met so far.
     skipped : errors of the targets that lie inside jumps.
-    mark : reference separation, m; a path makes progress when its distance from `mark` is at least one longest step.
-    idle : number of equilibria since the last target, or since `mark` was set.
+    progress_from : separation, m, from which a change by one longest step counts as progress.
+    idle : number of equilibria since the last progress: since the last target, or since `progress_from` was set.
     """
 
     contact: ContactModel
@@ -50,25 +50,24 @@ class PathProgress:
     report: Callable[[str], None] | None = None
     reached: int = 0
     skipped: list[InsideJump] = field(default_factory=list)
-    mark: float = np.inf
+    progress_from: float = np.inf
     idle: int = 0
 
     def record_equilibrium(self, state: State, loading: bool) -> None:
-        """Count one more equilibrium; raise `NotConverged` if the path makes no progress."""
-        if abs(state.separation - self.mark) >= self.longest:
-            self.mark, self.idle = state.separation, 0
+        """Count an equilibrium without progress, or reset the count; raise `NotConverged` if the count is too large."""
+        if abs(state.separation - self.progress_from) >= self.longest:
+            self.progress_from, self.idle = state.separation, 0
             return
         if self.idle == _MOST_EQUILIBRIA:
             within = f"{self.longest / self.contact.rms_height:.3g} h_rms"
-            raise self.make_path_error(
-                state, loading, NotConverged(f"no progress: {self.idle} equilibria within {within} of separation")
-            )
+            reason = f"no progress: {self.idle} equilibria within {within} of separation"
+            raise self.make_path_error(state, loading, NotConverged(reason))
         self.idle += 1
 
     def record_target(self, target: Target, state: State) -> None:
         """Count and report a target that the first loading has met."""
         self.reached, self.idle = self.reached + 1, 0
-        self.report_position(f"stop {self.reached} of {self.total}: {target.describe(6)}", state)
+        self.report_position(f"stop {self.reached} of {self.total}: {target.describe()}", state)
 
     def report_position(self, name: str, state: State) -> None:
         """Report the separation, contact area and number of spots of a state."""
@@ -82,13 +81,14 @@ class PathProgress:
     def require_valid_state(
         self, before: State, after: State, target: TargetFunction | None, pending: list[TargetFunction], loading: bool
     ) -> None:
-        """Raise `NotConverged` if the model is not valid in the state after a step.
+        """Raise `NotConverged` if the model is not valid in the state `after` a step.
 
-        Between targets the mean gap must be positive, unless the model is valid up to full contact. At a target the
-        mean gap may be negative, because the range of targets is already limited.
+        The contact area must not be larger than `contact.largest_area_fraction`. Between targets the mean gap must be
+        positive, unless the model is valid up to full contact. At a target the mean gap may be negative, because the
+        range of targets is already limited.
 
         target : target that the state after the step meets; None if there is no such target.
-        pending : targets that are not met yet, sorted.
+        before, pending, loading : start of the step, and all targets not met yet, sorted; only for the message.
         """
         contact = self.contact
         ahead = target or (pending[0] if pending else None)
@@ -108,7 +108,10 @@ class PathProgress:
         return step / 2
 
     def make_path_error(self, state: State, loading: bool, *failures: NotConverged) -> NotConverged:
-        """Return the exception for a path that ends after a state; its message says if the surface is sticky."""
+        """Return the exception for a path that cannot continue after a state.
+
+        The message reports the position, the errors of skipped targets, the failures, and on loading a sticky surface.
+        """
         contact, failures = self.contact, (*self.skipped, *failures)
         sticky = ""
         # A surface is sticky if adhesion alone has spread the contact, or has prevented the first equilibrium.
@@ -123,9 +126,10 @@ class PathProgress:
         )
 
 
-# Number of attempts to reach a target in one step before two states bracket it.
+# Number of failed attempts to solve directly for a target. After these, an ordinary step brackets the target.
 _DIRECT_ATTEMPTS = 2
-# If a step to a target fails and is longer than `_LONG` longest steps, it is multiplied by `_FIRST_FRACTION`.
+# After the first failed attempt, the path goes this fraction of the distance to the target, and then tries again. If
+# the distance is less than `_LONG` longest steps, there is no second attempt.
 _FIRST_FRACTION, _LONG = 0.6, 0.1
 # Number of equilibria after a failed step before steps become longer again, because a longer step usually fails again.
 _PATIENCE = 8
@@ -137,15 +141,16 @@ def first_loading(
     """Follow a path that ends with the first loading, and yield a waypoint for every target.
 
     If a target is expected within the next step, the solver looks directly for the state at this target. Otherwise, or
-    if this fails twice, the separation decreases by one step, which is at most `longest`, m, and a target within the
-    step is found by bisection. Raise the errors of `icha.path.follow.follow`.
+    if this fails twice (once if the target is near), the separation decreases by one step, at most `longest`, m. A
+    target within this step is found by `find_first_target`. The step is halved if there is no equilibrium at its end.
+    Raise the errors of `icha.path.follow.follow`; those of targets inside jumps are raised after the last target.
     """
     state = first_contact = contact.untouched()
     pending, step, failed_trials, successes = sort_targets(targets, -1), longest, 0, 0
     target: TargetFunction | None
     while pending:
         if contact.spot_count(state) == 0 and state.separation > first_contact.separation:
-            state = first_contact  # there are no events above first contact
+            state = first_contact  # There are no events above first contact, so start from there.
         following = next_of_each_kind(pending)
         expected, nearest = max(((each.predict_separation(state), each) for each in following), key=itemgetter(0))
         distance = state.separation - expected
@@ -184,8 +189,8 @@ def first_loading(
         raise progress.make_path_error(state, True)
 
 
-def _solve_within_step(target, expected, pending, state, step) -> State | None:
-    """Return the state at a target; None if none is found within a step, m, or if another target comes first."""
+def _solve_within_step(target, expected, following, state, step) -> State | None:
+    """Return the state at a target; None if none is found within a step, m, or if another of `following` is first."""
     try:
         found = target.solve(state, expected)
     except NotConverged:
@@ -193,6 +198,6 @@ def _solve_within_step(target, expected, pending, state, step) -> State | None:
     same = SAME_SEPARATION * target.contact.rms_height
     if target.control and not state.separation - step <= found.separation <= state.separation + same:
         return None
-    if any(other.excess(found) > SAME_EXCESS for other in pending if other is not target):
+    if any(other.excess(found) > SAME_EXCESS for other in following if other is not target):
         return None
     return found

@@ -59,10 +59,11 @@ class StepAccuracy:
     def is_work_known(self, state, step):
         """Return whether the work of a step that ends in a state is known accurately enough.
 
-        With error-controlled steps, `Step.work_error` must be small enough. With other models the work is not known in
-        three cases. First, `Step.event_error` is too large. Second, spots unite or split in a long step. Third, in a
-        step whose events cannot change the pressure, the integral of the pressure is inaccurate and differs from the
-        change of the stored energy. The third case is not checked for steps up to 1/256 of the longest step.
+        With error-controlled steps, `Step.work_error` must be small enough. Without them the work is not known in three
+        cases. First, `Step.event_error` is too large. Second, spots unite or split in a long step. Third, in a step
+        without events that may change the pressure, the integral of the pressure is inaccurate and differs from the
+        change of the stored energy; its limits are smaller on unloading in tension. The third case is not checked for
+        steps up to 1/256 of the longest step.
         """
         if self.contact.path_accuracy.error_controlled_steps:
             return step.work_error <= self.allowed_work_error(step)
@@ -82,34 +83,41 @@ class StepAccuracy:
         return step.may_change_pressure or not unbalanced or length <= _UNEXAMINED_STEP * self.longest
 
     def allowed_work_error(self, step):
-        """Return the largest allowed value of `work_error` or `event_error` of a step, J/m^2."""
+        """Return the largest allowed value of `work_error` or `event_error` of a step, J/m^2.
+
+        With error-controlled steps, or without reference losses, it is a fraction of the energy scale after the step.
+        Otherwise it is a fraction of the reference losses including this step, or of the energy scale if that is more.
+        """
         energy_scale, accuracy = self.energy_scale_after(step), self.contact.path_accuracy
         if accuracy.error_controlled_steps:
             return accuracy.loss * max(energy_scale, accuracy.least_work)
-        released = EVENT_ERROR_OVER_LOSS * (self.reference_loss + step.reference_loss(self.contact))
-        return max(released, accuracy.loss * energy_scale) if released else EVENT_ERROR_OVER_WORK * energy_scale
+        by_losses = EVENT_ERROR_OVER_LOSS * (self.reference_loss + step.reference_loss(self.contact))
+        return max(by_losses, accuracy.loss * energy_scale) if by_losses else EVENT_ERROR_OVER_WORK * energy_scale
 
     def is_tension_known(self, start, state, step):
-        """Return whether a step between two states cannot hide a new largest tension of the path.
+        """Return False if the tension inside a step may be larger than in any state of the path so far.
 
-        On unloading, the tension just before an event may be larger than in both states and earlier on the path. Also
-        return False if the last contact breaks.
+        This is only possible on unloading with events that may change the pressure: the tension just before the event
+        may be up to that of the tangent at the start. It may exceed both states of the step by `_MISSED_TENSION`. With
+        adhesion also return False if the last contact breaks in the step.
         """
         contact = self.contact
         if step.separation_change < 0 or not step.may_change_pressure:
             return True
         if contact.adhesive and contact.spot_count(start) and not contact.spot_count(state):
-            return False  # this event must be located as exactly as possible
-        # The pressure may have decreased along its tangent up to the event.
+            return False  # This event must be located as exactly as possible.
         p, slope = contact.pressure(start), -contact.stiffness(start)
-        lowest, found = min(p, p + step.separation_change * slope), min(p, contact.pressure(state))
-        return lowest >= self.lowest_pressure or found - lowest <= _MISSED_TENSION * abs(lowest)
+        lowest, known = min(p, p + step.separation_change * slope), min(p, contact.pressure(state))
+        return lowest >= self.lowest_pressure or known - lowest <= _MISSED_TENSION * abs(lowest)
 
     def locate_largest_tension(self, start, state, step):
-        """Return the separation at which the tension is largest between two states without an event, m.
+        """Return the separation at which the tension is largest between two states, m.
 
-        Return None on loading, if the tension has no maximum between the states, if the tension was larger earlier on
-        the path, or if the tension in one of the two states equals the maximum within the required accuracy.
+        The largest tension is estimated where the tangents at both states meet. The separation is that of the minimum
+        of the cubic polynomial with the pressures and slopes of both states; without a minimum, that of the meeting
+        tangents. Return None on loading, from or to full contact, with events that may change the pressure, or if the
+        tension has no maximum between the states. Also return None if the tension was larger earlier on the path, or if
+        the tension in one of the two states equals the estimate within the required accuracy.
         """
         contact = self.contact
         slope, end_slope = (-contact.stiffness(each) for each in (start, state))
@@ -117,7 +125,7 @@ class StepAccuracy:
         if step.separation_change < 0 or step.may_change_pressure or not -np.inf < slope < 0 < end_slope:
             return None
         p, q = (contact.pressure(each) for each in (start, state))
-        # The tangents meet below the curve.
+        # The tangents meet below the curve, so this tension is an upper bound.
         meet = (q - end_slope * step.separation_change - p) / (slope - end_slope)
         lowest = p + slope * meet
         if lowest >= self.lowest_pressure or min(p, q) - lowest <= contact.path_accuracy.tension * abs(lowest):
@@ -127,7 +135,7 @@ class StepAccuracy:
 
 
 def _minimum_of_cubic(length, values, slopes):
-    """Return the position of the minimum between 0 and `length` of the cubic with given values and slopes, or None."""
+    """Return the position of the minimum of a cubic with values and slopes (-, +) at 0 and `length`, or None."""
     # The import takes long, and loading does not need it.
     from scipy.interpolate import CubicHermiteSpline
 

@@ -1,4 +1,4 @@
-"""Stops of a path: targets as functions of the state of a contact, and the search for the equilibrium at a target."""
+"""Stops (targets) of a path as functions of the state of a contact, and the search for the equilibrium at a target."""
 
 from collections.abc import Iterable
 from contextlib import suppress
@@ -13,12 +13,13 @@ from icha.path.targets import LEAST_PRESSURE, MEAN_SEPARATION, Target
 SAME_EXCESS = 1e-9
 # Largest difference of two separations, in h_rms, that rounding can cause. A narrower bracket contains a jump.
 SAME_SEPARATION = 1e-10
-# If the solver fails in a bracket narrower than this, in h_rms, the bracket contains a jump (da/d(delta) is infinite).
+# If the solver fails in a bracket narrower than this, in h_rms, the bracket contains a jump: before a spot jumps, its
+# radius changes infinitely fast with the approach.
 CLOSE_TO_A_JUMP = 1e-4
 # Largest number of times that a bracket is halved.
 _MAX_HALVINGS = 80
-# The solver tries to meet the target before each of the first nine halvings, then only before the 17th, 33rd and 65th,
-# because a target that was missed so often usually lies inside a jump.
+# The solver tries to meet the target before each of the first `_TRIALS` + 1 halvings, then only before the 17th, 33rd
+# and 65th, because a target that was missed so often usually lies inside a jump.
 _TRIALS = 8
 # Largest change of load or area between two states without a jump, over the change by the slope at one of the states.
 _LARGEST_BEND = 4.0
@@ -32,9 +33,9 @@ class TargetFunction:
     contact: ContactModel
 
     def excess(self, state: State) -> float:
-        """Return by how much a state exceeds the target, relative to its absolute value; the excess rises on loading.
+        """Return the excess of a state over the target, relative to the absolute value of the target.
 
-        The excess over a mean separation is relative to h_rms, and over a load of zero to LEAST_PRESSURE.
+        The excess rises on loading. Over a mean separation it is relative to h_rms; over zero load, to LEAST_PRESSURE.
         """
         quantity, value = self.target.quantity, self.target.value
         if quantity.controlled is None:
@@ -50,12 +51,15 @@ class TargetFunction:
         return self.target.quantity.control(self.contact, self.target.value)
 
     def predict_separation(self, state: State) -> float:
-        """Return the separation, m, at which an exponential curve from a state meets a positive target; or -inf."""
+        """Return the expected separation of the target, m: a mean separation itself, or an exponential extrapolation.
+
+        The extrapolation is -inf if the load or area in the state is not positive, or does not grow on loading.
+        """
         control = self.control
         if control is None:
             return self.target.value
-        value, slope = 1 + self.excess(state), self.contact.slope(control.quantity, state) / control.target
-        return state.separation - np.log(value) / (slope / value) if value > 0 and slope < 0 else -np.inf
+        ratio, slope = 1 + self.excess(state), self.contact.slope(control.quantity, state) / control.target
+        return state.separation - np.log(ratio) / (slope / ratio) if ratio > 0 and slope < 0 else -np.inf
 
     def solve(self, state: State, separation: float) -> State:
         """Find the equilibrium at the target from a nearby state and a separation, m: a guess, or the target itself."""
@@ -80,17 +84,17 @@ def next_of_each_kind(pending: Iterable[TargetFunction]) -> list[TargetFunction]
 
 
 class InsideJump(NotConverged):
-    """Error: the path jumps over the target, and no equilibrium at the target is found after the jump."""
+    """Error: the path jumps over the `target` after the state `before`, and no equilibrium at the target is found."""
 
     def __init__(self, target: TargetFunction, before: State, after: State):
         """Write the message about a target that lies between the states before and after a jump."""
         contact = target.contact
-        low, high = (contact.area_fraction(state) for state in (before, after))
+        area_before, area_after = (contact.area_fraction(state) for state in (before, after))
         super().__init__(
             f"{target.target.describe()} lies inside a jump: at a mean separation of "
-            f"{after.separation / contact.rms_height:.4f} h_rms the contact area jumps from {low:.3g} to "
-            f"{high:.3g} of the nominal area, and the branch after the jump does not reach back to the target; remove "
-            "this target, or give the path by mean separations"
+            f"{after.separation / contact.rms_height:.4f} h_rms the contact area jumps from {area_before:.3g} to "
+            f"{area_after:.3g} of the nominal area, and the branch after the jump does not reach back to the target; "
+            "remove this target, or give the path by mean separations"
         )
         self.target, self.before = target, before
 
@@ -98,10 +102,12 @@ class InsideJump(NotConverged):
 def find_target_state(target: TargetFunction, before: State, after: State) -> State:
     """Find the state at a target that lies between two states of the path, on loading or unloading.
 
-    The interval between the two states is halved until the solver finds the state at the target inside the interval. If
-    the load or area jumps past the target, the interval becomes very narrow. Then the solver looks for the target on
-    the branch after the jump, where load control would continue; the found state may lie behind `before`. Raise
-    `InsideJump` if there is no such equilibrium. Raise `NotConverged` if an equilibrium far from any jump is not found.
+    The state at a mean separation is computed directly. For a load or area, the interval between the two states is
+    halved until the solver finds the state at the target inside the interval. If the load or area jumps past the
+    target, the interval becomes very narrow. Then the solver looks for the target on the branch after the jump, where
+    load control would continue; the separation of the found state may be outside the interval, before `before`. Raise
+    `InsideJump` if there is no such equilibrium, or if the middle of an interval below `CLOSE_TO_A_JUMP` has no
+    equilibrium. Raise `NotConverged` if the middle of a wider interval has none, or after `_MAX_HALVINGS`.
     """
     contact = target.contact
     if target.control is None:
@@ -111,8 +117,8 @@ def find_target_state(target: TargetFunction, before: State, after: State) -> St
         width = sign * (before.separation - after.separation)
         if width <= max(SAME_SEPARATION, contact.path_accuracy.event) * contact.rms_height:
             return _solve_after_jump(target, before, after)
-        reached = not contact.path_accuracy.error_controlled_steps or _is_near(target, before, after)
-        if reached and (halvings < _TRIALS or halvings & (halvings - 1) == 0):
+        possible = not contact.path_accuracy.error_controlled_steps or _is_reachable(target, before, after)
+        if possible and (halvings < _TRIALS or halvings & (halvings - 1) == 0):
             with suppress(NotConverged):
                 found = target.solve(before, _guess_separation(target, before, after))
                 if 0 < sign * (before.separation - found.separation) <= width:
@@ -124,7 +130,7 @@ def find_target_state(target: TargetFunction, before: State, after: State) -> St
                 raise
             raise InsideJump(target, before, after) from None
         if not 0 < sign * (before.separation - middle.separation) < width:
-            # Between full contact and its first gap there are no states.
+            # No state lies between full contact and the first gap, so that the middle may be an end of the interval.
             return _solve_after_jump(target, before, after)
         if sign * target.excess(middle) >= 0:
             after = middle
@@ -133,8 +139,8 @@ def find_target_state(target: TargetFunction, before: State, after: State) -> St
     raise NotConverged(f"{target.target.describe()} was not met after {_MAX_HALVINGS} halvings of the step")
 
 
-def _is_near(target, before, after):
-    """Return whether load or area, with its slope at one of two states, may reach the target between them."""
+def _is_reachable(target, before, after):
+    """Return whether the target is within `_LARGEST_BEND` times slope times distance of the value of either state."""
     control, contact, width = target.control, target.contact, abs(after.separation - before.separation)
     value = contact.pressure if control.quantity == PRESSURE else contact.area_fraction
     return any(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import itertools
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from icha.contact.model import AREA_FRACTION as CONTROLLED_AREA
@@ -24,7 +24,7 @@ LEAST_PRESSURE, LEAST_AREA = 1e-12, 1e-9
 MIN_STEP, MAX_STEP = 1e-4, 0.5
 DEFAULT_STEP = 0.15
 # Largest error of the work of one step because its events may happen anywhere in the step, relative to the sum of the
-# absolute reference losses of all jumps so far.
+# absolute reference losses of all jumps so far. Paths use it in `step_accuracy`, and checks use it in finished runs.
 EVENT_ERROR_OVER_LOSS = 5e-4
 
 STEP = FloatRange("h_rms", least=MIN_STEP, most=MAX_STEP)
@@ -36,9 +36,9 @@ class TargetQuantity:
 
     Attributes
     ----------
-    name : name in targets and in files; with an s at the end, the argument of `Path` for a list of such targets.
+    name : name in targets and in files; except for relative loads, `Path` has an argument with this name and an s.
     rule : range of values that a target may have.
-    controlled : PRESSURE or AREA_FRACTION if the solver prescribes this quantity; None for the mean separation.
+    controlled : PRESSURE or CONTROLLED_AREA if the solver prescribes this quantity; None for the mean separation.
     unit_attribute : name of the attribute of the contact that is the unit of a pressure; empty for other quantities.
     """
 
@@ -48,7 +48,7 @@ class TargetQuantity:
     unit_attribute: str = ""
 
     def scale(self, contact: ContactModel) -> float:
-        """Return the factor from the value of a target to SI units: a pressure, Pa, or 1."""
+        """Return the factor that converts the value of a target to SI units: in Pa for a load, and 1 otherwise."""
         return getattr(contact, self.unit_attribute) if self.unit_attribute else 1.0
 
     def evaluate(self, contact: ContactModel, state: State) -> float:
@@ -97,7 +97,7 @@ class Target:
     ----------
     kind : name of the prescribed quantity, a key of `QUANTITIES`; or BETWEEN.
     value : prescribed value, in m for a mean separation; all other kinds have no unit.
-    snapshot : whether the distributions and spots of the state are stored.
+    snapshot : whether the distributions and spots of the state are saved.
     """
 
     kind: str
@@ -106,12 +106,12 @@ class Target:
 
     @property
     def quantity(self) -> TargetQuantity:
-        """Prescribed quantity."""
+        """Prescribed quantity; `KeyError` for the kind BETWEEN."""
         return QUANTITIES[self.kind]
 
-    def describe(self, digits: int | None = None) -> str:
-        """Return a text such as `area_fraction = 0.01`, for messages."""
-        return f"{self.kind} = {self.value:{f'.{digits}' if digits else ''}g}"
+    def describe(self) -> str:
+        """Return a text such as `area_fraction = 0.01`, for messages, with six digits and without a unit."""
+        return f"{self.kind} = {self.value:g}"
 
 
 @dataclass(frozen=True, init=False)
@@ -123,24 +123,26 @@ class Path:
     reduced_pressures : values of p/(E* h'_rms), increasing, in [1e-12, 100]; with the asperity model at most 0.15.
     area_fractions : values of A/A0, increasing, in [1e-9, 1]; with the asperity model at most 0.25.
     mean_separations : values of u in m, decreasing, in [1e-24, 1e9]. Give exactly one of these three lists.
-    snapshots : pairs (kind, value), in any order, of states whose distributions and spots are stored. The kind is
-        "reduced_pressure", "relative_load" (F/(E* A0)), "area_fraction" or "mean_separation" (m). A snapshot is an
-        additional target unless the list contains the same kind and value. Snapshots are in the dataset in the order
-        in which the path reaches them. Default: the last target of the list.
+    snapshots : pairs (kind, value), in any order, of states of the first loading whose distributions and spots are
+        saved. The kind is "reduced_pressure", "relative_load" (F/(E* A0)), "area_fraction" or "mean_separation" (m). A
+        snapshot is an additional target unless the list contains the same kind and value. Snapshots are in the dataset
+        in the order in which the path reaches them. Default: the last target of the list.
     turning_points : pairs (kind, value) at which the path turns after its last target: the first one ends unloading,
         the second one ends loading, and so on. The kinds are those of snapshots. Loads that end unloading may be
         tensile (negative) or zero.
     unload : whether the path ends with complete separation. The last unloading meets again each target between its
-        start and complete separation, except targets inside jumps.
-    control : "separation": the mean separation is prescribed. "load": the load is prescribed, and all targets and
-        turning points must be loads. The path then follows the same curve of pressure against separation, but jumps at
-        constant load where the pressure falls on loading or rises on unloading.
+        start and complete separation, except targets inside jumps. After an odd number of turning points, the path does
+        not turn at the last one, but continues to complete separation in the same leg.
+    control : "separation": the mean separation is prescribed. "load": the load is prescribed. All targets and turning
+        points must then be loads, and the path must unload or have turning points. It follows the same curve of
+        pressure against separation, but jumps at constant load where the pressure falls on loading or rises on
+        unloading.
     max_step : longest change of the mean separation between two equilibria, in units of h_rms, in [1e-4, 0.5].
 
     Raises
     ------
     ValueError
-        If a value is out of range; the message names the argument.
+        If an argument is not valid: wrong type, range, order or side, or repeated; the message names the argument.
     """
 
     targets: tuple[Target, ...]
@@ -155,8 +157,8 @@ class Path:
         area_fractions: Iterable[float] | None = None,
         mean_separations: Iterable[float] | None = None,
         *,
-        snapshots: Iterable[tuple[str, float]] | None = None,
-        turning_points: Iterable[tuple[str, float]] = (),
+        snapshots: Sequence[tuple[str, float]] | None = None,
+        turning_points: Sequence[tuple[str, float]] = (),
         unload: bool = False,
         control: str = SEPARATION_CONTROL,
         max_step: float = DEFAULT_STEP,
@@ -174,13 +176,11 @@ class Path:
             raise ValueError(f"control: {control!r} must be one of {SEPARATION_CONTROL}, {LOAD_CONTROL}")
         max_step = STEP.validate("max_step", max_step)
         values = _validate_list(kind, lists[kind])
-        recorded: list[tuple[str, float]] = _validate_snapshots(
-            [(kind, values[-1])] if snapshots is None else snapshots
-        )
-        targets = [Target(kind, value, (kind, value) in recorded) for value in values]
+        saved: list[tuple[str, float]] = _validate_snapshots([(kind, values[-1])] if snapshots is None else snapshots)
+        targets = [Target(kind, value, (kind, value) in saved) for value in values]
         listed = {(kind, value) for value in values}
         turns = _validate_turning_points(turning_points, targets[-1])
-        targets += [Target(*pair, True) for pair in recorded if pair not in listed]
+        targets += [Target(*pair, True) for pair in saved if pair not in listed]
         if control == LOAD_CONTROL:
             _require_loads((*targets, *turns), unload or bool(turns))
         # A frozen dataclass sets its fields this way.
@@ -189,7 +189,7 @@ class Path:
         )
 
     def within_asperity_range(self) -> Path:
-        """Return a copy without the targets outside the range of the asperity model; turning points stay."""
+        """Return a copy without reduced pressures and areas outside `ASPERITY_RANGES`; turning points always stay."""
         path, ranges = copy.copy(self), ASPERITY_RANGES
         within = (t for t in self.targets if t.kind not in ranges or ranges[t.kind].contains(t.value))
         vars(path).update(targets=tuple(within))
@@ -218,13 +218,13 @@ def _validate_list(kind, values):
 
 def _validate_snapshots(snapshots):
     """Return a list of (kind, value) of all snapshots; raise `ValueError` if a value is out of range or repeated."""
-    recorded = []
+    saved = []
     for label, kind, value in _label_pairs("snapshots", snapshots):
         pair = kind, QUANTITIES[kind].rule.validate(label, value)
-        if pair in recorded:
+        if pair in saved:
             raise ValueError(f"{label}: {kind} {value!r} is given twice; remove one of them")
-        recorded.append(pair)
-    return recorded
+        saved.append(pair)
+    return saved
 
 
 def _validate_turning_points(turning_points, previous):
@@ -240,23 +240,20 @@ def _validate_turning_points(turning_points, previous):
         rule = NUMBER if unloading and kind in LOADS else QUANTITIES[kind].rule
         value = rule.validate(label, value)
         if kind == REDUCED_PRESSURE and 0 < abs(value) < LEAST_PRESSURE:
-            raise ValueError(
-                f"{label}: {value!r} is too small a load; expected 0, or an absolute value of at least "
-                f"{LEAST_PRESSURE:g}"
-            )
+            expected = f"expected 0, or an absolute value of at least {LEAST_PRESSURE:g}"
+            raise ValueError(f"{label}: {value!r} is too small a load; {expected}")
         falls = unloading != (kind == MEAN_SEPARATION)
         if kind == previous.kind and not (value < previous.value if falls else value > previous.value):
-            raise ValueError(
-                f"{label}: {value!r} cannot end {'unloading' if unloading else 'loading'} that begins at "
-                f"{previous.value!r}; expected {'less' if falls else 'more'} than {previous.value!r}"
-            )
+            leg, side = "unloading" if unloading else "loading", "less" if falls else "more"
+            expected = f"expected {side} than {previous.value!r}"
+            raise ValueError(f"{label}: {value!r} cannot end {leg} that begins at {previous.value!r}; {expected}")
         previous = Target(kind, value)
         turns.append(previous)
     return tuple(turns)
 
 
 def _label_pairs(name, pairs):
-    """Yield the name in messages, the kind and the value of every pair; raise `ValueError` if a pair is invalid."""
+    """Yield label, such as `snapshots[0]`, kind and unchecked value of each pair; `ValueError` for an unknown kind."""
     if not isinstance(pairs, list | tuple):
         raise ValueError(f"{name}: expected a list of pairs (kind, value), got {pairs!r}")
     for index, pair in enumerate(pairs):
@@ -270,16 +267,12 @@ def _label_pairs(name, pairs):
         yield label, kind, value
 
 
-def _require_loads(targets, continues):
+def _require_loads(targets, unloads):
     """Raise `ValueError` if a path under load control has targets that are not loads, or has no unloading."""
     for target in targets:
         if target.kind not in LOADS:
-            raise ValueError(
-                f"control: {LOAD_CONTROL!r} with the target {target.describe()}; expected only loads as targets and "
-                "turning points"
-            )
-    if not continues:
-        raise ValueError(
-            f"control: {LOAD_CONTROL!r} without unloading; expected {SEPARATION_CONTROL!r}, or a path that unloads or "
-            "has turning points"
-        )
+            expected = "expected only loads as targets and turning points"
+            raise ValueError(f"control: {LOAD_CONTROL!r} with the target {target.describe()}; {expected}")
+    if not unloads:
+        expected = f"expected {SEPARATION_CONTROL!r}, or a path that unloads or has turning points"
+        raise ValueError(f"control: {LOAD_CONTROL!r} without unloading; {expected}")
