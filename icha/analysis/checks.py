@@ -19,14 +19,14 @@ from icha.support.atomic_files import whole_file
 
 # Largest relative error of a load. The search for the mean gap stops at an error of 2e-4.
 LOAD_LIMIT = 1e-3
-# Name of the check that a run reached the end of its path and passed all other checks.
+# Name of the check that a run reached the end of its path and passed the checks of its job.
 COMPLETED = "completed"
 
 
 def check_campaign(tree: xr.DataTree, expected: Iterable[RunLabels | tuple] | None = None) -> tuple[Check, ...]:
     """Check that a campaign dataset has all runs and describes all variables, and check every run (`check_run`).
 
-    An incomplete run, or a run that failed the checks of its job, has a single failed check that states the reason.
+    An incomplete run, or a run that failed the checks of its job, gets a single failed check that gives the reason.
 
     Parameters
     ----------
@@ -76,12 +76,12 @@ def _findings(solution) -> Iterator[Finding]:
     values = (variable.values for variable in solution.variables.values())
     yield "finite", count_not_finite(values), 0, "number of values that are not finite"
     converged = float(solution["residual"]) / float(solution["tolerance"])
-    yield "converged", converged, 1, "residual of the solver over its tolerance"
+    yield "converged", converged, 1, "residual of the solver, divided by its tolerance"
     unit = float(solution["contact_modulus"]) * float(solution["rms_slope"])
     target, nominal = float(solution["target_reduced_pressure"]) * unit, float(solution["nominal_pressure"])
     yield "load", abs(nominal / target - 1), LOAD_LIMIT, "relative error of the load"
     strength = float(solution["strength_number"])
-    words = "sqrt(dgamma dx/E*) over the range of attraction, where dx is the grid spacing; 0 without adhesion"
+    words = "sqrt(dgamma dx/E*)/range of attraction, where dx is the grid spacing; 0 without adhesion"
     yield "resolved", strength, MAX_STRENGTH_NUMBER, words
 
     gaps = solution["gap_density"].values * np.diff(solution["gap_bin_edges"].values)
@@ -94,12 +94,12 @@ def _findings(solution) -> Iterator[Finding]:
     words = "integral of P(p) over p, relative to the fraction of nodes in contact, minus 1"
     yield "area from P(p)", from_pressures, IDENTITY_LIMIT, words
     load = abs(loads.sum() + float(solution["outside_pressure"]) - nominal) / max(np.abs(loads).sum(), target)
-    words = "difference of F/A0 from the integral of p P(p) over p and the traction outside contact, over mean |p|"
+    words = "F/A0 minus (integral of p P(p) over p plus mean traction outside contact), divided by mean |p|"
     yield "load from P(p)", load, IDENTITY_LIMIT, words
 
 
 def worst(checks: Iterable[Check]) -> tuple[Check, ...]:
-    """Return the worst check of each name: the failed check, or else the passed check, with the largest value."""
+    """Return the worst check of each name: the largest value of the failed checks, or else of the passed checks."""
     found: dict[str, Check] = {}
     for check in checks:
         best = found.get(check.name)
@@ -116,7 +116,7 @@ def describe_failure(check: Check) -> str:
 
 
 def refuse_unknown_failures(checks: Iterable[Check], known: Iterable[str]) -> None:
-    """Raise ValueError if the failed checks are not exactly the known failures; the message lists the differences."""
+    """Raise ValueError if other runs than the known failures have failed checks, or if a known failure has none."""
     failed = [check for check in checks if not check.passed]
     known = list(known)
     passing = sorted(set(known) - {check.subject for check in failed})

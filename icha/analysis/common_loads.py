@@ -17,7 +17,7 @@ from icha.support.statistics import ensemble
 
 # Number of loads per decade at which curves are compared.
 _POINTS_PER_DECADE = 8
-# Largest relative difference between loads of two seeds that count as equal.
+# Loads of two seeds count as equal up to this relative difference.
 _SAME_LOAD = 1e-6
 
 _WITHOUT_SEED = tuple(label for label in LABELS if label != "seed")
@@ -25,12 +25,12 @@ _SEED_COUNT = Variable(_WITHOUT_SEED, "1", "number of seeds in the mean and the 
 _ASKED_SEED_COUNT = Variable(_WITHOUT_SEED, "1", "number of requested seeds", np.int32)
 _AVERAGED = (
     ("contact_area_fraction", "area", "A/A0"),
-    ("reduced_separation", "separation", "the mean separation, of a free square the mean gap, over the rms height"),
+    ("reduced_separation", "separation", "mean separation (of a free square: mean gap) divided by rms height"),
 )
 _STATISTICS = {
-    "mean": "mean of {} over the seeds",
-    "deviation": "standard deviation of {} over the seeds",
-    "confidence": "half the width of the 95 % confidence interval of the mean of {} over the seeds (Student's t)",
+    "mean": "mean over the seeds: {}",
+    "deviation": "standard deviation over the seeds: {}",
+    "confidence": "half the width of the 95 % confidence interval (Student's t) of the mean over the seeds: {}",
 }
 
 
@@ -49,8 +49,8 @@ def interpolate(load, values, at, *, logarithmic: bool) -> np.ndarray:
         If a load lies outside the range of the curve.
     """
     load, first = np.unique(np.asarray(load, float), return_index=True)
-    # Two targets of different kinds may have the same state. Between loads that differ only by rounding, the slope of
-    # the curve is meaningless.
+    # Two targets of different kinds may define the same state. Their loads then differ only by rounding, and the slope
+    # of the curve between these loads is meaningless.
     distinct = np.concatenate([[True], np.diff(load) > 1e-9 * load[1:]])
     load, values = load[distinct], np.asarray(values, float)[first][distinct]
     at = np.asarray(at, float)
@@ -81,7 +81,7 @@ def compare_runs(study: xr.Dataset) -> xr.Dataset:
     - `contact_area_fraction` and `reduced_separation` along the labels of the runs;
     - the mean of both variables over the seeds, the standard deviation, and half the width of the 95 % confidence
       interval (`area_mean`, `area_deviation`, `area_confidence`, `separation_mean`, …; `icha.support.statistics`);
-    - `material_spread` and `slope_spread`: the largest area of all materials (slopes) over the smallest, minus one.
+    - `material_spread`: largest area of all materials divided by the smallest, minus one; `slope_spread` for slopes.
 
     Incomplete runs (`status`) have no values and do not contribute to means. Runs that left the range of the model have
     values up to the limit of the model. Runs for which the asperity model is not applicable have values, but do not
@@ -105,7 +105,7 @@ def compare_runs(study: xr.Dataset) -> xr.Dataset:
         curves = {name: (Variable(LABELS, "1", study[name].attrs["long_name"]), on_grid[name]) for name in on_grid}
         for name, (description, values) in (curves | _spreads(on_grid, averaged)).items():
             along = description._replace(
-                dims=(*description.dims, axis), long_name=f"{description.long_name}, at {TERMS[axis].long_name}"
+                dims=(*description.dims, axis), long_name=f"{description.long_name}, at fixed {TERMS[axis].long_name}"
             )
             variables[name + suffix] = make_variable(along, values)
     described = combine_attributes(
@@ -151,14 +151,14 @@ def _spreads(on_grid, averaged):
     for name, short, symbol in _AVERAGED:
         over_seeds = ensemble(np.where(averaged[..., None], on_grid[name], np.nan), LABELS.index("seed"))
         for part, words in _STATISTICS.items():
-            missing = "where no run is in the mean" if part == "mean" else "where the mean has a single seed"
+            missing = "where the mean contains no run" if part == "mean" else "where the mean contains a single seed"
             description = Variable(_WITHOUT_SEED, "1", words.format(symbol), further={"missing": missing})
             found[f"{short}_{part}"] = description, getattr(over_seeds, part)
     for label, many in (("material", "materials"), ("rms_slope", "rms slopes")):
         description = Variable(
             tuple(each for each in LABELS if each != label),
             "1",
-            f"largest over smallest A/A0 of all {many}, minus 1",
+            f"largest A/A0 of all {many} divided by the smallest, minus 1",
         )
         spread = _spread(on_grid["contact_area_fraction"], LABELS.index(label))
         found[f"{label.removeprefix('rms_')}_spread"] = description, spread

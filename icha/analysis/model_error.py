@@ -33,10 +33,10 @@ _SUMMARY = "Results of the model and of boundary elements for the same topograph
 _LABELS = tuple(label for label in LABELS if label != "model")
 AXES = (*_LABELS, "reduced_pressure")
 
-# Variables that must be equal in a run and its reference, and the largest relative difference of equal values.
+# Variables that must be equal in a run and its reference, up to the relative difference `_ROUNDING`.
 SHARED = ("period", "rms_height", "rms_slope", "contact_modulus", "surface_energy", "interaction_range")
 _ROUNDING = 1e-6
-# Smallest fraction of a cell of a contact map that must be in contact for the cell to count as in contact.
+# A cell of a contact map counts as in contact if at least this fraction of the cell is in contact.
 _HALF = 0.5
 
 # Variables with a mean and a standard deviation over the seeds.
@@ -61,7 +61,7 @@ def model_error(
 
     Parameters
     ----------
-    campaign : the campaign dataset; asperity runs have a `reduced_pressure` snapshot at the load of every solution.
+    campaign : the campaign dataset; asperity runs must have a `reduced_pressure` snapshot at the load of each solution.
     solutions : labels and dataset of each solution at a finite range of attraction (`icha.references.finite_range`).
     runs : labels and dataset of each run with boundary elements in the limit of a short range, with contact maps. Areas
         and separations are compared at the targets of kind `reduced_pressure` of the first loading. Distributions and
@@ -113,7 +113,7 @@ def _short_range_entries(select, runs, origins):
             raise ValueError(f"{labels}: {error}") from None
         origins.setdefault(labels.study, []).extend((run.attrs, truth.attrs))
     for states in entries.values():
-        # A run has None at loads at which only other runs of the study have a state.
+        # Where only other runs of the study have a state at a load, the state of a run is None.
         loads = {labels.reduced_pressure for labels in states}
         for place in [labels._replace(reduced_pressure=load) for labels in states for load in loads]:
             states.setdefault(place, None)
@@ -248,7 +248,7 @@ def _shapes(run, snapshot, solution):
     height, nominal = float(solution["rms_height"]), float(state["nominal_pressure"])
     pressure = float(solution["contact_modulus"]) * float(solution["rms_slope"])
     gaps = solution["gap_density"].values * height
-    # The last bin of gaps contains all larger gaps. In the solution for a deep surface, this bin is wider.
+    # The last bin of gaps contains all larger gaps. For a deep surface, this bin of the solution is wider than usual.
     gaps[-1] *= np.diff(solution["gap_bin_edges"].values)[-1] / np.diff(GAP_BINS * height)[-1]
     return {
         "gap_distribution_distance": distribution_distance("gap", state, solution) / height,
@@ -339,7 +339,7 @@ def _entry_dataset(campaign, entry, states):
     labelled = xr.Dataset(coords=coords)
     shape = tuple(labelled.sizes[axis] for axis in AXES)
     grid = [SolutionLabels(entry, name, *labels_at(labelled, place, AXES)) for place in np.ndindex(shape)]
-    # A comparison is complete if a state was compared at one load at least.
+    # The comparison of a run is complete if states were compared at one load or more.
     statuses = [
         NOT_IN_DESIGN if labels not in states else INCOMPLETE if states[labels] is None else COMPLETE for labels in grid
     ]
@@ -388,7 +388,7 @@ def _arrange(shape, states):
         unknown = np.full([bins[dim] for dim in description.dims], np.nan)
         values = np.array([unknown if state is None else state.get(name, unknown) for state in states])
         values = values.reshape(shape + values.shape[1:])
-        missing = {"missing": "where a run does not have the state"} if None in states else {}
+        missing = {"missing": "where a run has no state at the load"} if None in states else {}
         variables[name] = xr.Variable(AXES + description.dims, values, description.attributes | missing)
         if description.dtype is int and values.dtype.kind == "f":
             variables[name].encoding["dtype"] = np.dtype("int32")
@@ -403,7 +403,7 @@ def _summarise_over_seeds(variables, applicable):
     for name in SUMMARISED:
         values, long_name = np.where(applicable, variables[name].values, np.nan), MODEL_ERROR[name].long_name
         over_seeds = ensemble(values, seeds)
-        further = {"missing": "where no run is in the mean"} | MODEL_ERROR[name].further
+        further = {"missing": "where the mean contains no run"} | MODEL_ERROR[name].further
         mean = Variable(others, "1", f"mean over the seeds: {long_name}", further=further)
         found[f"{name}_mean"] = make_variable(mean, over_seeds.mean)
         if values.shape[seeds] > 1:

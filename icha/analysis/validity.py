@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 # Relative errors of the asperity model in per cent, with adhesion (True) and without (False): lowest and highest mean
-# over the seeds. Campaign `validation` computes these errors for docs/validation.md. A test compares both.
+# over the seeds. Campaign `validation` computes these errors. A test compares them with the page docs/validation.md.
 VALIDATION = {
     True: {"contact area": (-25.3, -8.1), "mean separation": (-36.1, -0.8)},
     False: {"contact area": (-21.4, -4.9), "mean separation": (-36.4, -0.8)},
@@ -34,15 +34,15 @@ VALIDATION = {
 _VALIDATED = "on seven self-affine surfaces, p* from 0.001 to 0.1 (page on validation)"
 
 _RATIO = "full_contact_energy_ratio"
-# Keys of facts that some cases lack: pressure for complete contact (Pa), strength of the interface with and without a
-# flaw (Pa), largest tension that the grid resolves (Pa), size of the grid cells (m), rms height (m), and largest rms
-# height at which the surface sticks according to the bearing area model (m).
+# Keys of `Case.facts` that may be missing: pressure for complete contact (Pa), strength of the interface with and
+# without a flaw (Pa), largest tension that the grid resolves (Pa), size of the grid cells (m), rms height (m), and
+# largest rms height at which the surface sticks according to the bearing area model (m).
 COMPLETE, STRENGTH, THEORETICAL = "complete_contact_pressure", "interface_strength", "theoretical_strength"
 RESOLVED, SPACING = "resolved_tension", "spacing"
 RMS_HEIGHT, STICKY_HEIGHT = "rms_height", "sticky_rms_height"
 _OF_FULL_CONTACT = (COMPLETE, STRENGTH, THEORETICAL, RESOLVED)
 
-# Largest fraction of single spots outside the range of Wu's formula without a warning. Every surface has some.
+# Above this fraction of single spots outside the range of Wu's formula, there is a warning. Every surface has some.
 _FEW = 0.05
 # Largest number of cases that a statement names.
 _MOST_NAMES = 4
@@ -192,7 +192,7 @@ def _unresolved_strength(facts):
         return ""
     needed = facts[SPACING] * (facts[RESOLVED] / facts[STRENGTH]) ** 2
     return (
-        f"; at the edge of contact the grid resolves tensions up to {format_quantity(facts[RESOLVED], 'Pa')}, cells of "
+        f"; at the edge of contact the grid resolves tensions up to {format_quantity(facts[RESOLVED], 'Pa')}; cells of "
         f"{format_quantity(needed, 'm')} would resolve the strength"
     )
 
@@ -234,12 +234,12 @@ def _accuracy(cases, measured):
     advice = "a study with `models: [asperities, boundary_elements]` measures the error"
     if measured:
         advice = "the runs with boundary elements show the error"
-    text = f"the accuracy {'of the others' if adhesive else 'of this campaign'} is unknown ({reasons}); {advice}"
+    text = f"the accuracy of {'the other runs' if adhesive else 'this campaign'} is unknown ({reasons}); {advice}"
     return Statement("accuracy", f"{known}; {text}" if known else text, False)
 
 
 def join_first(cases: Iterable[str], between: str = ", ") -> str:
-    """Join the first texts of a list to one text, and append the number of the others."""
+    """Join the first texts of a list to one text, and append how many more texts there are."""
     cases = list(cases)
     more = len(cases) - _MOST_NAMES
     return between.join(cases[:_MOST_NAMES]) + (f" and {more} more" if more > 0 else "")
@@ -268,9 +268,7 @@ def _not_applicable(campaign):
     """Yield the statement on the runs for which the asperity model is not applicable."""
     reasons = sum(map(reasons_not_applicable, campaign.children.values()), Counter())
     if reasons:
-        text = (
-            f"{format_count(reasons.total(), 'run')} to which the model is not applicable: {join_first(reasons, '. ')}"
-        )
+        text = f"a model is not applicable to {format_count(reasons.total(), 'run')}: {join_first(reasons, '. ')}"
         yield Statement("applicability", text, False)
 
 
@@ -311,7 +309,7 @@ def _describe_shares(shares):
         for (surface, material), share in sorted(shares.items(), key=lambda item: -item[1])
         if share > _FEW
     ]
-    return f"outside: {join_first(cases)}" if cases else ""
+    return f"outside this range: {join_first(cases)}" if cases else ""
 
 
 def _shares_outside(study):

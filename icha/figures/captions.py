@@ -48,6 +48,5 @@ def count_runs(campaign: xr.DataTree, studies: Sequence[str]) -> str:
         if "applicability" in study:  # not in campaigns of earlier versions
             reasons = study["applicability"].transpose(*LABELS).values[status == COMPLETE]
             for reason, count in Counter(filter(None, map(str, reasons))).items():
-                runs = f"{count} run{'' if count == 1 else 's'}{suffix}"
-                found.append(f"The asperity model is not applicable to {runs}: {reason}.")
+                found.append(f"Note on {count} {'run' if count == 1 else 'runs'}{suffix}: {reason}.")
     return " ".join(found)

@@ -84,7 +84,7 @@ def test_no_accuracy_is_quoted_of_surfaces_outside_the_validation(name, value, r
     text, good = told({}, [case(other, "scan")])["accuracy"]
     assert not good and "%" not in text and "scan: " in text and reason in text
     text, _ = told({}, [case(other, "scan"), case(BARE)])["accuracy"]
-    assert "5 to 21 %" in text and "of the others is unknown (scan: " in text
+    assert "5 to 21 %" in text and "of the other runs is unknown (scan: " in text
 
 
 def test_sticky_materials_are_named():
@@ -151,7 +151,7 @@ def test_the_data_say_where_spots_lay_outside():
         for labels, run in small.runs()
     ]
     found = {each.about: each for each in statements_on_dataset(campaign_tree(runs, attrs=small.tree().attrs))}
-    assert found["jump-in"].text.endswith("; outside: soft on rough (40 % of single spots)")
+    assert found["jump-in"].text.endswith("; outside this range: soft on rough (40 % of single spots)")
     assert not found["jump-in"].good
 
 
@@ -165,5 +165,5 @@ def test_the_data_say_to_which_runs_their_model_is_not_applicable():
     found = {each.about: each for each in statements_on_dataset(campaign_tree(runs, attrs=small.tree().attrs))}[
         "applicability"
     ]
-    assert not found.good and found.text.startswith(f"{len(marked)} runs to which the model is not applicable: ")
+    assert not found.good and found.text.startswith(f"a model is not applicable to {len(marked)} runs: ")
     assert all(f"{material} surface" in found.text for material in marked)

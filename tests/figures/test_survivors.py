@@ -109,5 +109,5 @@ def test_captions_count_what_is_missing():
     tree = campaign(lacking=(2,), failed={3: 2}, checks=(4,), pale=(1, 5))
     assert count_runs(tree, ["five"]) == (
         "2 of 10 runs did not complete; see the section Failed runs. 1 of 10 runs failed their checks; see the section "
-        f"Failed runs. The asperity model is not applicable to 2 runs: {REASON}."
+        f"Failed runs. Note on 2 runs: {REASON}."
     )
