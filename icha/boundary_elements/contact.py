@@ -190,16 +190,8 @@ class BoundaryElements(FullContactProblem):
         problem = FrontProblem(self.space, self.front, self.topography, separation / self.spacing)
         start = self._predict(state, separation)
         solved, pending = solve_adhesive_contact(problem, self.summits, start, residual, nearby=nearby)
-        new = CellState(
-            separation,
-            solved.cells,
-            solved.fraction,
-            solved.pressure * self.contact_modulus,
-            solved.mean_fraction,
-            front_residual=find_active_cells(self.front, solved).residual,
-            gap_residual=self._gap_residual(solved),
-            pending=pending,
-        )
+        front_residual = find_active_cells(self.front, solved).residual
+        new = self._state_of(solved, separation, solved.mean_fraction, front_residual=front_residual, pending=pending)
         if reuse_slopes and np.array_equal(new.cells, state.cells):
             return replace(new, pressure_slope=state.pressure_slope, area_slope=state.area_slope, rates=state.rates)
         return self._with_slopes(new, float(np.clip(residual, *TOLERANCES.linear)))
@@ -208,20 +200,15 @@ class BoundaryElements(FullContactProblem):
         """Solve the equilibrium without adhesion at a given separation (cell sizes) or load (nominal pressure, E*)."""
         contact = Contact(state.cells, state.fraction, state.pressure / self.contact_modulus)
         solved = solve_nonadhesive_contact(self.space, self.topography, contact, **given)
-        new = CellState(
-            solved.separation * self.spacing,
-            solved.cells,
-            solved.fraction,
-            solved.pressure * self.contact_modulus,
-            np.zeros(len(solved.cells)),
-            gap_residual=self._gap_residual(solved),
-        )
+        new = self._state_of(solved, solved.separation * self.spacing, np.zeros(len(solved.cells)))
         return self._with_slopes(new, TOLERANCES.linear[0])
 
-    def _gap_residual(self, solved):
-        """Return the largest gap of a closed cell, or the largest overlap of the surfaces if that is larger, m."""
-        closed = solved.gap.ravel()[solved.cells[solved.fraction >= 1]]
-        return float(max(np.abs(closed).max(initial=0.0), -solved.gap.min())) * self.spacing
+    def _state_of(self, solved, separation, mean, **values):
+        """Return the state of a solved contact at a separation (m), with mean fractions and further `values`."""
+        pressure, closed = solved.pressure * self.contact_modulus, solved.cells[solved.fraction >= 1]
+        # Largest gap of a closed cell, or largest overlap of the surfaces if that is larger.
+        error = float(max(np.abs(solved.gap.ravel()[closed]).max(initial=0.0), -solved.gap.min())) * self.spacing
+        return CellState(separation, solved.cells, solved.fraction, pressure, mean, gap_residual=error, **values)
 
     def _events(self, before, after):
         """Find the jumps, coalescences and splits of patches between two consecutive states."""

@@ -278,12 +278,7 @@ def solve_pressures(
 
 
 def solve_nonadhesive_contact(
-    space: HalfSpace,
-    topography: Topography,
-    contact: Contact,
-    *,
-    separation: float = 0.0,
-    load: float | None = None,
+    space: HalfSpace, topography: Topography, contact: Contact, *, separation: float = 0.0, load: float | None = None
 ) -> ElasticContact:
     """Solve the contact without adhesion at a separation (in cell sizes) or under a nominal pressure (in E*).
 

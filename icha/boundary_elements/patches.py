@@ -115,10 +115,8 @@ def patch_centres(cells: np.ndarray, grid: int, labels: np.ndarray, count: int, 
     result = np.empty((count, 2))
     for axis, at in enumerate((cells % grid, cells // grid)):
         phase = turn[at]
-        mean = np.bincount(labels, weight * phase.real, count + 1) + 1j * np.bincount(
-            labels, weight * phase.imag, count + 1
-        )
-        result[:, axis] = np.angle(mean[1:]) * grid / (2 * np.pi) % grid
+        real, imag = (np.bincount(labels, weight * each, count + 1) for each in (phase.real, phase.imag))
+        result[:, axis] = np.angle((real + 1j * imag)[1:]) * grid / (2 * np.pi) % grid
     return result
 
 
