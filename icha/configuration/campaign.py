@@ -26,12 +26,12 @@ BESIDE_STUDIES = ("finite_range", "boundary_element_loops")
 # Largest number of entries in a section; a small number, because the check of each entry goes through all runs of a
 # study.
 _FEW = Field(max_length=100)
-# Cells per shortest wavelength: the fewest without a warning, and the recommended number.
+# Grid cells per shortest wavelength: the smallest number without a warning, and the recommended number.
 _LEAST_CELLS, _ADVISABLE_CELLS = 4, 8
 
 
 class Contact(NamedTuple):
-    """Surface, seed, rms slope and material of a run; the slope is `measured` until the surface's file is read."""
+    """Surface, seed, rms slope and material of a run; before the surface's file is read, the slope is `measured`."""
 
     surface: str
     seed: int
@@ -94,12 +94,12 @@ class Campaign(Section):
     studies: Annotated[dict[Name, Study], Field(min_length=1)]
     """Studies by name."""
     finite_range: Annotated[dict[Name, BoundaryElements], _FEW] = {}
-    """Solutions of boundary elements at a finite range of attraction, by name, to compare with the runs of a study."""
+    """Solutions with boundary elements at a finite range of attraction, by name, for comparison with a study."""
     boundary_element_loops: Annotated[dict[Name, BoundaryElementLoops], _FEW] = {}
-    """Loops of loading and unloading with boundary elements at a finite range of attraction, by name, to compare with
-    the runs of a study that unloads."""
+    """Loops of loading and unloading with boundary elements at a finite range of attraction, by name. ICHA compares the
+    loops with the runs of a study that unloads."""
     measurements: Annotated[dict[Name, Measurement], _FEW] = {}
-    """Your own measurements by name. Figure 5 shows the measurements beside the results of runs."""
+    """Your own measurements by name. Figure 5 shows the measurements together with the results of runs."""
     figures: Figures = Figures()
     """Figures to draw, with options."""
     publication: Publication = Publication()
@@ -126,7 +126,7 @@ class Campaign(Section):
         return list(self._contacts[study])
 
     def with_contacts(self, contacts: Mapping[str, Iterable[Contact]]) -> Campaign:
-        """Return the campaign with the given contacts; lists of studies are replaced by the values in the contacts."""
+        """Return the campaign with the given contacts; the values in the contacts replace the lists of each study."""
         contacts = {study: tuple(dict.fromkeys(runs)) for study, runs in contacts.items()}
         studies = {}
         for label, study in self.studies.items():
@@ -138,7 +138,7 @@ class Campaign(Section):
         return campaign
 
     def with_topographies(self, topographies: Mapping[str, Topography]) -> Campaign:
-        """Return the campaign with properties of topographies from files; their slopes replace the text `measured`."""
+        """Return the campaign with properties of topographies from files; real slopes replace the text `measured`."""
 
         def with_slope(contact):
             measured = contact.rms_slope == MEASURED
@@ -181,7 +181,7 @@ class Campaign(Section):
         return snapshots + [state for p in loads if (state := ("reduced_pressure", p)) not in known]
 
     def contacts_beside(self, entry: BesideStudy) -> list[Contact]:
-        """Return the contacts of a study that an entry of `finite_range` or `boundary_element_loops` solves."""
+        """Return the contacts that an entry of `finite_range` or `boundary_element_loops` selects from its study."""
         lists = (entry.surfaces, entry.seeds, entry.rms_slopes, entry.materials)
         asked = [None if values is None else set(values) for values in lists]
 
@@ -230,7 +230,7 @@ class Campaign(Section):
                 yield ("measurements", label, "path"), entry.path, str(error)
 
     def _model_problems(self, study: Study) -> Iterator[Problem]:
-        """Yield a problem for each surface of a study that one of its models does not support."""
+        """Yield a problem for each surface that a model of the study does not support."""
         for (index, label), name in itertools.product(enumerate(study.models), study.surfaces):
             surface, model = self.surfaces[name], MODELS[label]
             least = model.least_cells

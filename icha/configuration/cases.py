@@ -109,7 +109,7 @@ def run_sha256(campaign: Campaign, case: RunLabels) -> str:
 
 
 def campaign_sha256(campaign: Campaign, of_run: Callable[[RunLabels], str] | None = None) -> str:
-    """Compute the SHA-256 of all settings and files that determine the runs of a campaign, without figures and title.
+    """Compute the SHA-256 of all settings and files that determine the runs of a campaign; figures do not matter.
 
     `of_run` returns known checksums of runs; by default `run_sha256` computes these checksums.
     """

@@ -45,7 +45,7 @@ def expand_design(campaign: Campaign, content: Mapping) -> tuple[Campaign, list[
     Parameters
     ----------
     campaign : the campaign as written in the configuration file.
-    content : the configuration as nested mappings, with which sections with varied values are validated again.
+    content : the configuration as nested mappings, from which variants of surfaces and materials are made.
 
     Returns
     -------
@@ -101,7 +101,7 @@ def _cases(study: Study) -> list[dict[str, Any]]:
 
 
 def _axes(study: Study, lists: Mapping, fixed: Mapping) -> Iterator[list[str]]:
-    """Yield groups of lists; lists within a group are combined entry by entry, the groups in all combinations."""
+    """Yield groups of lists. Lists in a group are combined entry by entry; groups are combined in all combinations."""
     groups = [[_LISTS.get(name, name) for name in group] for group in study.zip]
     done = set(fixed)
     for name in lists:
@@ -113,7 +113,7 @@ def _axes(study: Study, lists: Mapping, fixed: Mapping) -> Iterator[list[str]]:
 
 
 def _too_many_runs(campaign: Campaign) -> Iterator[Problem]:
-    """Yield a problem if a campaign has too many runs or targets, before the runs are expanded."""
+    """Yield a problem if a campaign has too many runs or targets; call this before runs are expanded."""
     runs = targets = 0
     for label, study in campaign.studies.items():
         count, states = _run_count(label, study), {*study.targets.states, *(campaign.snapshots_of(label) or ())}
@@ -123,7 +123,7 @@ def _too_many_runs(campaign: Campaign) -> Iterator[Problem]:
 
 
 def _too_many_solutions(campaign: Campaign) -> Iterator[Problem]:
-    """Yield a problem if `finite_range` or `boundary_element_loops` has too many solutions; runs must be expanded."""
+    """Yield a problem if `finite_range` or `boundary_element_loops` has too many solutions; call after expansion."""
     for section in BESIDE_STUDIES:
         entries = [entry for entry in getattr(campaign, section).values() if entry.study in campaign.studies]
         counts = (len(campaign.contacts_beside(e)) * len(getattr(e, "reduced_pressures", [0])) for e in entries)
@@ -245,9 +245,9 @@ class _Variants:
         name = "-".join([base, *(f"{key}{value_label(variant, key)}" for key in changes)])
         if name in entries or len(name) > LONGEST_LABEL:
             reason = (
-                f"defines a variant of {base!r} with the name {name!r}; expected a name without another entry, with"
+                f"makes a variant of {base!r} with the name {name!r}; expected a name that no other entry has, of at"
             )
-            reason += f" at most {LONGEST_LABEL} letters. Rename an entry"
+            reason += f" most {LONGEST_LABEL} characters. Rename an entry"
             self.problems[section, name] = (*next(iter(changes.values())), reason)
         self.derived[section][name] = variant
         self.origin[section, name] = base

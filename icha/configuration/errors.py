@@ -23,14 +23,14 @@ _FORMER_KEYS = {
     ("Study", "united_until"): "was removed, because coalesced spots now split when their parts would no longer "
     "overlap. Remove the key",
 }
-# Messages by pydantic's type of error; they replace messages of pydantic that only programmers understand.
+# Messages by pydantic's type of error. For these errors, only programmers would understand the messages of pydantic.
 _NOT_A_SECTION = "is not a section; expected a mapping of keys to values"
 _REASONS = {
     "model_type": _NOT_A_SECTION,
     "model_attributes_type": _NOT_A_SECTION,
     "bool_type": "is neither true nor false; expected true or false",
     "dict_type": "is not a mapping; expected names with their sections",
-    "string_type": "is not text; expected text (in quotes if it looks like a number)",
+    "string_type": "is not text; expected text (in quotes if the text looks like a number)",
 }
 
 
@@ -39,7 +39,7 @@ class ConfigurationError(ValueError):
 
 
 def refuse(origin: str, problems: Iterable[Problem], implausible: Iterable[Problem] = ()) -> None:
-    """Raise ConfigurationError if there are problems; the message also lists implausible values, a possible cause."""
+    """Raise ConfigurationError if there are problems; the message also lists implausible values as possible causes."""
     found = list(itertools.islice(problems, MOST_PROBLEMS + 1))
     if not found:
         return

@@ -11,7 +11,7 @@ from icha.support.values import File, Name, Positive, Problem, Section, Text, co
 
 
 def _factor(unit: str, si_unit: str) -> float | None:
-    """Return the factor from a unit to an SI unit; None if the units are of different quantities."""
+    """Return the factor from a unit to an SI unit; None if the units belong to different quantities."""
     try:
         return float(conversion_factor(unit, si_unit))
     except ValueError:
@@ -87,7 +87,7 @@ class _Drawn(Section):
 Figures = create_model(
     "Figures",
     __base__=_Drawn,
-    __doc__="Figures of the campaign. ICHA draws only figures whose key is given.",
+    __doc__="Figures of the campaign. Each key is the name of a figure. ICHA draws only the figures that are given.",
     __module__=__name__,
     **{
         name: (declaration.options | None, Field(default=None, description=declaration.description))

@@ -34,7 +34,7 @@ from icha.support.values import Problem
 
 @dataclass(frozen=True)
 class Configuration:
-    """A valid campaign and the text from which it was loaded.
+    """A valid campaign, and the text from which the campaign was loaded.
 
     Parameters
     ----------
@@ -133,7 +133,7 @@ def _files_outside(campaign: Campaign, folder: str | os.PathLike) -> list[Proble
     ]
 
 
-# Folder for copies of the files of surfaces and measurements, beside the copy of the configuration in the results.
+# Folder for copies of the files of surfaces and measurements; a copy of the configuration is in the parent folder.
 INPUTS = "inputs"
 
 
@@ -143,7 +143,7 @@ def collect_inputs(configuration: Configuration) -> tuple[str, dict[str, str]]:
     Returns
     -------
     text : the configuration, in which files have the paths `inputs/<section>/<entry>/<name>`.
-    files : present paths of the files, by the new paths in `text`. Surfaces that no study uses are left out.
+    files : original path of each file, by the new path in `text`. Surfaces that no study uses are left out.
     """
     campaign = configuration.campaign
     # Variants of a surface have the same file as the original.
@@ -159,6 +159,6 @@ def collect_inputs(configuration: Configuration) -> tuple[str, dict[str, str]]:
         content[section][name] = (content[section][name] or {}) | {"path": stored}
         if section == "measurements" or (section, name) in used:
             files[stored] = path
-    # Every surface now has a path, so defaults must not contain one.
+    # Every surface now has a path, so the defaults must not contain a path.
     (content.get("defaults") or {}).get("surfaces", {}).pop("path", None)
     return dump_yaml(content, configuration.origin), files

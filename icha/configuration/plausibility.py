@@ -1,7 +1,7 @@
 """Find unusual values in a configuration; the usual cause is a wrong unit.
 
-ICHA refuses an unusual value, unless the campaign's list `confirmed` contains its key. A confirmed value causes a
-warning.
+ICHA refuses an unusual value, unless the campaign's list `confirmed` contains the key of the value. An unusual value
+that is confirmed causes a warning.
 """
 
 from collections.abc import Collection, Iterator, Mapping
@@ -49,7 +49,7 @@ _SIDE = Usual("m", "1 nm", "1 m", "from a few atoms to a machine part")
 _WAVE = Usual("m", "0.1 nm", "1 m", "from an atom to a machine part")
 _SLOPE = Usual("1", "1e-4", "5", "superpolished mirrors have 1e-3, fracture surfaces about 1")
 _OF_ENERGY = "van der Waals forces give 10 to 200 mJ/m^2, clean metals 1 to 3 J/m^2"
-_OF_RANGE = "chemical bonds have less than 1 nm, van der Waals forces some nm; grids may need some 100 nm"
+_OF_RANGE = "chemical bonds have less than 1 nm, van der Waals forces some nm; a coarse grid may need some 100 nm"
 # Usual values by key. The ranges contain every reasonable value and exclude most values with a wrong unit prefix.
 USUAL = {
     "contact_modulus": Usual("Pa", "1 kPa", "2000 GPa", "from soft gels to diamond on a rigid body, 1150 GPa"),
@@ -71,7 +71,7 @@ class Unusual(NamedTuple):
     Attributes
     ----------
     location : keys that lead to the value in the configuration.
-    source : origin of a value that is not in the configuration, as text for messages with a blank in front.
+    source : text for messages on the origin of a value that is not in the configuration; begins with a blank.
     """
 
     location: tuple
@@ -131,8 +131,8 @@ _RATIO = Usual(
     "1",
     f"{FULL_CONTACT_BELOW:g}",
     "inf",
-    "for smaller values full contact has the lower energy, and the asperity model does not apply; use a rougher "
-    "surface, a stiffer material, or `models: [boundary_elements]`",
+    "for smaller values full contact has a lower energy than no contact, and the asperity model does not apply; use a "
+    "rougher surface, a stiffer material, or `models: [boundary_elements]`",
 )
 
 
@@ -148,7 +148,7 @@ def energy_ratio(campaign: Campaign, contact) -> float:
 
 
 def sticky_runs(campaign: Campaign) -> Iterator[Unusual]:
-    """Yield the asperity run of each study with the smallest U_full/dgamma, if this ratio favours full contact."""
+    """For each study, yield the asperity run with the smallest U_full/dgamma if this ratio favours full contact."""
     for name, study in campaign.studies.items():
         if DEFAULT_MODEL not in study.models:
             continue

@@ -25,7 +25,7 @@ RESOURCES = tuple(
 # Characters of a web address (RFC 3986).
 _ADDRESS = r"[^\s<>\"{}|\\^`\x00-\x1f\u200b-\u200f]+"
 _ARXIV = r"arXiv:([0-9]{4}\.[0-9]{4,5}|[a-z-]+(\.[A-Z]{2})?/[0-9]{7})(v[0-9]+)?"
-# Conversion of Crockford's digits to base 32 into the digits of Python.
+# Translation of Crockford's digits of base 32 into the digits that Python reads.
 _FROM_CROCKFORD = str.maketrans("0123456789abcdefghjkmnpqrstvwxyz", "0123456789abcdefghijklmnopqrstuv")
 
 
@@ -50,7 +50,7 @@ Prose = Annotated[Text, AfterValidator(_prose)]
 
 
 def _orcid(value: str) -> str | None:
-    """Return the ORCID in a text or web address; None if there is none or its check digit is wrong (ISO 7064)."""
+    """Return the ORCID in a text or web address; None for another text, or if the check digit is wrong."""
     # The check digit follows ISO 7064 mod 11-2.
     plain = re.sub(r"^https?://orcid\.org/", "", value)
     if not re.fullmatch(r"([0-9]{4}-){3}[0-9]{3}[0-9X]", plain):
@@ -106,11 +106,11 @@ Doi = _checked(_doi, "a DOI", _DOI)
 Identifier = _checked(lambda value: _doi(value) or _web(value), "a DOI, arXiv:1234.56789 or a web address", _DOI)
 FunderId = _checked(lambda value: _doi(value) or _ror(value), "a ROR identifier, or a DOI", "https://ror.org/00k4n6c32")
 Date = _checked(_date, "year, month and day", "2026-01-31")
-Community = _checked(_matching(r"[a-z0-9_-]+"), "the end of the address of a community of Zenodo", "contact-mechanics")
+Community = _checked(_matching(r"[a-z0-9_-]+"), "the end of the address of a Zenodo community", "contact-mechanics")
 # The version is part of the name of a folder.
 Version = _checked(
     _matching(r"[0-9A-Za-z]([0-9A-Za-z.+_-]{0,38}[0-9A-Za-z])?"),
-    "letters and digits, with . + - _ between them, in quotes if it looks like a number",
+    "letters and digits, with . + - _ between them (in quotes if the version looks like a number)",
     "1.0.0",
 )
 
@@ -140,7 +140,7 @@ class Author(Section):
                 "family_names and given_names of a person, or name of an organisation"
             )
         if (self.orcid and not person) or (self.ror and person and not self.affiliation):
-            raise ValueError("expected orcid only for a person, and ror for an organisation or with an affiliation")
+            raise ValueError("expected orcid only for a person; ror only for an organisation or with an affiliation")
         return self
 
     @property
@@ -246,6 +246,6 @@ class Publication(Section):
 
 
 def missing_metadata(publication: Publication) -> list[str]:
-    """Return a message for each key of the section that a deposit needs and that is missing."""
+    """Return a message for each missing key that a deposit needs."""
     missing = [key for key in ("version", "date", "authors") if not getattr(publication, key)]
     return [f"publication.{key}: is missing; expected: {Publication.model_fields[key].description}" for key in missing]

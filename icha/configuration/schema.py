@@ -17,7 +17,7 @@ MARK = "<!-- generated from the model: make schema -->\n"
 
 
 def json_schema() -> str:
-    """Return the JSON schema with which editors check and complete configuration files."""
+    """Return the JSON schema with which text editors check and complete configuration files."""
     schema = _schema()
     for name in (*(kind.__name__ for kind in SURFACE_KINDS.values()), "Material", "Study"):
         # The defaults may contain a required key, so the schema must not require the key in every entry.
@@ -59,7 +59,7 @@ def _table(heading: str, section: dict) -> str:
     lines = [f"### {heading}", "", section.get("description", ""), "", "| key | default | meaning |", "|---|---|---|"]
     for key, value in section["properties"].items():
         default = value.get("default")
-        # The default of a section means that the section is missing.
+        # A default that is a section stands for a missing section.
         shown = "none" if default is None or isinstance(default, dict) else f"`{json.dumps(default)}`"
         lines.append(f"| `{key}` | {'required' if key in required else shown} | {value['description']} |")
     return "\n".join([*lines, ""])

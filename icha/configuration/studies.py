@@ -103,11 +103,11 @@ class Targets(Section):
 
     reduced_pressures: stops(ReducedPressure, increasing) | None = Field(
         default=None,
-        description=f"Reduced pressures p/(E* h'rms), increasing. Limit for asperities: {MAX_REDUCED_PRESSURE}.",
+        description=f"Reduced pressures p/(E* h'rms), increasing. Limit of the asperity model: {MAX_REDUCED_PRESSURE}.",
     )
     area_fractions: stops(AreaFraction, increasing) | None = Field(
         default=None,
-        description=f"Contact area fractions A/A0, increasing. Limit for asperities: {MAX_AREA_FRACTION}.",
+        description=f"Contact area fractions A/A0, increasing. Limit of the asperity model: {MAX_AREA_FRACTION}.",
     )
     mean_separations: stops(Length, decreasing) | None = None
     """Mean separations with unit, decreasing."""
@@ -207,8 +207,8 @@ class Study(Section):
     """Explicit list of runs, instead of all combinations. If a case has no value for a parameter, the parameter takes
     all values of the study."""
     models: Annotated[list[Literal[tuple(MODELS)]], Field(min_length=1), AfterValidator(distinct)] = [DEFAULT_MODEL]
-    """Contact models of every run. `asperities` is fast. `boundary_elements` assumes a very short range of attraction;
-    it needs a periodic surface and a grid with at least 4 (better 8) cells per shortest wavelength."""
+    """Contact models of every run. `asperities` is fast. `boundary_elements` assumes a very short range of attraction,
+    and needs a periodic surface and a grid with at least 4 (better 8) cells per shortest wavelength."""
     targets: Targets
     """Targets of the loading path."""
     snapshots: (
@@ -219,11 +219,11 @@ class Study(Section):
     unload: StrictBool = False
     """If true, each run unloads after loading until the surfaces no longer touch."""
     turning_points: list[TurningPoint] = []
-    """States at which the path turns after the last target. The first unloading ends at the first state, the next
-    loading at the second state, and so on."""
+    """States after the last target at which the loading direction changes. The first unloading ends at the first state,
+    the next loading ends at the second state, and so on."""
     control: Literal["separation", "load"] = "separation"
-    """Controlled quantity: the mean separation or the load. Under load control the separation jumps where
-    the load has a maximum or minimum along the path. All targets and turning points must then be loads."""
+    """Controlled quantity: the mean separation or the load. With `load`, the separation jumps where the load has a
+    maximum or minimum along the path, and all targets and turning points must be loads."""
     max_step: number(STEP) = DEFAULT_STEP
     """Largest change of the mean separation between two equilibria, in units of the rms height."""
 
@@ -252,12 +252,12 @@ class Study(Section):
     def problems(self, snapshots: list[tuple[str, float]] | None) -> Iterator[Problem]:
         """Yield the problems that prevent the study from running; `snapshots` come from `Campaign.snapshots_of`."""
         alone = self.models == [DEFAULT_MODEL]
-        # The smallest slope makes the largest reduced pressure.
+        # A relative load is the largest reduced pressure on the surface with the smallest slope.
         slope = min((slope for slope in self.rms_slopes if slope != MEASURED), default=math.inf)
         most = (MAX_REDUCED_PRESSURE if DEFAULT_MODEL in self.models else LARGEST_REDUCED_PRESSURE) * slope
         for location, kind, value in self._states():
-            # If a study has both models, asperity runs end at the limit of the asperity model, but the first target
-            # must be below.
+            # If a study has both models, asperity runs end early at the limit of the asperity model. The first target
+            # must be below this limit.
             needed = alone or (DEFAULT_MODEL in self.models and (location[-1] == 0 or location[0] == "turning_points"))
             if needed and kind in ASPERITY_RANGES and value > ASPERITY_RANGES[kind].most:
                 reason = f"is out of range; expected {ASPERITY_RANGES[kind].expected}, or models: [boundary_elements]"
@@ -301,19 +301,19 @@ class BesideStudy(Section):
     study: Name
     """Name of the study with the topographies."""
     surfaces: _Labels | None = None
-    """Surfaces of the study for which the contact is solved. Default: all."""
+    """Names of surfaces. Contacts on these surfaces are solved. Default: all surfaces of the study."""
     seeds: Seeds | None = None
-    """Seeds of the study for which the contact is solved. Default: all."""
+    """Seeds whose contacts are solved. Default: all seeds of the study."""
     rms_slopes: Annotated[list[Positive], Field(min_length=1), AfterValidator(distinct)] | None = None
-    """Rms slopes of the study for which the contact is solved. Default: all."""
+    """Rms slopes at which contacts are solved. Default: all rms slopes of the study."""
     materials: _Labels | None = None
-    """Materials of the study. Default: all. The grid must resolve the `interaction_range` of materials with
-    adhesion."""
+    """Names of materials whose contacts are solved. Default: all materials of the study. The grid must resolve the
+    `interaction_range` of materials with adhesion."""
     tolerance: number(TOLERANCE) = 1e-8
     """The solver stops when its relative error is below this value."""
     refinement: integer(REFINEMENT) = 1
-    """Ratio of the solver's grid to the grid of the surface, along a side. Heights between the nodes are
-    interpolated."""
+    """Number of nodes of the solver's grid for each node of the surface's grid, along a side. Heights between the
+    nodes of the surface are interpolated."""
 
     def problems(self, campaign: Any) -> Iterator[Problem]:
         """Yield the problems of this entry: names that the campaign does not define, and unsolvable contacts."""

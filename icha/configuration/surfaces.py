@@ -36,12 +36,12 @@ class MaterialSection(Section):
     (RΔγ²/E*²)^(1/3)/ε, where 1/R is the rms curvature of the surface."""
     flaw_radius: Length | None = None
     """Radius a of the largest flaw of the interface. A flaw grows as a penny-shaped crack at the tension √(πE*Δγ/(2a)).
-    Full contact opens at this tension or at the theoretical strength 1.03 Δγ/ε, if smaller. Default: no flaw."""
+    Full contact opens at the smaller of this tension and the theoretical strength 1.03 Δγ/ε. Default: no flaw."""
 
 
 def _unit_of_length(value: Any) -> float:
     """Convert a unit such as `um`, or a multiple of a unit such as `0.1 mm`, to metres."""
-    expected = "expected a unit of length, such as 'um', or a multiple of one, such as '0.1 mm'"
+    expected = "expected a unit of length, such as 'um', or a multiple of a unit, such as '0.1 mm'"
     if not isinstance(value, str):
         raise ValueError(f"is not a unit; {expected}")
     is_multiple = value.strip()[:1] in tuple("+-.0123456789")
@@ -109,8 +109,8 @@ class MeasuredSurface(_SurfaceFromFile):
     """Numbers (from 1) of the columns x, y and z of a text file, such as `[1, 2, 3]`. This key is required if
     the file has more than three columns."""
     data: Text | None = None
-    """Array or channel with the heights, if the file has several: name of the variable (netcdf), path of the dataset
-    (hdf5), or name of the channel (instrument). Default: the only array, or the file's default channel."""
+    """Array or channel with the heights, if the file has several arrays or channels: name of the variable (netcdf),
+    path of the dataset (hdf5), or name of the channel (instrument). Default: the only array, or the default channel."""
     first_axis: Literal["y", "x"] = "y"
     """First axis of the array in npy, netcdf, hdf5 and matrix files: `y` if each row of the array is a line along x,
     else `x`. ICHA ignores this key if the dimensions in the file have the names x and y."""
@@ -134,7 +134,7 @@ class MeasuredSurface(_SurfaceFromFile):
     """The square to cut out of the scan. Default: the largest square in the middle of the scan."""
     detrend: Literal["none", "tilt", "curvature"] | None = None
     """Trend to remove in addition to the mean height: `none`, the best plane (`tilt`), or the best paraboloid
-    (`curvature`). Default: `tilt`, or `none` with `boundary: periodic`."""
+    (`curvature`) in the least-squares sense. Default: `tilt`, or `none` with `boundary: periodic`."""
     cutoff: Length | None = None
     """Cut-off wavelength (nesting index) of a Gaussian S-filter (ISO 25178-3, areal filter of ISO 16610-61). The filter
     weakens short waves: a wave as long as the cut-off keeps half its amplitude. The edges are treated after the filter.
@@ -168,7 +168,7 @@ class MeasuredSurface(_SurfaceFromFile):
         settings["detrend"] = self.detrend or ("none" if self.boundary == "periodic" else "tilt")
         settings["taper"] = (self.taper or 0.1) if self.boundary == "window" else None
         if self.cutoff is None:
-            # Without this key, checksums of settings are those of earlier versions, and old results remain valid.
+            # Settings without this key have the same checksums as in earlier versions, so old results remain valid.
             del settings["cutoff"]
         if self.columns is None:
             del settings["columns"]
@@ -214,7 +214,7 @@ class SelfAffineSurface(Section):
     @field_validator("rolloff_wavelength", "short_wavelength", "grid")
     @classmethod
     def _check_wavelengths(cls, value, info):
-        """Refuse wavelengths unless qL <= q0 < q1 and the grid resolves the shortest wavelength 2π/q1."""
+        """Refuse wavelengths unless period >= roll-off > shortest wavelength, and the grid resolves the shortest."""
         period, rolloff, short = map(info.data.get, ("period", "rolloff_wavelength", "short_wavelength"))
         if info.field_name == "rolloff_wavelength":
             if period is not None and value > period * (1 + ROUNDING):

@@ -41,7 +41,7 @@ def inspect_topographies(campaign: Campaign) -> tuple[dict[str, Topography], lis
     return facts, problems
 
 
-# Known properties of topographies, by path, settings, time and size of the file.
+# Properties of the topographies that have been read, by path, settings, time and size of the file.
 _KNOWN: dict[tuple, Topography] = {}
 
 
@@ -69,7 +69,7 @@ def inspect_file(section: MeasuredSurface | FileSurface) -> Topography:
 
 
 def read_surface(section: MeasuredSurface | FileSurface) -> Surface:
-    """Read a surface from a file, and prepare it as its section of the configuration describes."""
+    """Read a surface from a file, and prepare the surface as its section of the configuration describes."""
     # The modules below import SciPy, which takes time; campaigns without surfaces from files do not need SciPy.
     if isinstance(section, MeasuredSurface):
         from icha.surfaces.measured.topography import prepared_topography

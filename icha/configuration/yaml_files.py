@@ -63,7 +63,7 @@ def excessive_size(content: Any) -> str:
     """Return a message if a configuration is too large to be checked; otherwise an empty text.
 
     Each alias counts with all its values, because a few lines of nested aliases can have billions of values. A default
-    value counts once for every entry that receives it.
+    value counts once for every entry that receives the value.
     """
     for count, depth in enumerate(_depths(content)):
         if depth > _DEEPEST:
@@ -84,7 +84,7 @@ class _Loader(yaml.SafeLoader):
     """A YAML loader that refuses repeated keys, and does not read numbers such as 064 as octal numbers."""
 
     def construct_unless_text(self, node, construct):
-        """Convert a scalar to a Python value; if this fails, return its text, and the section reports an error later.
+        """Convert a scalar to a Python value; if this fails, return the text, which the section refuses later.
 
         Conversion fails for `0b_` (similar to a number), for 30 February (similar to a date), and for integers with
         thousands of digits.
@@ -93,7 +93,7 @@ class _Loader(yaml.SafeLoader):
         # YAML 1.1 would read a time such as 1:30 as a number to base 60.
         if len(text) > _LONGEST_NUMBER or (":" in text and not node.tag.endswith("timestamp")):
             return text
-        # YAML 1.1 would read 064 as an octal number, which no author of a configuration means.
+        # YAML 1.1 would read 064 as an octal number, but authors of configurations mean 64.
         if node.tag.endswith(":int") and re.fullmatch(r"[-+]?0[0-9_]+", text):
             return int(text.replace("_", ""))
         try:
@@ -119,7 +119,7 @@ for _kind in ("int", "float", "timestamp"):
 
 
 def dump_yaml(content: Mapping, origin: str) -> str:
-    """Return a configuration as YAML text, with the keys in their order and one line for each value.
+    """Return a configuration as YAML text; the keys keep their order, and each value has its own line.
 
     Raises ConfigurationError if the text is too long to be read again; the message contains the path `origin`.
     """
