@@ -2,8 +2,8 @@
 
 The time of each kind of job is a power law. Powers and scales are a least-squares fit to the logarithms of measured
 times, mostly on one core of an AMD EPYC. Of the times in `tests/planning/measured_times.csv`, 90 % differ from the
-power law by less than a factor of two. `correction` adapts the times to the present machine with completed jobs of the
-campaign.
+power law by less than a factor of two. `correction` adapts expected times to the present machine, from the measured
+times of completed jobs of the campaign.
 """
 
 from __future__ import annotations
@@ -65,9 +65,9 @@ class PowerLaw:
         return self.base + self.scale * math.prod(quantities[name] ** power for name, power in self.powers.items())
 
 
-# Names of power laws: for runs, the model with adhesion and cycle; for other jobs, the Snakemake rule. Quantities:
-# `nodes` of the grid, `spots` at the largest load, `stops` (targets of the path), `load` p/(E* h'rms), `step` of the
-# mean gap in h_rms, `runs` of the campaign.
+# Power laws by name. The name for a contact is the solver, with `adhesion` and `cycle` if they apply; the name for
+# another job is its Snakemake rule. Quantities are numbers of `nodes`, of `spots` at the largest load, of `stops`
+# (targets of the path) and of `runs`, the `load` p/(E* h'rms), and the `step` of the mean gap in h_rms.
 LAWS = {
     "surface": PowerLaw(0.015, 2.4e-7, {"nodes": 1}),
     "asperities": PowerLaw(0.14, 1.6e-3, {"spots": 1.06}),
@@ -134,7 +134,7 @@ def surface_cost(grid: int) -> Cost:
 
 
 def spots(summits: float, load: float) -> float:
-    """Estimate the number of contact spots at a reduced pressure within a factor of 2, for 10 to 200 000 summits."""
+    """Estimate the number of contact spots at a reduced pressure; right within a factor of 2 for 10 to 2e5 summits."""
     return max(1.0, summits * min(0.6, math.sqrt(load)))
 
 
@@ -221,8 +221,8 @@ def finite_range_cost(nodes: int, *, adhesive: bool, **quantity: float) -> Cost:
     return Cost(seconds, WORKFLOW.forked + 20 * _DOUBLE * nodes**2, 40e3 + 0.04 * nodes**2)
 
 
-# Memory for using the campaign dataset, divided by the `values` of its runs; and largest such memory, bytes. Arrays
-# above `icha.datasets.results.LEFT_IN_FILE` are not read as a whole, so the memory has a limit.
+# Memory for the campaign dataset: ratio of this memory to the `values` of the runs, and its upper limit, bytes. It has
+# a limit because arrays above `icha.datasets.results.LEFT_IN_FILE` are not read as a whole.
 _COPIES, _MOST_READ = 3.9, 1.9e9
 # Largest memory for values of runs in the job that writes the campaign dataset block by block, bytes.
 _BLOCKS = 35 * MiB
@@ -253,7 +253,7 @@ def derived_cost(rule: str, runs: int, disk: float, values: float = 0.0, *, node
 def correction(pairs: Sequence[tuple[float, float]]) -> float:
     """Return the factor that corrects expected times; `pairs` are expected and measured times of similar jobs, s.
 
-    The factor is the median of measured/expected time. With few pairs the factor is closer to 1; no pairs give 1.
+    The factor is the median of measured/expected time. With few pairs the factor is closer to 1; without pairs it is 1.
     """
     if not pairs:
         return 1.0

@@ -55,7 +55,7 @@ def _is_copy(results: Path, file: Path) -> bool:
 
 
 def _record_of(results: Path, file: Path, workflow: Path) -> str:
-    """Return the path of a configuration file as the record contains the path."""
+    """Return the path of a configuration file in the form of the record."""
     folder = Path(os.path.abspath(results)).parent.parent
     folder, workflow, file = (Path(path).resolve() for path in (folder, workflow, file))
     if file.is_relative_to(workflow) and not file.is_relative_to(folder):

@@ -23,7 +23,7 @@ from icha.support.checksums import is_whole
 from icha.support.input_files import text
 
 DONE, TO_DO, CHANGED, FAILED, DAMAGED = "done", "to do", "changed", "failed", "damaged"
-# Largest number of jobs of one kind whose measured times correct the expected times.
+# Largest number of jobs of one kind from whose measured times the correction is computed.
 _SAMPLE = 200
 # Reduced pressure that is assumed for targets that are mean separations.
 _UNKNOWN_LOAD = 0.03
@@ -197,7 +197,7 @@ def _derived_files(campaign, files: CampaignFiles, computed: list[Item]) -> Iter
 def _cost_parameters(settings, rms_slope) -> dict:
     """Convert the settings of a run to arguments of `run_cost`."""
     path, snapshots = settings["path"], settings["path"]["snapshots"]
-    # Factors from targets to reduced pressures: about 1/2 for area fractions; `_UNKNOWN_LOAD` for separations.
+    # Factors from targets to reduced pressures, about 1/2 for area fractions. 0 means the reduced pressure is unknown.
     factors = {"reduced_pressure": 1, "relative_load": 1 / rms_slope, "area_fraction": 1 / 2, "mean_separation": 0}
     stops = {(kind, value) for kind in factors for value in path.get(f"{kind}s") or ()}
     stops |= {tuple(snapshot) for snapshot in snapshots or ()}
@@ -243,7 +243,7 @@ def failed_runs(campaign: Campaign, results: Path) -> dict[str, str]:
 def whole_cost(campaign: Campaign, results: Path) -> costs.Cost:
     """Return the expected cost of a whole campaign: time on one core, memory for one job at a time, disk space.
 
-    Times are not corrected by completed jobs, so the cost is the same on every machine.
+    Measured times are not used, so the cost is the same on every machine.
     """
     items = [replace(item, state=TO_DO) for item in _items(campaign, results)]
     return costs.Cost(time_on(items, 1), memory_on(items, 1), sum(item.cost.disk for item in items))

@@ -31,7 +31,7 @@ def missing_software(campaign: Campaign) -> str | None:
         return None
     return (
         f"{', '.join(_sections(campaign))}: needs Tamaas, which is not installed; run `make tamaas` in a clone, or "
-        "`pip install tamaas` elsewhere. ICHA does not include Tamaas, because its licence is AGPL-3.0-or-later."
+        "`pip install tamaas` elsewhere. ICHA does not include Tamaas, because Tamaas is under AGPL-3.0-or-later."
     )
 
 
@@ -66,7 +66,7 @@ def solver_memory(campaign: Campaign, surface: str, entry: BesideStudy) -> int:
 
 
 def figure_memory(campaign: Campaign, *, holds_topography: bool) -> int:
-    """Return the memory that Snakemake reserves for a figure, MB; `holds_topography` is True for a topography."""
+    """Return the memory that Snakemake reserves for a figure with or without a topography, MB."""
     largest = max(campaign.grid(surface) for study in campaign.studies.values() for surface in study.surfaces)
     return _megabytes(1000, max(MAP_ARRAYS.values()) * holds_topography, largest)
 
@@ -86,7 +86,7 @@ def memory_of_machine() -> int:
 
 
 def free_disk(folder: Path) -> int:
-    """Return the free space on the disk of a folder, bytes; the folder may not exist yet."""
+    """Return the free space on the disk of a folder, bytes; the folder need not exist."""
     existing = next(path for path in (folder, *folder.resolve().parents) if path.exists())
     return shutil.disk_usage(existing).free
 

@@ -17,9 +17,9 @@ class CampaignFiles:
     ----------
     surfaces : name and seed of each surface, by path.
     runs : labels of each run, by path.
-    theories : name of the surface of each file of theories, by path.
-    solutions, loops : labels of each solution at a finite range, by path.
-    compared : labels of boundary-element runs in studies with both models, by path.
+    theories : surface of each file of theories, by path.
+    solutions, loops : labels of each boundary-element solution or loop at a finite range, by path.
+    compared : labels of each boundary-element run in a study with both models, by path.
     model_error : path of the file of model errors; empty if there are no boundary-element results.
     """
 

@@ -41,7 +41,7 @@ from icha.surfaces.moments import (
 # icha.references.summit_theories also contains this number, but takes long to import.
 _SUMMIT_RADIUS = 3 * math.sqrt(math.pi) / 8
 
-# Tabor parameter that 5 % of the first contact spots do not reach, divided by the Tabor parameter of the mean summit.
+# About 5 % of the first contact spots have a Tabor parameter below this fraction of the mean summit's Tabor parameter.
 _SMALLEST_TABOR = 0.84
 
 
@@ -65,9 +65,9 @@ def surface_facts(campaign: Campaign, name: str) -> dict[str, float]:
 
     Returns
     -------
-    Properties of `icha.analysis.validity.VALIDATED`, and four more: `summits` is the number of supported summits,
-    `rms_curvature` the rms curvature of profiles (1/m), `rms_height` the rms height (m), `complete_contact_pressure`
-    the pressure for complete contact divided by E* (an estimate for random surfaces).
+    Properties of `icha.analysis.validity.VALIDATED`, and four more. `summits` is the number of summits that the
+    asperity model uses. `rms_curvature` is the rms curvature of profiles, 1/m. `rms_height` is the rms height, m.
+    `complete_contact_pressure` is the pressure of complete contact divided by E*, an estimate for random surfaces.
     """
     section = campaign.surfaces[name]
     if isinstance(section, SelfAffineSurface):
@@ -136,7 +136,7 @@ def expected_validity(campaign: Campaign) -> list[Statement]:
 
 
 def _describe_outside(tabor):
-    """Describe the cases with contact spots outside the range of Wu's formula; `tabor` has the Tabor parameters."""
+    """Describe the contacts with spots outside the range of Wu's formula, from the Tabor parameters in `tabor`."""
     cases = []
     for (material, surface), values in tabor.items():
         if _SMALLEST_TABOR * min(values) < WU_HOLDS_FROM:

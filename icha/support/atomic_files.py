@@ -1,8 +1,8 @@
 """Write files atomically: a file is either complete or missing, also after a power cut.
 
-The latest call of the program owns a folder of results: only jobs of this call may write there. Jobs of an earlier call
-may still run on another machine, but they cannot complete a result. Before a job moves a file to its final path, it
-locks the owner's file and checks the owner. A new call needs the same lock before it becomes the owner.
+The latest call of the program owns a folder of results: only jobs of this call may complete results in the folder. Jobs
+of an earlier call may still run on another machine. A small file records the owner. Before a job moves a result to its
+final path, the job locks this file and checks the owner. A new call needs the same lock before it becomes the owner.
 """
 
 import fcntl
@@ -15,7 +15,7 @@ from pathlib import Path
 # Number of bytes in a test of free disk space; libraries write about as many bytes at once.
 _PROBE = 2**20
 _ENDING = ".part"
-# Environment variable for programs that an owner starts. Its value is the content and the path of the owner's file.
+# Environment variable for programs that an owner starts: the content and the path of the file that records the owner.
 _OWNER_VARIABLE = "ICHA_OWNER"
 _moving: Callable[[], AbstractContextManager] = nullcontext
 _SUPERSEDED = "a later call of this campaign owns this result; this job wrote nothing"
@@ -63,7 +63,7 @@ def whole_file(path: str | os.PathLike, *, lasting: bool = True) -> Iterator[Pat
 
 
 def move_only_while_owned() -> None:
-    """Make this process a job: it may move results only while the call that started it owns the results."""
+    """Make this process a job, which may move results only while the call that started the job owns the results."""
     global _moving
     _moving = while_owned
 
@@ -74,7 +74,7 @@ def moving() -> AbstractContextManager:
 
 
 def is_left_over(name: str) -> bool:
-    """Return whether a file name belongs to a temporary file, which a killed program has left."""
+    """Return whether a file name belongs to a temporary file that a killed program has left."""
     return name.startswith(".") and name.endswith(_ENDING)
 
 
@@ -129,7 +129,7 @@ def take_over(file: str | os.PathLike) -> None:
 
 @contextmanager
 def while_owned() -> Iterator[None]:
-    """Let no other call become owner during a block; raise `Superseded` if another call is already owner."""
+    """Prevent other calls from becoming owner during a block; raise `Superseded` if another call is the owner."""
     word, _, file = os.environ.get(_OWNER_VARIABLE, "").partition(" ")
     if not word:
         yield

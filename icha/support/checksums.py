@@ -50,14 +50,14 @@ def hash_parameters(parameters: Iterable[str]) -> str:
 
 
 def write_checksum(results: str | os.PathLike, path: str, *, asked: str = "", inputs: Mapping[str, str] = {}) -> None:
-    """Write the sidecar of a result; `path` is in the folder `results`, see `Checksum` for `asked` and `inputs`."""
+    """Write the sidecar of the result `path` in the folder `results`; `Checksum` explains `asked` and `inputs`."""
     file = Path(results, path)
     size, mtime_ns = _size_and_time(file)
     _write(results, path, Checksum(sha256_of(file), size, mtime_ns, asked, inputs))
 
 
 def begin(results: str | os.PathLike, path: str) -> None:
-    """Record that a job starts to write a result, so that an unfinished result counts as stale, not damaged."""
+    """Record that a job starts to write a result, so that an unfinished result counts as stale, not as damaged."""
     _write(results, path, _BEGUN, lasting=False)
 
 
@@ -72,7 +72,7 @@ def is_whole(results: str | os.PathLike, path: str, *, thorough: bool = False) -
     """Return whether a result agrees with the checksum in its sidecar; True without a sidecar.
 
     Unless `thorough` is true, a result with the recorded size and time counts as whole. If only the time differs, the
-    sidecar receives the new time. The function returns False if the sidecar cannot be read.
+    sidecar receives the new time. An existing result whose sidecar cannot be read is not whole.
     """
     file = Path(results, path)
     try:
@@ -105,7 +105,7 @@ def damaged(results: str | os.PathLike, *, thorough: bool = False) -> list[str]:
 def stale(
     results: str | os.PathLike, paths: Iterable[str], asked: Callable[[str], str] | None = None
 ) -> Iterator[tuple[str, str]]:
-    """Yield path and reason for each existing result that was computed with other settings or inputs.
+    """Yield each existing result that was computed with other settings or inputs: its path, and the reason.
 
     Parameters
     ----------
@@ -168,7 +168,7 @@ def set_aside(results: str | os.PathLike, path: str) -> Path:
     return file.rename(next(name for name in names if not name.exists()))
 
 
-# Record of a result that a job has started to write. Its SHA-256 is empty, unlike that of any file.
+# Record of a result that a job has started to write. The empty SHA-256 differs from the SHA-256 of every file.
 _BEGUN = Checksum("", 0, 0)
 
 

@@ -59,7 +59,7 @@ def duration(seconds: float) -> str:
 
 
 def _digits(value: float, digits: int) -> str:
-    """Format a number with `digits` significant digits, or as an integer if it has more digits before the point."""
+    """Format a number with `digits` significant digits; a number with more digits before the point as an integer."""
     return f"{value:.0f}" if value >= 10.0**digits - 0.5 else f"{value:.{digits}g}"
 
 
@@ -75,7 +75,7 @@ def printable(text: object) -> str:
 
 
 def printable_lines(text: object) -> str:
-    """Escape control characters of a text as `printable` does, but keep line breaks and tabs."""
+    """Escape control characters of a text, but keep line breaks and tabs, unlike `printable`."""
     return _IN_LINES.sub(_escaped, str(text))
 
 

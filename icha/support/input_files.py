@@ -1,4 +1,4 @@
-"""Check input files from unknown sources: kind of file, memory for reading, dangerous HDF5 files; read CSV tables.
+"""Check input files from unknown sources (kind of file, memory for reading, dangerous HDF5 files); read CSV tables.
 
 A small file can declare a very large array, or contain a large array in compressed form. Readers compare the declared
 size with a limit (`require_room`), and limit the memory of the libraries that read the file (`bounded_memory`).
@@ -36,8 +36,8 @@ class TooLarge(RefusedFile):
     def __init__(self, needed: str, most: int):
         """Create the message from the needed memory (text) and the limit `most` (bytes)."""
         super().__init__(
-            f"needs {needed} of memory; expected at most {formatting.size(most)}. Set the environment variable "
-            f"{VARIABLE} to allow more, in MB"
+            f"needs {needed} of memory; expected at most {formatting.size(most)}. To allow more, set the environment "
+            f"variable {VARIABLE} (in MB)"
         )
 
 
@@ -78,9 +78,9 @@ def require_room(needed: float, most: int | None = None) -> None:
 
 @contextmanager
 def bounded_memory(most: int | None = None) -> Iterator[None]:
-    """Limit the memory that a block of code and its libraries allocate to `most` bytes, by default `most_memory`.
+    """Limit the memory of a block of code, with its libraries, to `most` bytes; the default is `most_memory`.
 
-    If the block needs more memory, it raises `TooLarge`; libraries in C may raise their own errors instead. Only Linux
+    A block that needs more memory raises `TooLarge`; libraries in C may raise their own errors instead. Only Linux
     supports the limit. On other systems, `require_room` is the only check.
     """
     most = most_memory() if most is None else most

@@ -9,7 +9,7 @@ LARGE_GRID = 2048
 
 
 def cores() -> int:
-    """Return the number of threads: OMP_NUM_THREADS if it is set, otherwise the number of available processors.
+    """Return the number of threads: OMP_NUM_THREADS if this is set, otherwise the number of available processors.
 
     Snakemake sets OMP_NUM_THREADS to the `threads` of a rule.
     """
@@ -32,7 +32,7 @@ def on_cores(function: Callable, items: Iterable) -> list:
     results, waiting = [None] * len(items), enumerate(items)
 
     def work():
-        # Each thread takes the next item itself, because the distribution of many short items would take too long.
+        # Each thread takes the next item itself. To send many short items to threads would take too long.
         for number, item in waiting:
             results[number] = function(item)
 

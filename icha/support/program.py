@@ -8,7 +8,7 @@ import os
 import signal
 from pathlib import Path
 
-# Folder of the workflow beside the installed package; the wheel contains it (tool.hatch.build.targets.wheel.hooks).
+# Name of the folder of the workflow next to the installed package; the wheel contains this folder (hatch_build.py).
 INSTALLED = "icha_workflow"
 _PACKAGE = Path(__file__).resolve().parent.parent
 _PR_SET_PDEATHSIG = 1  # of prctl(2)
@@ -26,7 +26,7 @@ def is_installed(workflow: Path) -> bool:
 
 
 def package_of(workflow: Path) -> Path:
-    """Return the folder of the package `icha`: inside a clone, or beside the folder of an installed workflow."""
+    """Return the folder of the package `icha`: inside a clone, or next to the folder of an installed workflow."""
     return (workflow.parent if is_installed(workflow) else workflow) / "icha"
 
 

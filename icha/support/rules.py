@@ -92,7 +92,7 @@ class IntegerRange:
 
 NUMBER = FloatRange()
 POSITIVE = FloatRange(above=0)
-# Bounds far beyond physical lengths; within the bounds, products of powers neither overflow nor vanish.
+# Bounds far beyond physical lengths; within the bounds, products of powers of lengths neither overflow nor underflow.
 LENGTH = FloatRange("m", least=1e-24, most=1e9)
 
 # Surfaces.
@@ -104,7 +104,7 @@ SEED = IntegerRange(0)
 # Materials.
 CONTACT_MODULUS = FloatRange("Pa", least=1e-9, most=1e15)
 SURFACE_ENERGY = FloatRange("J/m^2", least=0, most=1e24)
-# Surface energy divided by contact modulus, of materials with adhesion.
+# Surface energy divided by contact modulus, for materials with adhesion.
 ADHESION_LENGTH = FloatRange("m", least=1e-40, most=1e9)
 
 # Boundary elements.

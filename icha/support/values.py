@@ -37,8 +37,8 @@ USUAL = {
     ("mJ/m^2", "J/m^2"): "1e-3",
 }
 
-# Units of length. Pint is not used, because it also accepts px, pt, au and hand, which have other meanings in files of
-# heights.
+# Units of length. Pint is not used, because pint also accepts px, pt, au and hand, which have other meanings in files
+# of heights.
 _PREFIXES = {"deci": "1e-1", "centi": "1e-2", "milli": "1e-3", "micro": "1e-6", "nano": "1e-9", "pico": "1e-12"}
 _SYMBOLS = {"km": "1e3", "m": "1", "dm": "1e-1", "cm": "1e-2", "mm": "1e-3", "um": "1e-6", "\u03bcm": "1e-6"}
 _SYMBOLS |= {"nm": "1e-9", "pm": "1e-12", "\u00c5": "1e-10", "in": "0.0254", "mil": "2.54e-5", "thou": "2.54e-5"}
@@ -59,7 +59,7 @@ _LONGEST_NAME, LONGEST_LABEL = 80, 200
 ROUNDING = 1e-9
 # Largest number of names in a message.
 _MOST_LISTED = 30
-# A problem: location (keys) in a configuration, value, and message with problem and expected value.
+# A problem has three parts: its location (keys) in a configuration, the value, and the message.
 Problem = tuple[tuple, Any, str]
 # Placeholder for the value of a problem if the key is missing.
 NOTHING = object()
@@ -81,7 +81,7 @@ def _registry():
 
 @lru_cache(maxsize=1024)
 def conversion_factor(unit: str, si_unit: str) -> Decimal:
-    """Return the exact factor from `unit` to `si_unit`; raise ValueError for an unknown unit or another quantity."""
+    """Return the exact factor from `unit` to `si_unit`; raise ValueError if the units are not convertible."""
     if len(unit) > _LONGEST:
         raise ValueError(f"a text of {len(unit)} characters is not a unit")
     if unit == si_unit == "1":
@@ -101,7 +101,7 @@ def _length(unit):
 
 
 def _by_pint(unit, si_unit):
-    """Return the exact factor from `unit` to `si_unit` with pint; raise ValueError for other texts."""
+    """Return the exact factor from `unit` to `si_unit` with pint; raise ValueError if pint cannot convert `unit`."""
     factor = math.nan
     if _UNIT.fullmatch(unit):
         with contextlib.suppress(Exception):
@@ -232,7 +232,7 @@ def exactly_one(section):
 
 
 def list_names(names: Iterable) -> str:
-    """Join names for a message; of a long list, only the first names and the number of further names appear."""
+    """Join names for a message; a long list is cut, and the number of further names is added."""
     names = list(names)
     more = f", … ({len(names) - _MOST_LISTED} more)" if len(names) > _MOST_LISTED else ""
     return ", ".join(map(str, names[:_MOST_LISTED])) + more
@@ -300,7 +300,7 @@ def _seeds(value: Any) -> Any:
             raise ValueError(f"{shown}is not a range of seeds; {expected}")
         first, last = map(int, match.groups())
         if last < first:
-            raise ValueError(f"{shown}has an end below its begin; {expected}")
+            raise ValueError(f"{shown}must begin with the smaller seed; {expected}")
         if len(found) + last - first >= _MOST_SEEDS:
             raise ValueError(f"{shown}gives more than {_MOST_SEEDS} seeds; {expected}")
         found += range(first, last + 1)

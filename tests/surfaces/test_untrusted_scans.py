@@ -71,7 +71,7 @@ def test_declared_sizes_are_bounded_before_anything_is_read(name, tmp_path):
     with refused("path", r"needs about .*B of memory; expected at most 2 GB"):
         scan(tmp_path / name, **keys)
     if name.endswith((".nc", ".npy")):
-        with pytest.raises(ValueError, match=r"needs about .* at most 2 GB\. Set .* ICHA_INPUT_MB"):
+        with pytest.raises(ValueError, match=r"needs about .* at most 2 GB\. To allow more, .* ICHA_INPUT_MB"):
             read_height_map(tmp_path / name, 1.0)
 
 
