@@ -14,32 +14,32 @@ LOSSES = ("loss_by_jump_in", "loss_by_jump_off", "loss_by_coalescence", "loss_by
 # Counts of events in a run, in the order of the flags of `event_kind`.
 EVENT_COUNTS = ("jump_in_count", "jump_off_count", "coalescence_count", "split_count")
 
-# Largest unknown work of a loop, over its largest work, for which a gain of energy may be tolerated.
+# Upper limit of the tolerated gain of energy in a loop, divided by the largest work, also if more work is unknown.
 LARGEST_UNKNOWN_WORK = 1e-2
-# Largest gain of energy in a loop of boundary elements, over the largest work. This value is the error of the losses,
-# because a path limits the error of the work in every step (docs/short_range.md).
+# Largest gain of energy in a loop of boundary elements, divided by the largest work. This value is the error of the
+# losses, because a path limits the error of the work in every step (docs/short_range.md).
 CELL_LOSS_LIMIT = 1e-3
-# Largest loss of a loop of boundary elements without adhesion, over the largest work. The exact loss is zero.
+# Largest loss of a loop of boundary elements without adhesion, divided by the largest work. The exact loss is zero.
 CELL_CLOSURE_LIMIT = 1e-4
-# Largest gain of energy by unions of spots and their splits, over the largest work. The rule of unions does not
-# conserve energy: without adhesion loops close to a few hundredths of a per cent (docs/hysteresis.md).
+# Largest gain of energy by unions of spots and splits of unions, divided by the largest work. The rule of unions does
+# not conserve energy: without adhesion, loops close up to a few hundredths of a per cent (docs/hysteresis.md).
 UNION_LIMIT = 1e-3
 
-# Meanings of the checks by name. Energies are relative to the largest work of the run.
+# Meanings of the checks by name.
 LOOP_CHECKS = {
     "events": "number of events that are only in the counts of events or only in the list of events",
-    "loss adds up": "difference of the hysteresis loss and the sum of its parts, over the largest work",
-    "loss is the work": "difference of the hysteresis loss and the whole work of the loop, over the largest work",
-    "loop loses energy": "energy gained in the whole loop, over the largest work",
-    "jumps lose energy": "energy gained in jumps into and out of contact together, over the largest work",
-    "jumps off lose energy": "energy gained in jumps out of contact, over the largest work",
-    "unions lose energy": "energy gained in coalescence and splitting of spots, over the largest work",
-    "load jumps lose energy": "energy gained in jumps at constant load, over the largest work",
+    "loss adds up": "difference between the hysteresis loss and the sum of its parts, divided by the largest work",
+    "loss is the work": "difference between the hysteresis loss and the work of the loop, divided by the largest work",
+    "loop loses energy": "energy gained in the whole loop, divided by the largest work",
+    "jumps lose energy": "energy gained in jumps into and out of contact together, divided by the largest work",
+    "jumps off lose energy": "energy gained in jumps out of contact, divided by the largest work",
+    "unions lose energy": "energy gained in coalescence and splitting of spots, divided by the largest work",
+    "load jumps lose energy": "energy gained in jumps at constant load, divided by the largest work",
     "separated: spots": "number of spots left in contact at the end of unloading",
     "separated: pressure": "nominal pressure left at the end of unloading, in Pa",
-    "pull-off pressure": "difference of the pull-off pressure and the largest tension of the last unloading, over the "
-    "largest pressure of this unloading",
-    "loop closes": "hysteresis loss without adhesion and coalescence, which must be zero, over the largest work",
+    "pull-off pressure": "difference between the pull-off pressure and the largest tension of the last unloading, "
+    "divided by the largest pressure of this unloading",
+    "loop closes": "hysteresis loss divided by largest work; must be zero without adhesion and coalescence",
 }
 
 
@@ -64,7 +64,7 @@ def check_loop(run) -> Iterator[tuple]:
     back = run["nominal_pressure"][run["leg"] == int(run["leg"][-1])]
     error = abs(float(run["pull_off_pressure"]) + back.min()) / (np.abs(back).max() or 1.0)
     yield "pull-off pressure", error, IDENTITY_LIMIT
-    # The rule for unions of asperities may cost energy. Patches of boundary elements merge and split reversibly.
+    # The rule for unions of asperities may lose energy. Patches of boundary elements merge and split reversibly.
     if float(run["surface_energy"]) == 0 and not _has_united(run):
         model = model_of(run.attrs)
         unknown = work_error(run) / scale + 3 * model.accuracy.balance * count_unshared_separations(run)
@@ -90,8 +90,8 @@ def _check_losses(run, scale):
 
     yield "loop loses energy", gain(float(run["hysteresis_loss"])), with_unions
     yield "jumps lose energy", gain(into + out), tolerance
-    # A jump into contact may cost energy, by the law itself or by the forces of other spots. Then only the sum of the
-    # losses by jumps into and out of contact must be positive.
+    # A jump into contact may need energy, due to the law of a spot or due to the forces of other spots. Then only the
+    # sum of the losses by jumps into and out of contact must be positive.
     if int(run["uphill_jump_in_count"]) == 0:
         yield "jumps off lose energy", gain(out), tolerance
     yield "unions lose energy", gain(unions), with_unions

@@ -16,10 +16,10 @@ from icha.path.targets import AREA_FRACTION, BETWEEN
 # Largest error of an equilibrium, in h_rms, and largest relative error of a target.
 RESIDUAL_LIMIT = 1e-8
 TARGET_LIMIT = 1e-8
-# Largest residual of the fronts of boundary elements. The residual converges to 1e-6 or stagnates below this limit.
+# Largest residual of contact edges (fronts) of boundary elements. It converges to 1e-6 or stagnates below this limit.
 FRONT_LIMIT = 1e-3
-# Largest decrease of the contact area of boundary elements, over the largest area. The position of a front within a
-# cell is known less accurately, so that the area may seem to decrease a little when a front enters another cell.
+# Largest decrease of the contact area of boundary elements, divided by the largest area. The position of a front within
+# a cell is less accurate, so the computed area may decrease a little when a front enters another cell.
 CELL_LIMIT = 1e-3
 # Largest rise of the mean separation in a step in which spots unite, in h_rms. After a union, the same load may need a
 # larger separation.
@@ -30,24 +30,24 @@ _MAY_BE_INFINITE = {name for name, description in RUN.items() if INFINITE in des
 _CHECKS = LOOP_CHECKS | {
     "finite": "number of values that are not finite",
     "steps": "1 if the run has no steps, otherwise 0",
-    "residual": "largest equilibrium error over h_rms",
+    "residual": "largest equilibrium error divided by h_rms",
     "front": OF_MODELS["front_residual"].long_name,
     "gap": OF_MODELS["gap_residual"].long_name,
     "converged": "number of steps that did not converge",
-    "targets": "largest relative distance of a step from its target",
+    "targets": "largest relative difference between the value of a step and its target",
     "area rises": "largest decrease of A/A0 in the first loading, from target to target or in a step without unions, "
-    "over the largest A/A0",
+    "divided by the largest A/A0",
     "pressure rises": "largest decrease of the nominal pressure in the first loading, from target to target or in a "
-    "step without unions, over the largest pressure",
-    "separation falls": "largest rise of the mean separation in a step of the first loading without unions, over h_rms",
-    "separation falls where spots unite": "largest rise of the mean separation in a step of the first loading with "
-    "unions, over h_rms",
+    "step without unions, divided by the largest pressure",
+    "separation falls": "largest rise of mean separation/h_rms in a step of the first loading without unions",
+    "separation falls where spots unite": "largest rise of mean separation/h_rms in a step of the first loading with "
+    "unions",
     "stiffness": "number of steps with a negative contact stiffness, without adhesion",
-    "area from P(p)": "relative difference of the integral of P(p) and A/A0",
-    "load from P(p)": "difference of the integral of p P(p) and F/A0, over the sum of compression and tension",
-    "P(u) complete": "integral of P(u), plus A/A0 within the edges, plus overlap, minus 1",
-    "area of spots": "relative difference of the sum of the areas of spots and A/A0",
-    "load of spots": "difference of the sum of the forces of spots and F, over the sum of compression and tension",
+    "area from P(p)": "relative difference between the integral of P(p) and A/A0",
+    "load from P(p)": "difference between the integral of p P(p) and F/A0, divided by compression plus tension",
+    "P(u) complete": "integral of P(u) plus A/A0 within the edges plus overlap fraction, minus 1",
+    "area of spots": "relative difference between the sum of the areas of spots and A/A0",
+    "load of spots": "difference between the sum of the forces of spots and F, divided by compression plus tension",
 }
 
 
@@ -112,8 +112,8 @@ def _check_loading(run) -> Iterator[tuple]:
 def _largest_fall_in_loading(loading, name):
     """Return the largest decrease of a variable between targets or steps, divided by its largest magnitude.
 
-    Two united spots may carry less load than the same two spots before their union at the same separation. Therefore
-    the variable may decrease in a step in which spots unite, but not from one target to the next.
+    At the same separation, two spots may carry less load after their union than before. Therefore the variable may
+    decrease in a step in which spots unite, but not from one target to the next.
     """
     values, at_targets = loading[name], loading["step_kind"] != BETWEEN
     united = np.cumsum(np.diff(loading["coalescence_count"], prepend=0) != 0)
@@ -152,7 +152,7 @@ def _target_error(run):
         of_area = np.array([kind == AREA_FRACTION for kind in kinds])
         cells = np.minimum(AREA_TOLERANCE_CELLS / float(run["grid"]) ** 2, AREA_TOLERANCE_PART * np.abs(target))
         error = np.where(of_area, np.maximum(error - cells, 0.0), error)
-    # The error of a target of zero load is relative to the largest load of the run.
+    # If the target is zero load, the error is relative to the largest load of the run.
     largest = np.array([np.max(np.abs(reached[kind])) for kind in kinds])
     # With adhesion a load may be a small difference of attraction and repulsion. Both are about as large as the
     # stiffness times h_rms, and the error of the load is relative to this product.

@@ -1,19 +1,19 @@
 """Contact at a finite range of attraction, solved by the boundary-element code Tamaas.
 
-Tamaas is installed with the extra `tamaas` and shares no code with ICHA; nothing outside `icha.references` needs it.
+Tamaas is installed with the extra `tamaas` and shares no code with ICHA. Only modules of `icha.references` need Tamaas.
 The constant `REFERENCES` lists the publications on the methods of Tamaas.
 
-Tamaas minimises the energy of an elastic half-space in contact with the nodes of the topography. Without adhesion the
-unknowns are the pressures at a given load (Polonsky & Keer). With adhesion the unknowns are the gaps at a given mean
-gap (Rey et al.); the traction at a gap u is -(dgamma/rho) exp(-u/rho). With adhesion the load control of Tamaas
-converges to wrong states, so ICHA searches for the mean gap at which the contact carries a given load.
+Tamaas minimises the energy of an elastic half-space in contact with the nodes of the topography. Without adhesion, the
+unknowns are the pressures at a given load (Polonsky & Keer). With adhesion, the unknowns are the gaps at a given mean
+gap (Rey et al.), and the traction at a gap u is -(dgamma/rho) exp(-u/rho). The load control of Tamaas converges to
+wrong states with adhesion. Therefore ICHA searches for the mean gap at which the contact carries a given load.
 
 The gap is zero in contact, and attraction acts in a cohesive zone around the contact. In the law of Johnson, Kendall
-and Roberts (JKR) a contact area A lowers the energy by dgamma A. At a finite range the energetic area has the same
-effect. The energetic area is the integral of exp(-u/rho) over the nominal area. At fixed mean gap, the derivative of
-the energy with respect to dgamma equals minus the energetic area. The energetic area is larger than the area of zero
-gap. As the range decreases, both areas tend to the contact area of JKR. The energetic area approaches this limit at a
-much larger range.
+and Roberts (JKR), a contact area A lowers the energy by dgamma A. At a finite range, the energetic area replaces A. The
+energetic area is the integral of exp(-u/rho) over the nominal area. At fixed mean gap, the derivative of the energy
+with respect to dgamma equals minus the energetic area. The energetic area is larger than the area of zero gap. As the
+range decreases, both areas tend to the contact area of JKR. The energetic area is close to this limit already at a much
+larger range.
 """
 
 import math
@@ -40,14 +40,14 @@ from icha.surfaces.surface import Surface
 
 # Relative error of the minimised energy at which Tamaas stops.
 DEFAULT_TOLERANCE = 1e-8
-# Search for the mean gap at a load: largest relative error of the load, and largest number of solutions.
+# The search for the mean gap at a load stops at this relative error of the load, or fails after _MAX_SOLVES solutions.
 LOAD_TOLERANCE = 2e-4
 _MAX_SOLVES = 20
 _MAX_ITERATIONS = 100_000
-# Numbers of iterations between two checks of the gap: while no node is in contact, and otherwise.
+# Numbers of iterations between two checks of the gap: while no node is in contact, and while nodes are in contact.
 _OPEN_ITERATIONS, _TOUCHING_ITERATIONS = 50, 1000
-# Distance over which the load on rough surfaces decreases by about a factor e, for the first step of a search; and
-# longest step of the search. Both are in h_rms.
+# Lengths in h_rms. Over the distance _DECAY, the load on rough surfaces decreases by about a factor e; this gives the
+# first step of a search. No step is longer than _LONGEST_STEP.
 _DECAY, _LONGEST_STEP = 0.4, 0.3
 
 REFERENCES = (
@@ -107,7 +107,7 @@ class NodalState:
         return raw - self.outside_pressure * material.interaction_range / material.surface_energy
 
     def stored_energy(self, material: Material) -> float:
-        """Return the elastic energy minus the energy of adhesion per nominal area, J/m^2; 0 without interaction.
+        """Return elastic energy minus energy of adhesion, per nominal area, J/m^2; 0 if surfaces do not interact.
 
         The elastic energy is half the mean of traction times displacement.
         """
@@ -189,8 +189,8 @@ class _Solver:
     """Solver of Tamaas for one surface, in units of h_rms for lengths and E* for pressures."""
 
     def __init__(self, fine, variable, tolerance):
-        """Set up the solver; its unknown is tamaas.PolonskyKeerRey.pressure or .gap, whose mean is prescribed."""
-        # With one thread sums keep their order, and results their bytes.
+        """Set up the solver; the mean of `variable` (tamaas.PolonskyKeerRey.pressure or .gap) is prescribed."""
+        # With one thread, sums always have the same order, so the same input gives the same bytes.
         tamaas.initialize(1)
         self.tolerance = tolerance
         self.unit = fine.rms_height
@@ -241,7 +241,7 @@ class GapContact:
         self.solver = _Solver(fine, tamaas.PolonskyKeerRey.gap, tolerance)
         unit = self.solver.unit
         if material.surface_energy > 0:
-            # Tamaas holds only a reference, so the object must outlive this call.
+            # Tamaas stores only a reference to the object, so the object must exist as long as the solver.
             self.attraction = tamaas.ExponentialAdhesionFunctional(self.solver.heights)
             self.attraction.parameters = {
                 "rho": material.interaction_range / unit,
@@ -288,7 +288,7 @@ class GapContact:
         return np.min(self.solver.model["gap"]) > 0
 
     def _imbalance(self):
-        """Return the error of a state without contact: largest difference of traction and attraction over dgamma/rho.
+        """Return the error of a state without contact: largest difference of traction and attraction, in dgamma/rho.
 
         Each mode of the traction is E* q/2 times the same mode of the displacement; the mean traction is unknown.
         """
@@ -344,10 +344,10 @@ def _next_gap(tried):
 
 
 def perimeter_correction(contact: np.ndarray) -> tuple[float, float]:
-    """Return the area fraction of a periodic contact map, corrected for errors at contact edges, and the perimeter.
+    """Return the area fraction of a periodic contact map, corrected for the grid error, and the contact perimeter.
 
-    Nodes along the edge overestimate the area by (pi - 1 + ln 2)/24 of the perimeter times the spacing (Yastrebov,
-    Anciaux & Molinari 2017, eq. 9). The unit of the perimeter is the grid spacing.
+    Counts of nodes overestimate the area by (pi - 1 + ln 2)/24 times perimeter times spacing (Yastrebov, Anciaux &
+    Molinari 2017, eq. 9). The unit of the perimeter is the grid spacing.
     """
     edges = sum(int(np.count_nonzero(contact != np.roll(contact, 1, axis))) for axis in (0, 1))
     return (np.count_nonzero(contact) - BEYOND_EDGES * edges) / contact.size, float(edges)

@@ -4,8 +4,8 @@ The mean gap is prescribed, as in a stiff testing machine. Each solution starts 
 stays on the same branch until the branch ends. At the end of a branch the surfaces jump, and the jump loses energy. The
 work done on the contact is minus the integral of the nominal pressure over the mean gap, by the trapezoidal rule. The
 work differs from the change of the stored energy by the energy that jumps dissipate, and by the error of the
-trapezoidal rule. If work and change of the energy in a step differ too much, the step is halved, at most five times.
-Therefore the position of a jump remains uncertain.
+trapezoidal rule. A step is halved if its work differs too much from the change of the stored energy. A step is halved
+at most five times, so the position of a jump within the smallest step remains unknown.
 """
 
 import math
@@ -29,17 +29,17 @@ from icha.references.finite_range import (
 from icha.support.rules import POSITIVE, TOLERANCE
 from icha.surfaces.surface import Surface
 
-# Surfaces are apart if every gap exceeds this number of ranges. There the traction is at most 0.7 % of the strength.
+# Surfaces are apart if every gap exceeds this number of ranges. Attraction is then at most 0.7 % of the strength.
 _APART = 5.0
-# Mean gap at the start of the loop minus the height of the highest summit, in ranges.
+# Mean gap at the start of the loop minus the height of the highest summit, in ranges of attraction.
 _START = 6.0
-# Error of the work of a step, over the surface energy, above which the step is halved; and largest number of halvings.
+# A step is halved, at most _MAX_HALVINGS times, if the error of its work divided by the surface energy exceeds this.
 _WORK_TOLERANCE = 1e-4
 _MAX_HALVINGS = 5
-# Largest relative error of the largest load, unless it lies within a jump; and number of attempts to reach the load.
+# The search for the largest load stops at this relative error, or after _MAX_LOAD_SEARCHES attempts (load in a jump).
 _LOAD_TOLERANCE = 1e-3
 _MAX_LOAD_SEARCHES = 12
-# A loop that takes more solutions than this does not end.
+# A loop with more solutions than this is aborted.
 _MAX_SOLVES = 5000
 
 
@@ -130,7 +130,7 @@ class _LoopSolver:
         return min(abs(_dissipated(records)[0]), _jump_position_error(records)[0])
 
     def total_work_error(self, records):
-        """Return the work error of all steps in J/m^2: dissipation in steps without jumps plus errors by jumps."""
+        """Return the work error of all steps in J/m^2: dissipation in steps without jumps, plus errors due to jumps."""
         dissipated = _dissipated(records)
         jump = dissipated > self.work_tolerance
         return abs(dissipated[~jump].sum()) + _jump_position_error(records)[jump].sum()
@@ -165,7 +165,7 @@ def _load_and_unload(solver, step, target, progress):
                     area = f"contact area {leg[-1]['contact_area_fraction']:.4g} A0"
                     progress(f"{solver.describe(state)}, {area}, error {state.residual:.2g}")
                 last = state
-        # If contact breaks at a larger mean gap than `start`, loading states are added from this larger gap on.
+        # If contact breaks at a larger mean gap than `start`, states are added: loading then begins at this larger gap.
         count = round((last.mean_separation - start) / step)
         farther = [solver.solve_from_undeformed(start + step * k) for k in range(count, 0, -1)]
         legs[0][:0] = map(solver.record, farther)
@@ -192,7 +192,7 @@ def _load(solver, _, start, step, target):
 
 
 def _search_load(solver, before, after, target):
-    """Yield states between two states up to the given load; if the load lies in a jump, the last state is `after`."""
+    """Yield states from `before` to the load `target`, Pa; if this load lies in a jump, the last state is `after`."""
     for _ in range(_MAX_LOAD_SEARCHES):
         share = (target - before.nominal_pressure) / (after.nominal_pressure - before.nominal_pressure)
         separation = before.mean_separation + share * (after.mean_separation - before.mean_separation)

@@ -1,10 +1,10 @@
 """Persson's theory of the adhesionless contact of a nominally flat rough surface.
 
 Pressures are reduced, p* = p/(E* h'_rms). The constants in this file name the sources. The form of Persson's theory
-with the rms slope is in M. H. Muser et al., Tribol. Lett. 65 (2017) 118, doi:10.1007/s11249-017-0900-2. Equation and
-gamma of Xu et al. are from the programs in their public data, https://github.com/xylcsi/PerssonModelFudgeFactor. Source
-for the stiffness in proportion to pressure: B. N. J. Persson, Phys. Rev. Lett. 99 (2007) 125502,
-doi:10.1103/PhysRevLett.99.125502.
+with the rms slope is in M. H. Muser et al., Tribol. Lett. 65 (2017) 118, doi:10.1007/s11249-017-0900-2. The equation
+and the gamma of Xu et al. are from the programs in the public data of Xu et al.,
+https://github.com/xylcsi/PerssonModelFudgeFactor. The stiffness that is proportional to the pressure is in B. N. J.
+Persson, Phys. Rev. Lett. 99 (2007) 125502, doi:10.1103/PhysRevLett.99.125502.
 """
 
 import numpy as np
@@ -14,10 +14,10 @@ from scipy.special import erf
 PERSSON = "B. N. J. Persson, J. Chem. Phys. 115 (2001) 3840, doi:10.1063/1.1388626"
 XU = "Y. Xu, L. Zhu, F. Xiao and Y. Zhou, Tribol. Lett. 72 (2024), doi:10.1007/s11249-024-01838-4, gamma = 0.45"
 YANG_PERSSON = "C. Yang and B. N. J. Persson, J. Phys.: Condens. Matter 20 (2008) 215214, gamma = 0.45"
-# Elastic energy of a small contact over that of full contact on the same area (Yang & Persson, gamma); and the same
-# ratio of the variances of the pressure (Xu et al., gamma).
+# Two parameters gamma. Yang & Persson: elastic energy of a small contact divided by that of full contact on the same
+# area. Xu et al.: the same ratio for the variance of the pressure.
 YANG_PERSSON_GAMMA, XU_GAMMA = 0.45, 0.45
-# Iterations for the area of Xu et al.; each one reduces its error to less than a quarter.
+# Iterations for the area of Xu et al. Each iteration reduces the error of the area to less than a quarter.
 _AREA_ITERATIONS = 40
 # Number of wave numbers of the quadrature on either side of the roll-off; odd for Simpson's rule.
 _POINTS = 401
@@ -89,8 +89,8 @@ def _over_wave_numbers(share, reduced_pressure, spectrum):
     pressure = np.asarray(reduced_pressure, float)
     if np.any(pressure <= 0):
         raise ValueError("reduced_pressure: must be greater than 0")
-    # Units are q_L for wave numbers and the value up to the roll-off for C. At q_L, w diverges and the inner integral
-    # vanishes, so nodes are spaced by the logarithm of q - q_L.
+    # The unit of wave numbers is q_L, and the unit of C is its value below the roll-off. At q_L, w diverges and the
+    # inner integral vanishes, so nodes are equally spaced along the logarithm of q - q_L.
     rolloff = max(spectrum.period / spectrum.rolloff_wavelength, 1.0)
     cutoff = spectrum.period / spectrum.short_wavelength
     falling = -2 * (1 + spectrum.hurst)

@@ -34,7 +34,7 @@ SEPARATE_SUMMITS_AREA_LIMIT = 0.1
 # McCool's 0.8968: alpha times the relative difference between the variances of all heights and of the summit heights.
 _SUMMIT_VARIANCE = 1 - 3 * math.sqrt(3) + 16 / math.pi
 
-# Largest distances from the mean summit height, in standard deviations: of the summits in the sum, and of the plane.
+# Largest distances from the mean summit height, in standard deviations: for summits in the sum, and for the plane.
 _FARTHEST_SUMMIT = 12.0
 _FARTHEST_PLANE = 10.0
 # Gauss-Legendre quadrature of the sum, on [-1, 1].
@@ -122,8 +122,8 @@ def fuller_tabor_pressure(reduced_separation, moments: SpectralMoments, material
 def separation_at(quantity: Callable, value, moments: SpectralMoments, *arguments):
     """Return the reduced separations at which quantity(separation, moments, *arguments) has the values `value`.
 
-    The quantity must decrease with the separation. Raise `ValueError` if a value is not positive, or if the separation
-    for a value is farther than 10 standard deviations from the mean summit height.
+    The quantity must decrease with the separation. Raise `ValueError` if a value is not positive, or if the plane would
+    be farther than 10 standard deviations from the mean summit height.
     """
     summits = gaussian_summits(moments)
     middle, reach = summits.mean_height / moments.rms_height, _FARTHEST_PLANE * summits.deviation / moments.rms_height
