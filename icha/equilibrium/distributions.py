@@ -38,7 +38,7 @@ def gap_distribution(law: JKR, surface: Surface, state: ContactState) -> dict:
     Returns
     -------
     gap_density : (bins,) float, P(u) in the bins of `icha.contact.model.gap_bins`, 1/m.
-    overlap_fraction : fraction of the nominal area outside the spots where the gap is negative: surfaces overlap there.
+    overlap_fraction : fraction of the nominal area outside the spots where the gap is negative: the surfaces overlap.
     area_beyond_edges : part of A/A0 that the cells do not count: spot area over the edges of a free square, and the
         excess over 1 in cells that overlapping spots cover more than once. The sum of the integral of P(u), A/A0
         and overlap_fraction is 1 + area_beyond_edges.
@@ -70,7 +70,7 @@ def gap_distribution(law: JKR, surface: Surface, state: ContactState) -> dict:
 
 
 def _gap_bin(u, edges):
-    """Return the bin of every gap u among `edges` from `gap_bins`: bin 0 if u < 0, the last bin above all edges."""
+    """Return the bin of every gap u for `edges` from `gap_bins`; bin 0 if u < 0, the last bin if u > edges[-1]."""
     last = len(edges) - 2
     decade = np.log10(np.maximum(u / edges[1], 1.0))
     index = np.minimum(decade * GAPS_PER_DECADE + 1, last).astype(np.intp)

@@ -24,9 +24,9 @@ from icha.half_space.interaction import Interaction
 
 # Largest relative error of a prescribed load or area.
 TARGET_TOLERANCE = 1e-11
-# With this weight, a relative error of load or area of TARGET_TOLERANCE counts as RESIDUAL_TOLERANCE.
+# With this weight, an error TARGET_TOLERANCE of load or area counts as much as an error RESIDUAL_TOLERANCE of a site.
 _TARGET_WEIGHT = RESIDUAL_TOLERANCE / TARGET_TOLERANCE
-# The interaction is set up for contact radii larger than now, so that several evaluations can use it. These radii are
+# The interaction is set up for larger contact radii, so that several evaluations can use it. The larger radii are
 # _RADIUS_AHEAD times the radii that the spots would have if all approaches were larger by _APPROACH_AHEAD h_rms.
 _APPROACH_AHEAD = 0.02
 _RADIUS_AHEAD = 1.2
@@ -71,9 +71,9 @@ class Evaluation:
     a : (n,) float, contact radii of the sites, m.
     equilibrium_height : (n,) float, asperity heights at which these approaches would be an equilibrium, m.
     error : (n,) float, left side minus right side of each equation, m.
-    control_error : nominal pressure (Pa) or area fraction minus the prescribed value; 0 if none is prescribed.
-    repulsion : repulsive parts of all forces over the nominal area, Pa, the unit of the error of a load close to zero;
-        0 if no load is prescribed.
+    control_error : nominal pressure (Pa) or area fraction minus the prescribed value; 0 for a given separation.
+    repulsion : sum of the repulsive parts of all forces, divided by the nominal area, Pa: the scale of the error of a
+        small load. It is 0 if no load is prescribed.
     interaction : elastic interaction of the spots.
     """
 
@@ -130,8 +130,8 @@ class Equations:
     def error_size(self, evaluation: Evaluation, target_weight: float = _TARGET_WEIGHT) -> float:
         """Return the larger of two errors: the largest error of the sites, in h_rms, and the error of load or area.
 
-        The error of load or area is relative to its target, times `target_weight`. The error of a load close to zero, a
-        small difference of repulsion and attraction, is relative to SMALLEST_LOAD times the repulsion.
+        The error of load or area is divided by its target and multiplied by `target_weight`. A load close to zero is a
+        small difference of repulsion and attraction: its error is divided by SMALLEST_LOAD times the repulsion.
         """
         size = float(np.max(np.abs(evaluation.error), initial=0.0)) / self.contact.rms_height
         if self.control is None:

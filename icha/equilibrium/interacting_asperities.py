@@ -52,15 +52,15 @@ class InteractingAsperities(AsperityContact):
         return find_equilibrium(self, state, separation, control, let_go=let_go)
 
     def continue_from(self, state: ContactState, before: ContactState) -> ContactState:
-        """Raise `NotImplementedError`: no path calls this method of a model without `error_controlled_steps`."""
+        """Raise `NotImplementedError`: a path calls this method only for models with `error_controlled_steps`."""
         raise NotImplementedError
 
     def pressure(self, state: ContactState) -> float:
-        """Return the force over the nominal area, Pa."""
+        """Return the force divided by the nominal area, Pa."""
         return pressure_or_area_fraction(self, PRESSURE, state.spots.contact_radius, state.spots.radius_of_curvature)
 
     def area_fraction(self, state: ContactState) -> float:
-        """Return the contact area over the nominal area."""
+        """Return the contact area divided by the nominal area."""
         spots = state.spots
         return pressure_or_area_fraction(self, AREA_FRACTION, spots.contact_radius, spots.radius_of_curvature)
 
@@ -91,10 +91,10 @@ class InteractingAsperities(AsperityContact):
         return float(np.sum(derivative_by_radius(self, quantity, a, R) * growth))
 
     def stored_energy(self, state: ContactState) -> float:
-        """Return the elastic energy minus the energy of adhesion, over the nominal area, J/m^2; zero without contact.
+        """Return the elastic energy minus the energy of adhesion, per nominal area, J/m^2; zero without contact.
 
-        The energy of a spot is that of a single JKR contact, plus half its force times the displacement by the other
-        spots. The displacement is taken at the centre of a spot, as in eq. (4), although the spot has an area.
+        The energy of a spot is that of a single JKR contact, plus F w/2. Here F is the force of the spot, and w the
+        displacement by the other spots. As in eq. (4), w is that at the centre of the spot, although a spot has an area.
         Therefore the interaction of two spots of different size is not exactly reciprocal. Along a path without events,
         the change of the energy and the work done are not exactly equal. They differ by about (a/r)^2 times the
         interaction energy, where r is the distance of the spots.
@@ -125,9 +125,9 @@ class AsperityObservables:
         return {}
 
     def of_step(self, state: ContactState) -> dict:
-        """Return the residual, the number of barred asperities, and the fraction outside the range of Wu's eq. (3).
+        """Return the residual, the number of barred asperities, and the fraction of single spots outside Wu's range.
 
-        The fraction counts the single spots whose Tabor parameter is below 1. Without adhesion it is 0.
+        Wu's formula for jump-in, eq. (3), is verified for Tabor parameters from 1. Without adhesion the fraction is 0.
         """
         law, spots = self.contact.law, state.spots
         verified = law.is_jump_in_verified(spots.radius_of_curvature[spots.members == 1])

@@ -18,11 +18,11 @@ class IterationState:
     ----------
     contact : contact of the asperities.
     start : equilibrium from which the search starts.
-    unloading : whether the prescribed or first guessed separation is larger than that of `start`.
+    unloading : whether the separation, prescribed or first guessed, is larger than the separation of `start`.
     sites : table of sites.
     site_of_asperity, last_approach, last_separation, barred_count : as in `ContactState`.
-    released_from : (asperities,) int, site of the union that released an asperity when it broke contact, since the last
-        call of `apply_jump_in`; -1 for other asperities.
+    released_from : (asperities,) int, site of the union that has released the asperity since the last call of
+        `apply_jump_in`; -1 for other asperities.
     was_released : (asperities,) bool, whether a union has released an asperity during this search.
     barred : (asperities,) bool, whether an asperity may not make contact again because it broke contact in this search.
     new_unions : indices of the sites of unions whose heights are not known yet.

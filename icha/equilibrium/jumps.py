@@ -38,7 +38,7 @@ def add_candidates(state: IterationState, separation: float) -> IterationState:
     fall = state.last_separation - separation
     growth = _USUAL_APPROACH_RATE * fall + _sudden_growth(state.contact, *_SUDDEN_GUESS)
     candidates = np.flatnonzero((state.last_approach + growth > 0) & state.lacks_site)
-    # If an asperity was in contact just before, its approach is not known, but it is small.
+    # If an asperity was in contact just before, its approach is small, but not known.
     expected = np.where(np.isfinite(fall), state.last_approach + fall, 0.0)
     return _add_sites(state, candidates, CANDIDATE, expected[candidates])
 
@@ -79,7 +79,7 @@ def apply_jump_in(state: IterationState, evaluation: Evaluation, margin: float) 
     splits, jumping = np.unique(source[source >= 0]), ready[source < 0]
     state = state.with_events(SPLIT, state.sites.position[splits], state.sites.members[splits])
     if contact.adhesive:
-        # The jump releases its energy at the jump-in approach. Any further approach is work done on the spot.
+        # The jump releases its energy at the jump-in approach. Work done on the spot causes any further approach.
         R = asperities.radius_of_curvature[jumping]
         energy = -law.energy(law.contact_radius(contact.jump_in_approach[jumping], R), R)
         state = state.with_events(JUMP_IN, asperities.position[jumping], 1, energy, jumping)
@@ -87,14 +87,14 @@ def apply_jump_in(state: IterationState, evaluation: Evaluation, margin: float) 
 
 
 def _sudden_growth(contact, x, y):
-    """Return x h_rms + y |delta_off|, m: guess (_SUDDEN_GUESS) or bound of the growth of an approach by other jumps."""
+    """Return x h_rms + y |delta_off|, m: a possible increase of an approach by jumps of other spots (_SUDDEN_GUESS)."""
     return x * contact.rms_height - y * contact.law.jump_off_approach(np.max(contact.asperities.radius_of_curvature))
 
 
 def _evaluate_approaches(state, evaluation, spots, margin):
     """Compute the approaches of the asperities without site that may have reached jump-in, and store them in the state.
 
-    If `margin` is 0, an upper bound selects these asperities; otherwise a guess selects them, which may miss some.
+    If `margin` is 0, an upper bound selects these asperities; otherwise a guess selects them, and may miss some.
     Return the new state, and the indices of the evaluated asperities. `spots` : indices of the sites in contact.
     """
     contact, asperities, sites = state.contact, state.contact.asperities, state.sites

@@ -3,8 +3,8 @@
 The unknowns are the approaches of the sites: the spots and, without adhesion, the candidates for contact. A candidate
 with a negative approach exerts no force, so the solution shows which candidates are in contact.
 
-The approximate matrix of the linear equations neglects the higher moments of the pressure of distant spots. Its changes
-of the displacements have a relative error of about 1e-3. It is several times faster than the exact matrix.
+The approximate matrix of the linear equations neglects the higher moments of the pressure of distant spots. Changes of
+the displacements then have a relative error of about 1e-3. This matrix is several times faster than the exact matrix.
 """
 
 from dataclasses import replace
@@ -37,7 +37,7 @@ _PAST_JUMP_OFF = 0.2
 
 
 def newton_step(equations: Equations, evaluation: Evaluation, size: float) -> tuple[Evaluation, bool, bool]:
-    """Take one Newton step; halve it until it lowers `size`, the `error_size` before the step, by enough.
+    """Take one Newton step, halved until the error is enough below `size`, the `error_size` before the step.
 
     The error must fall by at least 10 % after the full step, 5 % after half the step, and so on. If eight trials with
     the approximate matrix fail, eight with the exact matrix follow. Return the evaluation after the step (the old one
@@ -58,10 +58,11 @@ def newton_step(equations: Equations, evaluation: Evaluation, size: float) -> tu
 
 
 def solve_response(equations: Equations, evaluation: Evaluation) -> np.ndarray:
-    """Return the response x = d(delta)/du of the approach of every site to the mean separation, (n,); -1 if removed.
+    """Return the response x = d(delta)/du of the approach of every site to the mean separation, (n,).
 
     The response solves (1 + W' da/d(delta)) x = -1, where W' = dw/da is the derivative of the displacements. Repeated
-    solves correct x, with the approximate matrix and then with the exact one. Raise `NotConverged` if these fail.
+    solves correct x, with the approximate matrix and then with the exact one. Raise `NotConverged` if these fail. The
+    response of removed sites is -1.
     """
     sites = equations.sites
     response = np.full(len(sites), -1.0)
@@ -142,15 +143,15 @@ def _solve_step(equations, evaluation, exact):
 def _take_step(equations, evaluation, step):
     """Return the approaches (n,) after a Newton step (n,), m, which is modified for three kinds of spots.
 
-    The modifications apply only with adhesion. They use that the equations are smooth functions of the contact radius,
-    which changes near jump-off as s, the square root of delta - delta_off.
+    The modifications apply only with adhesion. The equations are smooth functions of the contact radius, but near
+    jump-off the radius changes as s, the square root of delta - delta_off.
 
     1. A spot in contact with a radius below 1.5 jump-off radii and a step towards jump-off: the step is taken in the
        radius. If the radius reaches its lowest value, the jump-off radius, the approach falls by the rest of the step.
     2. A spot far past jump-off: the approach rises at most to jump-off.
     3. A spot a little past jump-off that returns to contact (`_returns_to_contact`): s solves s^2 + c s = L. Here L is
        the new value of delta - delta_off if the displacement remained the same, and c s is the change of the
-       displacement. The Newton step gives s_N, which neglects s^2. Therefore c = L/s_N.
+       displacement. The Newton step neglects s^2 and gives s_N, so that c = L/s_N.
     """
     approach = evaluation.approach + step
     if not equations.contact.adhesive:
@@ -167,7 +168,7 @@ def _take_step(equations, evaluation, step):
     R, a = sites.radius_of_curvature[close], evaluation.a[close]
     stable = np.maximum(evaluation.approach, jump_off_approach)[close]
     change = radius_slope(law, a, R, stable, jump_off_approach[close]) * step[close]
-    # The rest of the step is a fraction of the step, or the same fraction of minus the error if this is lower.
+    # The rest is a fraction of the step or, if minus the error is lower than the step, a fraction of minus the error.
     rest_fraction = 1 - np.minimum((lowest - a) / np.where(change < 0, change, -1.0), 1.0)
     reached = law.approach(np.maximum(a + change, lowest), R)
     approach[close] = reached + np.where(change < 0, rest_fraction * np.minimum(step, -evaluation.error)[close], 0.0)
@@ -180,7 +181,7 @@ def _take_step(equations, evaluation, step):
 
 
 def _returns_to_contact(sites, evaluation):
-    """Return a mask (n,) of the spots that are a little past jump-off and that their error moves back into contact."""
+    """Return a mask (n,) of the spots a little past jump-off whose errors move them back into contact."""
     excess = sites.jump_off_approach - evaluation.approach
     return (sites.status == CONTACT) & (excess >= 0) & (excess < -_PAST_JUMP_OFF * evaluation.error)
 

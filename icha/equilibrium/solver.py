@@ -23,7 +23,7 @@ from icha.equilibrium.unions import absorb_new_asperities, merge_overlapping, se
 # is exceeded by less than _EVENT_MARGIN times the error.
 _EVENT_TOLERANCE = 3e-4
 _EVENT_MARGIN = 10.0
-# Largest number of Newton steps between two rounds of events, and largest number of steps with the exact matrix in the
+# Largest number of Newton steps between two rounds of events. Largest number of steps with the exact matrix in the
 # whole search. If more are needed, the step of the path is too long.
 _MAX_NEWTON_STEPS = 60
 _MAX_EXACT_STEPS = 4
@@ -41,8 +41,8 @@ def find_equilibrium(
 ) -> ContactState:
     """Find the equilibrium at another mean separation, load or contact area, starting from an equilibrium.
 
-    Parameters and errors are those of `icha.contact.model.ContactModel.equilibrium`: with a `control`, `separation` is
-    only the first guess; `let_go` is the number of spots that are made to break contact before the first Newton step.
+    Parameters and errors are those of `icha.contact.model.ContactModel.equilibrium`. With a `control`, `separation` is
+    only the first guess. `let_go` is the number of spots that are made to break contact before the first Newton step.
     When the equations are nearly solved, all events that are due are applied. If no Newton step reduces the error,
     overlapping spots merge. The search ends when the equations are solved and no event is due.
 

@@ -22,8 +22,8 @@ def merge_overlapping(state: IterationState, evaluation: Evaluation, margin=0.0,
     """Replace pairs of overlapping spots by unions; each spot merges with at most one other. Return the new state.
 
     margin : error of the approaches, m; two spots merge only if they overlap more than this error can cause.
-    deep : whether only those pairs merge in which one spot covers the centre of the other. It also matters for two
-        spots from the split of one union: on unloading, they merge again only if `deep` is True.
+    deep : whether only those pairs merge in which one spot covers the centre of the other. On unloading, two spots
+        from the split of one union merge again only if `deep` is True.
     """
     sites, law, cell, a = state.sites, state.contact.law, state.contact.asperities.cell, evaluation.a
     pairs = _select_merging_pairs(state, evaluation, margin, deep)
