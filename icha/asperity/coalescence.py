@@ -36,7 +36,7 @@ def overlapping_pairs(position, a, first, second, r):
 
 
 def disjoint_pairs(pairs):
-    """Select pairs in their order: each pair that shares no spot with a pair selected before."""
+    """Select pairs in the given order, without each pair that shares a spot with a pair selected before."""
     taken, chosen = set(), []
     for i, j in pairs.tolist():
         if i not in taken and j not in taken:
@@ -46,7 +46,7 @@ def disjoint_pairs(pairs):
 
 
 def equivalent_spots(law: JKR, position_i, a_i, R_i, position_j, a_j, R_j, period):
-    """Return the centres, contact radii and radii of curvature (m) of the spots that replace the pairs i, j."""
+    """Return the centres, contact radii and radii of curvature (m) of the spots that replace pairs of spots i, j."""
     a, R, fraction = law.union(a_i, R_i, a_j, R_j)
     offset = periodic_difference(position_j, position_i, period)
     centre = np.mod(position_i + fraction[:, None] * offset, period)

@@ -10,7 +10,7 @@ import math
 
 from icha.asperity.material import Material
 
-# Strength number from which nodes jump into contact one at a time. Such a grid is refused.
+# Smallest strength number at which nodes jump into contact one at a time. ICHA refuses such a grid.
 MAX_STRENGTH_NUMBER = 0.5
 
 
@@ -22,7 +22,7 @@ def longest_spacing(material: Material) -> float:
 
 
 def strength_number(material: Material, spacing: float) -> float:
-    """Return sqrt(dgamma dx/E*)/rho for a spacing dx, m: the distance of the jump of a single node, divided by rho."""
+    """Return sqrt(dgamma dx/E*)/rho for a spacing dx, m: the distance over which one node jumps, divided by rho."""
     return math.sqrt(material.adhesion_length * spacing) / material.interaction_range
 
 

@@ -46,7 +46,7 @@ class Material:
 
     @property
     def adhesion_length(self) -> float:
-        """Surface energy over contact modulus, the elasto-adhesive length, m."""
+        """Surface energy divided by contact modulus, the elasto-adhesive length, m."""
         return self.surface_energy / self.contact_modulus
 
     @property
