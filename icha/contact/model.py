@@ -23,7 +23,7 @@ class Control:
 
     Attributes
     ----------
-    quantity : PRESSURE (nominal pressure, Pa) or AREA_FRACTION (contact area over nominal area).
+    quantity : PRESSURE (nominal pressure, Pa) or AREA_FRACTION (contact area divided by nominal area).
     target : prescribed value of the quantity.
     """
 
@@ -114,8 +114,8 @@ class ContactModel(Protocol):
     rms_height : rms height h_rms of the surface, the unit of separations, m.
     asperities : summits of the surface; there may be none if the model does not need them.
     area : nominal contact area A0, m^2.
-    largest_area_fraction : contact area over nominal area above which the model is not valid.
-    path_accuracy : accuracy to which a path resolves its events.
+    largest_area_fraction : contact area, divided by nominal area, above which the model is not valid.
+    path_accuracy : accuracy with which a path resolves its events.
     """
 
     adhesive: bool
@@ -149,13 +149,13 @@ class ContactModel(Protocol):
         """
 
     def pressure(self, state: State) -> float:
-        """Return the force over the nominal area, Pa; negative in tension."""
+        """Return the force divided by the nominal area, Pa; negative in tension."""
 
     def area_fraction(self, state: State) -> float:
-        """Return the contact area over the nominal area."""
+        """Return the contact area divided by the nominal area."""
 
     def mean_gap(self, state: State) -> float:
-        """Return the mean gap over the nominal area, m; on a periodic surface the mean separation."""
+        """Return the mean of the gap in the nominal area, m; on a periodic surface the mean separation."""
 
     def spot_count(self, state: State) -> int:
         """Return the number of contact spots."""

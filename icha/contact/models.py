@@ -14,8 +14,8 @@ RESIDUAL_TOLERANCE = 1e-9
 # With adhesion a load is the difference of repulsion and attraction. If the load is less than this fraction of the
 # repulsion, the error of the load is relative to this fraction of the repulsion.
 SMALLEST_LOAD = 1e-4
-# Error of a prescribed area, without adhesion, if contact is counted in whole cells. It must be below both values: the
-# first is in cells, the second is a fraction of the area.
+# Error of a prescribed area, without adhesion, if contact is counted in whole cells. The error must be below both
+# values: the first is in cells, the second is a fraction of the area.
 AREA_TOLERANCE_CELLS, AREA_TOLERANCE_PART = 2.0, 0.1
 
 
@@ -54,11 +54,11 @@ class PathAccuracy:
 
     Attributes
     ----------
-    event : step length, in h_rms, up to which an event in the step counts as located.
+    event : an event counts as located if the step that contains it is not longer than this value, in h_rms.
     loss : largest error of the work of one step with events, relative to `StepAccuracy.energy_scale`.
     balance : largest difference of work and energy change in a long step without events, relative to the same scale.
     tension : largest relative error of the largest tension in a step without events.
-    least_work : smallest energy to which `loss` is relative, J/m^2.
+    least_work : lower limit of the energy to which `loss` is relative, J/m^2.
     error_controlled_steps : if True, the error of the work of each step decides the length of the next step, because
         the pressure may jump without an event. If False, each step may be twice as long as the last one.
     """
@@ -87,7 +87,7 @@ class Model:
     stiffness_error : largest relative error of the contact stiffness.
     by_summits : whether summits represent the surface. If so, spots unite by a rule, which may lose or gain energy.
     by_cells : whether contact is counted in cells of the grid; runs then contain a map of the contact.
-    periodic_only : whether the model cannot press a square with free edges.
+    periodic_only : whether the model requires a periodic surface, not a square with free edges.
     least_cells : smallest valid number of grid cells per shortest wavelength; 0 for no limit.
     accuracy : accuracy with which a path resolves its events.
     resumable : whether a run saves checkpoints; if so, `module` contains a function `resumable(contact, folder)`.
