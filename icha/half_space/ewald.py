@@ -69,7 +69,7 @@ def short_mean(alpha, contact_modulus, period):
 class _SmoothSum:
     """Function that sums the smooth half of the displacement with non-uniform FFTs.
 
-    Making the FFT plans takes long. The plans depend only on the number of modes; points are set when they change.
+    FFT plans take long to make, but depend only on the number of modes. Points are set when they change.
     """
 
     def __init__(self, period, alpha, contact_modulus, cut, tolerance, dtype=np.complex128):
@@ -156,7 +156,7 @@ class Ewald:
         return (basis(points[:, 1], self.period), basis(points[:, 0], self.period)) if self.free else None
 
     def image_displacement(self, sources, targets, moments):
-        """Return the displacement (m) at targets by the images of sources; `bases` returns both arguments."""
+        """Return the displacement (m) at targets by the images of sources, whose `bases` are given."""
         field = image_field(*sources, moments, self.period, self.contact_modulus)
         by, bx = targets
         return np.einsum("ia,ia->i", by @ field, bx)

@@ -102,8 +102,8 @@ def image_potential(y, x):
 def mean_displacement(side: float, contact_modulus: float, position, force) -> float:
     """Return the mean displacement (m) of a square on a free half-space by n point forces at given positions.
 
-    By reciprocity, the mean displacement by one force is the displacement of its point if the force is spread uniformly
-    over the square. Each of the four rectangles between point and corners contributes x asinh(y/x) + y asinh(x/y).
+    By reciprocity, the mean displacement by a force at a point equals the displacement at this point by the same force,
+    spread over the square. Each of the four rectangles at the point contributes x asinh(y/x) + y asinh(x/y).
     """
     x, y = ([distance, side - distance] for distance in np.clip(position.T, 0.0, side))
     potential = sum(_corner_potential(width, height) for width in x for height in y)

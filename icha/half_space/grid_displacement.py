@@ -147,7 +147,7 @@ class DisplacementField:
 
     @cached_property
     def _smooth_half(self):
-        """Smooth half of all groups: refinement factor of its grid, and Fourier series along x of each refined row."""
+        """Smooth half of all groups: refinement factor of the grid, and Fourier series along x of each refined row."""
         modes = on_cores(self._compute_modes, self._groups)
         highest = [each.shape[1] - 1 for each in modes]
         finer = -(-(2 * max(highest) + 1) // self._nodes)
@@ -171,7 +171,7 @@ class DisplacementField:
         strength, factor = np.zeros(q2.shape, dtype=complex), np.ones(q2.shape)
         for even, odd in group.moments.T.reshape(-1, 2, len(group.spots)):
             # Two moments are transformed together, as real and imaginary parts. In the spectrum c, the part with
-            # c(-k) = conj c(k) belongs to the first moment. One thread fixes the order of summation.
+            # c(-k) = conj c(k) belongs to the first moment. One thread fixes every bit of the result.
             c = finufft.nufft2d1(y, x, even + 1j * odd, (len(k), len(k)), eps=_NUFFT_TOLERANCE, isign=-1, nthreads=1)
             mirrored = np.conj(c[::-1, ::-1])[:, highest:]
             c = c[:, highest:]
@@ -185,7 +185,7 @@ class DisplacementField:
         return strength
 
     def _evaluate_short_half(self, group, of_group, dy, dx):
-        """Return the exact displacement minus the smooth half in windows of a group; arguments as from `windows`."""
+        """Return the exact displacement minus the smooth half in windows of a group; `windows` yields the arguments."""
         spot, r2 = group.spots[of_group], dy[:, None] ** 2 + dx**2
         a, R = self.contact_radius[spot][:, None], self.radius_of_curvature[spot][:, None]
         w = self.law.displacement(np.sqrt(r2), a, R)
@@ -284,7 +284,7 @@ _SMOOTH_HALF = _smooth_half_table()
 def windows(centres, reach: float, grid: int, period: float, rows: slice):
     """Yield the nodes in some rows that lie in squares around `centres`, an (m, 2) array in m.
 
-    The half width of a square is `reach`, m. Some nodes lie a little outside. No node occurs twice for one centre.
+    The half width of a square is `reach`, m. Some nodes lie a little outside. No node occurs twice for the same centre.
 
     Yields
     ------

@@ -1,6 +1,6 @@
 """Elastic interaction of contact spots: the displacement at each spot by all other spots, the sum in eq. (4).
 
-Within eight radii of a spot, its exact displacement is used. Farther away, the moments of its axisymmetric pressure
+Within eight radii of a spot, the exact displacement is used. Farther away, moments of the axisymmetric pressure
 represent the spot: force, second moment and fourth moment, whose fields fall as 1/r, 1/r^3 and 1/r^5. The fourth moment
 acts only in the near field of the Ewald sum. Most of the sum depends only on the positions of the spots, and
 `icha.half_space.ewald` computes this part once. Only the exact displacements depend on the contact radii.
@@ -112,7 +112,7 @@ class Interaction:
         counts = np.flatnonzero(present[self.source])
         j, r, target = self.source[counts], self.r[counts], self.target[counts]
         fields = [moment[j] * field[counts] for moment, field in zip(moments, self.by_moments, strict=True)]
-        # Exact derivatives at the pairs, minus the derivatives by forces alone; and minus those by all moments.
+        # Exact derivatives at the pairs, minus derivatives by the forces. The second array subtracts all moments.
         beyond_forces = law.displacement_derivative(r, a[j], R[j]) - fields[0]
         beyond_moments = beyond_forces - fields[1] - fields[2]
 
