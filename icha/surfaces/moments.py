@@ -24,7 +24,7 @@ RESOLVED_CELLS = 8
 LEAST_CELLS_OF_SUMMIT = 80
 # Fewest cells per shortest wave with which boundary elements represent the surface.
 LEAST_CELLS_PER_WAVE = 1.5
-# Smallest ratio of the mean square slopes along two directions at which the smaller slope is not a rounding error.
+# Ratio of the mean square slopes along two directions, up to which the smaller slope is a rounding error.
 _NO_SLOPE = 1e-12
 # Wave number, in units of 2 pi/L, above which an integral replaces the sum over the waves.
 _DENSE = 64

@@ -119,7 +119,7 @@ class SelfAffineSpectrum:
         ----------
         grid : nodes along a side; fewer than 2 per shortest wavelength raise an error, fewer than 4 cause a warning.
         seed : seed of the random phases, a non-negative integer.
-        amplitudes : "fixed" (every seed has the rms height and slope of the spectrum), or "gaussian" (random).
+        amplitudes : "fixed" (each seed has the rms height and slope of the spectrum), or "gaussian" (random ones).
 
         Returns
         -------

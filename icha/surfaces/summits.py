@@ -121,7 +121,7 @@ def locate_summits(surface: Surface) -> Asperities:
     grid, the highest node can lie several cells away from the summit, or no node is a maximum. Missed and misplaced
     summits would change the contact area by some per cent from grid to grid. Therefore Newton's method starts from
     every node whose local parabola has its top at most one cell away. ICHA ignores a start node if Newton's method
-    converges far from the node. Steps can be very long where a principal curvature is nearly zero.
+    converges far from the node, because steps can be very long where a principal curvature is nearly zero.
 
     The edges of a free square have no maxima, because a crest that crosses an edge has its top outside the square.
     Point reflection continues the heights at these edges, and only summits between the outermost nodes count.

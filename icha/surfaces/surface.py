@@ -113,11 +113,11 @@ class Surface:
             raise ValueError(f"boundary: {FREE!r}; {purpose} needs a surface of boundary {PERIODIC!r}")
 
     def by_wave_vector(self, function) -> list:
-        """Return the results of `function(k2, count, power)`, called for blocks of all wave vectors except zero.
+        """Call `function(k2, count, power)` for blocks of all wave vectors, and return the list of the results.
 
         Wave vectors are 2 pi/L (kx, ky) with integers kx and ky. k2 is the array of kx^2 + ky^2, and power the array of
-        |h_q|^2 in m^2. count is 2 in columns where power is the sum over two opposite wave vectors, else 1. A free
-        square is treated as one cell of a periodic surface.
+        |h_q|^2 in m^2, 0 for k2 = 0. count is 2 in columns where power is the sum over two opposite wave vectors,
+        else 1. A free square is treated as one cell of a periodic surface.
         """
         n = self.grid
         half = np.empty((n, n // 2 + 1), dtype=complex)

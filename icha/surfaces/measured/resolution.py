@@ -50,7 +50,7 @@ class ScanResolution(PreparedTopography):
 
     Attributes
     ----------
-    measured : the square of the scan before the filter, the treatment of edges and the change of grid.
+    measured : the square of the scan before filter, treatment of edges and change of grid.
     cutoff : nesting index of the filter, m; None without a filter.
     """
 

@@ -106,7 +106,7 @@ def read_matrix(file: SourceFile, settings: Preparation) -> FileContent:
 
 
 def _as_instrument_file(file, settings):
-    """Read a text with SurfaceTopography; None if it finds no unit, or heights not proportional to the numbers."""
+    """Read a text with SurfaceTopography; None if it finds no unit, or if the heights disagree with the numbers."""
     try:
         found = read_instrument(file, settings)
     except Exception:  # SurfaceTopography raises many types of errors for texts of other formats
@@ -154,7 +154,7 @@ def _titles(layout):
 
     Returns
     -------
-    Name and unit (m, or None) of every column. The list is empty unless x, y and z are each the title of one column.
+    Name and unit (m, or None) of every column. The list is empty unless x, y and z each occur exactly once.
     """
     if not layout.heading:
         return []
@@ -195,7 +195,7 @@ def _mark_missing(heights, heading):
 def _read_heading(lines: Sequence[str], shape: tuple[int, int], decimal_comma: bool, settings: Preparation) -> _Heading:
     """Read units, size and missing heights from the heading of a table of this shape (rows, columns).
 
-    Raises UnfitTopography if the settings have no size and the heading has one with an ambiguous comma.
+    Raises UnfitTopography if the size in the heading has an ambiguous comma and the settings have no size.
     """
     entries, sides = _entries(lines), _image_sides(lines)
     if {"ncols", "nrows", "cellsize"} <= entries.keys():
@@ -264,7 +264,7 @@ def _size(sizes, pixels, shape):
 
 
 def _lengths(text):
-    """Return two lengths x and y from a text, and whether their unit is known (then in m); None without lengths."""
+    """Return two lengths x and y from a text, and whether they are in m (False: unknown unit); None without lengths."""
     if not (found := _LENGTHS.match(text)):
         return None
     x, y, units = _number(found[1]), _number(found[3] or found[1]), (found[2] or found[4], found[4] or found[2])

@@ -121,7 +121,7 @@ def are_halves_of_decimals(rows: list[list[str]]) -> bool:
     """Return whether columns alternate between digits before and digits after decimal commas.
 
     Digits after a comma have no sign, and their number is the same in all rows of a column. This may also hold for
-    columns of integers. Evidence of decimals is a leading zero after a comma, or a different length before a comma.
+    columns of integers. Leading zeros after a comma, or numbers of other lengths before a comma, show decimals.
     """
     # A row is shorter if its last field is empty.
     width = max(map(len, rows))
