@@ -36,7 +36,7 @@ from icha.support.formatting import format_count, printable_lines
 CHOICES = ("study", "surface", "rms_slope", "material", "seed")
 # Largest numbers of cells along an edge of a topography, and along an edge of a contact map, which has finer details.
 MOST_HEIGHTS, MOST_CELLS = 256, 512
-# Smallest pressure density on the page, as a fraction of the highest one: the tail of JKR is infinite.
+# Smallest pressure density on the page, divided by the highest density. With the JKR law, the tail has no end.
 LEAST_DENSITY = 1e-3
 LEVELS = 255  # largest grey level of a picture
 CONTACT_COLOUR = (230, 0, 13)  # red, green and blue of spots and patches
@@ -121,7 +121,7 @@ def _dataset(folder: Path) -> Path:
 
 
 def _contacts(labels: list[RunLabels], only: Mapping[str, Collection]) -> list[list[RunLabels]]:
-    """Group the chosen runs that differ only in their model. Groups with the first seed of each contact come first."""
+    """Group the chosen runs that differ only in their model. First come the groups with the first seed of a contact."""
     for name, values in only.items():
         known = list(dict.fromkeys(getattr(run, name) for run in labels))
         if unknown := [value for value in values if value not in known]:
@@ -154,7 +154,7 @@ def _contact(campaign: xr.DataTree, folder: Path, labels: list[RunLabels]) -> di
 
 
 def _maps(folder: Path, labels: RunLabels, run: xr.Dataset) -> list[str] | None:
-    """Return the contact map at every snapshot of a run with boundary elements; None for other runs or without a file.
+    """Return the contact map at each snapshot of a boundary-element run; None for other runs or without a file.
 
     Only the file of the run contains maps. The order of snapshots in this file and in the campaign dataset may differ.
     """
@@ -275,7 +275,7 @@ def _points(curve) -> list[str]:
 
 
 def encode_map(contact: np.ndarray) -> str:
-    """Return a map of contact as a PNG in base64; opacity is the fraction of a cell in contact.
+    """Return a map of contact as a PNG in base64; the opacity of a cell is its fraction in contact.
 
     Parameters
     ----------

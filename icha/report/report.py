@@ -27,7 +27,7 @@ from icha.report.studies import summarise_study
 from icha.report.template import MOST_ROWS, write_page
 
 SOFTWARE = ("icha", "numpy", "scipy", "finufft", "xarray", "netCDF4", "matplotlib", "snakemake")
-FOLDED_ROWS = 30  # rows of a table; longer tables are folded
+FOLDED_ROWS = 30  # largest number of rows of a table that is not folded
 
 
 @dataclass(frozen=True)
@@ -106,7 +106,7 @@ def write_report(
 
 
 def _content(campaign, checks, model_error, surfaces):
-    """Return what the page says about the campaign, its surfaces and its checks, by the names in the template."""
+    """Return the contents of the page on the campaign, its surfaces and its checks, by the names in the template."""
     studies = [summarise_study(campaign, name) for name in campaign.children]
     errors = list(model_error.children.values()) if model_error is not None else []
     texts = ";".join(node.attrs.get("references", "") for node in [*campaign.children.values(), *errors])
@@ -132,7 +132,7 @@ def _content(campaign, checks, model_error, surfaces):
 
 
 def _pictures(figures: Sequence[ReportFigure], campaign: xr.DataTree, link) -> list[dict]:
-    """Return the figures of the page: first the figures of several studies or none, then the figures of each study.
+    """Return the figures of the page: first the figures of several studies or of no study, then those of each study.
 
     The number of a figure is part of its name. Captions state how many runs are missing or drawn pale.
     """

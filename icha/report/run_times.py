@@ -10,7 +10,7 @@ from icha.support.atomic_files import whole_file
 def write_times(table: str | os.PathLike, benchmarks: str | os.PathLike) -> None:
     """Write the wall time and the peak memory of every job that has a benchmark file below a folder.
 
-    The memory is the part that a job does not share with its parent process (`max_uss`). The value is 0 if the job
+    Only the memory that a job does not share with its parent process counts (`max_uss`). The value is 0 if the job
     ended before the first measurement.
     """
     rows = ["job\tseconds\tmegabytes"]

@@ -1,4 +1,4 @@
-"""Sections of the report on surfaces, and on the error of the asperity model against boundary elements."""
+"""Sections of the report: surfaces, and the error of the asperity model relative to boundary elements."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ def draw_spectra(members):
 
 
 def summarise_errors(errors: xr.Dataset) -> dict:
-    """Return the values for the section on one comparison of models: ranges of errors, and a row for each state."""
+    """Return the values for the section on one comparison of models: ranges of errors, and a table row per state."""
     rows = []
     for (surface, slope), material in itertools.product(
         surfaces_and_slopes(errors), errors["material"].values.tolist()

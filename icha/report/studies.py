@@ -29,7 +29,7 @@ SHOWN_AT = {
     "area_fraction": ("pressure", "gap"),
     "mean_separation": ("pressure", "area"),
 }
-MOST_STOPS = 12  # columns of a table; from more targets, 12 are chosen evenly
+MOST_STOPS = 12  # largest number of targets (columns) in a table; if there are more, 12 are chosen evenly
 FORMATS = {"pressure": format_scientific, "area": format_scientific, "gap": "{:.3f}".format}
 EVENT_COUNTS = ("spot_count", "jump_in_count", "jump_off_count", "coalescence_count")
 STATISTICS = ("asperity_count", "nayak_parameter", "stickiness", "tabor_parameter", "full_contact_energy_ratio")
@@ -53,7 +53,7 @@ def summarise_study(campaign: xr.DataTree, name: str) -> dict:
     )
     failed = [*incomplete, *failed_checks]
     reasons = [(labels, _reason(dataset, "applicability", labels)) for labels in complete]
-    # Spots and events are many, and the page does not need them.
+    # Spots and events take much memory, and the page does not need these variables.
     small = xr.DataTree.from_dict({f"/{name}": dataset.drop_dims([dim for dim in RAGGED if dim in dataset.dims])})
     runs = [(labels, select_run(small, labels)) for labels in complete[:MOST_ROWS]]
     return {
@@ -68,7 +68,7 @@ def summarise_study(campaign: xr.DataTree, name: str) -> dict:
         "not_applicable": [(labels, reason) for labels, reason in reasons if reason],
         "lacking": missing[:MOST_ROWS],
         "axes": axes,
-        # Above a free square, the mean separation is that from the half-space far away, not the mean gap.
+        # For a free square, the mean separation differs from the mean gap (`reduced_gap`).
         "free": bool((dataset["boundary"] == "free").any()),
         "materials": [_material(dataset.sel(material=material)) for material in axes["material"][:MOST_ROWS]],
         "runs": [_run(labels, run) for labels, run in runs],
@@ -92,7 +92,7 @@ def _material(dataset: xr.Dataset) -> dict[str, str]:
 
 
 def _run(labels: RunLabels, run: xr.Dataset) -> dict:
-    """Return the statistics of a run; events are counted up to the end of its first loading."""
+    """Return the statistics of a run; jumps and coalescences are counted up to the end of the first loading."""
     loaded = np.flatnonzero(loading_stops(run).values)[-1:]
     return {
         "labels": labels,
@@ -105,7 +105,7 @@ def _run(labels: RunLabels, run: xr.Dataset) -> dict:
     }
 
 
-# --- tables of states at the stops of the path ---
+# --- tables of states at the targets of the path ---
 
 
 def collect_states(run: xr.Dataset) -> dict[tuple[str, float], dict[str, float]]:
@@ -192,7 +192,7 @@ def _loops(campaign: xr.DataTree, dataset: xr.Dataset, complete: list[RunLabels]
     if "hysteresis_loss" not in dataset:
         return {"rows": [], "parts": {}, "count": 0}
     runs = {labels: select_run(campaign, labels) for labels in complete}
-    # The path of a run beyond its model ends before it unloads.
+    # The path of a run that leaves the range of its model ends before unloading.
     groups = _ensembles(dataset, [labels for labels, run in runs.items() if "hysteresis_loss" in run])
     rows = [row | _loop([runs[labels] for labels in members]) for row, members in groups[:MOST_ROWS]]
     shown = {name for row in rows for name, share in row["shares"].items() if share}
@@ -206,7 +206,7 @@ def _loop(runs: list[xr.Dataset]) -> dict:
     def values(name):
         return np.array([float(run[name]) for run in runs])
 
-    # A smaller loss of a closed loop is a rounding error.
+    # A closed loop with a loss smaller than `rounding` has no loss.
     rounding = IDENTITY_LIMIT * np.array([np.nanmax(np.abs(run["work"].values)) for run in runs])
     loss = values("hysteresis_loss")
     lost = np.abs(loss) > rounding
@@ -230,7 +230,7 @@ def _loop(runs: list[xr.Dataset]) -> dict:
 
 
 def _with_unit(values: np.ndarray, unit: str = "") -> Markup:
-    """Format a mean with its unit, and its accuracy below it."""
+    """Format a mean with its unit; a second line contains the accuracy of the mean."""
     factor, unit = choose_unit(float(np.mean(values)), unit) if unit else (1.0, "")
     mean = format_scientific(float(np.mean(values)) * factor) + (f" {unit}" if unit else "")
     text = format_range(values * factor, format_scientific)

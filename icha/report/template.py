@@ -13,7 +13,7 @@ from icha.support.atomic_files import whole_file
 from icha.support.formatting import printable_lines
 from icha.support.statistics import ENOUGH, ensemble
 
-MOST_ROWS = 300  # rows of a table
+MOST_ROWS = 300  # largest number of rows in a table
 # Symbols in captions and attributes, and their form on a page.
 SYMBOLS = {
     r"h(?:&#39;|')_?rms": "<i>h</i>′<sub>rms</sub>",
@@ -51,7 +51,7 @@ def per_cent(value: float, *, signed: bool = True) -> str:
 
 
 def format_mean(values: np.ndarray, form) -> Markup:
-    """Format the mean of values, and its accuracy (`format_range`); the function `form` formats one number."""
+    """Format the mean of values and the accuracy of the mean (`format_range`); `form` formats one number."""
     text = format_range(values, form)
     return Markup(form(float(np.mean(values)))) + (Markup(" ") + text if text else "")
 

@@ -179,10 +179,10 @@ def test_unloaded_runs_have_tables_of_pull_off_and_loss(write):
     assert pull_off["hertz"]["Pull-off"] == "0 Pa" and pull_off["hertz"]["Last contact"] == "–"
     # All is lost in jumps out of contact, and nothing without adhesion.
     assert loss["soft"]["Jump-off, %"] == "100.0" and loss["hertz"]["Jump-off, %"] == "–"
-    assert loss["hertz"]["Loss"] == "0 J/m²" and loss["hertz"]["over Δγ"] == "–"
+    assert loss["hertz"]["Loss"] == "0 J/m²" and loss["hertz"]["Loss / Δγ"] == "–"
     over = np.array([float(run["hysteresis_loss"]) / 0.05 for run in runs])
     mean, low, high = (format_scientific(each) for each in (over.mean(), over.min(), over.max()))
-    assert loss["soft"]["over Δγ"] == f"{mean}<br>({low} … {high})".replace("-", "−")
+    assert loss["soft"]["Loss / Δγ"] == f"{mean}<br>({low} … {high})".replace("-", "−")
     assert "Coalescence, %" not in loss["soft"], "a loss of zero in all rows has no column"
 
 

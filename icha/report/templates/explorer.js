@@ -1,5 +1,5 @@
 "use strict";
-// The data of the page (icha/report/explorer.py): contacts, each with its runs by model; and topographies.
+// The data of the page (icha/report/explorer.py): topographies, and contacts. Each contact has one run per model.
 const { contacts, topographies } = JSON.parse(document.getElementById("data").textContent);
 const CHOICES = ["study", "surface", "rms_slope", "material", "seed"];
 const WORDS = { asperities: "asperities", boundary_elements: "boundary elements" };
@@ -13,7 +13,7 @@ const stop = byId("stop");
 
 const bytes = (text) => Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
 const floats = (text) => new Float32Array(bytes(text).buffer);
-// A number as text to four digits, with a true minus sign.
+// Format a number with four digits and a typographic minus sign.
 const digits = (value) => (value && Math.abs(value) < 1e-4 ? value.toExponential(3) : value.toPrecision(4));
 const format = (value) => digits(value).replace(/(\.\d*?)0+(e|$)/, "$1$2").replace(/\.(e|$)/, "$1").replaceAll("-", "−");
 
@@ -28,7 +28,7 @@ function fill(list, values, words = {}) {
   list.disabled = values.length < 2;
 }
 
-// Each list offers the values that exist with the choices before it.
+// Each list offers the values that exist for the choices in the earlier lists.
 function choose() {
   let left = contacts;
   for (const name of CHOICES) {
@@ -51,14 +51,14 @@ function opened(run) {
 
 // The step of a run at the position of the slider; -1 without such a step.
 const stepOf = (run) => (run === leading || !run.partners ? Number(stop.value) : run.partners[Number(stop.value)]);
-// The latest snapshot at or before a step, if there is any. Snapshots stand in the order of the campaign.
+// The latest snapshot at or before a step, if there is any. The list of snapshots has the order of the campaign.
 function snapshotOf(run, step) {
   const before = run.snapshots.filter((each) => each.step <= step);
   return before.reduce((last, each) => (last && last.step >= each.step ? last : each), undefined);
 }
 const legOf = (run, step) => (run.leg[step] % 2 ? "unloading" : "loading") + (run.leg[step] > 1 ? ` (leg ${run.leg[step]})` : "");
 
-// The colours of the style sheet as the browser resolves them in the scheme, light or dark.
+// The colours of the style sheet in the present scheme of the browser, light or dark.
 let colours;
 function mix() {
   colours = Object.fromEntries(["ink", "soft", "line", "paper", "asperities", "boundary_elements"].map((name) => {
@@ -118,7 +118,7 @@ function alike(model, change) {
 }
 
 const PREFIXES = [[1, ""], [1e3, "m"], [1e6, "µ"], [1e9, "n"], [1e12, "p"]];
-// Factor and name of the unit of length in which a value is 1 or more.
+// Largest unit of length in which the number of a value is at least 1: factor and name.
 function unitOf(metres) {
   const [factor, prefix] = PREFIXES.find(([each]) => metres * each >= 1) || PREFIXES.at(-1);
   return [factor, `${prefix}m`];
@@ -157,7 +157,7 @@ function drawCurves() {
   }
 }
 
-// Curve of a snapshot, its axes, and the powers of a length in its units.
+// For each plot: the curve of the snapshot, both axes, and the powers of length in the units of both axes.
 const DISTRIBUTIONS = {
   gap_density: ["gap", { title: "gap <i>u</i>/<i>h</i><sub>rms</sub>", type: "log" }, { title: "<i>P</i>(<i>u</i>) <i>h</i><sub>rms</sub>", type: "log" }, 0, 0],
   pressure_density: ["pressure", { title: "pressure <i>p</i>/(<i>E</i>*<i>h</i>′<sub>rms</sub>)" }, { title: "<i>P</i>(<i>p</i>) <i>E</i>*<i>h</i>′<sub>rms</sub>", type: "log" }, 0, 0],
@@ -184,7 +184,7 @@ function drawDistributions(now) {
   }
 }
 
-// From the least to the largest value of some lists, with a margin; for a logarithmic axis the exponents that plotly.js expects.
+// Range of the values in some lists, with a margin. For a logarithmic axis, plotly.js expects the exponents.
 function rangeOf(lists, type) {
   const values = lists.flatMap((list) => Array.from(list, (value) => (type === "log" ? Math.log10(value) : value))).filter(Number.isFinite);
   if (!values.length) return undefined;

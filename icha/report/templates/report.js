@@ -1,5 +1,5 @@
 "use strict";
-// Figures are enlarged by a click; arrow keys and buttons go on to the next, Escape or a click closes.
+// A click enlarges a figure. Arrow keys and buttons show the next or the previous figure. Escape or a click closes it.
 const viewer = document.getElementById("viewer");
 const figures = [...document.querySelectorAll("figure")];
 let shown = 0;
@@ -23,7 +23,7 @@ viewer.addEventListener("keydown", (event) => {
   if (event.key === "ArrowLeft") show(shown - 1);
 });
 
-// The contents mark where the reader is: the last heading that has passed the top.
+// The table of contents marks the present section: the last heading above the top of the window.
 const links = [...document.querySelectorAll("nav a")];
 const places = links.map((link) => document.getElementById(link.hash.slice(1)));
 let marked = null;
@@ -43,7 +43,7 @@ function mark() {
 document.addEventListener("scroll", mark, { passive: true });
 mark();
 
-// A link into a folded part unfolds it.
+// A link to a folded part of the page unfolds this part.
 document.querySelectorAll("a[href^='#']").forEach((link) => link.addEventListener("click", () => {
   const target = document.getElementById((link.hash || link.getAttribute("href")).slice(1));
   const folded = target && target.closest("details");
