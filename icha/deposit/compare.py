@@ -6,8 +6,8 @@ Therefore two numbers count as equal within a tolerance:
 
 - Two numbers are equal if their difference is at most `TOLERANCE` times the larger number.
 - Two values smaller than `FLOOR` times the largest value of the variable are equal if their difference is at most
-  `TOLERANCE` times `FLOOR` times this largest value. A value near zero is often a difference of large values and has
-  their absolute error.
+  `TOLERANCE` times `FLOOR` times this largest value. A value near zero is often a difference of large values, and then
+  has the absolute error of the large values.
 - Two residuals of a solver are equal if they differ by at most the largest residual that the solver accepts (`NOISE`),
   because all digits of a residual are rounding errors.
 
@@ -85,7 +85,7 @@ class File(NamedTuple):
 
     @property
     def is_remark(self) -> bool:
-        """True if the file only shows other results, as a figure does, and differs from the file of the rerun."""
+        """True if the file (such as a figure) only presents other results, and differs from the file of the rerun."""
         return self.verdict == DIFFERENT and self.path.endswith(_DERIVED)
 
 
@@ -273,6 +273,6 @@ def _lines(comparison: Comparison, within: bool) -> list[str]:
     lines = []
     for (place, verdict), found in grouped.items():
         deviation, detail, path = max(found)
-        files = path if len(found) == 1 else f"{len(found)} files, most in {path}"
+        files = path if len(found) == 1 else f"{len(found)} files, the largest in {path}"
         lines.append((-deviation, f"{place}: {verdict}, {detail}" + (f" ({files})" if place != path else "")))
     return [line for _, line in sorted(lines)]

@@ -3,7 +3,7 @@
 The crate follows RO-Crate 1.1 (https://w3id.org/ro/crate/1.1) and Provenance Run Crate 0.5
 (https://w3id.org/ro/wfrun/provenance/0.5).
 
-The crate does not contain the times of jobs or the person who ran them, so that the same data have the same crate.
+The crate contains neither times of jobs nor names of people who ran jobs, so the same data always have the same crate.
 """
 
 import hashlib
@@ -27,7 +27,7 @@ from icha.deposit.verify import CRATE, README, SOURCE
 _PROGRAM = f"{SOURCE}/"
 _WORKFLOW = f"{_PROGRAM}Snakefile"
 _LICENCE = f"{_PROGRAM}LICENSE"
-# Files of the program's source that the crate lists, besides the scripts of the jobs.
+# Files of the program's source that the crate lists in addition to the scripts of the jobs.
 _SHOWN = {_WORKFLOW, f"{_PROGRAM}uv.lock", _LICENCE}
 
 _WORKFLOW_PROFILE = "https://w3id.org/workflowhub/workflow-ro-crate/1.0"
@@ -178,7 +178,7 @@ def _describe_workflow(crate: ROCrate, files: Mapping[str, File], revision: str,
 
 
 def _add_jobs(crate: ROCrate, jobs: Sequence[Job], files: Mapping[str, File], campaign: str, description: str) -> None:
-    """Add the run of the workflow and every job of this run to the crate, with the step that started each job."""
+    """Add the run of the workflow and all its jobs to the crate; for every job, add the step that started the job."""
     engine = crate.dereference("#snakemake")
     made = {path for job in jobs for path in job.outputs}
     given = {path for job in jobs for path in job.inputs} - made | {CONFIGURATION}

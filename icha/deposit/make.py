@@ -97,7 +97,7 @@ def make_deposit(
 
 
 def refuse_mixed(results: Path, campaign: Campaign, recorded: Mapping[str, str]) -> None:
-    """Raise ValueError if results were computed with other settings, or from other files than those in the folder.
+    """Raise ValueError if settings or input files have changed since the results were computed.
 
     Parameters
     ----------

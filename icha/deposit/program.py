@@ -28,7 +28,7 @@ from icha.support.program import INSTALLED, is_installed, own_workflow, package_
 PROGRAM = ("Snakefile", "icha/", "workflow/", "profiles/default/")
 # Folder of configurations, which need not be committed, because a deposit contains the configuration that was used.
 _CONFIGURATIONS = "config/"
-# File in the folder of results of a campaign that lists versions of packages with which results may have been made.
+# File in the folder of results that lists all package versions with which results of the campaign may have been made.
 MADE_WITH = "made_with.txt"
 # With this environment, settings of the user or the system do not change what git reads.
 _GIT_ENVIRONMENT = {"GIT_CONFIG_GLOBAL": os.devnull, "GIT_CONFIG_NOSYSTEM": "1", "GIT_NO_REPLACE_OBJECTS": "1"}
@@ -122,7 +122,7 @@ def _git(project: Path, *arguments: str) -> bytes:
 
 
 def _changes(recorded: Mapping[str, str], present: Mapping[str, Path], added: str) -> list[str]:
-    """List files whose checksum differs from the recorded one, missing files, and `added` files without a record."""
+    """List changed or missing files of `recorded`, and files that are only in `present`, with the label `added`."""
     changed = [
         f"changed: {name}"
         for name, digest in recorded.items()
@@ -212,14 +212,14 @@ def refuse_other_environment(project: Path, results: Path) -> None:
             )
         problems = "\n".join(wrong)
         raise ValueError(
-            f"the installed packages are not those of uv.lock, which the deposit contains. Use {command}:\n{problems}"
+            f"the installed packages are not those of uv.lock in the deposit. Use {command}:\n{problems}"
         )
     locked = locked_versions(lock)
     made_with = (line.partition("==")[::2] for line in sorted(_noted(results)))
     if other := [f"{name} {version}" for name, version in made_with if locked.get(name, version) != version]:
         raise ValueError(
-            f"{results}: some results may have been made with other versions than those of uv.lock, which the deposit "
-            f"contains. Remove {results}, and run the campaign again:\n{_listed(other)}"
+            f"{results}: some results may have been made with other versions than those of uv.lock in the deposit. "
+            f"Remove {results}, and run the campaign again:\n{_listed(other)}"
         )
 
 

@@ -33,7 +33,7 @@ from icha.planning.requirements import further_software
 from icha.support import formatting
 
 _TEMPLATE = "README.md.jinja"
-# Largest number of entries of a list that are written.
+# The page shows at most this number of entries of a list.
 _MOST_NAMES = 12
 # A web address in a text, without the punctuation that follows the address.
 _ADDRESS = re.compile(r"(https?://[^\s<>|`\\]*[^\s<>|`\\.,;:!?()\[\]*_~'\"])")
@@ -186,7 +186,7 @@ def _parts(sizes: Mapping[str, int]) -> list[dict]:
 
 
 def _few(values: Sequence) -> str:
-    """Return a list as text; a long list is cut, and its length is added in brackets."""
+    """Return a list as text; a long list is shortened, and the number of its entries is added in brackets."""
     shown = [markdown(value) for value in values]
     return ", ".join(shown) if len(shown) <= _MOST_NAMES else f"{', '.join(shown[:_MOST_NAMES])}, … ({len(shown)})"
 

@@ -25,9 +25,9 @@ from icha.support.input_files import refuse_traps
 from icha.support.values import NAME_PATTERN
 
 SMALLEST = "smallest"
-# Files in the source of a deposit with the version of the program, and with the versions of all packages.
+# Two files in the source of a deposit: one with the version of the program, one with the versions of all packages.
 _PYPROJECT, _LOCK = f"{SOURCE}/pyproject.toml", f"{SOURCE}/uv.lock"
-# File with the checksum of the deposit's SHA256SUMS, and folder of configuration and results, in the folder of a rerun.
+# Entries in the folder of a rerun: file with the checksum of SHA256SUMS, and folder for configuration and results.
 _BEGUN, _PROJECT = "rerun-of.sha256", "data"
 _RUN = re.compile(r"runs(/[^/]+){4}/[^/]+\.nc")
 
@@ -97,7 +97,7 @@ def find_runs(only: Iterable[str], deposit: Path) -> list[str]:
 
 
 def _smallest(deposit: Path, runs: list[str]) -> str:
-    """Return the complete run with the smallest total size of the files of run and surface."""
+    """Return the complete run for which the files of run and surface have the smallest total size."""
     sizes = {run: sum((deposit / path).stat().st_size for path in add_surfaces([run], deposit)) for run in runs}
     for run in sorted(runs, key=lambda run: sizes[run]):
         if _is_complete(deposit, run):

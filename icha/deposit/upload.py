@@ -66,7 +66,7 @@ def server_address(address: str) -> str:
     Raises
     ------
     ValueError
-        If `address` is not the address of a server, or if it begins with http for a server on another machine, since
+        If `address` is not the address of a server. Also if it begins with http and is not on this machine, because
         others could then read the token.
     """
     parts = urlsplit(address if "//" in address else f"https://{address}")
@@ -126,7 +126,7 @@ class Zenodo:
             received = _md5(self._call("PUT", f"/{draft.bucket}/{quote(name)}", data=file))
         if received and received != md5:
             raise ZenodoError(
-                f"{name} was damaged on its way: the MD5 is {md5} here and {received} on the server. Upload it again"
+                f"{name} was damaged in the upload: the MD5 is {md5} here and {received} on the server. Upload it again"
             )
         return bool(received)
 

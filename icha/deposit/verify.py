@@ -33,8 +33,8 @@ COMPUTED = (
 LARGEST_TEXT = 64_000_000
 # Largest lengths in bytes of a name and of a path that common file systems accept.
 _LONGEST_NAME, _LONGEST_PATH = 255, 1000
-# Limits without the option `LARGE`: number of files; ratio of the sizes of an extracted zip and of the zip; size in
-# bytes that an extracted zip may always have. ICHA does not compress zips. Compression reduces zips to about a third.
+# Limits without the option `LARGE`: at most MOST_FILES files; an extracted size of at most MOST_GROWTH times the zip
+# size plus ALLOWANCE bytes. ICHA does not compress zips. Compression would reduce zips to about a third.
 MOST_FILES, MOST_GROWTH, ALLOWANCE = 200_000, 50, 100_000_000
 LARGE = "--large"
 _LINE = re.compile(r"([0-9a-f]{64})  (.+)")
@@ -182,7 +182,7 @@ def _problems(folder: Path, large: bool) -> Iterator[str]:
 
 
 def _inspect(folder: Path, large: bool) -> tuple[set[str], dict[str, str]]:
-    """Return the acceptable files in a folder, and problems with names and kinds of the others; follow no links."""
+    """Return the acceptable files in a folder, and the problems with all other files; do not follow links."""
     found: set[str] = set()
     problems: dict[str, str] = {}
     pending = [""]

@@ -223,7 +223,7 @@ def test_the_same_difference_in_many_files_is_one_line(tmp_path):
     text = format_comparison(compare_folders(tmp_path / "deposit", tmp_path / "rerun"))
     assert (
         text.count("pressure") == 1
-        and "3e-08, at [3]: 1000.0 and 1000.00003 (3 files, most in runs/load/rough/seed3" in text
+        and "3e-08, at [3]: 1000.0 and 1000.00003 (3 files, the largest in runs/load/rough/seed3" in text
     )
     write(tmp_path / "rerun" / path, changed("pressure", 3, 2e3))
     lines = format_comparison(compare_folders(tmp_path / "deposit", tmp_path / "rerun")).splitlines()

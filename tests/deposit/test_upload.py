@@ -261,7 +261,7 @@ POST, PUT, ZIP = ("POST", "depositions"), ("PUT", "depositions"), ("PUT", ".zip"
         (PUT, refuse(200, "done"), "does not answer like Zenodo"),
         (PUT, refuse(400, VALIDATION), "Missing data for required field."),
         (ZIP, refuse(413), "too large"),
-        (ZIP, refuse(201, {"checksum": "md5:" + 32 * "0"}), "was damaged on its way"),
+        (ZIP, refuse(201, {"checksum": "md5:" + 32 * "0"}), "was damaged in the upload"),
     ],
 )
 def test_refusals_of_a_server_are_shown_with_advice(server, deposit, request_, action, message):
