@@ -211,9 +211,7 @@ def refuse_other_environment(project: Path, results: Path) -> None:
                 "`pip install --constraint locked.txt 'icha[workflow]'`"
             )
         problems = "\n".join(wrong)
-        raise ValueError(
-            f"the installed packages are not those of uv.lock in the deposit. Use {command}:\n{problems}"
-        )
+        raise ValueError(f"the installed packages are not those of uv.lock in the deposit. Use {command}:\n{problems}")
     locked = locked_versions(lock)
     made_with = (line.partition("==")[::2] for line in sorted(_noted(results)))
     if other := [f"{name} {version}" for name, version in made_with if locked.get(name, version) != version]:
