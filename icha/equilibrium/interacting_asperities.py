@@ -94,10 +94,10 @@ class InteractingAsperities(AsperityContact):
         """Return the elastic energy minus the energy of adhesion, per nominal area, J/m^2; zero without contact.
 
         The energy of a spot is that of a single JKR contact, plus F w/2. Here F is the force of the spot, and w the
-        displacement by the other spots. As in eq. (4), w is that at the centre of the spot, although a spot has an area.
-        Therefore the interaction of two spots of different size is not exactly reciprocal. Along a path without events,
-        the change of the energy and the work done are not exactly equal. They differ by about (a/r)^2 times the
-        interaction energy, where r is the distance of the spots.
+        displacement at its centre by the other spots, as in eq. (4). Spots have an area, so the interaction of two
+        spots of different size is not exactly reciprocal. Along a path without events, the change of the energy and the
+        work done are not exactly equal. They differ by about (a/r)^2 times the interaction energy, where r is the
+        distance of the spots.
         """
         spots, law = state.spots, self.law
         a, R = spots.contact_radius, spots.radius_of_curvature
