@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from icha.boundary_elements.cells import find_among, merge_cells, rim_of
-from icha.boundary_elements.front import COMPLIANCE, average_fractions
+from icha.boundary_elements.front import average_fractions, bond_compliance
 from icha.boundary_elements.half_space import HalfSpace, Operator
 from icha.contact.model import FullContact, NotConverged
 from icha.support.parallel import blocks, on_cores
@@ -64,7 +64,7 @@ class Contact:
     @property
     def bond_compliance(self) -> np.ndarray:
         """Compliance of the bond of each cell, (k,), in cell sizes per E*."""
-        return COMPLIANCE * (1 / self.fraction - 1)
+        return bond_compliance(self.fraction)
 
 
 @dataclass(frozen=True, eq=False)

@@ -47,6 +47,11 @@ STENCIL = _profile / _profile.sum()
 _BATCH = 4096
 
 
+def bond_compliance(fraction: np.ndarray) -> np.ndarray:
+    """Return the compliance of bonds, gap divided by tension, in cell sizes per E*."""
+    return COMPLIANCE * (1 / fraction - 1)
+
+
 def average_fractions(fractions: np.ndarray) -> np.ndarray:
     """Return the Gaussian average w*f of the fractions around every cell of periodic fields (..., n, n)."""
     from scipy.ndimage import correlate1d
@@ -162,9 +167,20 @@ class Front:
         """Return the gap of cells at the front by the law from their strengths and fractions, in cell sizes."""
         return COMPLIANCE * strengths * (1 - fraction)
 
-    def law_gap_change(self, strengths_change: np.ndarray, tension_change: np.ndarray) -> np.ndarray:
-        """Return the change of the gap by the law for given changes of strength and tension, in single precision."""
-        return np.float32(COMPLIANCE) * (strengths_change - tension_change)
+    def law_gap_change(
+        self,
+        strengths: np.ndarray,
+        fraction: np.ndarray,
+        strengths_change: np.ndarray,
+        fraction_change: np.ndarray,
+        damping: np.ndarray,
+    ) -> np.ndarray:
+        """Return the first-order change of the gap by the law, in single precision.
+
+        damping : (m,), for each cell; the gap changes as if the change of the tension were (1 + damping) times as large.
+        """
+        tension_change = self.tension_change(strengths, fraction, strengths_change, fraction_change)
+        return np.float32(COMPLIANCE) * (strengths_change - (1 + damping) * tension_change)
 
     def intensity(self, fraction: np.ndarray, pressure: np.ndarray, mean_fraction: np.ndarray) -> np.ndarray:
         """Return K/K_c of cells in contact: their tension divided by the tension of the law at the same fraction."""

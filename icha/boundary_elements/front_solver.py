@@ -312,8 +312,9 @@ class FrontRelaxation:
             self.damping = 2 * TOLERANCES.damping
         self.steps += 1
         change, pressure_change = newton_step(problem, active, self.damping)
-        # The step would raise the energy to first order: the sum of (G/dgamma - 1) df is positive.
-        if np.sum((active.intensity**2 - 1) * change) > _WORK_ROUNDING * np.abs(change).sum():
+        # The step would raise the energy to first order: the sum of (G - w) df is positive, w the local work of adhesion.
+        adhesion = (problem.front.local_strengths(active.mean_fraction) / problem.front.straight_strength) ** 2
+        if np.sum((active.intensity**2 - 1) * adhesion * change) > _WORK_ROUNDING * np.abs(change).sum():
             self._damp(2, active.residual)
             return
         accuracy = max(_SMALLEST_ERROR, min(self.coarsest, self._moving_accuracy(active)))
@@ -381,7 +382,7 @@ class LinearisedFront:
         self.closed, self.at_front = ~at_front, np.flatnonzero(at_front)
         self.local_strengths = front.local_strengths(mean_fraction[self.at_front]).astype(np.float32)
         self.fraction = contact.fraction[self.at_front].astype(np.float32)
-        self.damping_factor = (1 + damping[self.at_front]).astype(np.float32)
+        self.damping = damping[self.at_front].astype(np.float32)
         self.operator = space.restrict_to(contact.cells)
         self.weights = neighbour_weights(contact.cells[self.at_front], space.shape)
         self.straight_strength = np.float32(front.straight_strength or 1.0)
@@ -416,7 +417,7 @@ class LinearisedFront:
         return fraction, scale * pressure.astype(float)
 
     def _pressures(self, unknowns):
-        """Convert unknowns to changes of the pressures, (k,), and of the strengths and tensions at the front."""
+        """Convert unknowns to changes of the pressures, (k,), and of the strengths and fractions at the front."""
         fraction = unknowns[self.at_front] / self.straight_strength
         if not len(fraction):
             return unknowns, fraction, fraction
@@ -424,13 +425,14 @@ class LinearisedFront:
         tension = self.front.tension_change(self.local_strengths, self.fraction, stronger, fraction)
         pressure = unknowns.copy()
         pressure[self.at_front] = -tension
-        return pressure, stronger, tension
+        return pressure, stronger, fraction
 
     def _left_side(self, unknowns, operator=None):
         """Return the left side of the equations: change of displacement minus change of the gap by the law."""
-        pressure, stronger, tension = self._pressures(unknowns)
+        pressure, stronger, fraction = self._pressures(unknowns)
         result = (operator or self.operator).displacement(pressure)
-        result[self.at_front] -= self.front.law_gap_change(stronger, self.damping_factor * tension)
+        law = self.local_strengths, self.fraction, stronger, fraction
+        result[self.at_front] -= self.front.law_gap_change(*law, self.damping)
         return result
 
     def _approximate_inverse(self, right):
