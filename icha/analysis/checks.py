@@ -99,7 +99,7 @@ def _findings(solution) -> Iterator[Finding]:
 
 
 def worst(checks: Iterable[Check]) -> tuple[Check, ...]:
-    """Return the worst check of each name: the largest value of the failed checks, or else of the passed checks."""
+    """Return the check with the largest value for each name; if checks of a name failed, only failed checks count."""
     found: dict[str, Check] = {}
     for check in checks:
         best = found.get(check.name)
@@ -116,7 +116,7 @@ def describe_failure(check: Check) -> str:
 
 
 def refuse_unknown_failures(checks: Iterable[Check], known: Iterable[str]) -> None:
-    """Raise ValueError if other runs than the known failures have failed checks, or if a known failure has none."""
+    """Raise ValueError if a run failed that is not a known failure, or if a known failure passed all checks."""
     failed = [check for check in checks if not check.passed]
     known = list(known)
     passing = sorted(set(known) - {check.subject for check in failed})

@@ -192,7 +192,7 @@ def at_common_loads(
 
 
 def _spread(area, axis):
-    """Return the ratio of the largest to the smallest area along an axis, minus 1; NaN without a complete run."""
+    """Return the ratio of the largest to the smallest area along an axis, minus 1; NaN if no run is complete."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)
         return np.nanmax(area, axis) / np.nanmin(area, axis) - 1

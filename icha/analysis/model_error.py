@@ -75,11 +75,11 @@ def model_error(
     material and the target of the reduced pressure. A group has
 
     - the variables of `icha.datasets.variables.model_error`;
-    - for each name in `SUMMARISED`, the mean over the seeds `<name>_mean`, and for two seeds or more the standard
+    - for each name in `SUMMARISED`, the mean `<name>_mean` over the seeds; with two seeds or more, also the standard
       deviation `<name>_deviation`;
     - modulus, surface energy, range of attraction and Tabor parameter of the runs;
-    - `status(surface, seed, rms_slope, material)`: whether a run and its reference are complete. If the run or the
-      reference is not complete, the values are missing.
+    - `status(surface, seed, rms_slope, material)`, which is complete if both a run and its reference are complete.
+      Otherwise the values are missing.
 
     Raises
     ------
@@ -221,7 +221,7 @@ def _amounts(state, solution):
         if not value > 0:
             raise ValueError(f"the {name} of boundary elements is {value:g}; expected a positive value")
     # At a finite range, attraction also acts outside the area of zero gap. As the range decreases, both the energetic
-    # area and the area of zero gap approach the area of JKR theory. The energetic area does so faster.
+    # area and the area of zero gap approach the area of JKR theory. The energetic area approaches it faster.
     adhesive = float(solution["surface_energy"]) > 0
     raw, energetic = float(solution["contact_area_fraction_raw"]), float(solution["energetic_area_fraction"])
     return {
@@ -285,12 +285,12 @@ def contact_of_spots(run: xr.Dataset, snapshot: int, grid: int) -> np.ndarray:
 
 
 def jaccard(one: np.ndarray, other: np.ndarray) -> float:
-    """Return the number of nodes in both contact maps divided by the number in at least one; 1 if both are empty."""
+    """Return the number of nodes in contact in both maps, divided by the number in at least one; 1 without contact."""
     return shared(one | other, one & other)
 
 
 def shared(one: np.ndarray, other: np.ndarray) -> float:
-    """Return the number of nodes in both contact maps divided by the number in the first; 1 if the first is empty."""
+    """Return the number of nodes in contact in both maps, divided by that in map `one`; 1 if `one` has no contact."""
     count = np.count_nonzero(one)
     return np.count_nonzero(one & other) / count if count else 1.0
 

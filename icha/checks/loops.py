@@ -14,7 +14,7 @@ LOSSES = ("loss_by_jump_in", "loss_by_jump_off", "loss_by_coalescence", "loss_by
 # Counts of events in a run, in the order of the flags of `event_kind`.
 EVENT_COUNTS = ("jump_in_count", "jump_off_count", "coalescence_count", "split_count")
 
-# Upper limit of the tolerated gain of energy in a loop, divided by the largest work, also if more work is unknown.
+# A loop must not gain more energy than this, divided by its largest work, even if the error of its work is larger.
 LARGEST_UNKNOWN_WORK = 1e-2
 # Largest gain of energy in a loop of boundary elements, divided by the largest work. This value is the error of the
 # losses, because a path limits the error of the work in every step (docs/short_range.md).
@@ -52,7 +52,7 @@ def check_events(run) -> Iterator[tuple]:
 
 def check_loop(run) -> Iterator[tuple]:
     """Yield name, value and limit of the checks of a loop: losses, pull-off and complete separation at the end."""
-    # All energies are differences of works, so that their errors are relative to the largest work.
+    # All energies are differences of works, so their errors are relative to the largest work.
     scale = float(np.max(np.abs(run["work"]))) or 1.0
     loss = float(run["hysteresis_loss"])
     parts = sum(float(run[name]) for name in LOSSES if name in run)
@@ -72,7 +72,7 @@ def check_loop(run) -> Iterator[tuple]:
 
 
 def _has_united(run):
-    """Return whether spots have united by a rule; the unions may cost or gain a little energy."""
+    """Return whether spots have united by a rule; such unions may lose or gain a little energy."""
     return model_of(run.attrs).by_summits and int(run["coalescence_count"][-1]) > 0
 
 

@@ -1,6 +1,6 @@
 """Write the campaign dataset run by run, so that only a few numbers of each run stay in memory.
 
-First, ICHA reads one run after the other and appends its values to a temporary file. The sizes of all arrays, the
+First, ICHA reads all runs, one by one, and appends their values to a temporary file. The sizes of all arrays, the
 snapshots and the lengths of texts stay in memory, because ICHA needs this information before it writes the first run.
 Then ICHA reads the temporary file in the order of the dataset, and writes one block of neighbouring runs at a time.
 """

@@ -39,7 +39,7 @@ _ATTRIBUTES = ("contact_model", "config_sha256", "applicability", *STATUS_ATTRIB
 
 
 def read_run_values(path: str | os.PathLike) -> tuple[Values, dict[str, str]]:
-    """Read the values of a run dataset, except maps, and the attributes that describe settings and status of the run.
+    """Read the attributes for settings and status of a run, and the values of the run dataset, except maps.
 
     Raises
     ------
@@ -91,7 +91,7 @@ class Entry(NamedTuple):
 
     @property
     def extent(self) -> tuple[bool, int]:
-        """Sort key: True if the run reached its end, and number of steps; the largest run has all variables."""
+        """Sort key (reached its end, number of steps); the run with the largest key has all variables."""
         return self.status not in _ENDED_EARLY, self.sizes.get("step", 0)
 
 
@@ -199,7 +199,7 @@ class Arrangement:
 
     @property
     def slope_dims(self) -> tuple[str, ...]:
-        """Dimensions of the coordinate `rms_slope`: with `surface` if surfaces have different slopes."""
+        """Dimensions of the coordinate `rms_slope`. They include `surface` if surfaces have different slopes."""
         return slope_dims(self.known["rms_slope"])
 
     def dims_of(self, name: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
@@ -329,7 +329,7 @@ def _sizes(entries: list[Entry], dim: str) -> np.ndarray:
 def _snapshots(entries: list[Entry]) -> dict[tuple[bytes, float], int]:
     """Assign a number to each snapshot of a study; kind and target identify a snapshot.
 
-    Runs may reach their targets in different orders: one run a load before an area, another run this area first.
+    Runs may reach their targets in different orders: one run a load before an area, another run the area first.
     """
     longest = max(entries, key=lambda entry: entry.extent)
     known = dict.fromkeys(itertools.chain(longest.snapshots, *(entry.snapshots for entry in entries)))

@@ -33,7 +33,7 @@ _OTHERS = {
 
 # Words in names of attributes that a file must not have, because the same input must give the same bytes.
 _REFUSED = re.compile("user|host|mail|date|time")
-# Largest relative difference due to rounding between values that must be equal.
+# Values that must be equal may differ by this relative difference, due to rounding.
 _ROUNDING = 1e-9
 # Units that targets may have: m for lengths, 1 for other quantities and for targets of several kinds.
 _UNITS_OF_TARGETS = dict.fromkeys(("step_target", "snapshot_target"), ("1", "m"))

@@ -23,7 +23,7 @@ RUN = "{study}/{surface}/seed{seed}/slope{slope}/{model_folder}{material}"
 CONTACT = "{entry}/{surface}/seed{seed}/slope{slope}/{material}"
 SOLUTION = CONTACT + "/p{pressure}"
 _NUMBERS = {"rms_slope": "slope", "reduced_pressure": "pressure"}
-# Largest relative difference between two rms slopes that count as equal. Scaling of surfaces causes rounding errors.
+# Two rms slopes count as equal up to this relative difference, because scaling of surfaces causes rounding errors.
 _SAME_SLOPE = 1e-9
 
 
@@ -114,7 +114,7 @@ def path_fields(labels: RunLabels | ContactLabels | SolutionLabels) -> dict[str,
 
 
 def number_label(value: float) -> str:
-    """Return the shortest text that reads back as `value`: 0.2 is `0.2`, 1.0 is `1`."""
+    """Return the shortest decimal text for a number: `0.2` for 0.2, `1` for 1.0."""
     return repr(float(value)).removesuffix(".0")
 
 

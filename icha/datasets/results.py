@@ -26,11 +26,11 @@ DEPOSIT = "publish/{campaign}-{version}"
 # Arrays with fewer values are not compressed, because the chunks of a compressed array would need as much space as
 # compression saves (docs/reference/dataset.md, "Compression").
 LEAST_COMPRESSED = 1024
-# Numbers of values of compressed arrays. Larger arrays are heights of surfaces. Compression of heights would save only
+# Range of the number of values of compressed arrays. Larger arrays are heights. Compression of heights would save only
 # a sixth of the space, and take 13 s for 8192 x 8192 nodes.
 COMPRESSED_SIZES = range(LEAST_COMPRESSED, 2**22)
 COMPRESSION = {"zlib": True, "complevel": 4, "shuffle": True}
-# Size in bytes of the largest array of a campaign dataset that is read as a whole.
+# Arrays of a campaign dataset up to this size in bytes are read as a whole.
 LEFT_IN_FILE = 2**26
 
 

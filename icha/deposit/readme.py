@@ -125,7 +125,7 @@ def _settings(campaign: Campaign) -> dict:
 
 
 def _outcome(publication: Publication, dataset: xr.DataTree, checks: Sequence[Check]) -> dict:
-    """Return the results for the page: numbers of complete runs, incomplete runs, and checks."""
+    """Return the results that the page shows: runs of every study by status, incomplete runs, and checks."""
     known = {failure.run: failure.reason for failure in publication.known_failures}
     designs, incomplete, complete = [], [], []
     for name, node in dataset.children.items():

@@ -115,7 +115,7 @@ def _is_complete(deposit: Path, run: str) -> bool:
 
 
 def add_surfaces(runs: Iterable[str], deposit: Path) -> list[str]:
-    """Return the paths of runs, and the paths of the surfaces of these runs that are in the deposit."""
+    """Return the paths of runs and of the surfaces of these runs; leave out surfaces that are not in the deposit."""
     surfaces = dict.fromkeys("surfaces/{2}/{3}.nc".format(*run.split("/")) for run in runs)
     return [*runs, *(path for path in surfaces if (deposit / path).is_file())]
 

@@ -1,1 +1,1 @@
-"""Draw the figures of a campaign: one module for each figure, and modules with functions for all figures."""
+"""Figures of a campaign: one module for each figure, and modules of functions that all figures share."""

@@ -31,7 +31,7 @@ def caption_of(name: str) -> str:
 def count_runs(campaign: xr.DataTree, studies: Sequence[str]) -> str:
     """Return sentences for the end of a caption, with the number of missing runs and of runs that are drawn pale.
 
-    The text is empty if all runs are complete and the asperity model is applicable to all of them.
+    The text is empty if no run is missing and no run is drawn pale.
     """
     from icha.datasets.variables.campaign import COMPLETE, COMPUTED_RUNS, FAILED_CHECKS, INCOMPLETE, MISSING
 

@@ -121,7 +121,7 @@ def model_name(dataset: xr.Dataset) -> str:
 
 
 def snapshot_looks(campaign: xr.DataTree, study: str, lines: Sequence[select.Snapshots]) -> tuple[list[dict], Looks]:
-    """Return the arguments of `Axes.plot` for each line of a figure of one snapshot, and the `Looks` of the figure."""
+    """Return, for a figure of one snapshot, the arguments of `Axes.plot` for each line, and the `Looks`."""
     dataset = campaign[study].to_dataset()
     groups = [line.runs for line in lines]
     looks = Looks(campaign, dataset, [group.contact for group in groups])

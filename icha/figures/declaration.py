@@ -1,4 +1,4 @@
-"""The declaration of a figure: its options in a configuration, and the files from which it is drawn.
+"""Declaration of a figure: the options of the figure in a configuration, and the input files.
 
 Every figure is a module `fig<number>_<words>` of this folder, with a `DECLARATION` and a function `figure` that draws.
 `icha.figures.registry` finds these modules by their names, so no list of figures exists. To read a configuration, ICHA
@@ -31,7 +31,7 @@ Inputs = dict[str, str | list[str]]
 
 
 class FigureOptions(Section):
-    """Options of a figure, a section of the configuration."""
+    """Options of a figure: one section of the configuration."""
 
     def problems(self, campaign: Campaign) -> Iterator[Problem]:
         """Yield a problem for each option that does not fit the campaign, such as the name of an unknown study."""
@@ -205,7 +205,7 @@ class ComparedFigure(StudyFigure):
     """A comparison with boundary elements. The study needs both models, or an entry of `finite_range`."""
 
     def study_problems(self, campaign: Campaign, study: Any) -> Iterator[Problem]:
-        """Also yield a problem if no boundary elements solve the study at the same loads."""
+        """Also yield a problem if the study has no solutions with boundary elements at the same loads."""
         yield from super().study_problems(campaign, study)
         if campaign.compares_models(self.study) or is_solved_at_finite_range(campaign, self.study):
             return
@@ -219,7 +219,7 @@ def is_solved_at_finite_range(campaign: Campaign, study: str) -> bool:
 
 
 def problems_of_unloading(campaign: Campaign, studies: Mapping[tuple, str]) -> Iterator[Problem]:
-    """Yield a problem for each of `studies` (names by configuration key) that does not exist or does not unload."""
+    """Yield a problem for each study that does not exist or does not unload; `studies` maps keys to names."""
     for location, name in studies.items():
         yield from unknown(location, name, campaign.studies)
         if name in campaign.studies and not campaign.studies[name].unload:

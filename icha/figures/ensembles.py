@@ -71,7 +71,7 @@ def mark_fewer(
 
 
 def _draw_scatter(axes, x, members, colour, *, positive):
-    """Draw a confidence band, or every member of a small ensemble; the band does not change the limits of the axes."""
+    """Draw a confidence band, or every member if there are few; the band does not change the limits of the axes."""
     over = ensemble(members)
     if over.count.min(initial=len(members)) < ENOUGH:
         # A single point has no line.
@@ -126,7 +126,7 @@ def draw_points(
     x : (k,) or (members, k) float, positions on the x axis.
     members : (members, k) float, values of every member; NaN where a member has no value.
     positive : True if the values are positive; both ends of the bars are then positive too.
-    asked : number of requested members, for all or for each point; markers of means over fewer members are crossed out.
+    asked : number of requested members, for all points or for each; a mean over fewer members has a crossed-out marker.
     """
     known, over = np.isfinite(members), ensemble(members)
     x = np.where(known, x, np.nan)

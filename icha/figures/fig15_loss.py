@@ -47,7 +47,7 @@ PARTS = {
     "loss_by_load_jump": ("jumps at controlled load", {"fc": "0.85", "hatch": "xxxx"}),
     "loss_unattributed": ("unattributed", {"fc": "white", "hatch": "...."}),
 }
-# Smallest number of points of a fit, because a straight line passes through any two points.
+# A line is fitted only to this number of points or more, because a straight line passes through any two points.
 _LEAST_POINTS = 3
 _FIT_POINTS = 100
 # The axes are logarithmic if the ratio of the largest to the smallest value exceeds this number, for both axes.
@@ -110,7 +110,7 @@ def fit_line(x: np.ndarray, y: np.ndarray, along: np.ndarray) -> tuple[np.ndarra
     Returns
     -------
     Values of the line at `along`; coefficient of determination; exponent of a power law through the same points. The
-    exponent is NaN if a y is not positive.
+    exponent is NaN if a value of y is not positive.
     """
     from scipy.stats import linregress
 

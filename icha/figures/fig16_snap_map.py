@@ -48,8 +48,8 @@ _KINDS = {
     "coalescence": ("union", "loading", {"marker": "D", "mfc": "none", "mec": BLACK}),
     "split": ("union undone", "unloading", {"marker": "+", "mec": _RED}),
 }
-# Size of the marks in points, for up to _FEW events. With more events the marks are smaller, so that the area of all
-# marks is about the same. The smallest size is _LEAST_SIZE.
+# Size of the marks in points, for up to _FEW events. With more events the marks are smaller, so that the total area
+# of the marks is about the same. The smallest size is _LEAST_SIZE.
 _FEW = 60
 _SIZE = 5.0
 _LEAST_SIZE = 1.6

@@ -69,7 +69,7 @@ def figure(
     if solved := _finite_range_curves(model_error, study, shown.looks):
         shown.crosses.extend(solved)
         shown.handles[FINITE_RANGE] = model_handle(FINITE_RANGE, ms=8)
-    # Solutions at a finite range are used only if there are none in the limit of a short range, which they only bound.
+    # Solutions at a finite range are only bounds. If there are solutions in the limit of a short range, these are used.
     truths = {truth.runs.contact: truth for truth in reversed(shown.crosses)}
     compared = [(line, truths[line.runs.contact]) for line in shown.lines if line.runs.contact in truths]
     fig, axes = new_panels(4.5, 2, sharex=True, height_ratios=(1, _LOWER)) if compared else new_panels(3.3)

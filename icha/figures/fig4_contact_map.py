@@ -1,4 +1,4 @@
-"""Fig. 4: contact spots, in their true size, over the topography."""
+"""Fig. 4: contact spots, in their true size, on a map of the topography."""
 
 from __future__ import annotations
 
@@ -67,9 +67,9 @@ def figure(
     ----------
     campaign : the campaign dataset.
     surface : dataset of the surface file, with the topography of the run.
-    truth : the same run with boundary elements, with its maps, if there is one.
+    truth : the same run with boundary elements and contact maps, if there is such a run.
     run : labels of the run.
-    kind, target : kind and target of the snapshot; None for the first one.
+    kind, target : kind and target of the snapshot; None for the first snapshot.
     """
     from matplotlib.patches import Rectangle
 

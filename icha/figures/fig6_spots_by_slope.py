@@ -79,7 +79,7 @@ def figure(
 
 
 def _draw_slopes(ax, runs, kind, colours, length):
-    """Draw the spots of each slope at the first snapshot of a kind; `runs` are runs by slope."""
+    """Draw the spots of each slope at the first snapshot of a kind; `runs` maps slopes to runs."""
     from matplotlib.collections import PatchCollection
     from matplotlib.patches import Wedge
 

@@ -54,7 +54,7 @@ def _over_pressure(run):
 
 
 def stiffness_points(run: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
-    """Return reduced pressures p* and reduced stiffnesses -dp*/d(u/h_rms) of the steps at which both are positive."""
+    """Return p* and the reduced stiffness -dp*/d(u/h_rms) of all steps at which both quantities are positive."""
     unit = float(run["contact_modulus"] * run["rms_slope"] / run["rms_height"])
     p, stiffness = run["reduced_pressure"].values, run["contact_stiffness"].values / unit
     positive = (p > 0) & (stiffness > 0)

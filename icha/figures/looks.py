@@ -1,4 +1,4 @@
-"""Colours, markers and legends of lines, which are the same in all figures of a campaign.
+"""Colours, markers and legends of lines. A material has the same colour in all figures, unless colours are graded.
 
 The colour of a marker shows the material. Crosses are results of boundary elements. Closed markers are results of the
 asperity model with adhesion, open markers those without adhesion. The shape of closed and open markers distinguishes

@@ -64,7 +64,7 @@ def select_runs(
 
     Parameters
     ----------
-    ragged : True to include spots and events of the runs, which takes long.
+    ragged : True to include spots and events of the runs; False is much faster.
     model : name of the model. Default: the `shown_model` of the study.
 
     Raises
@@ -149,7 +149,7 @@ def path_steps(run: xr.Dataset) -> xr.Dataset:
 
 
 def branches(run: xr.Dataset) -> Iterator[tuple[str, xr.Dataset]]:
-    """Yield the branch (loading or unloading) and the steps of every leg, with the last step of the previous leg."""
+    """Yield branch (loading or unloading) and steps of every leg; the last step of the previous leg comes first."""
     legs = run["leg"].values
     for leg in np.unique(legs):
         steps = np.flatnonzero(legs == leg)

@@ -78,7 +78,7 @@ in_style = _style()
 
 
 def new_figure(width: float, height: float) -> Figure:
-    """Return an empty figure, width and height in inches, without a window and without pyplot's global state."""
+    """Return an empty figure without a window and without pyplot's global state; width and height are in inches."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -110,7 +110,7 @@ def save(figure: Figure, png: str | os.PathLike, pdf: str | os.PathLike) -> None
 
 
 def logarithmic_axes(axes: Axes, directions: str = "xy") -> None:
-    """Make axes logarithmic; axes with fewer than two powers of ten also have labels at 2 and 5 times powers of ten."""
+    """Make axes logarithmic; if an axis has fewer than two powers of ten, also label 2 and 5 times powers of ten."""
     for direction in directions:
         axes.set(**{f"{direction}scale": "log"})
         axis = getattr(axes, f"{direction}axis")

@@ -319,7 +319,7 @@ def _find_gap_at_load(contact, pressure, separation, progress):
     raise NotSolved(
         f"no mean gap was found at which the contact carries the load: after {len(tried)} attempts the smallest "
         f"relative error of the load is {min(abs(e) for _, e in tried):.2g}; expected at most {LOAD_TOLERANCE:g}. The "
-        f"last mean gap was {tried[-1][0]:.8g} h_rms, with {1 + tried[-1][1]:.6g} times the load"
+        f"last mean gap was {tried[-1][0]:.8g} h_rms, with {1 + tried[-1][1]:.6g} times this load"
     )
 
 
@@ -418,7 +418,7 @@ def describe_problem(
 
 
 def attributes(material: Material, title: str, summary: str) -> dict[str, str]:
-    """Return the attributes of a dataset by Tamaas; `{}` in the title is replaced by `with` or `without`."""
+    """Return the attributes of a dataset from Tamaas; `with` or `without` replaces `{}` in the title."""
     return file_attributes(
         title.format("with" if material.surface_energy > 0 else "without"),
         summary,

@@ -1,4 +1,4 @@
-"""Loading and unloading at a finite range of attraction, with boundary elements, from no contact to no contact.
+"""Loading and unloading with boundary elements at a finite range; surfaces are apart at both ends of the loop.
 
 The mean gap is prescribed, as in a stiff testing machine. Each solution starts from the last solution and therefore
 stays on the same branch until the branch ends. At the end of a branch the surfaces jump, and the jump loses energy. The
@@ -111,7 +111,7 @@ class _LoopSolver:
         return self.contact.solve(separation)
 
     def steps(self, state, separation, halvings=_MAX_HALVINGS):
-        """Yield states from one state to a mean gap in m; steps are halved until their work is accurate."""
+        """Yield the states from `state` to a mean gap in m; a step is halved until the work of the step is accurate."""
         after = self.solve(state.gap, separation)
         if halvings == 0 or self.work_error(state, after) <= self.work_tolerance:
             yield after

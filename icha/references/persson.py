@@ -53,7 +53,7 @@ def persson_pressure_density(pressure, reduced_pressure):
 
 
 def persson_mean_separation(reduced_pressure, spectrum):
-    r"""Return the mean separation over h_rms at an array of reduced pressures, from the spectrum of the surface.
+    r"""Return the mean separation divided by h_rms at an array of reduced pressures, from the spectrum of the surface.
 
     Yang & Persson (2008): with w(q) = (pi int_{q_L}^q k^3 C(k) dk)^(-1/2) and P = erf(w p/E*),
 

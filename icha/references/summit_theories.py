@@ -1,10 +1,10 @@
 r"""Theories of separate summits: spheres at given heights, each in contact with a plane as if it were alone.
 
 Pressures are reduced, p* = p/(E* h'_rms). Separations are distances between the plane and the mean plane of the rough
-surface, over h_rms. In these theories only the summits deform, so these distances are mean separations. The constants
-in this file name the sources. Further sources: P. R. Nayak, J. Lubr. Technol. 93 (1971) 398, doi:10.1115/1.3451608, for
-the summits of a Gaussian surface; J. A. Greenwood, Tribol. Lett. 65 (2017) 159, doi:10.1007/s11249-017-0938-1, for
-Fuller & Tabor on loading.
+surface, divided by h_rms. Only the summits deform in these theories, so these distances are mean separations. The
+constants in this file name the sources. Two further sources: P. R. Nayak, J. Lubr. Technol. 93 (1971) 398,
+doi:10.1115/1.3451608, for the summits of a Gaussian surface; J. A. Greenwood, Tribol. Lett. 65 (2017) 159,
+doi:10.1007/s11249-017-0938-1, for the theory of Fuller & Tabor on loading.
 """
 
 import math

@@ -131,7 +131,7 @@ def _summit_theories(moments, adhesive):
 
 
 def _published_points(spectrum):
-    """Return published points by Green's function molecular dynamics, for this spectrum, by variable name."""
+    """Return published points from Green's function molecular dynamics for a spectrum, by variable name; {} if none."""
     gfmd = literature("gfmd_area")
     if spectrum is None:
         return {}
