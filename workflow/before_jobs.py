@@ -1,4 +1,4 @@
-"""Preparations before Snakemake plans its jobs, and before it starts them."""
+"""Preparations before Snakemake plans jobs, and before Snakemake starts jobs."""
 
 import atexit
 import contextlib
@@ -74,7 +74,7 @@ def start_jobs_freely(workflow) -> None:
 
 
 class CampaignResults:
-    """Results of a campaign in the working directory, which are inspected and locked before jobs start.
+    """Results of one campaign in the working directory; the results are inspected and locked before jobs start.
 
     Snakemake also reads the Snakefile for calls that only report or clean up. The lock stops only calls that start jobs
     (`begin`).
@@ -104,13 +104,13 @@ class CampaignResults:
             self._set_aside(path, "damaged")
         for path, record in records.items():
             if path not in damaged and os.path.exists(f"{results}/{path}"):
-                self._set_aside(path, "Snakemake's record of it is damaged")
+                self._set_aside(path, "damaged record in Snakemake")
             if not dry_run:
-                record.unlink()  # some of these stop Snakemake
+                record.unlink()  # some damaged records stop Snakemake
         if dry_run:
             return
         if os.path.isdir(results):
-            self._claim()  # results of an older version, for which there may be no jobs
+            self._claim()  # results of an older version may need no jobs, which would claim the results
         if not METADATA.is_dir() or not os.access(".snakemake", os.W_OK):
             self._refuse_unwritable()  # nothing was computed yet, or Snakemake could not write its records
         elif os.path.isdir(results) and not os.access(results, os.W_OK):
@@ -118,7 +118,7 @@ class CampaignResults:
             _warn(f"cannot write to {results}: missing results cannot be computed")
 
     def have_stale_made_again(self, paths: Iterable[str], rules: Iterable) -> None:
-        """Mark results that do not match the present settings as incomplete, unless Snakemake itself detects them.
+        """Mark as incomplete the results that differ from the present settings, unless Snakemake detects this itself.
 
         Snakemake compares the settings with its own records. After a result was restored from a backup, the records may
         be missing or may describe another file. For inputs, Snakemake compares time stamps, not contents.
@@ -190,8 +190,8 @@ class CampaignResults:
             take_over(f".snakemake/{Path(self.results).name}.owner")
         if changed := checksums.damaged(self.results):
             raise SystemExit(
-                f"{self.results}/{changed[0]} has changed while the jobs were planned, perhaps by a job of an earlier "
-                "call. Nothing was computed; repeat the command."
+                f"{self.results}/{changed[0]} has changed while the jobs were planned. Perhaps a job of an earlier "
+                "call has changed this file. Nothing was computed; repeat the command."
             )
         self.remove_left_over()
         self._claim()
@@ -262,9 +262,9 @@ def _warn(text: str) -> None:
 
 
 def _damaged_records(results: str) -> Iterator[tuple[str, Path]]:
-    """Yield results whose Snakemake record is damaged, and the record, for example after the disk was full.
+    """Yield each result with a damaged record in Snakemake, and the record. A full disk can damage a record.
 
-    At a damaged record, Snakemake stops or considers the result up to date. Snakemake has no public interface that
+    If a record is damaged, Snakemake stops or considers the result up to date. Snakemake has no public interface that
     lists damaged records.
     """
     for folder, _, names in os.walk(METADATA):

@@ -19,14 +19,14 @@ def campaign_configuration(workflow, root: str) -> Configuration:
     Raises
     ------
     SystemExit
-        If the configuration has errors; the message lists them.
+        If the configuration has errors; the message lists the errors.
     """
     settings = workflow.config_settings
     files = [_shortened(path) for path in settings.configfiles]
     try:
         if len(files) > 1:
             names = ", ".join(map(str, files))
-            raise ConfigurationError(f"--configfile: {names}; expected one file, because a campaign is one file")
+            raise ConfigurationError(f"--configfile: {names}; expected one file, because one file describes a campaign")
         file = files[0] if files else _shortened(Path(root, DEFAULT))
         configuration = load_configuration(file, dict(settings.config))
     except ConfigurationError as error:

@@ -20,14 +20,14 @@ from pathlib import Path
 from typing import NamedTuple
 
 PACKAGE = "icha"
-# The module beside the scripts that starts and ends every job. It changes no number.
+# The module in the folder of the scripts that starts and ends every job. The module has no effect on results.
 JOB_MODULE = "job.py"
 
 
 def code_fingerprint(script: str | Path, *modules: str) -> str:
     """Return the fingerprint of a script with all modules that it imports (`files_of`), and with their data files.
 
-    A data file counts if it is beside a module that contains the name of the file.
+    A data file counts if it is in the folder of a module that contains the name of the file.
     """
     files = files_of(script, *modules)
     digest = hashlib.sha256("".join(files).encode())
@@ -83,7 +83,7 @@ def _imports(file: Path) -> set[Path]:
 
 
 def _resolve(file: Path, module: str, name: str | None) -> Path | None:
-    """Return the file of an import; None if it is neither in the package nor beside a script."""
+    """Return the file of an import; None if the file is neither in the package nor in the folder of a script."""
     if module.split(".")[0] != PACKAGE:
         neighbour = file.parent / f"{module}.py"
         return neighbour if neighbour.is_file() and not file.is_relative_to(_package_folder()) else None
@@ -108,7 +108,7 @@ def _module_file(name: str, missing_ok: bool = False) -> Path | None:
 
 @cache
 def _data_files(file: Path) -> list[Path]:
-    """Return the data files beside a module that are named in the module, directly or by the name of their folder."""
+    """Return the data files in the folder of a module whose names, or whose subfolders' names, are in the module."""
     files = set()
     for name in _syntax_of(file).names:
         path = file.parent / name
@@ -136,7 +136,7 @@ class _Syntax(NamedTuple):
     names: list[str]
 
 
-# Reading the syntax trees of all modules takes a second. Therefore their content is cached beside Python's bytecode.
+# Reading the syntax trees of all modules takes a second, so what is read is cached in the folder of Python's bytecode.
 # The key is the checksum of the text of the module; the file name depends on the versions of Python and of this module.
 _READER = hashlib.sha256(Path(__file__).read_bytes() + sys.version.encode()).hexdigest()[:16]
 _CACHE = Path(importlib.util.cache_from_source(__file__)).with_suffix(f".{_READER}.json")

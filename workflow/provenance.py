@@ -46,8 +46,8 @@ def recorded_jobs(
         missing = [name for name in record["input"] if name not in places]
         if missing:
             raise ValueError(
-                f"{missing[0]}: {outputs[log][0]} was made from it, but the deposit will not contain it; expected "
-                "every input of a result in the deposit"
+                f"{missing[0]}: {outputs[log][0]} was made from this file, but the deposit will not contain the file; "
+                "expected every input of a result in the deposit"
             )
         script = PurePosixPath(record["code"].strip().strip("\"'")).name
         jobs.append(
@@ -64,7 +64,7 @@ def recorded_jobs(
 
 
 def recorded_parameters(records: Path, name: str) -> list[str]:
-    """Return the parameters of the job that made a file, as `repr` writes them; errors as in `recorded_jobs`."""
+    """Return the `repr` of each parameter of the job that made a file; raise the same errors as `recorded_jobs`."""
     return _record(records, name)["params"]
 
 
@@ -89,8 +89,8 @@ def _record(records: Path, name: str) -> dict[str, Any]:
 def _settings(params: list[str]) -> tuple[tuple[str, str], ...]:
     """Return names and values of the settings of a job, from its recorded parameters.
 
-    Snakemake records parameters without their names. So only parameters that are mappings, with names in them, are
-    included. The attributes of datasets, and paths of this machine, are omitted.
+    Snakemake records parameters without their names. Therefore only parameters that are mappings are included, because
+    their keys are names. The attributes of datasets, and paths of this machine, are omitted.
     """
     settings: dict[str, str] = {}
     for text in params:

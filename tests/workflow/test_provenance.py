@@ -91,5 +91,5 @@ def test_a_result_without_a_record_is_named_with_the_command_to_use(recorded_job
 
 def test_inputs_of_results_must_be_in_the_deposit(recorded_jobs, tmp_path):
     without = {USED: GIVEN[USED]}
-    with pytest.raises(ValueError, match=rf"^{SCAN}: {SURFACE} was made from it"):
+    with pytest.raises(ValueError, match=rf"^{SCAN}: {SURFACE} was made from this file"):
         recorded_jobs(recorded(tmp_path), MADE, without, scripts=WORKFLOW / "scripts")

@@ -1,5 +1,5 @@
-# References for runs: theories and published data points; solutions by boundary elements at a finite range for the
-# surface and the material of a run, at one load or in a cycle of loading and unloading.
+# References for runs. The first rule writes theories and published data points. The other rules solve the contact of a
+# run with boundary elements at a finite range, at one load or in a cycle of loading and unloading.
 
 from icha.configuration.cases import adhesive_contacts, loop_settings, solution_settings
 from icha.planning.requirements import solver_memory

@@ -1,5 +1,5 @@
-# report.html: figures, tables, parameters and checks on one page. The times of jobs differ between executions, so they
-# are in a separate table, run_times.tsv. Then the same data always give exactly the same page.
+# report.html: figures, tables, parameters and checks on one page. The same data always give exactly the same page. The
+# times of jobs are in a separate table, run_times.tsv, because times differ between executions.
 
 from icha.planning.requirements import further_software
 

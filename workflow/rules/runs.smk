@@ -1,4 +1,4 @@
-# One job for each run. Runs with another model than the asperity model are in a folder with the name of the model.
+# One job for each run. Runs of other models than the asperity model are in a folder with the name of the model.
 
 from icha.configuration.cases import run_settings
 from icha.contact.models import MODELS
@@ -26,7 +26,7 @@ rule run:
         "<logs>/runs/<run>.log",
     benchmark:
         "<benchmarks>/runs/<run>.jsonl"
-    # Long runs start first; otherwise the last of them would occupy one core at the end.
+    # Long runs start first; otherwise, at the end, one long run could occupy one core while other cores are idle.
     priority: by_case(lambda case: int(MODELS[case.model].resumable))
     conda:
         "../envs/icha.yaml"

@@ -1,4 +1,4 @@
-"""Functions for the scripts of all jobs: output to the log, errors, checksums, end of the job with Snakemake."""
+"""Functions for the scripts of all jobs: write the log, report errors, verify checksums, end a job with Snakemake."""
 
 import contextlib
 import os
@@ -33,7 +33,7 @@ def job_context(snakemake):
     """Context manager: verify the inputs of a job, write checksums of its outputs, and report its errors.
 
     All output goes to the log of the job. An error ends the job, and the error message is written to the log. For an
-    unexpected error, the traceback is written to a file beside the log for the developers.
+    unexpected error, the traceback is written to a second file in the folder of the log, for the developers.
 
     Yields
     ------
@@ -90,7 +90,7 @@ def refuse_changed(file, sha256, name=None):
 
 
 def attributes(snakemake):
-    """Return the attributes of the dataset of a job: those of its rule, and an `id` that is equal on all machines."""
+    """Return the attributes of a job's dataset: the attributes in its rule, and an `id` that all machines share."""
     attributes = snakemake.params.attributes
     path = Path(snakemake.output[0]).relative_to(_results(snakemake)).with_suffix("")
     return {"id": f"{attributes['campaign']}/{path.as_posix()}"} | attributes

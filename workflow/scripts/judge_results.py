@@ -1,4 +1,4 @@
-"""Write the verdict on the checks; the job fails if a check failed that is not a known failure."""
+"""Write the verdict on the checks; the job fails if a check has failed, except for known failures."""
 
 from job import job_context
 
@@ -17,7 +17,7 @@ def judge_results(checks, output, *, known):
     Raises
     ------
     ValueError
-        If a check failed that is not a known failure; the message lists the failed checks.
+        If a check has failed and is not a known failure; the message lists the failed checks.
     """
     found = read_checks(checks)
     failed = sum(not check.passed for check in found)

@@ -1,4 +1,4 @@
-"""Compare runs with the asperity model to boundary elements: runs of the campaign, and solutions at finite ranges."""
+"""Compare runs of the asperity model with boundary elements: runs of the campaign, and solutions at finite ranges."""
 
 from job import attributes, job_context
 

@@ -7,7 +7,7 @@ from job import job_context
 
 
 def publish(archive, *, results, files, named_files, project):
-    """Write the deposit as a zip, and as a folder beside it.
+    """Write the deposit as a zip and as a folder.
 
     Parameters
     ----------
@@ -17,7 +17,7 @@ def publish(archive, *, results, files, named_files, project):
     named_files : files that the configuration names, by their paths relative to the configuration as used.
     project : folder of the workflow.
     """
-    # The fork server imports modules at the top for every campaign.
+    # These imports are inside the function, because the fork server imports top-level modules for every campaign.
     from icha.configuration.load import load_configuration
     from icha.deposit.make import make_deposit, refuse_mixed
     from icha.deposit.program import program_source, refuse_other_environment

@@ -16,7 +16,7 @@ from icha.datasets.surface_file import read_surface
 from icha.path.targets import Path
 from icha.simulation import ConvergenceError, empty_run, simulate
 
-# Errors of the machine, not of the run: the job fails, and the next call repeats it.
+# Errors of the machine, not of the run: the job fails, and the next call repeats the job.
 MACHINE_ERRORS = (OSError, MemoryError, ImportError)
 
 

@@ -35,14 +35,14 @@ __all__ = ["Executor", "common_settings"]
 
 
 class Executor(LocalExecutor):
-    """Executor for this machine that runs scripts of one thread in forks."""
+    """Executor for this machine; scripts that use one thread run in forks."""
 
     def __post_init__(self):
-        """Set the modules that the fork server imports, and one thread for its libraries."""
+        """Set the modules that the fork server imports, and limit the libraries of the fork server to one thread."""
         super().__post_init__()
         self._processes = multiprocessing.get_context("forkserver")
         self._processes.set_forkserver_preload([f"{__name__}.preload"])
-        # Libraries read it when they are loaded; Snakemake sets it for jobs in their own process.
+        # Libraries read these variables when they are loaded. Snakemake sets them only for jobs in a new process.
         os.environ.update(dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1"))
         # Without a spec, forks would import the main program: the whole command line of Snakemake.
         program = sys.modules["__main__"]
@@ -116,6 +116,6 @@ def run_script(script: str, context: Snakemake, benchmark: str | None) -> None:
 
 
 def _shared_megabytes() -> float:
-    """Return the memory that this process shares with other processes, MiB: nearly all of its memory after the fork."""
+    """Return the memory that this process shares with others, MiB. After the fork, this is nearly all its memory."""
     memory = psutil.Process().memory_full_info()
     return (memory.rss - memory.uss) / 2**20

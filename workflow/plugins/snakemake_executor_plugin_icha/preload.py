@@ -9,7 +9,7 @@ import icha
 from icha.support.program import end_with_parent
 
 SERVER = os.getpid()
-# The command line, and modules that only a deposit needs.
+# Subpackages that are not imported: the command line, and modules that only a deposit needs.
 _EXCLUDED = ("cli", "deposit")
 # Modules that libraries import at their first use.
 _LATE = ("pint", "PIL.PngImagePlugin", "matplotlib.style", "matplotlib.backends.backend_pdf", "fontTools.subset")

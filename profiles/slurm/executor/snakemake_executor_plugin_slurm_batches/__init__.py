@@ -1,9 +1,9 @@
 """The executor `slurm` of Snakemake, with batches (groups of jobs) whose jobs run in parallel and fail independently.
 
 The executor `slurm` runs the jobs of a group one after the other, each in a separate Snakemake, on any number of cores.
-If a job fails, it starts no further jobs and removes the results of the finished ones. This executor starts one
-Snakemake on the node, which runs all jobs of the group on the cores and in the memory of the submission, and continues
-after a failed job. Finished results are kept: see `keep-incomplete` in profiles/slurm/config.yaml.
+If a job fails, `slurm` starts no further jobs, and removes the results of finished jobs. The executor in this module
+starts one Snakemake on the node. This Snakemake runs all jobs of the group on the cores and in the memory of the
+submission, and continues after a failed job. Finished results are kept (`keep-incomplete` in the profile `slurm`).
 """
 
 from pathlib import Path
@@ -20,13 +20,13 @@ def _jobs_of(submission):
 
 
 class Executor(SlurmExecutor):
-    """Executor that submits jobs and groups of jobs; on the node, they are forks of one process (workflow/plugins)."""
+    """Executor that submits jobs and groups of jobs; on the node, jobs are forks of one process (workflow/plugins)."""
 
     def run_job_pre(self, job):
         """Remove the outdated results of a job before it is submitted.
 
-        Snakemake removes them when a job starts. If a job never starts, because its submission was cancelled or ran out
-        of time, the outdated results would remain, and with `keep-incomplete` they would pass for new ones.
+        Snakemake removes outdated results only when a job starts. A job never starts if its submission is cancelled or
+        runs out of time. Its outdated results would remain, and `keep-incomplete` would let them count as new results.
         """
         for each in _jobs_of(job):
             for file in each.output:
@@ -42,7 +42,7 @@ class Executor(SlurmExecutor):
         return "--executor icha --keep-going --show-failed-logs"
 
     async def check_active_jobs(self, active_jobs):
-        """Check the states of the submissions; the interval between checks is at most six times the first one."""
+        """Check the states of the submissions; the interval between checks is at most six times the first interval."""
         async for job in super().check_active_jobs(active_jobs):
             yield job
         longest = 6 * self.workflow.executor_settings.init_seconds_before_status_checks
