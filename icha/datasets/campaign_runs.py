@@ -39,7 +39,7 @@ _ATTRIBUTES = ("contact_model", "config_sha256", "applicability", *STATUS_ATTRIB
 
 
 def read_run_values(path: str | os.PathLike) -> tuple[Values, dict[str, str]]:
-    """Read the attributes for settings and status of a run, and the values of the run dataset, except maps.
+    """Read all values of a run dataset except maps, and the attributes that give settings and status of the run.
 
     Raises
     ------
@@ -91,7 +91,7 @@ class Entry(NamedTuple):
 
     @property
     def extent(self) -> tuple[bool, int]:
-        """Sort key (reached its end, number of steps); the run with the largest key has all variables."""
+        """Sort key: True if the run reached its end, number of steps. A run with the largest key has all variables."""
         return self.status not in _ENDED_EARLY, self.sizes.get("step", 0)
 
 

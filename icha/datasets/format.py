@@ -31,7 +31,7 @@ _OTHERS = {
     "boundary-element loop at a finite range": "dissipated",
 }
 
-# Words in names of attributes that a file must not have, because the same input must give the same bytes.
+# A file must not have attributes with these words in their names, because the same input must give the same bytes.
 _REFUSED = re.compile("user|host|mail|date|time")
 # Values that must be equal may differ by this relative difference, due to rounding.
 _ROUNDING = 1e-9

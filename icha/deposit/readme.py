@@ -158,7 +158,7 @@ def _outcome(publication: Publication, dataset: xr.DataTree, checks: Sequence[Ch
 
 
 def _model_errors(tree: xr.DataTree) -> list[dict]:
-    """Return the smallest and largest error of the model, by entry and material, for all loads, surfaces and slopes."""
+    """Return, for each entry and material, the smallest and the largest error of all loads, surfaces and slopes."""
     found = []
     for entry, node in tree.children.items():
         for material, errors in node.to_dataset().groupby("material"):

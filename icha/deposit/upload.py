@@ -13,7 +13,7 @@ from requests.adapters import HTTPAdapter
 from urllib3 import Retry
 
 ZENODO = "https://zenodo.org"
-# Longest times in s to wait for the connection, and for an answer; the server computes checksums of large files.
+# Longest times in s to wait for the connection, and for an answer, which takes long after the upload of a large file.
 _TIMEOUT = (20, 900)
 # HTTP statuses of a server that is busy or has failed.
 _FAILING = (429, 500, 502, 503, 504)
@@ -53,8 +53,8 @@ class Draft(NamedTuple):
     files: dict[str, tuple[str, str]]
 
 
-# Failed requests that can be repeated are sent again after 0, 2, 4, 8 and 16 s, or after the time that the server
-# states, at most 300 s.
+# Failed requests that can be repeated are sent again after 0, 2, 4, 8 and 16 s. If the server states another time (at
+# most 300 s), requests are sent again after this time.
 _PATIENCE = Retry(
     total=5, backoff_factor=1, status_forcelist=_FAILING, redirect=0, raise_on_status=False, retry_after_max=300
 )

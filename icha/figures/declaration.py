@@ -125,7 +125,7 @@ class TruthFigure(StudyFigure):
         return tuple(dict.fromkeys(filter(None, (self.study, self.boundary_elements))))
 
     def problems(self, campaign: Campaign) -> Iterator[Problem]:
-        """Also yield a problem if `boundary_elements` names a study that does not exist or has no such runs."""
+        """Also yield a problem if the study in `boundary_elements` does not exist or has no boundary elements."""
         yield from super().problems(campaign)
         if self.boundary_elements is None:
             return

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 # All materials share a panel if each material has at most this number of lines.
 _MOST_LINES = 2
-# Points at the same load are drawn side by side, with this ratio of their positions, so that no bar hides another one.
+# Points at the same load are drawn side by side, so that no bar hides another. Neighbouring positions have this ratio.
 _APART = 1.025
 # The load axis extends beyond all loads by the factor _MARGIN. The end of the axis is at least _LEAST_REACH times the
 # middle of the axis, which leaves room for a tick label.

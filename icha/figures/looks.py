@@ -161,7 +161,7 @@ class Looks:
         """Return a name that distinguishes a line from the other lines of the figure."""
         material, *place = contact
         place = self.place_name(tuple(place))
-        # If colours distinguish surfaces and slopes, the legend does not name a single material.
+        # If colours distinguish surfaces and slopes, the name of the only material is left out.
         if place and self.by_place and len(self.materials) == 1:
             return place
         return ", ".join(filter(None, [self.material_name(material), place]))

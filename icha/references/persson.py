@@ -85,7 +85,7 @@ def persson_stiffness(reduced_pressure, spectrum):
 
 
 def _over_wave_numbers(share, reduced_pressure, spectrum):
-    """Return sqrt(pi) int dq q^2 C(q) w(q) share(w p/E*) over h_rms at reduced pressures, an array."""
+    """Return sqrt(pi) int dq q^2 C(q) w(q) share(w p/E*), divided by h_rms, at an array of reduced pressures."""
     pressure = np.asarray(reduced_pressure, float)
     if np.any(pressure <= 0):
         raise ValueError("reduced_pressure: must be greater than 0")
