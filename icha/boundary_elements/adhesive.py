@@ -25,7 +25,7 @@ class Summits:
     cell : (k,) int, grid cell of each summit.
     above : (k,), height of the summit above the grid node of its cell.
     reach : (k,), largest gap at which the summit jumps into contact.
-    radius : (k,), radius of the contact after the jump of a single summit. A smaller contact might not grow.
+    radius : (k,), radius of the disc that closes: that of a single summit after its jump. A smaller one could shrink.
     """
 
     cell: np.ndarray
@@ -58,7 +58,8 @@ class Summits:
     ) -> tuple[np.ndarray, np.ndarray, int]:
         """Find new contact at summits and overlapping cells within reach by more than a margin, if not `tried` before.
 
-        Return the cells to close, the cells newly tried, and the number of all cells within reach (also tried ones).
+        Return the cells to close, the cells among them that count as tried (the discs count as the cells of their
+        summits), and the number of all cells within reach, tried before or not.
         """
         within, overlapping = self.find_within_reach(state, margin)
         candidates = np.union1d(self.cell[within], overlapping)
@@ -72,7 +73,8 @@ def solve_adhesive_contact(
 ) -> tuple[AdhesiveContact, int]:
     """Solve the adhesive contact at a separation: relax the fronts and close cells within reach of the attraction.
 
-    A summit or cell that closes and then loses contact again stays open.
+    Each summit or cell is closed at most once in a call: if it loses contact again, it stays open. In three stages the
+    fronts are relaxed to TOLERANCES.coarse, TOLERANCES.fine and `tolerance`. New contact starts the stages again.
 
     Parameters
     ----------
@@ -85,7 +87,7 @@ def solve_adhesive_contact(
 
     Returns
     -------
-    The contact, and the number of summits and overlapping cells within reach (less the margin) that stay open.
+    The contact, and the number of summits and overlapping cells within reach (in the last stage) that stay open.
 
     Raises
     ------
@@ -127,7 +129,7 @@ def solve_adhesive_contact(
 
 
 def _form_contact(problem, contact, formed):
-    """Close the cells `formed`, (m,); if windows save time, also relax fronts near these cells, solve the contact."""
+    """Close cells `formed`, (m,), relax the front near them in windows and solve; without windows, only close them."""
     closed = contact.close_cells(formed)
     relaxed = relax_in_windows(problem.space, problem.front, problem.separation, closed, contact.gap, formed)
     if relaxed is None:

@@ -39,8 +39,8 @@ from icha.surfaces.surface import Surface
 _SMALLEST_OPENING = 1e-4
 # Largest change of a fraction of contact up to which the rates of a state predict the next state.
 _LARGEST_PREDICTION = 1.0
-# Smallest work to which errors of a loop are compared, divided by the surface energy times the nominal area A0. The
-# value is the work of adhesion of 0.1 % of A0.
+# Smallest work to which errors of a loop are compared, divided by the nominal area A0 times `surface_energy`, the work
+# of adhesion.
 _SMALLEST_WORK = 1e-3
 
 
@@ -60,12 +60,12 @@ class BoundaryElements(FullContactProblem):
 
     @cached_property
     def path_accuracy(self) -> PathAccuracy:
-        """Accuracy to which a path resolves its events; without adhesion there are no jumps and no losses."""
+        """Accuracy of a path; without adhesion no energy is lost, so that errors of the work do not control steps."""
         least_work = _SMALLEST_WORK * self.law.material.surface_energy
         return replace(MODELS[REFERENCE_MODEL].accuracy, least_work=least_work, error_controlled_steps=self.adhesive)
 
     def untouched(self) -> CellState:
-        """Return the state without contact at the separation at which the first summit or plateau starts to touch."""
+        """Return the state without contact where the first summit jumps into contact, or the highest point touches."""
         separation = float(self.heights.max())
         if self.adhesive:
             first = self.asperities.height + self.summits.reach * self.spacing
@@ -78,12 +78,14 @@ class BoundaryElements(FullContactProblem):
     ) -> CellState:
         """Find the next equilibrium from a state: at a mean separation (m), or at the load or area of `control`.
 
-        With `control`, `separation` is the first guess. `let_go`, the number of patches to detach by force, must be 0:
-        fronts move until they are stable, so unstable patches already detach.
+        With `control`, `separation` is the first guess. The result may be full contact, at separation 0: under a large
+        load, or at a separation below `smallest_gap`. Without `control`, the first call from full contact only lowers
+        the pressure to the opening pressure; the next call opens the contact. Raise `NotConverged` if there is no
+        equilibrium, or if `let_go` is not 0: unstable patches already detach, and no patch is detached by force.
         """
         if let_go:
             raise NotConverged("boundary elements cannot detach single patches by force")
-        find = self._leave_full_contact if self.is_full(state) else self._next_equilibrium
+        find = self._from_full_contact if self.is_full(state) else self._next_equilibrium
         return self.continue_from(find(state, separation, control), state)
 
     def continue_from(self, state: CellState, before: CellState) -> CellState:
@@ -92,7 +94,7 @@ class BoundaryElements(FullContactProblem):
         return replace(state, history=(*before.history, events) if len(events) else before.history)
 
     def _next_equilibrium(self, state, separation, control):
-        """Find the next equilibrium from a state that is not full contact; arguments as in `equilibrium`."""
+        """Find the next equilibrium from a state with gaps: directly, or by `solve_at_control`; see `equilibrium`."""
         if control is None:
             closed = separation < self.smallest_gap
             return self.full_contact(self.undetermined_pressure) if closed else self._solve(state, separation)
@@ -102,11 +104,10 @@ class BoundaryElements(FullContactProblem):
             return self._solve_nonadhesive(state, load=control.target / self.contact_modulus)
         return solve_at_control(ControlProblem(self, control, self._solve, self._events), state, separation)
 
-    def _leave_full_contact(self, state, separation, control):
-        """Find the next equilibrium from full contact, which opens where tension is largest; see `equilibrium`."""
+    def _from_full_contact(self, state, separation, control):
+        """Find the next equilibrium from full contact, which opens below its opening pressure; see `equilibrium`."""
         if control is None and separation <= 0:
             return self.full_contact(self.undetermined_pressure)
-        # Without control, the pressure first falls to the opening pressure, at any separation. The next call opens.
         if control is None and self.pressure(state) > self.opening_pressure + ROUNDING * self.contact_modulus:
             return self.full_contact(self.opening_pressure)
         if control and control.quantity == PRESSURE and control.target >= self.opening_pressure:
@@ -114,7 +115,7 @@ class BoundaryElements(FullContactProblem):
         if control and control.quantity == AREA_FRACTION and control.target >= 1:
             return state
         separation = max(separation, self.smallest_gap)
-        return self._next_equilibrium(self.open_weakest(separation), separation, control)
+        return self._next_equilibrium(self.open_most_tensile(separation), separation, control)
 
     def observables(self, surface: Surface) -> PatchObservables:
         """Return the object that computes recorded values of states from this contact and its surface."""
@@ -134,7 +135,7 @@ class BoundaryElements(FullContactProblem):
         return float(np.sum(self.area_of_cells(state))) / self.heights.size
 
     def area_of_cells(self, state: CellState) -> np.ndarray:
-        """Return the contact area of each cell, (k,), divided by the cell area, corrected along the perimeter."""
+        """Return `reported_areas`, (k,); without adhesion, whole cells less a constant part for each free edge."""
         if self.adhesive:
             return reported_areas(state.fraction, state.mean_fraction)
         return 1 - BEYOND_EDGES * free_edges(state.cells, self.space.grid)
@@ -158,10 +159,10 @@ class BoundaryElements(FullContactProblem):
 
     def stiffness(self, state: CellState) -> float:
         """Return the contact stiffness -dp/du with moving fronts, Pa/m; p nominal pressure, u mean separation."""
-        return 0.0 - self.slope(PRESSURE, state)
+        return 0.0 - self.slope(PRESSURE, state)  # not -0.0 without contact
 
     def slope(self, quantity: str, state: CellState) -> float:
-        """Return the derivative of nominal pressure or area fraction with respect to the separation; fronts move."""
+        """Return the slope that is stored in a state: of the nominal pressure (Pa/m), or of the area fraction (1/m)."""
         return state.pressure_slope if quantity == PRESSURE else state.area_slope
 
     def stored_energy(self, state: CellState) -> float:
@@ -173,7 +174,7 @@ class BoundaryElements(FullContactProblem):
         return False
 
     def _predict(self, state, separation):
-        """Predict the contact at a separation (m) from the rates of a state; if that is too far, do not change it."""
+        """Predict the contact at a separation (m) by the rates of a state, if it has rates and is not too far."""
         contact = Contact(state.cells, state.fraction, state.pressure / self.contact_modulus)
         if state.rates is None:
             return contact
@@ -184,7 +185,11 @@ class BoundaryElements(FullContactProblem):
         return contact.apply_step(change, state.rates[1] * distance)
 
     def _solve(self, state, separation, residual=TOLERANCES.front, *, nearby=False, reuse_slopes=False):
-        """Solve the equilibrium at a separation (m), to a residual of the front; options as for `ControlProblem`."""
+        """Solve the equilibrium at a separation (m), starting from the prediction of `_predict`.
+
+        The options have an effect only with adhesion. residual : largest residual of the front. nearby : whether the
+        start is near equilibrium. reuse_slopes : keep the slopes of `state` if the same cells are in contact.
+        """
         if not self.adhesive:
             return self._solve_nonadhesive(state, separation=separation / self.spacing)
         problem = FrontProblem(self.space, self.front, self.topography, separation / self.spacing)
@@ -217,7 +222,7 @@ class BoundaryElements(FullContactProblem):
         return patch_events(before, after, energy, self.summits.cell, self.space.grid, self.spacing)
 
     def _with_slopes(self, state, accuracy):
-        """Return the state with its rates, and with the derivatives of nominal pressure and area fraction."""
+        """Return the state with rates and slopes to a relative accuracy; without adhesion, estimate the area slope."""
         if not len(state.cells):
             return state
         contact = Contact(state.cells, state.fraction, state.pressure / self.contact_modulus)
@@ -250,13 +255,10 @@ def contact_of(surface: Surface, material: Material) -> BoundaryElements:
     law, asperities, h = JKR(material), locate_summits(surface), surface.spacing
     column, row = (np.rint(asperities.position / h).astype(int) % surface.grid).T
     cell = row * surface.grid + column
-    jump_in = law.jump_in_approach(asperities.radius_of_curvature)
-    summits = Summits(
-        cell,
-        (asperities.height - surface.heights.ravel()[cell]) / h,
-        -jump_in / h,
-        law.contact_radius(jump_in, asperities.radius_of_curvature) / h,
-    )
+    R = asperities.radius_of_curvature
+    jump_in = law.jump_in_approach(R)
+    above, radius = asperities.height - surface.heights.ravel()[cell], law.contact_radius(jump_in, R)
+    summits = Summits(cell, above / h, -jump_in / h, radius / h)
     strength = material.interface_strength / material.contact_modulus
     front = Front(material.surface_energy / (material.contact_modulus * h), strength)
     if 0 < front.critical_opening < _SMALLEST_OPENING * np.abs(surface.heights).max() / h:
@@ -274,6 +276,7 @@ def contact_of(surface: Surface, material: Material) -> BoundaryElements:
 def resumable(contact: BoundaryElements, folder: pathlib.Path) -> CheckpointedContact:
     """Return the contact with checkpoints: equilibria are saved in a folder, so that an interrupted path can resume."""
     programs = [(name, version(name)) for name in ("icha", "numpy", "scipy")]
-    others = repr((contact.spacing, contact.law.material, programs, CellState.__match_args__)).encode()
-    of = hashlib.sha256(contact.heights.tobytes() + others).hexdigest()
-    return CheckpointedContact(contact, of[:32], folder, pack, unpack)
+    # Another surface, material or version of a program gets other checkpoints.
+    settings = repr((contact.spacing, contact.law.material, programs, CellState.__match_args__)).encode()
+    identity = hashlib.sha256(contact.heights.tobytes() + settings).hexdigest()
+    return CheckpointedContact(contact, identity[:32], folder, pack, unpack)

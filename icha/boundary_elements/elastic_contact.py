@@ -3,7 +3,7 @@
 The cells of the initial contact stay in contact, under pressure or tension. Other cells join the active set where the
 surfaces overlap, and leave the set when they are in tension. The iteration is a Newton method for the complementarity
 of pressure and gap (Hintermueller, Ito & Kunisch, SIAM J. Optim. 13 (2003) 865). A bond transmits only tension, so that
-a partial cell under pressure closes.
+a partial cell under pressure becomes a closed cell, with the fraction of contact 1.
 """
 
 from __future__ import annotations
@@ -22,7 +22,8 @@ from icha.support.parallel import blocks, on_cores
 ROUNDING, NO_CONTACT = 5e-7, 1e-9
 # Largest error after a correction, divided by the error before it; above, the iteration has stagnated.
 LARGEST_REMAINDER = 0.5
-# Error after one correction divided by the error before: while the active set changes; smallest in single precision.
+# Error after a correction divided by the error before it: _COARSE_PART while the active set changes; _FINE_PART is the
+# smallest value that single precision allows.
 _COARSE_PART, _FINE_PART = 0.1, 1e-4
 # Smallest compliance of the half-space, 2/q at the shortest wave, in h/E*.
 _SMALLEST_COMPLIANCE = np.sqrt(2) / np.pi
@@ -40,7 +41,7 @@ class Contact:
     Parameters
     ----------
     cells : (k,) int, flat indices of the cells in contact, ascending.
-    fraction : (k,), part f of the area of each cell that is in contact, 0 < f <= 1.
+    fraction : (k,), part f of the area of each cell that is in contact, 0 < f <= 1; 0 for rim cells of `ActiveCells`.
     pressure : (k,), force on each cell divided by the area of the whole cell, in E*; negative in tension.
     """
 
@@ -141,7 +142,8 @@ def solve_active_set(
     load : nominal pressure, in E*; `contact` must then have at least one cell.
     sticky : whether the cells of the initial contact stay in contact under tension.
 
-    Raise `FullContact` if all cells close at a given separation, which is impossible: the separation is the mean gap.
+    Raise `FullContact` if all cells close at a given separation: no equilibrium exists, because the mean gap would be
+    zero. Raise `NotConverged` if the cells in contact or the pressures do not converge.
     """
     dtype = np.float32 if tolerance > topography.rounding else float
     keep, gap, before, changing = np.full(len(contact.cells), sticky), None, np.inf, not sticky
@@ -162,9 +164,8 @@ def solve_active_set(
         changed = _next_active_set(contact, keep, joining, left if dtype is float and not sticky else 0.0)
         if changed is None:
             if left <= tolerance:
-                return ElasticContact(
-                    contact.cells, contact.fraction, contact.pressure, gap, separation, misfit, tolerance
-                )
+                cells, fraction, pressure = contact.cells, contact.fraction, contact.pressure
+                return ElasticContact(cells, fraction, pressure, gap, separation, misfit, tolerance)
             if not left <= LARGEST_REMAINDER * before:
                 if dtype == np.float32 and np.isfinite(left):
                     # Displacements much larger than the heights are rounded more.
@@ -191,9 +192,9 @@ def _scale_to_load(space, contact, load):
 
 
 def _next_active_set(contact, keep, joining, smallest):
-    """Close partial cells under pressure, remove cells in tension, add cells `joining`, (m,).
+    """Close partial cells under pressure, remove cells with a pressure below `smallest`, add cells `joining`, (m,).
 
-    keep : (k,) bool, cells that stay in any case. smallest : pressure below which other cells leave contact.
+    keep : (k,) bool, cells that stay under any pressure.
     Return the new contact and its `keep`; None if nothing changes.
     """
     to_close = (contact.pressure > 0) & (contact.fraction < 1)
@@ -201,18 +202,13 @@ def _next_active_set(contact, keep, joining, smallest):
     if not to_close.any() and staying.all() and not len(joining):
         return None
     fraction = np.where(to_close, 1.0, contact.fraction)
-    cells, *values, keep = merge_cells(
-        contact.cells[staying],
-        joining,
-        (fraction[staying], 1.0),
-        (contact.pressure[staying], 0.0),
-        (keep[staying], False),
-    )
+    fractions, pressures = (fraction[staying], 1.0), (contact.pressure[staying], 0.0)
+    cells, *values, keep = merge_cells(contact.cells[staying], joining, fractions, pressures, (keep[staying], False))
     return Contact(cells, *values), keep
 
 
 def _compute_gap(space, topography, contact, separation, load, dtype, out=None):
-    """Compute the gap field, the misfit of cells in contact, and the separation (unknown only if a load is given)."""
+    """Compute the gap, the misfit of cells in contact, and the separation (under a load: with zero mean gap there)."""
     cells = contact.cells
     displacement = space.displacement(cells, contact.pressure.astype(dtype), out=out)
     if load is not None:
@@ -222,7 +218,7 @@ def _compute_gap(space, topography, contact, separation, load, dtype, out=None):
 
 
 def _correct_pressures(space, contact, misfit, part, zero_sum):
-    """Correct the pressures to reduce the largest misfit by the factor `part`; zero_sum as in `solve_pressures`."""
+    """Reduce the largest misfit to max(part, operator.error) times its value; zero_sum as in `solve_pressures`."""
     operator = space.restrict_to(contact.cells)
     error = np.abs(misfit).max()
     change, _ = solve_pressures(operator, contact.bond_compliance, misfit / error, max(part, operator.error), zero_sum)
@@ -248,13 +244,13 @@ def solve_pressures(
     ----------
     operator : compliance K of the half-space between k cells.
     bonds : (k,), compliance of the bond of each cell.
-    wanted : (k,), prescribed displacement of each cell, in cell sizes.
-    accuracy : largest allowed error of a displacement, in cell sizes.
+    wanted : (k,), prescribed displacement of each cell, in cell sizes or scaled.
+    accuracy : largest allowed error of a displacement, in the unit of `wanted`; after _MAX_ITERATIONS it may be larger.
     zero_sum : if True, the pressures sum to zero, and the displacements may differ from `wanted` by a constant.
 
     Returns
     -------
-    Pressures (k,) in E*, and remaining errors of the displacements (k,).
+    Pressures (k,) in E*, with the scale of `wanted`, and remaining errors of the displacements (k,).
     """
     scale = np.sqrt(_TYPICAL_COMPLIANCE / (_TYPICAL_COMPLIANCE + bonds)).astype(np.float32)
     bonds, residual = bonds.astype(np.float32), wanted.astype(np.float32)
@@ -301,7 +297,7 @@ class AdhesiveContact(ElasticContact):
     Parameters
     ----------
     energy : elastic energy of half-space and bonds, in E* times cell size^3.
-    energy_error : largest amount by which `energy` may be too small.
+    energy_error : largest error of `energy`, which apart from rounding is only too small (see `solve_bonded_contact`).
     mean_fraction : (k,), Gaussian average of the fractions around each cell (`average_fractions`).
     rim : (m,) int, open cells that share an edge with a cell in contact, ascending.
     mean_fraction_rim : (m,), Gaussian average of the fractions around each cell of the rim.

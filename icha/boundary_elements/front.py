@@ -12,7 +12,7 @@ The sum of the fractions overestimates the contact radius by a constant part of 
 
     A = sum f - b sum f (1 - w*f),   w a Gaussian stencil,
 
-subtracts a term in proportion to the perimeter. With the area A the work of adhesion is lower at convex fronts.
+subtracts a term in proportion to the perimeter. By this term, the work of adhesion per area is lower at convex fronts.
 
 Lengths are in units of the cell size, pressures in E*.
 """
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 # divided by that of the row. With this factor circular patches follow JKR at any position (docs/short_range.md).
 _ROW_COMPLIANCE, _BOND_FACTOR = 1.7316, 3.5
 COMPLIANCE = _BOND_FACTOR * _ROW_COMPLIANCE
-# Compliance of a cell at the front in preconditioners: compliance of its bond minus that of the half-space.
+# Compliance of a cell at the front in preconditioners: about that of its bond minus that of the half-space.
 NET_COMPLIANCE = 0.6 * COMPLIANCE
 # Width and radius of the stencil in cells, and weight of the perimeter in the work of adhesion, fitted to JKR patches.
 _WIDTH, _RADIUS = 1.5, 5
@@ -126,8 +126,8 @@ class Front:
     Parameters
     ----------
     adhesion_length : dgamma/E*, in cell sizes; zero without adhesion.
-    interface_strength : tension, in E*, at which closed cells open inside the contact, where the grid resolves tension.
-        At the front the grid smooths a singular tension, so that the strength s depends on the cell size.
+    interface_strength : tension, in E*, at which a closed cell opens although its four neighbours are closed. (Cells at
+        the front have the strength s, which depends on the cell size: the grid smooths a singular tension.)
     """
 
     adhesion_length: float

@@ -42,19 +42,20 @@ class FrontTolerances:
     front : largest residual of a converged front. For comparison, the grid causes relative errors of areas and loads
         of about 1e-3.
     stagnation : largest residual at which a front is accepted although no step lowers its energy.
-    coarse : residual above which cells are relaxed locally and damped. Below it, contact forms where the gap is below
-        the reach of the attraction by at least `coarse` critical openings, and the first trial for a load ends.
-    fine : residual below which contact forms wherever the gap is below the reach, and later trials for a load end.
-        Cells above it are relaxed locally if they are a smaller part of the front than `few`. Also the relative error
-        of a load below which its trials are solved to the final tolerances.
-    few : part of the front, or of the grid if cells are open, that counts as few cells, 0 to 1.
+    coarse : residual above which cells are relaxed locally and damped. It is also the residual of the front in the
+        first stage of `solve_adhesive_contact` and in the first trial for a load. In this stage, contact forms where
+        the gap is below the reach of the attraction by at least `coarse` critical openings.
+    fine : residual of the front in the second stage, where contact forms wherever the gap is below the reach, and in
+        later trials for a load. Cells above it are relaxed locally if they are few. It is also the relative error of a
+        load at which the trials end, and the steps to the final tolerances begin.
+    few : part that counts as few cells, 0 to 1: of the front for local relaxation, of the whole grid for open cells.
     displacement : largest error of displacements, divided by the allowed residual of the front.
     moving_displacement : largest error of displacements in the first steps. After a step, the allowed error is
         residual * min(moving_displacement, max(residual, linear[0])), about the residual that a Newton step leaves.
     certain_displacement : error of displacements at which the energies of two similar states can be compared.
-    linear : smallest and largest relative error of the linearised equations; between them the error is the residual.
-    damping : smallest damping of the bonds after a step that would raise the energy. At least twice this damping is
-        used from the start if most of the front is far from equilibrium, and always at cells above `coarse`.
+    linear : smallest and largest relative error of the linearised equations; within these limits it is the residual.
+    damping : damping of the bonds after a first step that would raise the energy. If most of the front is far from
+        equilibrium, the damping starts at twice this value. Cells above `coarse` always have at least twice this value.
     """
 
     front: float = 1e-6
@@ -86,8 +87,9 @@ class ActiveCells(Contact):
     ----------
     gap : (k,), gap of each cell, in cell sizes.
     mean_fraction : (k,), Gaussian average of the fractions around each cell.
-    intensity : (k,), stress intensity of each cell divided by the critical stress intensity, K/K_c = sqrt(G/dgamma).
-        For open cells: gap divided by the gap at which the tension vanishes; also below 1 if the cell closes.
+    intensity : (k,), above 1 the fraction of a free cell falls, below 1 it grows. For cells in contact it is the stress
+        intensity divided by the critical one, K/K_c = sqrt(G/dgamma). For open cells it is the gap divided by the gap
+        at which the tension vanishes.
     free : (k,) bool, whether the fraction of a cell may change.
     """
 
@@ -170,9 +172,9 @@ class FrontProblem:
         return solve_bonded_contact(self.space, self.topography, self.separation, contact, tolerance, self.background)
 
     def _tolerance(self, accuracy, contact):
-        """Return the largest error of displacements, in cells: a smaller one if only few cells are open.
+        """Return the largest allowed error of displacements, in cell sizes; it is smaller if only few cells are open.
 
-        Such a contact is stiff against its mean pressure, so that a small error of displacements is a large one of it.
+        Near full contact, a small error of the displacements causes a large error of the mean pressure.
         """
         open_part = 1 - float(np.sum(contact.fraction)) / self.space.size
         return accuracy * self.front.critical_opening * float(np.clip(open_part / TOLERANCES.few, 1e-3, 1.0))
@@ -255,9 +257,10 @@ class FrontRelaxation:
     ----------
     state : contact after the last step.
     damping : damping of the bonds in the next step.
-    start, coarsest : largest allowed error of displacements in critical openings: at the start, and in the next step.
-    local_relaxations : number of local relaxations since the last step of the whole front.
-    steps : number of steps of the whole front.
+    start, coarsest : largest allowed error of displacements in critical openings: in the first solution, and in the
+        next step. After a failed step `coarsest` is smaller than `start`.
+    local_relaxations : number of local relaxations since the last successful step; the largest number after a failure.
+    steps : number of steps of the whole front that were tried.
     """
 
     def __init__(self, problem: FrontProblem, contact: Contact, nearby: bool):
@@ -281,7 +284,10 @@ class FrontRelaxation:
         return True
 
     def relax_locally(self, active: ActiveCells, relax_around: Callable) -> bool:
-        """Relax the front around cells far from equilibrium; keep the result and return True if the energy is lower."""
+        """Relax the front around cells far from equilibrium; keep the result and return True if the energy is lower.
+
+        Do this only a few times between two successful steps, and after a failure not before the next successful step.
+        """
         far, few = active.cells_to_relax()
         if not far.any() or self.local_relaxations >= (_MAX_LOCAL_RELAXATIONS if few else 1):
             return False
@@ -301,7 +307,7 @@ class FrontRelaxation:
         return True
 
     def _moving_accuracy(self, active: ActiveCells) -> float:
-        """Return the allowed error of displacements after a step, in units of the critical opening."""
+        """Return an error of displacements (critical openings) that fits the residual that a Newton step leaves."""
         residual = active.residual
         return residual * min(TOLERANCES.moving_displacement, max(residual, TOLERANCES.linear[0]))
 
@@ -343,7 +349,8 @@ def newton_step(problem: FrontProblem, active: ActiveCells, damping: float) -> t
     # A running front needs shorter steps.
     dampings = np.where(np.abs(active.intensity - 1) > TOLERANCES.coarse, max(damping, 2 * TOLERANCES.damping), damping)
     linear = LinearisedFront(problem.space, front, active, active.mean_fraction, at_front, dampings)
-    # First set the tension to that of the law at the present fraction. Then change tension and fraction by the law.
+    # First subtract `missing` from the pressures, to get the tension of the law at the present fraction. This changes
+    # the displacements by -`moved`. Then change tension and fraction by the law.
     local_strengths = front.local_strengths(active.mean_fraction)
     missing = np.where(at_front, front.tension(local_strengths, active.fraction) + active.pressure, 0.0)
     moved = linear.operator.displacement(missing.astype(np.float32))
@@ -356,7 +363,7 @@ def newton_step(problem: FrontProblem, active: ActiveCells, damping: float) -> t
 def rates_with_separation(
     space: HalfSpace, front: Front, contact: Contact, mean_fraction: np.ndarray, accuracy: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return derivatives of fraction and pressure (E*), (k,), by separation (cells) if no other cells open or close."""
+    """Return derivatives of fraction and pressure (E*), (k,), by separation (cell sizes); only partial cells change."""
     linear = LinearisedFront(space, front, contact, mean_fraction, contact.fraction < 1, np.zeros(len(mean_fraction)))
     return linear.solve(np.full(len(mean_fraction), -1.0), accuracy)
 
@@ -388,7 +395,10 @@ class LinearisedFront:
         self.straight_strength = np.float32(front.straight_strength or 1.0)
 
     def solve(self, right: np.ndarray, accuracy: float) -> tuple[np.ndarray, np.ndarray]:
-        """Solve for the changes of fraction and pressure, (k,) each, with a right-hand side, to a relative accuracy.
+        """Solve for the changes of fraction and pressure, (k,) each, with a right-hand side, by GMRES.
+
+        The residual is reduced to the relative `accuracy`. If tiles are too inaccurate for this, residuals of the full
+        grid correct the solution, as long as each correction halves them; so the accuracy may not be reached.
 
         Raises
         ------
@@ -445,7 +455,7 @@ class LinearisedFront:
 # Some processors raise the flag of an invalid value in products of finite matrices (numpy/numpy issue 24067).
 @np.errstate(invalid="ignore")
 def gmres(matrix: Callable, preconditioner: Callable, right: np.ndarray, accuracy: float) -> np.ndarray:
-    """Solve linear equations by right-preconditioned GMRES to a relative accuracy, or until _MAX_KRYLOV steps."""
+    """Solve by right-preconditioned GMRES to a relative accuracy, or until _MAX_KRYLOV steps; NaN if it breaks down."""
     norm = float(np.linalg.norm(right))
     if norm == 0:
         return np.zeros_like(right)

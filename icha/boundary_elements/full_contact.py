@@ -55,7 +55,7 @@ class FullContactProblem(MaterialUnits):
 
     @property
     def interface_strength(self) -> float:
-        """Tension at which closed cells open inside the contact, Pa: the strength of the interface."""
+        """Largest tension that the interface carries away from the front, Pa; closed cells open at this tension."""
         return self.front.interface_strength * self.contact_modulus
 
     @property
@@ -83,10 +83,10 @@ class FullContactProblem(MaterialUnits):
         """Nominal pressure for full contact at zero separation, Pa: not determined, so an arbitrary large value."""
         return 10 * max(float(np.abs(self.full_contact_pressure).max()), self.interface_strength)
 
-    def open_weakest(self, mean_gap):
-        """Return full contact, at separation 0, without its weakest cells; `mean_gap` (m) only fixes their number."""
+    def open_most_tensile(self, mean_gap):
+        """Return a start: full contact, opened where tension is largest; a larger `mean_gap` (m) opens more cells."""
         pressure = self.full_contact_pressure.ravel() - self.full_contact_pressure.min()
-        # Around the first gap the tension is the strength of a front, not the tension that opened the gap.
+        # Shift the pressures: around the first gap the tension is the strength of a front, not that which opened it.
         pressure -= self.front.straight_strength * self.contact_modulus
         largest_gap = max(self.front.critical_opening * self.spacing, mean_gap)
         count = int(min(1 + mean_gap / largest_gap * pressure.size, pressure.size / 2))

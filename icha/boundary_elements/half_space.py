@@ -30,7 +30,8 @@ class HalfSpace:
     ----------
     shape : shape of all fields, (n, n) or (t, n, n).
     compliance : displacement by unit pressure for each Fourier mode, (n, n//2 + 1), in double and single precision.
-    stiffness : approximate inverse of the compliance, (n, n//2 + 1), in single precision.
+    stiffness : inverse of the compliance for each mode, (n, n//2 + 1), in single precision; for the mean displacement
+        _MEAN_STIFFNESS times the value of the longest wave.
     """
 
     shape: tuple[int, ...]
@@ -68,7 +69,7 @@ class HalfSpace:
         cells : (k,) int, loaded cells, ascending.
         pressure : (k,), pressure on these cells, in E*; in single or double precision.
         at : (m,) int, ascending, the cells where the displacement is computed; None for the whole grid.
-        out : array that may be overwritten with the result; None for a new array. Small grids do not use it.
+        out : array that large grids use for the result; None for a new array. Always use the returned array.
         """
         return self.filter(cells, pressure, self.compliance[pressure.dtype], at, out)
 
@@ -127,7 +128,7 @@ class FullGrid:
         return self.space.displacement(self.cells, pressure, self.cells)
 
     def approximate_inverse(self, displacement: np.ndarray) -> np.ndarray:
-        """Return approximate pressures of the k cells for given displacements."""
+        """Return pressures of the k cells by `stiffness`, plus a uniform pressure against the mean displacement."""
         pressure = self.space.filter(self.cells, displacement, self.space.stiffness, self.cells)
         if len(self.space.shape) == 2:
             # The contact is stiffer against a mean displacement if a larger share of the grid is in contact.

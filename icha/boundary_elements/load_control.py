@@ -20,11 +20,12 @@ if TYPE_CHECKING:
 _MET = 5e-10
 # Smallest difference of two separations, divided by h_rms.
 _SAME_SEPARATION = 1e-13
-# Reference for errors if the target is zero load, divided by stiffness times h_rms. At zero load, attraction and
+# Least reference of errors if the target is zero load, divided by stiffness times h_rms. At zero load, attraction and
 # repulsion of about this size cancel.
 _ZERO_LOAD = 1e-2
 _MAX_TRIALS, _MAX_ATTEMPTS = 30, 4
-# Largest decrease of the mean gap between trials on the way to full contact: divided by the mean gap, and by h_rms.
+# Largest decrease of the mean gap between trials on the way to full contact: _CLOSING is divided by the mean gap, and
+# _LONGEST by h_rms.
 _CLOSING, _LONGEST = 0.5, 0.1
 
 
@@ -36,8 +37,8 @@ class ControlProblem:
     ----------
     contact : the contact model.
     control : the controlled quantity (nominal pressure or area fraction) and its target.
-    solve : function that solves the equilibrium at a separation (m), from a state, to a residual of the front. Options:
-        nearby, whether the state is near equilibrium; reuse_slopes, whether the slopes of the state are reused.
+    solve : function that solves the equilibrium at a separation (m), from a state, to a residual of the front, with the
+        options of `BoundaryElements._solve`.
     events : function that finds the events between two states.
     """
 
@@ -56,14 +57,14 @@ class ControlProblem:
         return of(state)
 
     def scale(self, state: CellState) -> float:
-        """Return the reference of relative errors: |target|, or for zero load a typical load at the first state."""
+        """Return the reference of relative errors: |target|, or for zero load |p| in a state, at least `_ZERO_LOAD`."""
         if self.control.target:
             return abs(self.control.target)
         unit = abs(self.contact.stiffness(state)) * self.contact.rms_height
         return max(abs(self.contact.pressure(state)), _ZERO_LOAD * unit if np.isfinite(unit) else 0.0)
 
     def tolerance(self, scale: float) -> float:
-        """Return the largest error at which the target counts as met; `scale` is the reference of relative errors."""
+        """Return the error up to which the target is met: a part of `scale`; cells for an area without adhesion."""
         if self.control.quantity == AREA_FRACTION and not self.contact.adhesive:
             cells = AREA_TOLERANCE_CELLS * self.contact.spacing**2 / self.contact.area
             return max(_MET * scale, min(cells, AREA_TOLERANCE_PART * scale))
@@ -80,7 +81,7 @@ class ControlProblem:
 
 @dataclass(frozen=True, eq=False)
 class Bracket:
-    """Two states with the target load or area between them.
+    """State before the target load or area and, once it is known, a state beyond the target.
 
     Parameters
     ----------
@@ -100,7 +101,9 @@ class Bracket:
         return replace(self, before=state) if self.sign * error < 0 else replace(self, beyond=state)
 
     def limit(self, separation: float) -> float:
-        """Return a predicted separation (m) if it lies inside the bracket, or else the middle of the bracket.
+        """Return a predicted separation (m), or the middle of the bracket if the prediction lies outside.
+
+        Without `beyond`, any finite prediction is returned.
 
         Raises
         ------
@@ -120,7 +123,9 @@ class Bracket:
 def solve_at_control(problem: ControlProblem, state: CellState, separation: float) -> CellState:
     """Find the equilibrium with the target load or area, starting from a nearby state.
 
-    separation : first guess of the mean separation, m.
+    Return full contact if the target load is larger than all loads down to the smallest mean gap.
+
+    separation : first guess of the mean separation, m; if it is not positive, half the separation of the state is used.
 
     Raises
     ------
@@ -146,7 +151,6 @@ def solve_at_control(problem: ControlProblem, state: CellState, separation: floa
             bracket = initial.with_state(found, problem.error(found))
             separation = bracket.limit(problem.newton_separation(found))
     except FullContact:
-        # The target load is larger than the load at the smallest mean gap.
         if control.quantity == PRESSURE and initial.sign > 0:
             return contact.full_contact(control.target)
         reason = ": the contact closes over the whole surface"
@@ -156,9 +160,11 @@ def solve_at_control(problem: ControlProblem, state: CellState, separation: floa
 
 
 def find_nearby_state(problem: ControlProblem, bracket: Bracket, separation: float, scale: float) -> CellState:
-    """Find a state near the target with coarsely relaxed fronts, within a bracket of the target.
+    """Find a state near the target: its error is at most TOLERANCES.fine times `scale` (final one without adhesion).
 
-    After a trial that passes the target with an event, the next trial starts again from the state before the target.
+    The first trial relaxes the fronts to TOLERANCES.coarse, and later trials to TOLERANCES.fine. After a trial that
+    passes the target with an event, the next trial starts again from the state before the target. Raise `FullContact`
+    if the mean gap vanishes, and `NotConverged` after too many trials.
     """
     contact, start, residual = problem.contact, bracket.before, TOLERANCES.coarse
     control_is_load = problem.control.quantity == PRESSURE
@@ -185,7 +191,11 @@ def find_nearby_state(problem: ControlProblem, bracket: Bracket, separation: flo
 
 
 def iterate_secant(problem: ControlProblem, bracket: Bracket, trial: CellState, scale: float) -> tuple[CellState, bool]:
-    """Approach the target by secant steps from a state near it; return the last state and whether the target is met."""
+    """Approach the target by secant steps from a state near it; return the last state and whether the target is met.
+
+    The steps end without meeting the target when an error exceeds TOLERANCES.fine times `scale`, as after a jump. Raise
+    `FullContact` if the mean gap vanishes, and `NotConverged` after _MAX_TRIALS steps.
+    """
     before, error = None, problem.error(trial)
     for _ in range(_MAX_TRIALS):
         separation = bracket.limit(problem.newton_separation(trial, before))

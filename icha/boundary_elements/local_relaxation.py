@@ -33,7 +33,7 @@ _BATCH = 65_536
 # Residual of the front at which a window stops early; the whole front is relaxed afterwards.
 _TOLERANCE = 1e-4
 # Distance from the given cells within which the front may move, in cells; largest total area of the windows, divided by
-# the area of the grid; largest number of iterations in a window. Windows that cover little are wider.
+# the area of the grid; largest number of iterations in a window. The first entry whose windows fit in its area is used.
 _EXTENTS = ((20, 0.05, 60), (4, 0.5, 20))
 
 
@@ -63,10 +63,10 @@ def relax_in_windows(
     mean_fraction = average_fractions(space.field(contact.cells, contact.fraction, np.float32)).ravel()
     kernels = {side: window_kernel(space.grid, side) for side in {cells.shape[-1] for cells, _ in windows}}
 
-    def relax(window):
-        cells, free = window
+    def relax(batch):
+        cells, free = batch
         small = HalfSpace(cells.shape, *kernels[cells.shape[-1]])
-        return _relax_window(small, front, separation, contact, gap, mean_fraction, cells, free, max_iterations)
+        return _relax_batch(small, front, separation, contact, gap, mean_fraction, cells, free, max_iterations)
 
     found = on_cores(relax, windows)
     moved = np.zeros(space.size, dtype=bool)
@@ -77,18 +77,12 @@ def relax_in_windows(
         return None
     cells, fraction, pressure = map(np.concatenate, zip(*filter(None, found), strict=True))
     order, fixed = np.argsort(cells), ~moved[contact.cells]
-    return Contact(
-        *merge_cells(
-            contact.cells[fixed],
-            cells[order],
-            (contact.fraction[fixed], fraction[order]),
-            (contact.pressure[fixed], pressure[order]),
-        )
-    )
+    fractions, pressures = (contact.fraction[fixed], fraction[order]), (contact.pressure[fixed], pressure[order])
+    return Contact(*merge_cells(contact.cells[fixed], cells[order], fractions, pressures))
 
 
-def _relax_window(small, front, separation, contact, gap, mean_fraction, windows, free, max_iterations):
-    """Relax fronts in windows for `max_iterations`; return cells, fractions, pressures, or None if the solver fails."""
+def _relax_batch(small, front, separation, contact, gap, mean_fraction, windows, free, max_iterations):
+    """Relax fronts in a batch of windows; return cells, fractions and pressures, or None if the solver fails."""
     cells = windows[free]
     touching, index = find_among(cells, contact.cells)
     inside = np.flatnonzero(free)[touching]
@@ -146,7 +140,7 @@ class Regions(NamedTuple):
 
 
 def _boxes(labels):
-    """Return the box (rows, columns) around each label, in blocks; a box across the period has negative numbers."""
+    """Return the box (rows, columns) around each label, in blocks; across the period, it starts at a negative index."""
     half = len(labels) // 2
     boxes = []
     rolled = np.roll(labels, (half, half), (0, 1))
@@ -157,7 +151,7 @@ def _boxes(labels):
 
 
 def _cut(labels, boxes):
-    """Cut boxes that no window can hold into pieces with new numbers in `labels`; return all boxes and the pieces."""
+    """Cut boxes wider than half the largest window; return all boxes, then the pieces, with new numbers in `labels`."""
     widest, step = _SIDES[-1] // 2 // BLOCK, _PIECE // BLOCK
     pieces = []
     for number, box in enumerate(boxes, 1):

@@ -25,15 +25,16 @@ class PatchObservables:
     surface: Surface
 
     def of_contact(self) -> dict:
-        """Return the largest tension that the grid resolves at a straight edge of contact, Pa."""
+        """Return the tension at which a cell at a straight edge opens, Pa, the largest that this grid resolves."""
         return {"resolved_tension": self.contact.front.straight_strength * self.contact.contact_modulus}
 
     def of_step(self, state: CellState) -> dict:
-        """Return the residuals of a state, and the share of touched summits outside the range of Wu's formula."""
+        """Return residuals, the number of pending cells, and the share of summits in contact outside Wu's range."""
         contact = self.contact
         touched = np.isin(contact.summits.cell, state.cells)
         verified = contact.law.is_jump_in_verified(contact.asperities.radius_of_curvature[touched])
         outside = np.count_nonzero(~verified) / max(len(verified), 1)
+        # The first residual is the one that every model has; here it is that of the gap.
         return {
             "residual": state.gap_residual / contact.rms_height,
             "front_residual": state.front_residual,
@@ -76,7 +77,7 @@ class PatchObservables:
         return content / gap.size / np.diff(edges_of_bins)
 
     def _pressure_density(self, state, areas):
-        """Return the probability density of the pressure over the nominal area, and the mean pressure of each bin."""
+        """Return the density of the pressure in contact, with the area fraction as integral, and means of the bins."""
         edges_of_bins = PRESSURE_BINS * self.contact.pressure_unit
         # The force on a cell acts on its fraction in contact. One factor scales all fractions to the contact area.
         weight = state.fraction * (np.sum(areas) / (np.sum(state.fraction) or 1.0))
@@ -88,7 +89,7 @@ class PatchObservables:
         return content / self.contact.heights.size / np.diff(edges_of_bins), mean
 
     def _patches(self, state, areas):
-        """Return position, area, perimeter, force, number of summits, radius of the highest summit of each patch."""
+        """Return position, area, perimeter, force, number of summits and radius of the highest summit of each patch."""
         contact, h = self.contact, self.contact.spacing
         grid = contact.space.grid
         labels, count = label_patches(state.cells, grid)
@@ -108,6 +109,7 @@ class PatchObservables:
             "spot_y": centre[:, 1],
             "spot_radius": np.sqrt(area / np.pi),
             "spot_area": area,
+            # For edges in all directions, the mean length of the free edges is 4/pi times the perimeter.
             "spot_perimeter": np.pi / 4 * sums(free_edges(state.cells, grid)) * h,
             "spot_force": sums(state.pressure) * h**2,
             "spot_curvature_radius": radius[1:],

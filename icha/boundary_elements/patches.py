@@ -23,13 +23,13 @@ class CellState:
     cells : (k,) int, flat indices of the grid cells in contact, ascending.
     fraction : (k,), part f of the area of each cell that is in contact, 0 < f <= 1.
     pressure : (k,), force on each cell divided by the area of the whole cell, Pa; negative in tension.
-    mean_fraction : (k,), Gaussian average of the fractions of each cell and its neighbours.
+    mean_fraction : (k,), Gaussian average of the fractions of each cell and its neighbours; without adhesion not used.
     pressure_slope, area_slope : derivatives of the nominal pressure (Pa/m) and of the area fraction (1/m) with respect
         to the separation; the fronts move.
     rates : changes of the fractions, (k,), and of the pressures in E*, (k,), when the separation increases by one cell
         size; None if unknown.
     front_residual : largest |sqrt(G/dgamma) - 1| at the cells where the front can move; G is the energy release rate.
-    gap_residual : largest gap of a closed cell, or largest overlap of the surfaces, m.
+    gap_residual : largest gap of a closed cell, or largest overlap of the surfaces if that is larger, m.
     pending : number of cells within reach of the attraction that stay open because contact there is not stable.
     history : events of the path up to this state, one `Events` for each equilibrium with events.
     """
@@ -110,7 +110,7 @@ def free_edges(cells: np.ndarray, grid: int) -> np.ndarray:
 
 
 def patch_centres(cells: np.ndarray, grid: int, labels: np.ndarray, count: int, weight: np.ndarray) -> np.ndarray:
-    """Return the centre (x, y) of each patch, (count, 2), in cell sizes: the weighted mean position of its cells."""
+    """Return the centre (x, y) of each patch, (count, 2), in cell sizes: the weighted circular mean of its cells."""
     turn = np.exp(2j * np.pi * np.arange(grid) / grid)
     result = np.empty((count, 2))
     for axis, at in enumerate((cells % grid, cells // grid)):
@@ -128,7 +128,7 @@ def patch_events(
     grid: int,
     spacing: float,
 ) -> Events:
-    """Find the jumps, coalescences and splits of patches between two consecutive states.
+    """Find the jumps, coalescences and splits of patches between two states; patches with a common cell are the same.
 
     Parameters
     ----------
@@ -143,24 +143,19 @@ def patch_events(
     parts_of_old = np.bincount(pairs[0], minlength=old_count + 1)[1:]
     parts_of_new = np.bincount(pairs[1], minlength=new_count + 1)[1:]
 
-    def of_old(kind, which, sign):
-        return _events(kind, before, old, old_count, energy_of_cells, which, sign, summits, grid, spacing)
-
-    def of_new(kind, which, sign):
-        return _events(kind, after, new, new_count, energy_of_cells, which, sign, summits, grid, spacing)
-
-    return Events.concatenate(
-        [
-            of_new(JUMP_IN, np.flatnonzero(parts_of_new == 0), -1.0),
-            of_old(JUMP_OFF, np.flatnonzero(parts_of_old == 0), 1.0),
-            of_new(COALESCENCE, np.repeat(np.arange(new_count), np.maximum(parts_of_new - 1, 0)), 0.0),
-            of_old(SPLIT, np.repeat(np.arange(old_count), np.maximum(parts_of_old - 1, 0)), 0.0),
-        ]
-    )
+    of_old = before, old, old_count, energy_of_cells, summits, grid, spacing
+    of_new = after, new, new_count, energy_of_cells, summits, grid, spacing
+    # A coalescence of m patches, or a split into m patches, is recorded as m - 1 events.
+    joined = np.repeat(np.arange(new_count), np.maximum(parts_of_new - 1, 0))
+    split = np.repeat(np.arange(old_count), np.maximum(parts_of_old - 1, 0))
+    jumps_in = _events_of_patches(JUMP_IN, np.flatnonzero(parts_of_new == 0), -1.0, *of_new)
+    jumps_off = _events_of_patches(JUMP_OFF, np.flatnonzero(parts_of_old == 0), 1.0, *of_old)
+    coalescences = _events_of_patches(COALESCENCE, joined, 0.0, *of_new)
+    return Events.concatenate([jumps_in, jumps_off, coalescences, _events_of_patches(SPLIT, split, 0.0, *of_old)])
 
 
-def _events(kind, state, labels, count, energy_of_cells, which, sign, summits, grid, spacing):
-    """Return one event for each patch in `which`, (k,), from 0; it releases sign * energy of the patch, at least 0."""
+def _events_of_patches(kind, which, sign, state, labels, count, energy_of_cells, summits, grid, spacing):
+    """Return an event that releases sign * energy, at least 0, for each entry of `which`: patch number - 1, (e,)."""
     if not len(which):
         return Events.concatenate(())
     energy = np.bincount(labels, energy_of_cells(state), count + 1)[1:]

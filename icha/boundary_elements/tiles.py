@@ -1,8 +1,9 @@
 """Displacements of cells in contact on large grids: tiles for short distances, a coarse grid for long distances.
 
-The kernel is split as in `icha.half_space.ewald`: 2/q = (2/q) erf(q/2a) + (2/q) erfc(q/2a), in Fourier space. The first
-term has a short range and is summed tile by tile. The second term is smooth and is computed on a coarser grid; splines
-transfer values between both grids (R. W. Hockney & J. W. Eastwood, Computer Simulation Using Particles, 1988, ch. 8).
+The kernel 2/q is split as in `icha.half_space.ewald`. The term (2/q) erf(q/(2 alpha)), in real space erfc(alpha r)/(pi
+r), has a short range and is summed tile by tile. The term (2/q) erfc(q/(2 alpha)) is smooth, and is computed on a
+coarser grid; splines transfer values between both grids (R. W. Hockney & J. W. Eastwood, Computer Simulation Using
+Particles, 1988, ch. 8).
 The inverse of the kernel also has a short range. So a small contact needs few tiles, and no transform of the grid.
 """
 
@@ -25,7 +26,7 @@ TILE, RANGE = 128, 16
 # Spacing of the coarse grid in cells, and order of its splines; their support is at most RANGE.
 COARSENING, _ORDER = 4, 4
 _NODES = TILE // COARSENING
-# Ewald parameter a, per cell size. With this value the cut-off part of the short kernel and the error of the coarse
+# Ewald parameter alpha, per cell size. With this value the cut-off part of the short kernel and the error of the coarse
 # grid are both below `error`.
 _ALPHA = 2.3 / RANGE
 # Largest total area of the tiles, divided by the area of the grid, for which tiles are faster than the whole grid; the
@@ -56,12 +57,11 @@ class TiledGrid:
     nodes: np.ndarray
     covered: np.ndarray
 
-    # Largest error of a displacement, divided by the largest displacement.
     error = 1e-3
 
     @classmethod
     def of(cls, cells: np.ndarray, grid: int) -> TiledGrid | None:
-        """Return the tiles of cells (k,), ascending; None if they would not be faster than the whole grid."""
+        """Return the tiles of cells (k,), ascending; None if no cells, not faster, or COARSENING does not fit."""
         if grid % COARSENING:
             return None
         many = -(-grid // (TILE - 2 * RANGE))
@@ -116,8 +116,8 @@ class TiledGrid:
             field = scipy.fft.irfft2(field, s=(TILE, TILE), overwrite_x=True, workers=1)
             if coarse is not None:
                 field += _interpolate(coarse[batch])
-            numbers, positions = self.targets.of_batch(batch)
-            result[numbers] = field.ravel()[positions]
+            indices, positions = self.targets.of_batch(batch)
+            result[indices] = field.ravel()[positions]
 
         on_cores(convolve, blocks(self.count, _BATCH))
 
@@ -129,14 +129,14 @@ class _CellsByTile:
     batches: tuple[tuple[np.ndarray, np.ndarray], ...]
 
     def of_batch(self, batch):
-        """Return the list indices and the positions of the cells in a batch of tiles."""
+        """Return the list indices and the flat positions of the cells in a batch of tiles."""
         return self.batches[batch.start // _BATCH]
 
     def field(self, batch, values):
         """Return a batch of tiles, (t, TILE, TILE), filled with the values (k,) of its cells and zeros elsewhere."""
         field = np.zeros((batch.stop - batch.start, TILE, TILE), values.dtype)
-        numbers, positions = self.of_batch(batch)
-        field.ravel()[positions] = values[numbers]
+        indices, positions = self.of_batch(batch)
+        field.ravel()[positions] = values[indices]
         return field
 
 
@@ -154,7 +154,7 @@ def _cells_by_tile(cells, grid, corner, size):
         for source, target, (rows, columns) in zip(with_margin, without, size[batch].tolist(), strict=True):
             inner = slice(RANGE, RANGE + rows), slice(RANGE, RANGE + columns)
             target[inner] = source[inner]
-        return _numbers_and_positions(with_margin), _numbers_and_positions(without)
+        return _indices_and_positions(with_margin), _indices_and_positions(without)
 
     try:
         sources, targets = zip(*on_cores(assign, blocks(len(corner), _BATCH)), strict=True)
@@ -171,10 +171,10 @@ def _window(field, row, column):
     return field[np.ix_((row + along) % grid, (column + along) % grid)]
 
 
-def _numbers_and_positions(windows):
-    """Return list indices and positions of the cells in tiles (t, TILE, TILE), which contain list index + 1 or 0."""
-    positions = np.flatnonzero(windows)
-    return windows.ravel()[positions].astype(int) - 1, positions
+def _indices_and_positions(tiles):
+    """Return list indices and flat positions of the cells in tiles, (t, TILE, TILE), of list indices + 1, or 0."""
+    positions = np.flatnonzero(tiles)
+    return tiles.ravel()[positions].astype(int) - 1, positions
 
 
 # Spline of one coarse node, evaluated on the cells around it; splines of all coarse nodes of a tile, on its cells.

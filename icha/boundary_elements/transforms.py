@@ -10,7 +10,7 @@ import scipy.fft
 from icha.support import parallel
 from icha.support.parallel import blocks, on_cores
 
-# Smallest size of a field, in bytes, for which blocks are faster than one transform; number of columns in a block.
+# Size of the cache in bytes: larger fields are filtered in blocks of rows of half this size. Columns in a block.
 CACHE, _COLUMNS = 2_000_000, 32
 
 
@@ -80,5 +80,6 @@ def reusable_field(shape: tuple[int, int], dtype: np.dtype) -> np.ndarray:
 
 
 def _one_by_one(function, items):
+    """Call a function with each item in turn; small grids use it instead of `on_cores`."""
     for item in items:
         function(item)

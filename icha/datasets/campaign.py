@@ -28,10 +28,7 @@ _OF_EVERY_CAMPAIGN = ("status", "step_count", "failure")
 
 
 def campaign_tree(
-    runs: Iterable[LabelledRun],
-    *,
-    design: Iterable[RunLabels | tuple] | None = None,
-    attrs: Mapping[str, str] = {},
+    runs: Iterable[LabelledRun], *, design: Iterable[RunLabels | tuple] | None = None, attrs: Mapping[str, str] = {}
 ) -> xr.DataTree:
     """Return the campaign dataset of some runs in memory; arguments and errors are those of `write_campaign`."""
     with tempfile.TemporaryDirectory() as folder:

@@ -231,10 +231,7 @@ def summarise_loop(
     summit_pull_off_pressure: float,
     unattributed: float,
 ) -> dict[str, float]:
-    """Return the values of a loop that ends without contact, by the names of the variables of a run.
-
-    The values are pull-off, detachment (last state with contact), losses, largest area and largest reduced pressure.
-    Values divided by a quantity of adhesion are 0 without adhesion.
+    """Return pull-off, detachment (last state with contact), losses and maxima of a loop that ends without contact.
 
     Parameters
     ----------

@@ -196,8 +196,6 @@ def _solve_within_step(target, expected, following, state, step) -> State | None
     except NotConverged:
         return None
     same = SAME_SEPARATION * target.contact.rms_height
-    if target.control and not state.separation - step <= found.separation <= state.separation + same:
-        return None
-    if any(other.excess(found) > SAME_EXCESS for other in following if other is not target):
-        return None
-    return found
+    outside = target.control and not state.separation - step <= found.separation <= state.separation + same
+    passed = any(other.excess(found) > SAME_EXCESS for other in following if other is not target)
+    return None if outside or passed else found

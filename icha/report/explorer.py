@@ -208,13 +208,7 @@ def encode_topography(surface: xr.Dataset) -> dict:
     means = average_blocks(heights, MOST_HEIGHTS)
     low, high = float(means.min()), float(means.max())
     levels = np.rint((means - low) / (high - low) * LEVELS).astype(np.uint8)
-    return {
-        "grid": len(heights),
-        "cells": len(means),
-        "low": low,
-        "high": high,
-        "levels": _base64(levels.tobytes()),
-    }
+    return {"grid": len(heights), "cells": len(means), "low": low, "high": high, "levels": _base64(levels.tobytes())}
 
 
 def encode_run(run: xr.Dataset, maps: Sequence[str] | None) -> dict:

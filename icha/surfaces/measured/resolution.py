@@ -10,12 +10,7 @@ import numpy as np
 import scipy.fft
 
 from icha.surfaces.measured.topography import LEAST_PIXELS, PreparedTopography, prepared_topography
-from icha.surfaces.moments import (
-    LEAST_CELLS_OF_SUMMIT,
-    RESOLVED_CELLS,
-    cells_per_short_wave,
-    radial_power_spectrum,
-)
+from icha.surfaces.moments import LEAST_CELLS_OF_SUMMIT, RESOLVED_CELLS, cells_per_short_wave, radial_power_spectrum
 from icha.surfaces.summits import Asperities, SummitCoverage, locate_summits
 from icha.surfaces.surface import FREE, PERIODIC, Surface, edges_fit
 
