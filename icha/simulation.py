@@ -120,7 +120,7 @@ def simulate(
         has no summits, or the model is not available for the surface.
     ConvergenceError
         If an equilibrium is not found, a target cannot be reached, or the path leaves the range of the model. The
-        attribute `dataset` of the error contains the targets reached before.
+        attribute `dataset` of the error contains the targets that were reached.
     """
     if model not in tuple(MODELS):
         raise ValueError(f"model: {model!r} must be one of {', '.join(MODELS)}")
@@ -181,7 +181,7 @@ def empty_run(
 
 
 def _dataset(surface, material, path, name, seed, record, summits, reasons, of_contact):
-    """Build the dataset of a run from the record of its path, without the summary of its loop.
+    """Build the dataset of a run from the record of its path, without the values of pull-off and hysteresis loss.
 
     name : name of the model; summits : summits of the surface.
     reasons : reasons why the model does not represent the surface; of_contact : values that are the same in all states.
@@ -300,7 +300,7 @@ def _count_uphill_jumps_in(record: _PathRecord) -> int:
 def _record_path(contact, observables, path, reachable, progress) -> _PathRecord:
     """Follow a path and return the record of its steps, snapshots and events.
 
-    reachable : path without the targets outside the range of the model. The record ends before the first of them.
+    reachable : path without the targets outside the range of the model. The record ends before the first such target.
     """
     left_out = [target for target in path.targets if target not in reachable.targets]
     remaining = len(reachable.targets)
@@ -327,7 +327,7 @@ def _record_path(contact, observables, path, reachable, progress) -> _PathRecord
                 record.pressed, largest = state, step["contact_area_fraction"]
             if waypoint.target.snapshot:
                 record_snapshot(waypoint.target, state, index)
-            # Keep the state of largest tension of the last leg (a leg ends at a turning point of the path).
+            # Keep the state with the largest tension in the last leg. A leg of the path ends at a turning point.
             tension = waypoint.leg, -step["nominal_pressure"]
             if weakest is None or tension > weakest[0]:
                 weakest = tension, state, index
@@ -342,7 +342,7 @@ def _record_path(contact, observables, path, reachable, progress) -> _PathRecord
 
 
 def _require_finite(values: dict) -> dict:
-    """Return the values; raise `NotConverged` if a value is not finite. The stiffness of full contact is infinite."""
+    """Return the values; raise `NotConverged` if a value is not finite. Only a stiffness may be infinite."""
     for name, value in values.items():
         numbers = np.asarray(value)
         if name == "contact_stiffness" and np.isposinf(numbers).all():

@@ -110,7 +110,7 @@ class CampaignResults:
         if dry_run:
             return
         if os.path.isdir(results):
-            self._claim()  # results of an older version may need no jobs, which would claim the results
+            self._claim()  # claim results of an older version, even if no job starts
         if not METADATA.is_dir() or not os.access(".snakemake", os.W_OK):
             self._refuse_unwritable()  # nothing was computed yet, or Snakemake could not write its records
         elif os.path.isdir(results) and not os.access(results, os.W_OK):
@@ -293,7 +293,7 @@ def hold_lock(path: str) -> str | None:
     """
     try:
         Path(path).parent.mkdir(parents=True, exist_ok=True)
-        # Jobs do not inherit this file, because processes that they leave behind would keep the lock.
+        # Jobs do not inherit this file, because processes that jobs leave behind would keep the lock.
         file = open(path, "a+", encoding="ascii")
     except OSError:
         return None  # without write permission in this folder, nothing can be computed

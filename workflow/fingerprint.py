@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 PACKAGE = "icha"
-# The module in the folder of the scripts that starts and ends every job. The module has no effect on results.
+# Module that starts and ends every job, in the folder of the scripts. The module has no effect on results.
 JOB_MODULE = "job.py"
 
 
@@ -108,7 +108,7 @@ def _module_file(name: str, missing_ok: bool = False) -> Path | None:
 
 @cache
 def _data_files(file: Path) -> list[Path]:
-    """Return the data files in the folder of a module whose names, or whose subfolders' names, are in the module."""
+    """Return the data files next to a module; the module contains their names, or the name of their folder."""
     files = set()
     for name in _syntax_of(file).names:
         path = file.parent / name

@@ -135,7 +135,7 @@ def reproduce(
 
 
 def _introduce(deposit: Path, original: Path, folder: Path | None) -> None:
-    """Print the size of a deposit and the program that computes it; raise `RerunError` if program versions differ."""
+    """Print the deposit, the installed program and the folder of results; raise `RerunError` if versions differ."""
     from icha.deposit.reproduce import RerunError, other_versions
 
     echo(f"deposit:    {printable(deposit)}, {_contents(original)}")

@@ -1,4 +1,4 @@
-"""The command `icha describe`: print what a campaign computes, which results exist, and the cost of further results."""
+"""The command `icha describe`: print what a campaign computes, which results exist, and the cost of missing results."""
 
 import statistics
 import sys
@@ -31,7 +31,7 @@ def describe(
     cores: Cores = None,
     folder: Folder = None,
 ) -> None:
-    """Print what a campaign computes, which results exist, and the time, memory and disk space of further results.
+    """Print what a campaign computes, which results exist, and the time, memory and disk space for missing results.
 
     The command computes nothing. Times are estimates, usually right within a factor of two. If some runs are done, the
     estimates use the times of these runs. A run counts as done if its file was made with the present settings;
@@ -66,7 +66,7 @@ def _print_scans(campaign) -> None:
 
 
 def print_plan(path: Path, campaign, workflow: Path, home: Path, cores: int, *, runs=False, profile=None) -> None:
-    """Print what a campaign computes, which results exist, the cost of further results, and what prevents a run.
+    """Print what a campaign computes, which results exist, the cost of missing results, and what prevents a run.
 
     Parameters
     ----------

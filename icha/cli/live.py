@@ -58,7 +58,7 @@ class Progress:
 
     Attributes
     ----------
-    expected : by the path of an output file, the rule of the job that writes the file, and the expected core-seconds.
+    expected : rule and expected core-seconds of the job that writes a file, by the path of the file.
     clock : function that returns the present time, s.
     total : number of jobs of each rule.
     running : running jobs, by their number in Snakemake.
@@ -141,7 +141,7 @@ class Progress:
     def _waiting_work(self, begun: list[JobRecord]) -> float:
         """Return the expected core-seconds of the jobs that have not begun.
 
-        Snakemake reports only the number of waiting jobs of each rule, so each job counts as the mean of its rule.
+        Snakemake reports only the number of waiting jobs of each rule, so each job counts as the mean job of its rule.
         """
         outputs = {output for job in begun for output in job.outputs}
         expected: dict[str, list[float]] = {}

@@ -23,7 +23,7 @@ def new(
     ] = None,
     data: Annotated[
         str | None,
-        option("Variable, dataset or channel of heights, if the measured file has several.", metavar="NAME"),
+        option("Variable, dataset or channel with the heights, if the file contains several.", metavar="NAME"),
     ] = None,
     pull_off: Annotated[bool, typer.Option("--pull-off", help="Add a study of pull-off and hysteresis.")] = False,
     boundary_elements: Annotated[

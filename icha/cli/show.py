@@ -67,7 +67,7 @@ def _print_run(run, file: Path) -> None:
     for label, values in curves.items():
         echo(f"{label:>10} {values.min():.3g} to {values.max():.3g}")
     if "gap/h_rms" in curves:
-        echo("          u: from the mean plane to the undeformed half-space; gap: mean gap between the surfaces")
+        echo("          u: distance from mean plane to undeformed half-space; gap: mean gap between the surfaces")
     if "hysteresis_loss" in run:
         tension = format_quantity(-float(run["pull_off_pressure"]), "Pa")
         echo(f"pull-off: {tension} of tension; loss {float(run['hysteresis_loss']):.3g} J/m²")

@@ -88,7 +88,7 @@ class Campaign(Section):
     defaults: Defaults = Defaults()
     """Default values for all surfaces, materials or studies."""
     surfaces: Annotated[dict[Name, AnySurface], Field(min_length=1)]
-    """Surfaces by name: `kind: self_affine`, `kind: measured` or `kind: file`."""
+    """Surfaces by name. Each surface has `kind: self_affine`, `kind: measured` or `kind: file`."""
     materials: Annotated[dict[Name, MaterialSection], Field(min_length=1)]
     """Materials by name."""
     studies: Annotated[dict[Name, Study], Field(min_length=1)]
@@ -138,7 +138,7 @@ class Campaign(Section):
         return campaign
 
     def with_topographies(self, topographies: Mapping[str, Topography]) -> Campaign:
-        """Return the campaign with properties of topographies from files; real slopes replace the text `measured`."""
+        """Return the campaign with properties of topographies from files; numbers replace the slope `measured`."""
 
         def with_slope(contact):
             measured = contact.rms_slope == MEASURED

@@ -94,7 +94,7 @@ class _SurfaceFromFile(Section):
 
 
 class MeasuredSurface(_SurfaceFromFile):
-    """A measured topography, and the steps that prepare it for contact models. The mean height is always removed."""
+    """A measured topography, and its preparation for contact models. The mean height is always removed."""
 
     kind: Literal["measured"]
     """A topography from a measurement."""

@@ -221,12 +221,12 @@ def finite_range_cost(nodes: int, *, adhesive: bool, **quantity: float) -> Cost:
     return Cost(seconds, WORKFLOW.forked + 20 * _DOUBLE * nodes**2, 40e3 + 0.04 * nodes**2)
 
 
-# Memory for the campaign dataset: ratio of this memory to the `values` of the runs, and its upper limit, bytes. It has
-# a limit because arrays above `icha.datasets.results.LEFT_IN_FILE` are not read as a whole.
+# Memory for the campaign dataset: bytes for each byte in `values` of the runs, and upper limit, bytes. The limit exists
+# because arrays above `icha.datasets.results.LEFT_IN_FILE` are not read as a whole.
 _COPIES, _MOST_READ = 3.9, 1.9e9
 # Largest memory for values of runs in the job that writes the campaign dataset block by block, bytes.
 _BLOCKS = 35 * MiB
-# Number of arrays of a topography in memory for a contact map, by the number of models in the map.
+# Number of arrays that a contact map needs, each with the size of the topography; by the number of models in the map.
 MAP_ARRAYS = {1: 2, 2: 7}
 # Memory for libraries and pages, by the rule of the job, bytes.
 _LIBRARIES = {"figure": 85 * MiB, "report_page": 18 * MiB}

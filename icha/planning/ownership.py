@@ -36,7 +36,7 @@ def find_conflict(results: Path, name: str, file: Path, workflow: Path) -> str |
 
 
 def claim(results: Path, file: Path, workflow: Path) -> None:
-    """Record that a folder of results belongs to a configuration file, unless it already belongs to a file."""
+    """Record that a folder of results belongs to a configuration file, unless the folder already has a record."""
     if _read_owner(results) is None and not _is_copy(results, file):
         with whole_file(results / RECORD) as temporary:
             temporary.write_text(f"{_record_of(results, file, workflow)}\n", encoding="utf-8")

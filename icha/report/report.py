@@ -80,7 +80,7 @@ def write_report(
     files : further files to which the page links, by their titles.
     results : folder of the results of the campaign, for links to runs and surfaces.
     citations : further sources to cite, such as sources of measurements.
-    further_software : packages whose versions the page lists besides `SOFTWARE`.
+    further_software : packages whose versions the page lists in addition to `SOFTWARE`.
     """
 
     def link(target):

@@ -150,7 +150,7 @@ def _table(runs) -> dict:
 def _ensembles(dataset: xr.Dataset, runs: list[RunLabels]) -> list[tuple[dict, list[RunLabels]]]:
     """Group runs that differ only in their seed; runs to which the model is not applicable form separate groups.
 
-    Return the start of a table row for each group (labels, numbers of seeds and of requested seeds), and its runs.
+    For each group, return the first cells of its table row (labels, numbers of seeds and requested seeds) and its runs.
     """
     groups: dict[tuple[RunLabels, bool], list[RunLabels]] = {}
     for run in runs:
@@ -206,7 +206,7 @@ def _loop(runs: list[xr.Dataset]) -> dict:
     def values(name):
         return np.array([float(run[name]) for run in runs])
 
-    # A closed loop with a loss smaller than `rounding` has no loss.
+    # Losses below this bound are rounding errors.
     rounding = IDENTITY_LIMIT * np.array([np.nanmax(np.abs(run["work"].values)) for run in runs])
     loss = values("hysteresis_loss")
     lost = np.abs(loss) > rounding

@@ -59,7 +59,7 @@ def duration(seconds: float) -> str:
 
 
 def _digits(value: float, digits: int) -> str:
-    """Format a number with `digits` significant digits; a number with more digits before the point as an integer."""
+    """Format a number with `digits` significant digits, but round no digits before the decimal point."""
     return f"{value:.0f}" if value >= 10.0**digits - 0.5 else f"{value:.{digits}g}"
 
 

@@ -12,7 +12,7 @@ from icha.surfaces.spectrum import SelfAffineSpectrum
 def make_references(surface, output, *, settings, adhesive, attributes):
     """Write the references for a surface: predictions of theories, and published data points.
 
-    Theories of independent summits are omitted if they do not apply to the surface or the materials.
+    Theories of separate summits are omitted if they do not apply to the surface or the materials.
 
     Parameters
     ----------
