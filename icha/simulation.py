@@ -91,7 +91,7 @@ def simulate(
     Parameters
     ----------
     surface : rough surface, scaled to its final rms slope.
-    material : contact modulus, work of adhesion, range of attraction and flaws of the contact.
+    material : contact modulus, work of adhesion, range of attraction and largest flaw of the interface.
     path : loads, areas or separations to reach; at some of these targets, spots and distributions are stored.
     model : "asperities" or "boundary_elements". Boundary elements are slower, use the limit of a short range of
         attraction, and need a periodic surface.
@@ -250,7 +250,7 @@ def _check_arguments(surface, material, path, by_summits):
             load = f"path: {RELATIVE_LOAD} = {target.value!r} on a surface of rms slope {surface.rms_slope:.4g}"
             if 0 < abs(target.value) < LEAST_PRESSURE * surface.rms_slope:
                 raise ValueError(
-                    f"{load} is too small a load; expected a reduced pressure of at least {LEAST_PRESSURE} in "
+                    f"{load} is too small; expected a reduced pressure of at least {LEAST_PRESSURE} in "
                     "absolute value, or 0 at a turning point that ends unloading"
                 )
             if by_summits and target.value > MAX_REDUCED_PRESSURE * surface.rms_slope:

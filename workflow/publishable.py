@@ -14,8 +14,8 @@ def publishable_source(configuration: Configuration, project: str, results: str)
     Raises
     ------
     SystemExit
-        If metadata are missing, if the source code is not committed, or if packages do not have the locked versions,
-        now or when a result was made.
+        If metadata are missing, if the source code is not committed, or if the versions of packages differ from the
+        locked versions, either now or at the time when a result was made.
     """
     campaign = configuration.campaign
     problems = [f"{configuration.origin}: {line}" for line in missing_metadata(campaign.deposit_metadata())]

@@ -18,7 +18,7 @@ from icha.cli.project import TARGETS
 from icha.support import formatting
 from icha.support.formatting import printable
 
-# Core-seconds of finished jobs after which measured times have more weight than expected times.
+# When finished jobs have taken this number of core-seconds, measured and expected times have the same weight.
 PRIOR_SECONDS = 5.0
 # Expected core-seconds of a job that the plan does not list. Such a job writes a few lines.
 DEFAULT_SECONDS = 0.1

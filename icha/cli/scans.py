@@ -1,4 +1,4 @@
-"""Description of a scan (a measured topography) for the user, and its section in the file of a new campaign."""
+"""Describe a scan (a measured topography) to the user, and write its section for the file of a new campaign."""
 
 from __future__ import annotations
 

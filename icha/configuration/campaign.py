@@ -266,7 +266,7 @@ class Campaign(Section):
         return found
 
     def resolve_paths(self, folder: FilePath) -> Campaign:
-        """Return the campaign with `folder` before all paths of files."""
+        """Return the campaign with `folder` added in front of all paths of files."""
 
         def in_folder(section):
             return section.model_copy(update={"path": str(folder / section.path)})

@@ -113,7 +113,7 @@ def _axes(study: Study, lists: Mapping, fixed: Mapping) -> Iterator[list[str]]:
 
 
 def _too_many_runs(campaign: Campaign) -> Iterator[Problem]:
-    """Yield a problem if a campaign has too many runs or targets, before the expansion."""
+    """Yield a problem if a campaign that is not yet expanded has too many runs or targets."""
     runs = targets = 0
     for label, study in campaign.studies.items():
         count, states = _run_count(label, study), {*study.targets.states, *(campaign.snapshots_of(label) or ())}
@@ -123,7 +123,7 @@ def _too_many_runs(campaign: Campaign) -> Iterator[Problem]:
 
 
 def _too_many_solutions(campaign: Campaign) -> Iterator[Problem]:
-    """Yield a problem if `finite_range` or `boundary_element_loops` has too many solutions, after the expansion."""
+    """Yield a problem if an expanded campaign has too many solutions in `finite_range` or `boundary_element_loops`."""
     for section in BESIDE_STUDIES:
         entries = [entry for entry in getattr(campaign, section).values() if entry.study in campaign.studies]
         counts = (len(campaign.contacts_beside(e)) * len(getattr(e, "reduced_pressures", [0])) for e in entries)

@@ -252,7 +252,7 @@ class Study(Section):
     def problems(self, snapshots: list[tuple[str, float]] | None) -> Iterator[Problem]:
         """Yield the problems that prevent the study from running; `snapshots` come from `Campaign.snapshots_of`."""
         alone = self.models == [DEFAULT_MODEL]
-        # A relative load is the largest reduced pressure on the surface with the smallest slope.
+        # At a given relative load, the smallest slope has the largest reduced pressure.
         slope = min((slope for slope in self.rms_slopes if slope != MEASURED), default=math.inf)
         most = (MAX_REDUCED_PRESSURE if DEFAULT_MODEL in self.models else LARGEST_REDUCED_PRESSURE) * slope
         for location, kind, value in self._states():

@@ -99,7 +99,7 @@ class MeasuredSurface(_SurfaceFromFile):
     kind: Literal["measured"]
     """A topography from a measurement."""
     path: File
-    """File of the topography, relative to the configuration file."""
+    """Path of the topography file, relative to the configuration file."""
     format: Literal["auto", "npy", "netcdf", "matrix", "xyz", "hdf5", "fourier", "instrument"] = "auto"
     """Format of the file: `npy`; `netcdf`; `matrix` (text, a row of heights in each line); `xyz` (text, x y z in each
     line, in any order); `hdf5`; `fourier` (text, qx qy Re Im in each line); `instrument` (a microscope's format that
@@ -195,7 +195,7 @@ class SelfAffineSurface(Section):
     """Number of nodes along a side of the periodic cell."""
     amplitudes: Literal["fixed", "gaussian"] = "fixed"
     """Amplitudes of the waves. `fixed`: every amplitude has the value of the spectrum, so all seeds have the same rms
-    height and slope. `gaussian`: amplitudes are random, with the spectrum as mean square."""
+    height and slope. `gaussian`: amplitudes are random, and their mean square is the spectrum."""
 
     @property
     def lengths_and_hurst(self) -> tuple[float, float, float, float]:

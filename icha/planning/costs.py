@@ -26,7 +26,7 @@ class Workflow:
 
     Attributes
     ----------
-    start : time from the call to the first job: start of `icha run`, of Snakemake and of the parent process of jobs.
+    start : time from the call to the first job; `icha run`, Snakemake and the parent process of jobs start.
     planned : additional start time for each file of the campaign.
     job : time of a job in addition to its computation: scheduling, fork, log, checksums.
     memory : memory of `icha run`, Snakemake and the parent process of jobs.

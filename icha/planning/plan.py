@@ -266,7 +266,7 @@ def time_on(items: Iterable[Item], cores: int) -> float:
 
 
 def start_up(items: Collection[Item]) -> float:
-    """Return the time in s from the call to the first job: start of Snakemake, its plan, and imports."""
+    """Return the time in s from the call to the first job, in which Snakemake starts and plans the jobs."""
     if not any(item.to_do for item in items):
         return 0.0
     return WORKFLOW.start + WORKFLOW.planned * len(items)

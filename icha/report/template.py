@@ -32,7 +32,7 @@ def _symbols(text: str) -> Markup:
 
 
 def format_scientific(value: float | None) -> Markup:
-    """Format a number with three digits, with a power of ten if it is small or large."""
+    """Format a number with three digits; a small or large number has a power of ten."""
     if value is None:
         return Markup("–")
     if value == 0:
@@ -62,7 +62,7 @@ def format_range(values: np.ndarray, form) -> Markup | str:
     If the interval of positive values would reach below zero, the interval is computed from their logarithms.
     """
     over = ensemble(values)
-    # Target loads are met exactly, except for rounding errors.
+    # Runs reach target loads exactly, except for rounding errors.
     if len(values) < 2 or np.ptp(values) <= 1e-6 * abs(over.mean):
         return ""
     if len(values) < ENOUGH:
