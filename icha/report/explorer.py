@@ -36,7 +36,7 @@ from icha.support.formatting import format_count, printable_lines
 CHOICES = ("study", "surface", "rms_slope", "material", "seed")
 # Largest numbers of cells along an edge of a topography, and along an edge of a contact map, which has finer details.
 MOST_HEIGHTS, MOST_CELLS = 256, 512
-# Smallest pressure density on the page, divided by the highest density. With the JKR law, the density has an infinite tail.
+# Smallest pressure density on the page, divided by the highest density. With the JKR law, the tail is infinite.
 LEAST_DENSITY = 1e-3
 LEVELS = 255  # largest grey level of a picture
 CONTACT_COLOUR = (230, 0, 13)  # red, green and blue of spots and patches
