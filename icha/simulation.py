@@ -224,8 +224,8 @@ def asperity_applicability(
     reasons = []
     if full_contact_energy_ratio < FULL_CONTACT_BELOW:
         reasons.append(
-            f"full contact has a lower energy than no contact (U_full/dgamma = {full_contact_energy_ratio:.3g}, less "
-            f"than {FULL_CONTACT_BELOW:g})"
+            "full contact has a lower energy than separated surfaces (U_full/dgamma = "
+            f"{full_contact_energy_ratio:.3g}, less than {FULL_CONTACT_BELOW:g})"
         )
     reasons += summit_reasons
     if contact_area_fraction > MAX_AREA_FRACTION * (1 + _AREA_TOLERANCE):

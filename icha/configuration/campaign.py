@@ -1,4 +1,4 @@
-"""A campaign: surfaces, materials, and studies that press the surfaces into half-spaces of the materials.
+"""A campaign: surfaces, materials, and studies of contacts between the surfaces and half-spaces of the materials.
 
 Values are in SI units. `icha.configuration.load` reads a campaign from a configuration file,
 `icha.configuration.errors` writes the messages, and `icha.configuration.schema` generates the JSON schema of the file.

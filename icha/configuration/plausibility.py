@@ -131,8 +131,8 @@ _RATIO = Usual(
     "1",
     f"{FULL_CONTACT_BELOW:g}",
     "inf",
-    "for smaller values full contact has a lower energy than no contact, and the asperity model does not apply; use a "
-    "rougher surface, a stiffer material, or `models: [boundary_elements]`",
+    "for smaller values full contact has a lower energy than separated surfaces, and the asperity model does not "
+    "apply; use a rougher surface, a stiffer material, or `models: [boundary_elements]`",
 )
 
 

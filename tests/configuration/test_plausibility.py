@@ -67,8 +67,8 @@ STICKY = {"materials.soft.contact_modulus": "50 kPa"}
 def test_sticky_runs_of_asperities_are_refused_until_they_are_confirmed(load, refused):
     message = (
         "studies.one.models: 'asperities with U_full/dgamma = 0.0275' is unusual for soft on rough at rms slope 0.2; "
-        "expected 1 to inf (for smaller values full contact has a lower energy than no contact, and the asperity model "
-        "does not apply; "
+        "expected 1 to inf (for smaller values full contact has a lower energy than separated surfaces, and the "
+        "asperity model does not apply; "
     )
     refused("", STICKY, message)
     refused("", STICKY, "or add `confirmed: [studies.one.models]` at the top level")
