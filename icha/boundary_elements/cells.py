@@ -66,7 +66,7 @@ def find_among(sought: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, np.nd
 
 
 def blocks_around(grid: int, distance: int, cells: np.ndarray) -> np.ndarray:
-    """Return a field of blocks (BLOCK x BLOCK cells): 1 within `distance` of `cells` and slightly beyond."""
+    """Return a field of blocks (BLOCK x BLOCK cells): 1 within `distance` cells of `cells`, and a bit beyond."""
     occupied = np.zeros(2 * [-(-grid // BLOCK)], np.uint8)
     row, column = np.divmod(cells, grid)
     occupied[row // BLOCK, column // BLOCK] = 1

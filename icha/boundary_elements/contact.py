@@ -94,7 +94,7 @@ class BoundaryElements(FullContactProblem):
         return replace(state, history=(*before.history, events) if len(events) else before.history)
 
     def _next_equilibrium(self, state, separation, control):
-        """Find the next equilibrium from a state with gaps: directly, or by `solve_at_control`; see `equilibrium`."""
+        """Find the next equilibrium from a state with gaps; areas, and loads with adhesion, need a search."""
         if control is None:
             closed = separation < self.smallest_gap
             return self.full_contact(self.undetermined_pressure) if closed else self._solve(state, separation)
@@ -135,7 +135,10 @@ class BoundaryElements(FullContactProblem):
         return float(np.sum(self.area_of_cells(state))) / self.heights.size
 
     def area_of_cells(self, state: CellState) -> np.ndarray:
-        """Return `reported_areas`, (k,); without adhesion, whole cells less a constant part for each free edge."""
+        """Return the contact area of each cell, (k,), divided by the cell area.
+
+        With adhesion these are `reported_areas`; without, 1 minus BEYOND_EDGES for each free edge of the cell.
+        """
         if self.adhesive:
             return reported_areas(state.fraction, state.mean_fraction)
         return 1 - BEYOND_EDGES * free_edges(state.cells, self.space.grid)

@@ -29,7 +29,7 @@ class PatchObservables:
         return {"resolved_tension": self.contact.front.straight_strength * self.contact.contact_modulus}
 
     def of_step(self, state: CellState) -> dict:
-        """Return residuals, the number of pending cells, and the share of summits in contact outside Wu's range."""
+        """Return residuals (gap over h_rms), number of pending cells, and share of summits outside Wu's range."""
         contact = self.contact
         touched = np.isin(contact.summits.cell, state.cells)
         verified = contact.law.is_jump_in_verified(contact.asperities.radius_of_curvature[touched])

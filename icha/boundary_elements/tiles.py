@@ -61,7 +61,7 @@ class TiledGrid:
 
     @classmethod
     def of(cls, cells: np.ndarray, grid: int) -> TiledGrid | None:
-        """Return the tiles of cells (k,), ascending; None if no cells, not faster, or COARSENING does not fit."""
+        """Return the tiles of cells (k,), ascending; None if empty or not faster, or if COARSENING does not fit."""
         if grid % COARSENING:
             return None
         many = -(-grid // (TILE - 2 * RANGE))

@@ -322,7 +322,7 @@ class _Cycle:
         return abs(separation - last_visited) > between
 
     def _first_trial_length(self):
-        """Return the distance to the next state of `ahead`, m, or else to the next station, or else `step_length`."""
+        """Return the distance to the next state of `ahead`, m, or to the next station of the leg, or `step_length`."""
         if self.ahead:
             return abs(self.ahead[-1].separation - self.state.separation)
         at, same, stations = self.state.separation, SAME_SEPARATION * self.contact.rms_height, self.stations

@@ -98,8 +98,8 @@ class StepAccuracy:
         """Return False if the tension inside a step may be larger than in any state of the path so far.
 
         This is only possible on unloading with events that may change the pressure: the tension just before the event
-        may be up to that of the tangent at the start. It may exceed both states of the step by `_MISSED_TENSION`. With
-        adhesion also return False if the last contact breaks in the step.
+        may be up to that of the tangent at the start. An excess of `_MISSED_TENSION` over both states of the step is
+        accepted. With adhesion also return False if the last contact breaks in the step.
         """
         contact = self.contact
         if step.separation_change < 0 or not step.may_change_pressure:
