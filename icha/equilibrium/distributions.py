@@ -12,7 +12,7 @@ from icha.surfaces.surface import Surface
 
 
 def cover_grid(period: float, grid: int, centres, radii, free_square: bool = False) -> tuple[np.ndarray, np.ndarray]:
-    """Return the area fraction of every grid cell that discs cover, and a mask of the nodes inside discs, both (n, n).
+    """Return the fraction of each grid cell that discs cover, and a mask of the nodes inside discs, both (n, n).
 
     A cell is the square around a grid node. If discs overlap, their fractions add up and may exceed 1.
 
@@ -32,16 +32,16 @@ def gap_distribution(law: JKR, surface: Surface, state: ContactState) -> dict:
     """Return the distribution P(u) of the gap u outside the spots, as a dictionary with the keys below.
 
     Here u is the gap at a point. In other modules of this package, u is the mean separation. If a spot covers part of a
-    grid cell, only the uncovered fraction of the cell is counted. The gap of this fraction is the gap at the node of
-    the cell, or zero if the node lies inside the spot. The last bin includes all larger gaps.
+    grid cell, only the uncovered fraction of the cell is counted, with the gap at the node of the cell. If the node is
+    inside the spot, this gap counts as zero. The last bin includes all larger gaps.
 
     Returns
     -------
     gap_density : (bins,) float, P(u) in the bins of `icha.contact.model.gap_bins`, 1/m.
-    overlap_fraction : fraction of the nominal area outside the spots where the gap is negative: the surfaces overlap.
-    area_beyond_edges : part of A/A0 that the cells do not count: spot area over the edges of a free square, and the
-        excess over 1 in cells that overlapping spots cover more than once. The sum of the integral of P(u), A/A0
-        and overlap_fraction is 1 + area_beyond_edges.
+    overlap_fraction : area outside the spots where the gap is negative (the surfaces overlap), divided by A0.
+    area_beyond_edges : part of A/A0 that the cells do not count: spot area outside a free square, and the excess
+        over 1 in cells that spots cover more than once. A periodic surface has only this excess. The integral of P(u),
+        A/A0 and overlap_fraction add up to 1 + area_beyond_edges.
     """
     edges = gap_bins(surface)
     spots, a = state.spots, state.spots.contact_radius
@@ -49,7 +49,7 @@ def gap_distribution(law: JKR, surface: Surface, state: ContactState) -> dict:
     field = DisplacementField(law, period, grid, spots.position, a, spots.radius_of_curvature, free_square)
 
     def count_cells(rows, w):
-        """Return three areas in cells: uncovered in every bin of the gap, covered, and covered more than once."""
+        """Return areas, in cells: uncovered area in each bin of the gap, covered area, area covered more than once."""
         u = w + (state.separation - surface.heights[rows])
         cover, inside = _cover_rows(period, grid, spots.position, a, rows, free_square)
         u[inside] = 0.0
@@ -131,7 +131,7 @@ def _cover_rows(period, grid, centres, radii, rows, free_square=False):
 
 
 def _disc_area_left_below(x, y, a):
-    """Return the area left of x and below y of a disc of radius a around the origin."""
+    """Return the area of the part of a disc that lies left of x and below y; radius a, centre at the origin."""
     x, y = np.clip(x, -a, a), np.clip(y, -a, a)
     left, below = _disc_area_left(x, a), _disc_area_left(y, a)
     # The lines at x and y divide the disc into four parts. The result is the area of the lower left part.
@@ -144,5 +144,5 @@ def _disc_area_left_below(x, y, a):
 
 
 def _disc_area_left(x, a):
-    """Return the area left of x, -a <= x <= a, of a disc of radius a around the origin."""
+    """Return the area of the part of a disc that lies left of x, -a <= x <= a; radius a, centre at the origin."""
     return a**2 * (0.5 * np.pi + np.arcsin(x / a)) + x * np.sqrt(np.maximum(a**2 - x**2, 0.0))

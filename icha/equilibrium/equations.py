@@ -50,7 +50,7 @@ def derivative_by_radius(contact: AsperityContact, quantity: str, a, R):
 
 
 def radius_slope(law: JKR, a, R, approach, jump_off_approach):
-    """Return da/d(delta) of n spots, the derivative of radius by approach; zero past jump-off and for radius zero.
+    """Return da/d(delta), (n,), the derivative of radius with respect to approach; zero past jump-off and for a = 0.
 
     The derivative is infinite at jump-off; `JKR.radius_derivative` limits its value there.
     """
@@ -72,8 +72,8 @@ class Evaluation:
     equilibrium_height : (n,) float, asperity heights at which these approaches would be an equilibrium, m.
     error : (n,) float, left side minus right side of each equation, m.
     control_error : nominal pressure (Pa) or area fraction minus the prescribed value; 0 for a given separation.
-    repulsion : sum of the repulsive parts of all forces, divided by the nominal area, Pa: the scale of the error of a
-        small load. It is 0 if no load is prescribed.
+    repulsion : sum of the repulsive parts of all forces, divided by the nominal area, Pa; 0 if no load is prescribed.
+        `Equations.error_size` compares the error of a small load with this value.
     interaction : elastic interaction of the spots.
     """
 
@@ -130,8 +130,8 @@ class Equations:
     def error_size(self, evaluation: Evaluation, target_weight: float = _TARGET_WEIGHT) -> float:
         """Return the larger of two errors: the largest error of the sites, in h_rms, and the error of load or area.
 
-        The error of load or area is divided by its target and multiplied by `target_weight`. A load close to zero is a
-        small difference of repulsion and attraction: its error is divided by SMALLEST_LOAD times the repulsion.
+        The error of load or area is divided by the larger of |target| and SMALLEST_LOAD times the repulsion, because a
+        load close to zero is a small difference of repulsion and attraction. `target_weight` multiplies the quotient.
         """
         size = float(np.max(np.abs(evaluation.error), initial=0.0)) / self.contact.rms_height
         if self.control is None:

@@ -19,7 +19,7 @@ from icha.half_space.free_square import mean_displacement
 from icha.surfaces.summits import LARGEST_DEPARTURE, SummitCoverage, find_summits, paraboloid_departure
 from icha.surfaces.surface import Surface
 
-# Derivative of the approach with respect to the mean separation, above which a spot counts as unstable. A stable spot
+# A spot is unstable if the derivative of its approach with respect to the separation exceeds this value. A stable spot
 # can have a smaller positive derivative: when its neighbours lose load, the half-space below the spot rises.
 _UNSTABLE_RESPONSE = 10.0
 
@@ -33,7 +33,7 @@ class InteractingAsperities(AsperityContact):
     path_accuracy = MODELS[DEFAULT_MODEL].accuracy
 
     def untouched(self) -> ContactState:
-        """Return the state without contact, at the mean separation at which the first asperity is about to jump in."""
+        """Return the state without contact, where the first asperity (not always the highest) is about to jump in."""
         asperities = self.asperities
         separation = float(np.max(asperities.height - self.jump_in_approach))
         return ContactState(
@@ -65,9 +65,9 @@ class InteractingAsperities(AsperityContact):
         return pressure_or_area_fraction(self, AREA_FRACTION, spots.contact_radius, spots.radius_of_curvature)
 
     def mean_gap(self, state: ContactState) -> float:
-        """Return the mean gap, m: on a periodic surface the mean separation.
+        """Return the mean gap, m; on a periodic surface it is the mean separation.
 
-        On a free square, add the mean displacement; each spot acts as a point force at its centre.
+        On a free square the mean displacement is added, computed with a point force at the centre of each spot.
         """
         if not self.asperities.free:
             return state.separation
@@ -80,11 +80,11 @@ class InteractingAsperities(AsperityContact):
         return len(state.spots)
 
     def stiffness(self, state: ContactState) -> float:
-        """Return the contact stiffness -dp/du of the present spots, Pa/m."""
+        """Return the contact stiffness -dp/du with the set of spots unchanged, Pa/m."""
         return 0.0 - self.slope(PRESSURE, state)  # not -0.0 without contact
 
     def slope(self, quantity: str, state: ContactState) -> float:
-        """Return the derivative of PRESSURE or AREA_FRACTION by the mean separation as long as no event occurs."""
+        """Return the derivative of PRESSURE or AREA_FRACTION with respect to the mean separation, without events."""
         sites, c = state.sites, state.contact_index
         a, R = state.contact_radius[c], sites.radius_of_curvature[c]
         growth = radius_slope(self.law, a, R, sites.approach[c], sites.jump_off_approach[c]) * sites.response[c]
@@ -94,10 +94,9 @@ class InteractingAsperities(AsperityContact):
         """Return the elastic energy minus the energy of adhesion, per nominal area, J/m^2; zero without contact.
 
         The energy of a spot is that of a single JKR contact, plus F w/2. Here F is the force of the spot, and w the
-        displacement at its centre by the other spots, as in eq. (4). Spots have an area, so the interaction of two
-        spots of different size is not exactly reciprocal. Along a path without events, the change of the energy and the
-        work done are not exactly equal. They differ by about (a/r)^2 times the interaction energy, where r is the
-        distance of the spots.
+        displacement at its centre by the other spots, as in eq. (4). Because w is taken at the centre, two spots of
+        different size do not act equally on each other. So along a path without events, the change of the energy is not
+        exactly the work done: they differ by about (a/r)^2 times the interaction energy, with the distance r of spots.
         """
         spots, law = state.spots, self.law
         a, R = spots.contact_radius, spots.radius_of_curvature
@@ -125,9 +124,9 @@ class AsperityObservables:
         return {}
 
     def of_step(self, state: ContactState) -> dict:
-        """Return the residual, the number of barred asperities, and the fraction of single spots outside Wu's range.
+        """Return residual, number of barred asperities (`pending_count`), and share of spots outside Wu's range.
 
-        Wu's formula for jump-in, eq. (3), is verified for Tabor parameters from 1. Without adhesion the fraction is 0.
+        Wu's formula, eq. (3), is verified for Tabor parameters from 1. Unions do not count. Without adhesion it is 0.
         """
         law, spots = self.contact.law, state.spots
         verified = law.is_jump_in_verified(spots.radius_of_curvature[spots.members == 1])
@@ -135,7 +134,7 @@ class AsperityObservables:
         return {"residual": state.residual, "pending_count": state.barred_count, "outside_wu_fraction": outside}
 
     def of_snapshot(self, state: ContactState) -> dict:
-        """Return the distributions of gap and pressure, and for every spot its position, radius, area, force etc."""
+        """Return the distributions of gap and pressure, and for each spot the properties `spot_…` below in SI units."""
         law, spots = self.contact.law, state.spots
         return {
             **gap_distribution(law, self.surface, state),
@@ -153,8 +152,8 @@ class AsperityObservables:
     def reasons_against(self, separations: Iterable[float], pressed: ContactState | None) -> list[str]:
         """Return reasons why summits do not represent the surface, as sentences for the user; an empty list if they do.
 
-        At the mean separations (m) of the first loading, peaks may have no summit, or nodes may not support summits.
-        In the state `pressed`, the tops under the spots of single asperities may not be parabolic.
+        The reasons are peaks without summits and unsupported summits (see `SummitCoverage`), at the mean separations of
+        the first loading, m, and tops that are not parabolic under the spots of single asperities in `pressed`.
         pressed : state with the largest contact area; None if there is no state.
         """
         reasons = SummitCoverage.of(self.surface, self.contact.asperities).reasons_against(separations)

@@ -47,7 +47,7 @@ class IterationState:
     def start_search(cls, contact: AsperityContact, state: ContactState, separation: float) -> IterationState:
         """Start a search from an equilibrium: extrapolate its approaches linearly to a mean separation, m.
 
-        All spots in contact now count as old. The table is compacted, so the indices of sites may change.
+        All spots in contact now count as old. The table may be compacted, which changes the indices of sites.
         """
         count, before = len(contact.asperities), state.sites
         sites = replace(

@@ -5,9 +5,9 @@ forms at an approach of zero and without a jump. Therefore, without adhesion all
 are candidates. The approaches of the candidates are unknowns of the equations, and the solution shows which candidates
 are in contact. Jump-off: a spot past jump-off, with an approach below its jump-off approach, breaks contact.
 
-The asperities of a broken spot are freed: each is released or barred. A union releases its asperities. A released
-asperity stays in contact if it has a stable state and is not under a larger new spot. A barred asperity does not make
-contact again in this search.
+The asperities of a broken spot, also those that it only covers, lose their site. The asperities of a union are
+released: they stay in contact if they have a stable state and are not under a larger new spot. The asperities of other
+spots are barred: they do not make contact again in this search. An asperity that was released before is barred too.
 """
 
 from dataclasses import replace
@@ -49,9 +49,9 @@ def apply_jump_in(state: IterationState, evaluation: Evaluation, margin: float) 
     An asperity is ready if its approach is at least the jump-in approach plus a margin, m. An asperity that a union has
     released since the last call is ready if its approach is at least the jump-off approach; otherwise it is barred.
 
-    1. A ready asperity that is barred stays out of contact and is counted in `barred_count`.
+    1. A ready asperity that was barred before stays out of contact and is counted in `barred_count`.
     2. A ready asperity under a spot becomes part of this spot. It does not count as an added site.
-    3. A ready asperity under the larger spot of another ready asperity gets no site in this call.
+    3. A ready asperity under the larger spot of another one gets no site; in the next call it must reach jump-in.
     4. Any other ready asperity gets a site: a contact with adhesion, a candidate without adhesion. If a union has
        released it, a split of the union is logged. Otherwise a jump-in is logged, but not for a candidate.
     """
@@ -70,7 +70,7 @@ def apply_jump_in(state: IterationState, evaluation: Evaluation, margin: float) 
     barred_count, ready = int(np.count_nonzero(barred[ready])), ready[~barred[ready]]
     under = covering_spot(asperities.position[ready], state.sites.position[spots], evaluation.a[spots], asperities.cell)
     site_of_asperity[ready[under >= 0]] = spots[under[under >= 0]]
-    ready = _largest_of_each_group(state, ready[under < 0])
+    ready = _select_uncovered(state, ready[under < 0])
     source = state.released_from[ready]
     state = replace(state, barred=barred, site_of_asperity=site_of_asperity, barred_count=barred_count)
     state = replace(state, released_from=np.full(len(barred), -1))
@@ -79,7 +79,7 @@ def apply_jump_in(state: IterationState, evaluation: Evaluation, margin: float) 
     splits, jumping = np.unique(source[source >= 0]), ready[source < 0]
     state = state.with_events(SPLIT, state.sites.position[splits], state.sites.members[splits])
     if contact.adhesive:
-        # The jump releases its energy at the jump-in approach. Work done on the spot causes any further approach.
+        # The jump releases the energy at the jump-in approach. Any further approach is due to work from outside.
         R = asperities.radius_of_curvature[jumping]
         energy = -law.energy(law.contact_radius(contact.jump_in_approach[jumping], R), R)
         state = state.with_events(JUMP_IN, asperities.position[jumping], 1, energy, jumping)
@@ -87,15 +87,15 @@ def apply_jump_in(state: IterationState, evaluation: Evaluation, margin: float) 
 
 
 def _sudden_growth(contact, x, y):
-    """Return x h_rms + y |delta_off|, m: a possible increase of an approach by jumps of other spots (_SUDDEN_GUESS)."""
+    """Return x h_rms + y |delta_off|, m, a possible increase of an approach by jumps of spots (see _SUDDEN_GUESS)."""
     return x * contact.rms_height - y * contact.law.jump_off_approach(np.max(contact.asperities.radius_of_curvature))
 
 
 def _evaluate_approaches(state, evaluation, spots, margin):
     """Compute the approaches of the asperities without site that may have reached jump-in, and store them in the state.
 
-    If `margin` is 0, an upper bound selects these asperities; otherwise a guess selects them, and may miss some.
-    Return the new state, and the indices of the evaluated asperities. `spots` : indices of the sites in contact.
+    They are selected by an upper bound of their approaches if `margin` is 0, otherwise by a guess that may miss some.
+    Return the new state and their indices. `spots` : indices of the present sites with a positive contact radius.
     """
     contact, asperities, sites = state.contact, state.contact.asperities, state.sites
     largest = state.last_approach + _LARGEST_APPROACH_RATE * np.abs(state.last_separation - evaluation.separation)
@@ -110,8 +110,8 @@ def _evaluate_approaches(state, evaluation, spots, margin):
     return replace(state, last_approach=last_approach, last_separation=last_separation), evaluated
 
 
-def _largest_of_each_group(state, jumping):
-    """Return those jumping asperities (indices) whose centres will not lie under the larger spot of another one."""
+def _select_uncovered(state, jumping):
+    """Return the jumping asperities (indices) whose centres will not lie under the larger spot of another one."""
     asperities = state.contact.asperities
     position = asperities.position[jumping]
     a = state.contact.law.contact_radius(state.last_approach[jumping], asperities.radius_of_curvature[jumping])
@@ -148,7 +148,7 @@ def apply_jump_off(state: IterationState, evaluation: Evaluation, margin: float)
     As long as a new spot (`Sites.counts_as_old` is False) is past jump-off, even by less than the margin, no old spot
     breaks contact: the old spots may be stable without the new one. Without adhesion, only unions break contact here,
     and only if the margin is 0. A single asperity with a negative approach needs no jump-off, because it exerts no
-    force. Return the new state.
+    force. Return the new state, or `state` itself if no spot breaks contact.
     """
     sites = state.sites
     breaking = sites.status == CONTACT
@@ -165,8 +165,8 @@ def apply_jump_off(state: IterationState, evaluation: Evaluation, margin: float)
 def break_closest_to_jump_off(state: IterationState, separation: float, count: int) -> IterationState:
     """Break the contact of the `count` spots closest to jump-off, and of spots equally close; return the new state.
 
-    The closest spots are those that reach jump-off after the smallest increase of the separation, as their responses
-    predict. This increase is counted from the start of the search, so all approaches are reset to their values there.
+    The closest spots are those that reach jump-off after the smallest increase of the separation from the start of the
+    search, as their responses predict. The new state has the approaches of the start, not the extrapolated ones.
 
     separation : mean separation to which the search has extrapolated the approaches, m.
     count : number of spots to break, not larger than the number of spots in contact.
@@ -182,9 +182,9 @@ def break_closest_to_jump_off(state: IterationState, separation: float, count: i
 def _break_contact(state, breaking):
     """Break the contact of the spots where the mask `breaking` (n,) is True, and log their jump-offs.
 
-    A union releases its asperities, including those that it only covers, each at most once during a search. All other
-    asperities in broken spots are barred. For an asperity that has jumped in during this search, no jump-off is logged;
-    its jump-in is deleted from the log.
+    A union releases its asperities, also those that it only covers, except asperities that were already released in
+    this search. All other asperities in broken spots are barred. If an asperity has jumped in during this search, its
+    jump-in is deleted from the log, and no jump-off is logged.
     """
     sites, law = state.sites, state.contact.law
     new = np.isin(sites.asperity, state.asperities_jumped_in) & breaking

@@ -19,7 +19,7 @@ from icha.equilibrium.sites import CONTACT
 
 # Largest number of trials of a Newton step; each trial after the first one halves the step.
 _STEP_TRIALS = 8
-# Largest error of the response d(delta)/du of the approaches to the mean separation.
+# Largest error of the equations for the responses: derivatives of the approaches with respect to the separation.
 _RESPONSE_ERROR = MODELS[DEFAULT_MODEL].stiffness_error
 # Relative errors of linear solves: with the approximate matrix, and with the exact matrix.
 _LINEAR_TOLERANCE = 3e-3
@@ -28,20 +28,20 @@ _EXACT_TOLERANCE = 1e-6
 _APPROXIMATE_SOLVES, _EXACT_SOLVES = 8, 4
 # Largest dimension of a Krylov space.
 _KRYLOV = 50
-# Largest change of the separation in a step, in h_rms.
+# Largest change of the separation in a Newton step, in h_rms.
 _LARGEST_CHANGE = 0.2
-# Contact radius, in jump-off radii, below which a step towards jump-off changes the radius instead of the approach.
+# A step towards jump-off changes the radius instead of the approach if the radius is below this many jump-off radii.
 _NEAR_JUMP_OFF = 1.5
 # A spot past jump-off returns to contact only if its distance from jump-off is below this fraction of its error.
 _PAST_JUMP_OFF = 0.2
 
 
 def newton_step(equations: Equations, evaluation: Evaluation, size: float) -> tuple[Evaluation, bool, bool]:
-    """Take one Newton step, halved until the error is enough below `size`, the `error_size` before the step.
+    """Take one Newton step; halve it until the `error_size` is enough below `size`, its value before the step.
 
     The error must fall by at least 10 % after the full step, 5 % after half the step, and so on. If eight trials with
     the approximate matrix fail, eight with the exact matrix follow. Return the evaluation after the step (the old one
-    if all trials fail), whether a trial succeeded, and whether the exact matrix was needed.
+    if all trials fail), whether a trial succeeded, and whether the exact matrix was needed. `_solve_step` may raise.
     """
     for exact in (False, True):
         step, separation_step = _solve_step(equations, evaluation, exact)
@@ -60,9 +60,8 @@ def newton_step(equations: Equations, evaluation: Evaluation, size: float) -> tu
 def solve_response(equations: Equations, evaluation: Evaluation) -> np.ndarray:
     """Return the response x = d(delta)/du of the approach of every site to the mean separation, (n,).
 
-    The response solves (1 + W' da/d(delta)) x = -1, where W' = dw/da is the derivative of the displacements. Repeated
-    solves correct x, with the approximate matrix and then with the exact one. Raise `NotConverged` if these fail. The
-    response of removed sites is -1.
+    The response solves (1 + W' da/d(delta)) x = -1, with the derivative W' = dw/da of the displacements; removed sites
+    get -1. Repeated solves correct x, first with the approximate matrix. Raise `NotConverged` if they all fail.
     """
     sites = equations.sites
     response = np.full(len(sites), -1.0)
@@ -109,12 +108,14 @@ def _linearise(equations, evaluation):
 def _solve_step(equations, evaluation, exact):
     """Return the Newton step by the exact or approximate matrix: changes of approaches (n,) and separation, m.
 
-    If the separation is given, its change is 0; if load or area is given, its change is at most _LARGEST_CHANGE h_rms.
+    If the separation is given, its change is 0. If load or area is given, its change is at most _LARGEST_CHANGE h_rms,
+    and limits the predicted changes of the approaches. Raise `NotConverged` if no contact radius changes with the
+    separation, or if the linear equations have no finite solution.
     """
     contact, sites, control = equations.contact, equations.sites, equations.control
     present, slope, exact_product, approximate_product = _linearise(equations, evaluation)
     product, tolerance = (exact_product, _EXACT_TOLERANCE) if exact else (approximate_product, _LINEAR_TOLERANCE)
-    size = len(present)
+    count = len(present)
     step = np.zeros(len(sites))
     if control is None:
         step[present] = _solve_linear(lambda x: x + product(x), -evaluation.error[present], tolerance)
@@ -130,13 +131,13 @@ def _solve_step(equations, evaluation, exact):
 
     def bordered(x):
         """Multiply the matrix by x (m + 1,): differences from the predicted changes, then change of separation."""
-        y = x[:size] + x[size] * last
-        return np.append(y + product(y) + x[size], np.sum(gradient * y) / rate)
+        y = x[:count] + x[count] * last
+        return np.append(y + product(y) + x[count], np.sum(gradient * y) / rate)
 
     x = _solve_linear(bordered, np.append(-evaluation.error[present], -evaluation.control_error / rate), tolerance)
     largest = _LARGEST_CHANGE * contact.rms_height
-    separation_step = float(np.clip(x[size], -largest, largest))
-    step[present] = x[:size] + separation_step * last
+    separation_step = float(np.clip(x[count], -largest, largest))
+    step[present] = x[:count] + separation_step * last
     return step, separation_step
 
 
@@ -148,10 +149,10 @@ def _take_step(equations, evaluation, step):
 
     1. A spot in contact with a radius below 1.5 jump-off radii and a step towards jump-off: the step is taken in the
        radius. If the radius reaches its lowest value, the jump-off radius, the approach falls by the rest of the step.
-    2. A spot far past jump-off: the approach rises at most to jump-off.
-    3. A spot a little past jump-off that returns to contact (`_returns_to_contact`): s solves s^2 + c s = L. Here L is
-       the new value of delta - delta_off if the displacement remained the same, and c s is the change of the
+    2. A spot a little past jump-off that returns to contact (`_returns_to_contact`): its new s solves s^2 + c s = L,
+       because its return changes the displacement by c s. L would be the new delta - delta_off at a constant
        displacement. The Newton step neglects s^2 and gives s_N, so that c = L/s_N.
+    3. Any other spot past jump-off: the approach rises at most to jump-off.
     """
     approach = evaluation.approach + step
     if not equations.contact.adhesive:
@@ -159,8 +160,8 @@ def _take_step(equations, evaluation, step):
     sites, law = equations.sites, equations.contact.law
     jump_off_approach = sites.jump_off_approach
     returns = _returns_to_contact(sites, evaluation)
-    far_past = (evaluation.approach < jump_off_approach) & ~returns
-    approach[far_past] = np.minimum(approach, jump_off_approach)[far_past]
+    stays_past = (evaluation.approach < jump_off_approach) & ~returns
+    approach[stays_past] = np.minimum(approach, jump_off_approach)[stays_past]
     close = np.flatnonzero(sites.present & ((step < 0) & (evaluation.approach > jump_off_approach) | returns))
     lowest = law.jump_off_radius(sites.radius_of_curvature[close])
     small = evaluation.a[close] < _NEAR_JUMP_OFF * lowest
@@ -187,10 +188,10 @@ def _returns_to_contact(sites, evaluation):
 
 
 def _solve_linear(apply, b, tolerance):
-    """Solve the linear equations apply(x) = b, (m,), approximately with GMRES, and return x, (m,)."""
-    size = len(b)
-    operator = LinearOperator((size, size), matvec=apply, dtype=float)
-    x, _ = gmres(operator, b, rtol=tolerance, atol=0.0, restart=min(size, _KRYLOV), maxiter=2)
+    """Return an approximate solution x of apply(x) = b, (m,); two cycles of GMRES may not reach the `tolerance`."""
+    count = len(b)
+    operator = LinearOperator((count, count), matvec=apply, dtype=float)
+    x, _ = gmres(operator, b, rtol=tolerance, atol=0.0, restart=min(count, _KRYLOV), maxiter=2)
     if not np.all(np.isfinite(x)):
-        raise NotConverged(f"the linear equations of {size} unknowns have no finite solution")
+        raise NotConverged(f"the linear equations of {count} unknowns have no finite solution")
     return x

@@ -37,13 +37,13 @@ class AsperityContact(MaterialUnits):
 
     @property
     def area(self) -> float:
-        """Nominal contact area A0, m^2."""
+        """Nominal area A0, m^2."""
         return self.asperities.period**2
 
 
 # Status of a site: in contact, candidate for contact (only without adhesion), or removed.
 CONTACT, CANDIDATE, REMOVED = 1, 2, 3
-# The half-space is set up again if the number of sites has grown by this factor, or this fraction of sites is removed.
+# The half-space is set up again if the number of sites has grown by this factor, or if this fraction is removed.
 _GROWTH = 1.5
 _REMOVED_FRACTION = 0.25
 
@@ -216,13 +216,11 @@ class ContactState:
     sites : table of sites, n of them.
     contact_radius : (n,) float, contact radius of each site, zero out of contact, m.
     site_of_asperity : (asperities,) int, site in contact to which an asperity belongs: its own spot, a union that
-        contains it, or a spot that covered it when it came into contact; -1 for an asperity out of contact, also if it
-        has a site as a candidate.
+        contains it, or a spot that covered it when it made contact; -1 for asperities out of contact and candidates.
     last_approach : (asperities,) float, approach of an asperity out of contact at its last evaluation, m.
     last_separation : (asperities,) float, mean separation at this evaluation, m; inf if the approach is not known.
     residual : largest error of the equations of equilibrium, in h_rms.
-    barred_count : number of asperities above their jump-in approach that stay out of contact, because they have broken
-        contact at this separation.
+    barred_count : number of asperities above jump-in that stay out of contact: they broke contact in the last search.
     history : events of the path up to this state, one `Events` for each equilibrium with events.
     """
 

@@ -19,8 +19,8 @@ from icha.equilibrium.newton import newton_step, solve_response
 from icha.equilibrium.sites import CANDIDATE, CONTACT, AsperityContact, ContactState
 from icha.equilibrium.unions import absorb_new_asperities, merge_overlapping, set_union_heights, split_unions
 
-# Error in h_rms below which the search applies events. An event waits until the equations are solved if its condition
-# is exceeded by less than _EVENT_MARGIN times the error.
+# The search applies events when its error is at most _EVENT_TOLERANCE h_rms. An event waits until the equations are
+# solved if its condition is exceeded by less than _EVENT_MARGIN times the error.
 _EVENT_TOLERANCE = 3e-4
 _EVENT_MARGIN = 10.0
 # Largest number of Newton steps between two rounds of events. Largest number of steps with the exact matrix in the
@@ -30,9 +30,9 @@ _MAX_EXACT_STEPS = 4
 # Largest number of rounds of events; a surface with many equal summits may need many. Largest number of rounds that
 # lead to the same spots; unions that form and split again and again have no equilibrium.
 _MAX_ROUNDS, _MAX_RETURNS = 1000, 10
-# Distance, in periods, up to which spots of two rounds count as the same spot.
+# Positions of spots are rounded to this part of the period when the spots of two rounds are compared.
 _SAME_PLACE = 1e-6
-# Contact area fraction above which the model of spots has no meaning.
+# The model of spots has no meaning if the contact area fraction exceeds this value.
 _FULL_CONTACT = 0.5
 
 
@@ -94,8 +94,9 @@ def find_equilibrium(
 def apply_events(state: IterationState, evaluation: Evaluation, margin: float) -> tuple[IterationState, bool]:
     """Apply a round of events: jump-offs, jump-ins, coalescences and, on unloading, splits.
 
-    An event occurs if its condition is exceeded by more than a margin, m. Splits need no margin. Return the new state,
-    and whether there was any event. Raise `FullContact` if more than half the nominal area is in contact.
+    An event occurs if its condition is exceeded by more than a margin, m. Splits need no margin. Without adhesion, new
+    sites need the margin 0. Return the new state, with the approaches of the evaluation, and whether a site was added,
+    removed or replaced. Raise `FullContact` if more than half the nominal area is in contact.
     """
     contact = state.contact
     area = pressure_or_area_fraction(contact, AREA_FRACTION, evaluation.a, state.sites.radius_of_curvature)
@@ -129,7 +130,7 @@ def _check_events_end(state, visited):
 def _merge_after_failed_step(state, evaluation, margin, size):
     """Merge overlapping spots because no Newton step succeeds, and return the new state.
 
-    Merge the pairs that overlap more than an error of the approaches by the margin, m, can cause. If there are none,
+    Merge the pairs that overlap even if the approaches are wrong by the margin, m. If there are none,
     merge the pairs in which one spot covers the centre of the other. If there are none, raise `NotConverged`.
     size : error of the equilibrium, in h_rms, for the message.
     """
@@ -170,7 +171,7 @@ def _build_contact_state(state, evaluation, control):
 def _update_candidates(state, evaluation):
     """Turn candidates with an approach > 0 into contacts, and contacts with an approach <= 0 into candidates.
 
-    Used only without adhesion. Log both as events. Asperities that a lost contact covered have no site afterwards.
+    Used only without adhesion. Log both as events. Other asperities under a lost contact have no site afterwards.
     """
     sites, status, site_of_asperity = state.sites, state.sites.status.copy(), state.site_of_asperity.copy()
     made = np.flatnonzero((status == CANDIDATE) & (evaluation.approach > 0))

@@ -1,9 +1,9 @@
 """Coalescence of spots, the splitting of unions on unloading, and new contacts that lie inside other spots.
 
 Two overlapping spots become one spot, a union (`icha.asperity.jkr.JKR.union`). At the moment of coalescence, the union
-has the contact area of both spots together. Its height is chosen so that the union is in equilibrium. Its force differs
-from the sum of both forces. New contacts inside other spots are removed, because the equations are singular when the
-edge of one spot passes through the centre of another spot.
+has the contact area of both spots together. Its force differs from the sum of both forces. `set_union_heights` then
+chooses its height so that the union is in equilibrium. New contacts inside other spots are removed, because the
+equations are singular when the edge of one spot passes through the centre of another spot.
 """
 
 from dataclasses import replace
@@ -21,7 +21,8 @@ from icha.surfaces.square import periodic_difference
 def merge_overlapping(state: IterationState, evaluation: Evaluation, margin=0.0, *, deep=False) -> IterationState:
     """Replace pairs of overlapping spots by unions; each spot merges with at most one other. Return the new state.
 
-    margin : error of the approaches, m; two spots merge only if they overlap more than this error can cause.
+    The unions have no heights before `set_union_heights` is called. If no spots merge, return `state` itself.
+    margin : error of the approaches, m; two spots merge only if they overlap even if the approaches have this error.
     deep : whether only those pairs merge in which one spot covers the centre of the other. On unloading, two spots
         from the split of one union merge again only if `deep` is True.
     """
@@ -106,7 +107,7 @@ def _record_unions(state, pairs, a, radius):
 
 
 def split_unions(state: IterationState, evaluation: Evaluation) -> IterationState:
-    """Split every union whose contact radius is below the radius at which its two spots would just touch."""
+    """Split every union with a contact radius below its `touching_radius`; if there is none, return `state` itself."""
     a, sites = evaluation.a, state.sites  # the evaluation lacks sites that were added in this round
     touching = np.array([0.0 if union is None else union.touching_radius for union in sites.union[: len(a)]])
     split = np.flatnonzero((sites.status[: len(a)] == CONTACT) & (a < touching))
@@ -149,22 +150,22 @@ def absorb_new_asperities(state: IterationState, evaluation: Evaluation) -> Iter
     a site is removed, the new state also has the approaches of the evaluation; otherwise the same state is returned.
     """
     sites, a, interaction, old = state.sites, evaluation.a, evaluation.interaction, state.sites.counts_as_old
-    i, j, r = interaction.target, interaction.source, interaction.r
-    inside = np.flatnonzero((r < a[j]) & (a[i] > 0) & ~old[i])
-    inside = inside[old[j[inside]] | (a[i[inside]] < a[j[inside]])]
+    site, cover, r = interaction.target, interaction.source, interaction.r
+    inside = np.flatnonzero((r < a[cover]) & (a[site] > 0) & ~old[site])
+    inside = inside[old[cover[inside]] | (a[site[inside]] < a[cover[inside]])]
     if not len(inside):
         return state
-    inside = inside[np.argsort((a[j] - r)[inside], kind="stable")]
-    i, j = i[inside], j[inside]
+    inside = inside[np.argsort((a[cover] - r)[inside], kind="stable")]
+    site, cover = site[inside], cover[inside]
     site_of_asperity = state.site_of_asperity.copy()
-    site_of_asperity[sites.asperity[i]] = i  # a candidate is not yet entered
+    site_of_asperity[sites.asperity[site]] = site  # a candidate is not yet entered
     index = np.append(np.arange(len(sites)), -1)
-    index[i] = j  # the spot that covers a site deepest is the last one and replaces the others
+    index[site] = cover  # the spot that covers a site deepest is the last one and replaces the others
     while np.any(index[index] != index):  # a covering spot may itself be covered by a larger spot
         index = index[index]
-    state = state.delete_jumps_in(sites.asperity[np.unique(i)])
+    state = state.delete_jumps_in(sites.asperity[np.unique(site)])
     return replace(
         state,
-        sites=replace(sites.remove(i), approach=evaluation.approach),
+        sites=replace(sites.remove(site), approach=evaluation.approach),
         site_of_asperity=index[site_of_asperity],  # -1 takes the last entry
     )
