@@ -1,9 +1,9 @@
 """Cycles of loading and unloading: all equilibria of a path that continues after the first loading.
 
 On unloading every spot follows its stable branch until it jumps off. Unloading ends at complete separation or at a
-turning point. Later legs visit separations of the first loading again, so that their curves can be compared, and errors
-of the integration cancel in compression. These separations are called stations. Close to an event that changes the
-pressure (see `energy_balance`), steps become so short that the energy lost in the event is known accurately. With
+turning point. Stations are separations of a loading that all later legs visit again. The curves of the legs can then be
+compared, and in compression the errors of the integration cancel. Close to an event that changes the pressure (see
+`energy_balance`), steps become so short that the energy lost in the event is known accurately. With
 `path_accuracy.error_controlled_steps`, the error of the work of each step decides the length of the next one.
 """
 
@@ -44,8 +44,8 @@ def follow_cycle(
 
     After each waypoint the caller may send one additional target for the next step (`generator.send`). If the step
     meets this target first, the generator yields the waypoint at this target. A sent target is ignored if it lies
-    inside a jump, or if it is sent after the last waypoint of a leg. The waypoints have no energy balances. Raise the
-    errors of `icha.path.follow.follow`.
+    inside a jump, or if it is sent up to first contact, after the last waypoint of a leg, or at a state from which the
+    branch leads back to a target. The waypoints have no energy balances. Raise the errors of `icha.path.follow.follow`.
 
     longest : longest step of the separation, m.
     progress : record of the path's progress, which counts and reports the targets.
@@ -89,18 +89,18 @@ class _Cycle:
 
     Attributes
     ----------
-    contact : contact that the path follows.
+    contact : contact model.
     longest : longest step of the separation, m.
-    progress : record of the path.
+    progress : record of the path's progress.
     state : last equilibrium.
     step_length : length of the next trial step, m, if `ahead` is empty and no station follows in this direction.
     accuracy : sums over all steps so far, and the accuracy that further steps need.
     leg : number of the leg, even on loading and odd on unloading.
-    event_at : direction times separation at the end of the shortest trial step that contained the next event, m; inf if
-        no event is known, and always with error-controlled steps.
+    event_at : position, direction times separation, m, at the end of the shortest trial step that contained the next
+        event: the event happens before it. It is inf if no event is known, and always with error-controlled steps.
     ahead : with error-controlled steps, equilibria found at the ends of too long trial steps; the nearest is last.
-    longest_part : longest accepted step since the last trial step began, m; a trial step that is too long is divided.
-    stations : separations of the loading that all later legs, in both directions, visit again, ascending, m.
+    longest_part : a trial step that is too long is divided; length of the longest part accepted so far, m.
+    stations : separations of a loading that all later legs, in both directions, visit again, ascending, m.
     """
 
     contact: ContactModel
@@ -127,7 +127,7 @@ class _Cycle:
 
     @property
     def direction(self) -> int:
-        """Direction of the separation: -1 on loading, 1 on unloading."""
+        """Sign of the change of the separation: -1 on loading, 1 on unloading."""
         return -1 if self.loading else 1
 
     def make_path_error(self, *failures: NotConverged) -> NotConverged:
@@ -140,9 +140,9 @@ class _Cycle:
         """Follow one leg to all its targets or, with `until_apart`, to complete separation; yield all waypoints.
 
         A target inside a jump is kept in `progress.skipped` in leg 0, and raises an error at once in later legs. With
-        `until_apart` it is left out. Without `until_apart`, raise `NotConverged` if the surfaces separate before the
-        last target. At the end of a loading leg, the separations that it visited become stations if they are far enough
-        apart (`_is_new_station`). A reloading adds only separations below all earlier stations.
+        `until_apart`, such a target is left out without an error. Without `until_apart`, raise `NotConverged` if the
+        surfaces separate before the last target. At the end of a loading leg, the visited separations become stations
+        if they are far enough apart (`_is_new_station`), after a reloading only those below all earlier stations.
         """
         self.leg, self.event_at, self.longest_part = leg, np.inf, 0.0
         self.ahead.clear()
@@ -152,7 +152,7 @@ class _Cycle:
             if not self.loading and self._is_apart():
                 if until_apart:
                     return
-                raise self.make_path_error(self._make_separation_error(pending[0]))
+                raise self.make_path_error(self._make_apart_error(pending[0]))
             state, step = self.find_next_equilibrium(min(self._first_trial_length(), length_limit))
             candidates = next_of_each_kind(pending) + ([sent] if sent else [])
             try:
@@ -182,7 +182,7 @@ class _Cycle:
                 step = Step.between(self.contact, self.state, met)
             listed = None if target is sent else target
             self.progress.require_valid_state(self.state, met, listed, pending, self.loading)
-            # The path starts with a step of only `event_length` with adhesion; the next step may be the longest one.
+            # With adhesion, leg 0 starts with `event_length`; a step may be the longest until a separation is kept.
             self.step_length = self._choose_next_length(step) if leg or len(visited) > 1 else self.longest
             between, length_limit = self._advance(step, met), np.inf
             if self._is_new_station(met.separation, visited[-1]):
@@ -197,7 +197,7 @@ class _Cycle:
             self.stations = sorted({*self.stations, *(at for at in [*visited, self.state.separation] if at < lowest)})
 
     def _advance(self, step, state):
-        """Make the end of a step the present state, and return its waypoint of kind BETWEEN."""
+        """Move to the end of a step, update `accuracy`, `progress` and `ahead`, and return the waypoint (BETWEEN)."""
         self.accuracy.add(step, state)
         self.progress.record_equilibrium(state, self.loading)
         self.state = state
@@ -210,14 +210,14 @@ class _Cycle:
             self.ahead.append(state)
 
     def find_next_equilibrium(self, length: float) -> tuple[State, Step]:
-        """Find the next equilibrium by a step so short that its work is known; return the equilibrium and the step.
+        """Find the next equilibrium by a step that is short enough; return the equilibrium and the step.
 
-        The step is halved until the solver finds an equilibrium. Then the step is halved until its work and its largest
-        tension are known accurately enough, or until its event is located. An event is located in a step of at most
-        `event_length`. It is also located in a step that starts at most `event_length` before `event_at`: equilibria
-        have errors, so that an event may happen in a long step and not in a short one. If the tension has a new maximum
-        within the step, the step ends at the maximum. With error-controlled steps, the ends of steps that were too long
-        are kept in `ahead`, and are tried again as ends of later steps.
+        The step is halved until the solver finds an equilibrium, and then until one of three conditions is true. (a)
+        Work and largest tension of the step are known accurately enough. (b) The step is at most `event_length` long.
+        (c) The step has an event that may change the pressure, and starts at most `event_length` before `event_at`. In
+        (c) the event is located well enough: equilibria have errors, so the event may not happen in a shorter step. If
+        (a) is true and the tension has a new maximum within the step, the step ends at the maximum. With
+        error-controlled steps, the ends of too long steps are kept in `ahead`, and tried again as ends of later steps.
 
         length : largest length of the first trial step, m. It ends at the next state of `ahead` if that is closer.
         """
@@ -259,9 +259,9 @@ class _Cycle:
         If the state `ahead` is given, this state is the equilibrium, and only its events are found. On unloading with
         adhesion, the spots together may lose their equilibrium before any single spot has reached its own jump-off. If
         this happens in a step shorter than `CLOSE_TO_A_JUMP` h_rms, the spot closest to jump-off is made to break
-        contact. If there is still no equilibrium, the two, four, … spots closest to jump-off are, while so many spots
-        exist. On unloading, an unstable equilibrium counts as none, unless spots were made to break contact. Raise the
-        first `NotConverged` if there is no equilibrium.
+        contact. If there is still no equilibrium, the same is tried with two, four, … spots, up to the number of spots.
+        On unloading, an unstable equilibrium counts as no equilibrium, unless spots were made to break contact. Raise
+        the first `NotConverged` if there is no equilibrium.
         """
         contact, start = self.contact, self.state
         if ahead is not None:
@@ -281,17 +281,17 @@ class _Cycle:
         raise first
 
     def _halve_step(self, length, failure):
-        """Return half the length, m, of a step without an equilibrium, and limit `step_length` to it."""
+        """Return half the length of a failed step, m, and limit `step_length`; `NotConverged` if this is too short."""
         length = self.progress.halve_step(length, failure, self.state, self.loading)
         self.step_length = min(self.step_length, length)
         return length
 
     def _choose_next_length(self, step):
-        """Return the value of `step_length` after a step, m, at most `longest`; update `longest_part`.
+        """Return the new `step_length` after an accepted step, m, at most `longest`; update `longest_part`.
 
-        Without error-controlled steps it doubles. With them it does not change until `ahead` is empty: then the last
-        trial step is complete, and the value is twice `longest_part`. If the last step is itself the longest part, the
-        value is `longest_part` when twice this length would make the error of the work too large.
+        Without error-controlled steps, `step_length` doubles. With them, it stays the same until `ahead` is empty: then
+        the last trial step is complete, and the new value is twice `longest_part`. But if the last step is the longest
+        part, and twice its length would make the error of the work too large, the new value is `longest_part`.
         """
         if not self.contact.path_accuracy.error_controlled_steps:
             return min(self.longest, 2 * self.step_length)
@@ -312,14 +312,14 @@ class _Cycle:
         highest = self.contact.untouched().separation - SAME_SEPARATION * self.contact.rms_height
         return self.state.separation >= highest
 
-    def _is_new_station(self, separation, last_visited):
-        """Return whether a separation, m, is far enough from `last_visited`, the last one kept, to become a station.
+    def _is_new_station(self, separation, last_kept):
+        """Return whether a separation, m, is far enough from `last_kept`, the last one kept, to become a station.
 
-        With adhesion, all the short steps around an event would otherwise become stations.
+        With adhesion, the least distance is 1/64 of the longest step, because there are many short steps around events.
         """
         contact = self.contact
         between = self.longest / 64 if contact.adhesive else SAME_SEPARATION * contact.rms_height
-        return abs(separation - last_visited) > between
+        return abs(separation - last_kept) > between
 
     def _first_trial_length(self):
         """Return the distance to the next state of `ahead`, m, or to the next station of the leg, or `step_length`."""
@@ -329,7 +329,7 @@ class _Cycle:
         k = bisect_left(stations, at - same) - 1 if self.loading else bisect_right(stations, at + same)
         return abs(stations[k] - at) if 0 <= k < len(stations) else self.step_length
 
-    def _make_separation_error(self, target):
+    def _make_apart_error(self, target):
         """Return the exception for a path on which the surfaces separate before a turning point."""
         reason = f"the surfaces are apart before the turning point {target.target.describe()}"
         if target.target.kind in LOADS:

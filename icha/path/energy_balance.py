@@ -2,8 +2,8 @@
 
 An event is a jump of a spot into or out of contact, the coalescence of two spots to a union, or the split of a union.
 Between two events the stored energy changes by the work done. An event changes the stored energy at constant
-separation, and the released energy is lost. Over a closed path the losses of all events add up to the area of
-the hysteresis loop in a diagram of pressure against separation.
+separation, and the released energy is lost. Over a closed path, all losses add up to the area of the hysteresis loop of
+pressure against separation. Every jump has a reference loss: the energy that it would release if its spot were alone.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from icha.asperity.material import Material
 from icha.contact.model import COALESCENCE, JUMP_IN, JUMP_OFF, SPLIT, ContactModel, Events, State, events_between
 from icha.path.targets import BETWEEN, Target
 
-# In these functions du and dp are the changes of the separation (m) and of the pressure (Pa) in a step; slope and
-# end_slope are dp/du at the start and at the end of the step, Pa/m.
+# In these functions du and dp are the changes of separation (m) and pressure (Pa) in a step. At the start and at the
+# end of the step, p and q are the pressures, Pa, and slope and end_slope are dp/du, Pa/m.
 
 
 def pressure_jump(du, dp, slope, end_slope):
@@ -32,7 +32,7 @@ def event_error(du, pressure_jump):
 
 
 def integration_error(du, slope, end_slope):
-    """Return the estimated error of the work of a step without events, J/m^2: half of a term of `Step.between`."""
+    """Return the estimated error of the work of a step without events, J/m^2: half the slope term of `Step.between`."""
     return du**2 * abs(end_slope - slope) / 24
 
 
@@ -44,9 +44,9 @@ _CERTAIN_LOSS = 0.1
 def _extrapolate_to_full_contact(du, p, q, slope, end_slope):
     """Return finite pressures and slopes at both ends of a step from or to full contact, and the error of the work.
 
-    Full contact is infinitely stiff: its pressure does no work, and jumps when the last gap closes or the first gap
-    opens. The pressure in full contact is replaced by an extrapolation along the tangent at the other end of the step.
-    If both ends are full contact, the pressures stay, and the error is 0.
+    Full contact is infinitely stiff, so its pressure does no work. This pressure jumps when the last gap closes or the
+    first gap opens. Therefore it is replaced by an extrapolation along the tangent at the other end of the step.
+    If both ends are full contact, the pressures stay, and the slopes and the error are 0.
     """
     if np.isinf(slope) and np.isinf(end_slope):
         return p, q, 0.0, 0.0, 0.0
@@ -107,7 +107,7 @@ class Step:
         )
 
     @property
-    def has_union(self) -> bool:
+    def unites_or_splits(self) -> bool:
         """True if spots have coalesced or unions have split in the step."""
         return self.events.count(COALESCENCE) + self.events.count(SPLIT) > 0
 
@@ -123,7 +123,7 @@ class Step:
 
     @property
     def work_error(self) -> float:
-        """Largest error of the work, J/m^2, if the pressure may jump anywhere in the step even without an event.
+        """Upper bound of the error of the work, J/m^2, as if the pressure could jump anywhere, even without an event.
 
         It is the larger one of the errors by such a jump and by the integration, but at most the computed loss. Because
         the stored energy is exact, the computed loss of a step that loses no energy is the error of the work.
@@ -132,7 +132,7 @@ class Step:
         return min(max(jump_error, self.integration_error), abs(self.loss))
 
     def reference_loss(self, contact: ContactModel) -> float:
-        """Return the sum of the absolute reference losses (see `EnergyBalance.add_step`) of all jumps, J/m^2."""
+        """Return the sum of the absolute reference losses of all jumps (see the module), J/m^2."""
         return float(np.abs(self.events.energy).sum()) / contact.area
 
 
@@ -159,14 +159,13 @@ class EnergyBalance:
     def add_step(self, contact: ContactModel, step: Step) -> EnergyBalance:
         """Return the balance after one more step.
 
-        Every jump has a reference loss: the energy that it would release if its spot were alone.
-        1. Step without coalescence and split. The jumps have the whole loss if it is within a factor of two of the sum
-           of the reference losses, or if its absolute value is more than a tenth of the work. Jumps in and jumps off
-           share the loss in proportion to their reference losses, which must not have different signs.
-        2. Any other step. Jumps in and jumps off have their reference losses. The rest of the loss is attributed to
+        1. Jumps have the whole loss if the step has no coalescence and no split, if the sum of the reference losses is
+           not zero, and if the loss is within a factor of two of this sum or more than a tenth of the work. Jumps in
+           and jumps off share the loss in proportion to their reference losses, which must not have different signs.
+        2. In all other cases, jumps in and jumps off have their reference losses. The rest of the loss is attributed to
            coalescence if the step has a coalescence or split; otherwise it is unattributed.
         """
-        energy, kinds, united = step.events.energy, step.events.kind, step.has_union
+        energy, kinds, united = step.events.energy, step.events.kind, step.unites_or_splits
         jump_in, jump_off = (float(energy[kinds == kind].sum()) / contact.area for kind in (JUMP_IN, JUMP_OFF))
         ratio = step.loss / ((jump_in + jump_off) or np.inf)
         certain = 0.5 < ratio < 2 or abs(step.loss) > _CERTAIN_LOSS * abs(step.work)
@@ -235,9 +234,9 @@ def summarise_loop(
 
     Parameters
     ----------
-    rows : one row for each equilibrium of the path, in order: pressure, separation, area and energies by variable name.
+    rows : one row per equilibrium, in order: pressures, separation, area, energies and spot_count by variable name.
     pull_off_row : index of the row with the largest tension of the last unloading.
-    material : material of the contact.
+    material : material of the contact; without adhesion, values relative to its adhesion are 0.
     summit_pull_off_pressure : nominal tension if all summits had their pull-off force at the same time, Pa.
     unattributed : loss that is not attributed to any kind of event, J/m^2.
     """

@@ -14,13 +14,12 @@ from icha.path.targets import BETWEEN, LOAD_CONTROL, REDUCED_PRESSURE, Path, Tar
 def follow(contact: ContactModel, path: Path, report: Callable[[str], None] | None = None) -> Iterator[Waypoint]:
     """Follow a path with a contact, and yield the waypoints in the order of the path.
 
-    For a path that ends with the first loading, the waypoints are the equilibria at the targets. For a cyclic path, the
-    waypoints are all equilibria; under load control only the equilibria that load control visits. Targets are met
-    exactly.
+    For a path that ends with the first loading, the waypoints are the equilibria at the targets. For a cyclic path they
+    are all equilibria, under load control only the equilibria that load control visits. Targets are met exactly.
 
     Parameters
     ----------
-    contact : contact to follow.
+    contact : contact model.
     path : targets and turning points.
     report : function that is called with a line of text at every target of the first loading, at every turning point,
         and at complete separation; None for no reports.

@@ -23,8 +23,7 @@ from icha.path.targets import Target
 
 # Shortest step after halvings, relative to the longest step.
 _SMALLEST_STEP = 2.0**-14
-# Largest number of equilibria without a target while the separation changes by less than the longest step. A path with
-# more equilibria makes no progress.
+# Largest number of equilibria without progress: without a target, and with a change of less than the longest step.
 _MOST_EQUILIBRIA = 2000
 
 
@@ -34,13 +33,13 @@ class PathProgress:
 
     Attributes
     ----------
-    contact : contact that the path follows.
+    contact : contact model.
     total : number of targets of the first loading; messages call these targets stops.
     longest : longest step of the separation, m.
     report : function that is called with each line of a report; None for no reports.
     reached : number of targets of the first loading met so far.
     skipped : errors of the targets that lie inside jumps.
-    progress_from : separation, m, from which a change by one longest step counts as progress.
+    progress_from : separation, m; a change from it by at least a longest step, up or down, counts as progress.
     idle : number of equilibria since the last progress: since the last target, or since `progress_from` was set.
     """
 
@@ -54,7 +53,7 @@ class PathProgress:
     idle: int = 0
 
     def record_equilibrium(self, state: State, loading: bool) -> None:
-        """Count an equilibrium without progress, or reset the count; raise `NotConverged` if the count is too large."""
+        """Count an equilibrium, or start from 0 again after progress; raise `NotConverged` if the count is too high."""
         if abs(state.separation - self.progress_from) >= self.longest:
             self.progress_from, self.idle = state.separation, 0
             return
@@ -70,7 +69,7 @@ class PathProgress:
         self.report_position(f"stop {self.reached} of {self.total}: {target.describe()}", state)
 
     def report_position(self, name: str, state: State) -> None:
-        """Report the separation, contact area and number of spots of a state."""
+        """Report the separation (in h_rms), the area fraction A/A0 and the number of spots of a state."""
         if self.report is not None:
             contact = self.contact
             self.report(
@@ -110,7 +109,7 @@ class PathProgress:
     def make_path_error(self, state: State, loading: bool, *failures: NotConverged) -> NotConverged:
         """Return the exception for a path that cannot continue after a state.
 
-        The message reports the position, the errors of skipped targets, the failures, and on loading a sticky surface.
+        The message gives position, errors of skipped targets, failures, and on loading whether the surface is sticky.
         """
         contact, failures = self.contact, (*self.skipped, *failures)
         sticky = ""
@@ -126,7 +125,7 @@ class PathProgress:
         )
 
 
-# Number of failed attempts to solve directly for a target. After these, an ordinary step brackets the target.
+# After this number of failed attempts to solve directly for a target, an ordinary step brackets the target.
 _DIRECT_ATTEMPTS = 2
 # After the first failed attempt, the path goes this fraction of the distance to the target, and then tries again. If
 # the distance is less than `_LONG` longest steps, there is no second attempt.
@@ -140,10 +139,11 @@ def first_loading(
 ) -> Iterator[Waypoint]:
     """Follow a path that ends with the first loading, and yield a waypoint for every target.
 
-    If a target is expected within the next step, the solver looks directly for the state at this target. Otherwise, or
-    if this fails twice (once if the target is near), the separation decreases by one step, at most `longest`, m. A
-    target within this step is found by `find_first_target`. The step is halved if there is no equilibrium at its end.
-    Raise the errors of `icha.path.follow.follow`; those of targets inside jumps are raised after the last target.
+    If a target is expected within the next step, the solver looks directly for the state at this target. If this fails
+    and the target is far, the path goes a part of the distance and tries once more. In all other cases the separation
+    decreases by one step, at most `longest`, m; a target within this step is found by `find_first_target`. The step is
+    halved if there is no equilibrium at its end. If a target lies inside a jump, the path goes on from the state before
+    the jump, and the error is raised after the last target. Raise the errors of `icha.path.follow.follow`.
     """
     state = first_contact = contact.untouched()
     pending, step, failed_trials, successes = sort_targets(targets, -1), longest, 0, 0
@@ -190,7 +190,10 @@ def first_loading(
 
 
 def _solve_within_step(target, expected, following, state, step) -> State | None:
-    """Return the state at a target; None if none is found within a step, m, or if another of `following` is first."""
+    """Return the state at a target, near the `expected` separation, m; None if the solver finds none.
+
+    Also None if a load or area is not met within a step, m, or if another target of `following` is met before.
+    """
     try:
         found = target.solve(state, expected)
     except NotConverged:

@@ -10,8 +10,7 @@ from icha.contact.model import ContactModel, State
 from icha.path.energy_balance import Step
 from icha.path.targets import EVENT_ERROR_OVER_LOSS
 
-# Energy scale: sum of the absolute values of work and loss of all steps of the path so far.
-# Largest error of the work by the events of a step, relative to the energy scale, while all reference losses are zero.
+# Largest error of the work by the events of a step, relative to `energy_scale`, while all reference losses are zero.
 EVENT_ERROR_OVER_WORK = 2e-4
 # Longest step in which spots may coalesce or split, relative to the longest step of the path.
 UNION_STEP = 1 / 16
@@ -33,7 +32,7 @@ class StepAccuracy:
 
     Attributes
     ----------
-    contact : contact that the path follows.
+    contact : contact model.
     longest : longest step of the separation, m.
     energy_scale : sum of the absolute values of work and loss of all steps so far, J/m^2; errors are relative to it.
     reference_loss : sum of `Step.reference_loss` of all steps so far, J/m^2.
@@ -71,7 +70,7 @@ class StepAccuracy:
         if step.event_error > self.allowed_work_error(step):
             return False
         # The union of two spots depends on how far they overlap when it is found.
-        if step.has_union and length > UNION_STEP * self.longest:
+        if step.unites_or_splits and length > UNION_STEP * self.longest:
             return False
         accuracy = self.contact.path_accuracy
         scale = energy_scale = self.energy_scale_after(step)
@@ -85,8 +84,10 @@ class StepAccuracy:
     def allowed_work_error(self, step):
         """Return the largest allowed value of `work_error` or `event_error` of a step, J/m^2.
 
-        With error-controlled steps, or without reference losses, it is a fraction of the energy scale after the step.
-        Otherwise it is a fraction of the reference losses including this step, or of the energy scale if that is more.
+        With error-controlled steps, it is `path_accuracy.loss` times the larger of the energy scale after the step and
+        `path_accuracy.least_work`. Otherwise, if the path including this step has reference losses, it is the larger of
+        EVENT_ERROR_OVER_LOSS times these losses and `path_accuracy.loss` times the energy scale after the step. Without
+        reference losses, it is EVENT_ERROR_OVER_WORK times this energy scale.
         """
         energy_scale, accuracy = self.energy_scale_after(step), self.contact.path_accuracy
         if accuracy.error_controlled_steps:
@@ -97,9 +98,9 @@ class StepAccuracy:
     def is_tension_known(self, start, state, step):
         """Return False if the tension inside a step may be larger than in any state of the path so far.
 
-        This is only possible on unloading with events that may change the pressure: the tension just before the event
-        may be up to that of the tangent at the start. An excess of `_MISSED_TENSION` over both states of the step is
-        accepted. With adhesion also return False if the last contact breaks in the step.
+        A larger tension is only possible on unloading with events that may change the pressure: the tension just before
+        the event may be up to that of the tangent at the start. An excess of `_MISSED_TENSION` over the tension in both
+        states of the step is accepted. With adhesion also return False if the last contact breaks in the step.
         """
         contact = self.contact
         if step.separation_change < 0 or not step.may_change_pressure:
@@ -111,13 +112,13 @@ class StepAccuracy:
         return lowest >= self.lowest_pressure or known - lowest <= _MISSED_TENSION * abs(lowest)
 
     def locate_largest_tension(self, start, state, step):
-        """Return the separation at which the tension is largest between two states, m.
+        """Return the separation at which the tension is largest between two states, m, or None.
 
-        The largest tension is estimated where the tangents at both states meet. The separation is that of the minimum
-        of the cubic polynomial with the pressures and slopes of both states; without a minimum, that of the meeting
-        tangents. Return None on loading, from or to full contact, with events that may change the pressure, or if the
-        tension has no maximum between the states. Also return None if the tension was larger earlier on the path, or if
-        the tension in one of the two states equals the estimate within the required accuracy.
+        The size of the largest tension is estimated where the tangents at both states meet. Its separation is that of
+        the minimum of the cubic polynomial with the pressures and slopes of both states, or where the tangents meet if
+        there is no minimum. Return None on loading, from or to full contact, with events that may change the pressure,
+        or if the tension has no maximum between the states. Also return None if the tension was larger earlier on the
+        path, or if the tension in one of the two states equals the estimate within the required accuracy.
         """
         contact = self.contact
         slope, end_slope = (-contact.stiffness(each) for each in (start, state))

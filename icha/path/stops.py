@@ -1,4 +1,4 @@
-"""Stops (targets) of a path as functions of the state of a contact, and the search for the equilibrium at a target."""
+"""Targets (in messages: stops) of a path as functions of the contact state, and the search for states at targets."""
 
 from collections.abc import Iterable
 from contextlib import suppress
@@ -18,10 +18,10 @@ SAME_SEPARATION = 1e-10
 CLOSE_TO_A_JUMP = 1e-4
 # Largest number of times that a bracket is halved.
 _MAX_HALVINGS = 80
-# The solver tries to meet the target before each of the first `_TRIALS` + 1 halvings, then only before the 17th, 33rd
-# and 65th, because a target that was missed so often usually lies inside a jump.
+# The solver tries to meet the target after 0 to `_TRIALS` halvings, and then only after 16, 32 and 64 halvings, because
+# a target that was missed so often usually lies inside a jump.
 _TRIALS = 8
-# Largest change of load or area between two states without a jump, over the change by the slope at one of the states.
+# Between two states without a jump, load or area changes at most by this factor times slope times distance.
 _LARGEST_BEND = 4.0
 
 
@@ -35,7 +35,7 @@ class TargetFunction:
     def excess(self, state: State) -> float:
         """Return the excess of a state over the target, relative to the absolute value of the target.
 
-        The excess rises on loading. Over a mean separation it is relative to h_rms; over zero load, to LEAST_PRESSURE.
+        The excess rises on loading. For a mean separation it is relative to h_rms, for zero load to LEAST_PRESSURE.
         """
         quantity, value = self.target.quantity, self.target.value
         if quantity.controlled is None:
@@ -51,9 +51,10 @@ class TargetFunction:
         return self.target.quantity.control(self.contact, self.target.value)
 
     def predict_separation(self, state: State) -> float:
-        """Return the expected separation of the target, m: a mean separation itself, or an exponential extrapolation.
+        """Return the expected separation of the target, m.
 
-        The extrapolation is -inf if the load or area in the state is not positive, or does not grow on loading.
+        A mean separation is the target itself. A load or area is extrapolated exponentially; the result is -inf if the
+        load or area in the state is not positive, or does not grow on loading.
         """
         control = self.control
         if control is None:
@@ -69,7 +70,7 @@ class TargetFunction:
 def sort_targets(targets: Iterable[TargetFunction], direction: int) -> list[TargetFunction]:
     """Return a list of targets in which targets of the same kind have the order in which a path meets them.
 
-    direction : direction of the separation: -1 on loading, 1 on unloading.
+    direction : sign of the change of the separation: -1 on loading, 1 on unloading.
     """
     signs = {MEAN_SEPARATION: direction}  # loads and areas change in the opposite direction
     return sorted(targets, key=lambda each: signs.get(each.target.kind, -direction) * each.target.value)
@@ -140,7 +141,7 @@ def find_target_state(target: TargetFunction, before: State, after: State) -> St
 
 
 def _is_reachable(target, before, after):
-    """Return whether the target is within `_LARGEST_BEND` times slope times distance of the value of either state."""
+    """Return whether, from one of the states, `_LARGEST_BEND` times slope times distance is enough for the target."""
     control, contact, width = target.control, target.contact, abs(after.separation - before.separation)
     value = contact.pressure if control.quantity == PRESSURE else contact.area_fraction
     return any(
@@ -175,7 +176,8 @@ def find_first_target(
 
     If there is no target between the states, return None and `after`. Raise the errors of `find_target_state`.
 
-    direction : direction of the separation: -1 on loading, 1 on unloading.
+    targets : targets not met at `before`; of a sorted list, the next one of each kind is enough.
+    direction : sign of the change of the separation: -1 on loading, 1 on unloading.
     """
     first: tuple[TargetFunction | None, State] = None, after
     for target in targets:

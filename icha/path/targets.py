@@ -19,8 +19,7 @@ MAX_AREA_FRACTION = 0.25
 LARGEST_REDUCED_PRESSURE = 100.0
 # Smallest reduced pressure (other than zero) and area fraction. Smaller values are below the error of an equilibrium.
 LEAST_PRESSURE, LEAST_AREA = 1e-12, 1e-9
-# Limits and default value of the longest step of the mean separation, in h_rms. With the smallest step a path has about
-# ten thousand equilibria.
+# Limits and default of the longest step of the separation, in h_rms. With 1e-4 a path has some 10 000 equilibria.
 MIN_STEP, MAX_STEP = 1e-4, 0.5
 DEFAULT_STEP = 0.15
 # Largest error of the work of one step because its events may happen anywhere in the step, relative to the sum of the
@@ -131,12 +130,11 @@ class Path:
         the second one ends loading, and so on. The kinds are those of snapshots. Loads that end unloading may be
         tensile (negative) or zero.
     unload : whether the path ends with complete separation. The last unloading meets again each target between its
-        start and complete separation, except targets inside jumps. After an odd number of turning points, the path does
-        not turn at the last one, but continues to complete separation in the same leg.
+        start and complete separation, except targets inside jumps. If the number of turning points is odd, the last one
+        lies on the last unloading: there the path does not turn, but continues to complete separation.
     control : "separation": the mean separation is prescribed. "load": the load is prescribed. All targets and turning
-        points must then be loads, and the path must unload or have turning points. It follows the same curve of
-        pressure against separation, but jumps at constant load where the pressure falls on loading or rises on
-        unloading.
+        points must then be loads, and the path must unload or have turning points. It follows the same pressure curve
+        against separation, but jumps at constant load where the pressure falls on loading or rises on unloading.
     max_step : longest change of the mean separation between two equilibria, in units of h_rms, in [1e-4, 0.5].
 
     Raises
