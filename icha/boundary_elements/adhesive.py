@@ -73,21 +73,21 @@ def solve_adhesive_contact(
 ) -> tuple[AdhesiveContact, int]:
     """Solve the adhesive contact at a separation: relax the fronts and close cells within reach of the attraction.
 
-    Each summit or cell is closed at most once in a call: if it loses contact again, it stays open. In three stages the
-    fronts are relaxed to TOLERANCES.coarse, TOLERANCES.fine and `tolerance`. New contact starts the stages again.
+    Each summit or cell is closed at most once in a call: if it loses contact again, it stays open. The fronts are
+    relaxed in stages, to TOLERANCES.coarse, TOLERANCES.fine and `tolerance`. New contact starts the stages again.
 
     Parameters
     ----------
     problem : the surface, the law of its front, and the separation.
     summits : summits at which contact may form.
     contact : initial contact.
-    tolerance : largest allowed residual of the fronts. Above TOLERANCES.fine, contact forms only where the gap
-        is below the reach by a margin of TOLERANCES.coarse critical openings.
+    tolerance : largest allowed residual of the fronts. If it is larger than TOLERANCES.fine, the stage with this value
+        is left out, and contact forms only where the gap is below the reach by TOLERANCES.coarse critical openings.
     nearby : whether the initial contact is near equilibrium; then the coarser stages are skipped.
 
     Returns
     -------
-    The contact, and the number of summits and overlapping cells within reach (in the last stage) that stay open.
+    The contact, and the number of cells within reach (of summits, or overlapping) that stay open in the last stage.
 
     Raises
     ------

@@ -29,7 +29,7 @@ def rim_of(cells: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
 
 
 def adjacent(cells: np.ndarray, grid: int) -> np.ndarray:
-    """Return the four neighbours that share an edge with each cell, (4, k)."""
+    """Return the neighbours of each cell (above, below, left, right; periodic on each of t grids), (4, k)."""
     within = cells % grid**2
     first, (row, column) = cells - within, np.divmod(within, grid)
     above, below, left, right = (row - 1) % grid, (row + 1) % grid, (column - 1) % grid, (column + 1) % grid
@@ -66,7 +66,7 @@ def find_among(sought: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, np.nd
 
 
 def blocks_around(grid: int, distance: int, cells: np.ndarray) -> np.ndarray:
-    """Return a field of blocks (BLOCK x BLOCK cells): 1 within `distance` cells of `cells`, and a bit beyond."""
+    """Return a field of blocks (BLOCK x BLOCK cells): 1 for those that may hold cells within `distance` of `cells`."""
     occupied = np.zeros(2 * [-(-grid // BLOCK)], np.uint8)
     row, column = np.divmod(cells, grid)
     occupied[row // BLOCK, column // BLOCK] = 1

@@ -37,10 +37,9 @@ from icha.surfaces.surface import Surface
 
 # Smallest critical opening divided by the largest height. Rounding of the heights would hide a smaller opening.
 _SMALLEST_OPENING = 1e-4
-# Largest change of a fraction of contact up to which the rates of a state predict the next state.
+# The rates of a state predict the next state if no fraction of contact changes by more than this.
 _LARGEST_PREDICTION = 1.0
-# Smallest work to which errors of a loop are compared, divided by the nominal area A0 times `surface_energy`, the work
-# of adhesion.
+# Errors of the work in a loop are compared with at least this work, in units of `surface_energy` times A0.
 _SMALLEST_WORK = 1e-3
 
 
@@ -50,7 +49,7 @@ class BoundaryElements(FullContactProblem):
 
     @property
     def area(self) -> float:
-        """Nominal contact area A0, m^2."""
+        """Nominal area A0, m^2."""
         return self.heights.size * self.spacing**2
 
     @property
@@ -80,8 +79,8 @@ class BoundaryElements(FullContactProblem):
 
         With `control`, `separation` is the first guess. The result may be full contact, at separation 0: under a large
         load, or at a separation below `smallest_gap`. Without `control`, the first call from full contact only lowers
-        the pressure to the opening pressure; the next call opens the contact. Raise `NotConverged` if there is no
-        equilibrium, or if `let_go` is not 0: unstable patches already detach, and no patch is detached by force.
+        the pressure to the opening pressure, at separation 0; the next call opens the contact. Unstable patches detach
+        without force, so `let_go` must be 0. Raise `NotConverged` otherwise, or if there is no equilibrium.
         """
         if let_go:
             raise NotConverged("boundary elements cannot detach single patches by force")
@@ -94,7 +93,7 @@ class BoundaryElements(FullContactProblem):
         return replace(state, history=(*before.history, events) if len(events) else before.history)
 
     def _next_equilibrium(self, state, separation, control):
-        """Find the next equilibrium from a state with gaps; areas, and loads with adhesion, need a search."""
+        """Find the equilibrium from a state with gaps; areas, adhesive loads and loads before contact need a search."""
         if control is None:
             closed = separation < self.smallest_gap
             return self.full_contact(self.undetermined_pressure) if closed else self._solve(state, separation)
@@ -177,7 +176,7 @@ class BoundaryElements(FullContactProblem):
         return False
 
     def _predict(self, state, separation):
-        """Predict the contact at a separation (m) by the rates of a state, if it has rates and is not too far."""
+        """Predict the contact at a separation (m) by a state's rates; it stays the same without rates or far away."""
         contact = Contact(state.cells, state.fraction, state.pressure / self.contact_modulus)
         if state.rates is None:
             return contact
@@ -211,16 +210,15 @@ class BoundaryElements(FullContactProblem):
         new = self._state_of(solved, solved.separation * self.spacing, np.zeros(len(solved.cells)))
         return self._with_slopes(new, TOLERANCES.linear[0])
 
-    def _state_of(self, solved, separation, mean, **values):
-        """Return the state of a solved contact at a separation (m), with mean fractions and further `values`."""
-        pressure, closed = solved.pressure * self.contact_modulus, solved.cells[solved.fraction >= 1]
+    def _state_of(self, found, separation, mean_fraction, **values):
+        """Return the state of a solved contact at a separation (m), with its gap residual and further `values`."""
+        pressure, closed = found.pressure * self.contact_modulus, found.cells[found.fraction >= 1]
         # Largest gap of a closed cell, or largest overlap of the surfaces if that is larger.
-        error = float(max(np.abs(solved.gap.ravel()[closed]).max(initial=0.0), -solved.gap.min())) * self.spacing
-        return CellState(separation, solved.cells, solved.fraction, pressure, mean, gap_residual=error, **values)
+        error = float(max(np.abs(found.gap.ravel()[closed]).max(initial=0.0), -found.gap.min())) * self.spacing
+        return CellState(separation, found.cells, found.fraction, pressure, mean_fraction, gap_residual=error, **values)
 
     def _events(self, before, after):
-        """Find the jumps, coalescences and splits of patches between two consecutive states."""
-        # Without adhesion, a jump releases no energy.
+        """Find jumps, coalescences and splits between two states; without adhesion they release no energy."""
         energy = self._energy_of_cells if self.adhesive else lambda state: np.zeros(len(state.cells))
         return patch_events(before, after, energy, self.summits.cell, self.space.grid, self.spacing)
 
@@ -277,9 +275,8 @@ def contact_of(surface: Surface, material: Material) -> BoundaryElements:
 
 
 def resumable(contact: BoundaryElements, folder: pathlib.Path) -> CheckpointedContact:
-    """Return the contact with checkpoints: equilibria are saved in a folder, so that an interrupted path can resume."""
+    """Return the contact with checkpoints to resume a path; each surface, material and program version has its own."""
     programs = [(name, version(name)) for name in ("icha", "numpy", "scipy")]
-    # Another surface, material or version of a program gets other checkpoints.
     settings = repr((contact.spacing, contact.law.material, programs, CellState.__match_args__)).encode()
     identity = hashlib.sha256(contact.heights.tobytes() + settings).hexdigest()
     return CheckpointedContact(contact, identity[:32], folder, pack, unpack)

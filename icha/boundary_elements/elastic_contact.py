@@ -18,17 +18,18 @@ from icha.boundary_elements.half_space import HalfSpace, Operator
 from icha.contact.model import FullContact, NotConverged
 from icha.support.parallel import blocks, on_cores
 
-# Relative error of displacements in single precision; smallest fraction of contact of a cell, below which it is open.
+# Relative error of displacements in single precision. A cell is open if its fraction of contact is at most NO_CONTACT.
 ROUNDING, NO_CONTACT = 5e-7, 1e-9
-# Largest error after a correction, divided by the error before it; above, the iteration has stagnated.
+# The iteration has stagnated if the error after a correction exceeds this part of the error before it.
 LARGEST_REMAINDER = 0.5
-# Error after a correction divided by the error before it: _COARSE_PART while the active set changes; _FINE_PART is the
-# smallest value that single precision allows.
+# A correction reduces the error to _COARSE_PART of its value while the active set changes, and later to not less than
+# _FINE_PART, because single precision allows no smaller value.
 _COARSE_PART, _FINE_PART = 0.1, 1e-4
 # Smallest compliance of the half-space, 2/q at the shortest wave, in h/E*.
 _SMALLEST_COMPLIANCE = np.sqrt(2) / np.pi
 # Typical compliance of the half-space per cell, in h/E*, to scale the preconditioner at soft bonds.
 _TYPICAL_COMPLIANCE = 2.5
+# Largest number of changes of the active set. Largest number of iterations of the conjugate gradients.
 _MAX_CHANGES, _MAX_ITERATIONS = 200, 300
 # Rows of a field that one core processes at a time.
 _ROWS = 1024
@@ -111,7 +112,7 @@ class ElasticContact(Contact):
     ----------
     gap : (n, n), gap at the grid nodes.
     separation : mean separation.
-    misfit : (k,), error of the displacement of each cell in contact; at most `tolerance`.
+    misfit : (k,), displacement that each cell in contact still lacks, -gap - c p, with its bond compliance c.
     tolerance : largest allowed error of the displacements of cells in contact.
     """
 
@@ -139,7 +140,7 @@ def solve_active_set(
     tolerance : largest allowed error of displacements in contact, in cell sizes. With a tolerance above the rounding
         error of single precision, all fields are computed in single precision.
     separation : mean separation, in cell sizes; ignored if `load` is given.
-    load : nominal pressure, in E*; `contact` must then have at least one cell.
+    load : nominal pressure, in E*; the cells of `contact` must then carry pressures.
     sticky : whether the cells of the initial contact stay in contact under tension.
 
     Raise `FullContact` if all cells close at a given separation: no equilibrium exists, because the mean gap would be
@@ -194,7 +195,7 @@ def _scale_to_load(space, contact, load):
 def _next_active_set(contact, keep, joining, smallest):
     """Close partial cells under pressure, remove cells with a pressure below `smallest`, add cells `joining`, (m,).
 
-    keep : (k,) bool, cells that stay under any pressure.
+    keep : (k,) bool, sticky cells, which stay under any pressure.
     Return the new contact and its `keep`; None if nothing changes.
     """
     to_close = (contact.pressure > 0) & (contact.fraction < 1)
@@ -208,7 +209,7 @@ def _next_active_set(contact, keep, joining, smallest):
 
 
 def _compute_gap(space, topography, contact, separation, load, dtype, out=None):
-    """Compute the gap, the misfit of cells in contact, and the separation (under a load: with zero mean gap there)."""
+    """Compute gap, misfit of cells in contact, and separation; under a load, cells in contact have zero mean gap."""
     cells = contact.cells
     displacement = space.displacement(cells, contact.pressure.astype(dtype), out=out)
     if load is not None:
@@ -278,7 +279,8 @@ def solve_nonadhesive_contact(
 ) -> ElasticContact:
     """Solve the contact without adhesion at a separation (in cell sizes) or under a nominal pressure (in E*).
 
-    contact : start of the iteration; an empty contact is replaced by the cells that are higher than the separation.
+    contact : start of the iteration, with pressures if a load is given. At a separation it may be empty: the start is
+        then the cells that are higher than the separation.
     """
     if not len(contact.cells):
         cells = np.flatnonzero(topography.double > separation)
@@ -297,7 +299,7 @@ class AdhesiveContact(ElasticContact):
     Parameters
     ----------
     energy : elastic energy of half-space and bonds, in E* times cell size^3.
-    energy_error : largest error of `energy`, which apart from rounding is only too small (see `solve_bonded_contact`).
+    energy_error : largest error of `energy`; apart from rounding, `energy` is never too large (`solve_bonded_contact`).
     mean_fraction : (k,), Gaussian average of the fractions around each cell (`average_fractions`).
     rim : (m,) int, open cells that share an edge with a cell in contact, ascending.
     mean_fraction_rim : (m,), Gaussian average of the fractions around each cell of the rim.

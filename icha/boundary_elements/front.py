@@ -10,7 +10,7 @@ being trapped, and makes the front about two cells wide.
 
 The sum of the fractions overestimates the contact radius by a constant part of a cell. So the area
 
-    A = sum f - b sum f (1 - w*f),   w a Gaussian stencil,
+    A = sum f - b sum f (1 - w*f),   b = `PERIMETER`, w a Gaussian stencil,
 
 subtracts a term in proportion to the perimeter. By this term, the work of adhesion per area is lower at convex fronts.
 
@@ -29,8 +29,8 @@ import numpy as np
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
-# Compliance of the last row of cells of a straight contact (kernel 2/q, cell size h), in h/E*; compliance of a bond,
-# divided by that of the row. With this factor circular patches follow JKR at any position (docs/short_range.md).
+# Compliance of the last row of cells of a straight contact (kernel 2/q, cell size h), in h/E*. The compliance of a bond
+# is larger by a factor. With this factor circular patches follow JKR at any position (docs/short_range.md).
 _ROW_COMPLIANCE, _BOND_FACTOR = 1.7316, 3.5
 COMPLIANCE = _BOND_FACTOR * _ROW_COMPLIANCE
 # Compliance of a cell at the front in preconditioners: about that of its bond minus that of the half-space.
@@ -38,8 +38,8 @@ NET_COMPLIANCE = 0.6 * COMPLIANCE
 # Width and radius of the stencil in cells, and weight of the perimeter in the work of adhesion, fitted to JKR patches.
 _WIDTH, _RADIUS = 1.5, 5
 PERIMETER = 0.7
-# Weights of the perimeter and of the width of the front in the reported area, fitted to patches between Hertz and JKR;
-# smallest reported area of a cell, divided by its fraction.
+# Weights of the perimeter and of the width of the front in the reported area, fitted to patches between Hertz and JKR.
+# Smallest reported area of a cell, divided by its fraction.
 _EDGE, _FRONT_WIDTH, _SMALLEST_SHARE = 0.236, 1.115, 0.02
 _profile = np.exp(-0.5 * (np.arange(-_RADIUS, _RADIUS + 1) / _WIDTH) ** 2)
 STENCIL = _profile / _profile.sum()
@@ -61,7 +61,7 @@ def average_fractions(fractions: np.ndarray) -> np.ndarray:
 
 
 def neighbour_weights(cells: np.ndarray, shape: tuple[int, ...]) -> csr_array:
-    """Return the sparse matrix (k, k) of the Gaussian weights w between given cells, in single precision.
+    """Return the sparse matrix (k, k) of weights w between cells, in single precision; zero outside 11 x 11 cells.
 
     Parameters
     ----------
@@ -108,9 +108,10 @@ def reported_areas(fraction: np.ndarray, mean_fraction: np.ndarray) -> np.ndarra
 
 
 def reported_area_gradient(fraction: np.ndarray, mean_fraction: np.ndarray) -> np.ndarray:
-    """Return the derivative of the sum of `reported_areas` with respect to the fraction of each cell.
+    """Return the derivative of the sum of `reported_areas` with respect to the fraction of each cell, (k,).
 
-    The derivative is approximate next to cells with the smallest area, `_SMALLEST_SHARE` of their fraction.
+    It includes the effect of a cell on the areas of its neighbours. The stencil is symmetric, so the values of the cell
+    are enough. The derivative is approximate next to cells with the smallest area, `_SMALLEST_SHARE` of their fraction.
     """
     gradient = 1 - _EDGE - _FRONT_WIDTH + 2 * _EDGE * mean_fraction + 2 * _FRONT_WIDTH * fraction
     share = 1 - _EDGE * (1 - mean_fraction) - _FRONT_WIDTH * (1 - fraction)
@@ -135,7 +136,7 @@ class Front:
 
     @property
     def straight_strength(self) -> float:
-        """Tension at which a closed cell at a straight edge starts to open, in E*."""
+        """Tension s = sqrt(2 dgamma/C) at which a closed cell at a straight edge starts to open, in E*."""
         return float(np.sqrt(2 * self.adhesion_length / COMPLIANCE))
 
     @property
@@ -164,30 +165,19 @@ class Front:
         return strengths * fraction_change + fraction * strengths_change
 
     def law_gap(self, strengths: np.ndarray, fraction: np.ndarray) -> np.ndarray:
-        """Return the gap of cells at the front by the law from their strengths and fractions, in cell sizes."""
+        """Return the gap g = C s (1 - f) of cells at the front from their strengths and fractions, in cell sizes."""
         return COMPLIANCE * strengths * (1 - fraction)
 
-    def law_gap_change(
-        self,
-        strengths: np.ndarray,
-        fraction: np.ndarray,
-        strengths_change: np.ndarray,
-        fraction_change: np.ndarray,
-        damping: np.ndarray,
-    ) -> np.ndarray:
-        """Return the first-order change of the gap by the law, in single precision.
-
-        damping : (m,), for each cell; the gap changes as if the change of the tension were (1 + damping) times as large.
-        """
-        tension_change = self.tension_change(strengths, fraction, strengths_change, fraction_change)
-        return np.float32(COMPLIANCE) * (strengths_change - (1 + damping) * tension_change)
+    def law_gap_change(self, strengths_change: np.ndarray, tension_change: np.ndarray) -> np.ndarray:
+        """Return the change of the gap g = C (s - t) for given changes of strength and tension, in single precision."""
+        return np.float32(COMPLIANCE) * (strengths_change - tension_change)
 
     def intensity(self, fraction: np.ndarray, pressure: np.ndarray, mean_fraction: np.ndarray) -> np.ndarray:
         """Return K/K_c of cells in contact: their tension divided by the tension of the law at the same fraction."""
         return -pressure / self.tension(self.local_strengths(mean_fraction), fraction)
 
     def relative_gap(self, gap: np.ndarray, mean_fraction: np.ndarray) -> np.ndarray:
-        """Return the gap of open cells divided by the gap at which their tension is zero; below 1 the cells close."""
+        """Return the gap of open cells divided by C s, where their tension becomes zero; below 1 the cells close."""
         return gap / (COMPLIANCE * self.local_strengths(mean_fraction))
 
     def adhesion_energy(self, fraction: np.ndarray, mean_fraction: np.ndarray) -> float:

@@ -34,13 +34,12 @@ from icha.contact.models import MODELS, REFERENCE_MODEL
 class FrontTolerances:
     """Tolerances of the solver; `docs/short_range.md` justifies them by measurements.
 
-    The residual of a cell is |K/K_c - 1| with the stress intensity K/K_c = sqrt(G/dgamma). Errors of displacements are
-    divided by the critical opening.
+    The residual of a cell is |intensity - 1|, see `ActiveCells`. In contact, the intensity is K/K_c = sqrt(G/dgamma).
+    Errors of displacements are divided by the critical opening.
 
     Parameters
     ----------
-    front : largest residual of a converged front. For comparison, the grid causes relative errors of areas and loads
-        of about 1e-3.
+    front : largest residual of a converged front. (The grid causes relative errors of areas and loads of about 1e-3.)
     stagnation : largest residual at which a front is accepted although no step lowers its energy.
     coarse : residual above which cells are relaxed locally and damped. It is also the residual of the front in the
         first stage of `solve_adhesive_contact` and in the first trial for a load. In this stage, contact forms where
@@ -48,12 +47,12 @@ class FrontTolerances:
     fine : residual of the front in the second stage, where contact forms wherever the gap is below the reach, and in
         later trials for a load. Cells above it are relaxed locally if they are few. It is also the relative error of a
         load at which the trials end, and the steps to the final tolerances begin.
-    few : part that counts as few cells, 0 to 1: of the front for local relaxation, of the whole grid for open cells.
+    few : largest share that counts as few cells: of the front for local relaxation, of the grid for open cells.
     displacement : largest error of displacements, divided by the allowed residual of the front.
     moving_displacement : largest error of displacements in the first steps. After a step, the allowed error is
-        residual * min(moving_displacement, max(residual, linear[0])), about the residual that a Newton step leaves.
+        residual * min(moving_displacement, max(residual, linear[0])), about the residual after the next step.
     certain_displacement : error of displacements at which the energies of two similar states can be compared.
-    linear : smallest and largest relative error of the linearised equations; within these limits it is the residual.
+    linear : smallest and largest relative error of the linearised equations; between them, it equals the residual.
     damping : damping of the bonds after a first step that would raise the energy. If most of the front is far from
         equilibrium, the damping starts at twice this value. Cells above `coarse` always have at least twice this value.
     """
@@ -75,7 +74,7 @@ TOLERANCES = FrontTolerances()
 _SMALLEST_ERROR = 1e-3 * TOLERANCES.front
 # Largest numbers of iterations, of Krylov vectors, of local relaxations between steps; largest damping.
 _MAX_ITERATIONS, _MAX_KRYLOV, _MAX_LOCAL_RELAXATIONS, _LARGEST_DAMPING = 400, 60, 5, 1e8
-# Relative rounding error of the energy, and relative rounding error of the work of a step.
+# Relative rounding error of the energy. Relative rounding error of the first-order change of the energy in a step.
 _ENERGY_ROUNDING, _WORK_ROUNDING = 1e-12, 1e-11
 
 
@@ -105,7 +104,7 @@ class ActiveCells(Contact):
 
     @property
     def residuals(self) -> np.ndarray:
-        """Residual |K/K_c - 1| of each cell, (k,); zero for cells that are not free."""
+        """Residual |intensity - 1| of each cell, (k,); zero for cells that are not free."""
         return np.where(self.free, np.abs(self.intensity - 1), 0.0)
 
     @property
@@ -114,7 +113,7 @@ class ActiveCells(Contact):
         return float(np.max(self.residuals, initial=0.0))
 
     def cells_to_relax(self) -> tuple[np.ndarray, bool]:
-        """Find cells far from equilibrium, (k,) bool; also return whether they are a small part of the front."""
+        """Return cells above `fine` if these are few, otherwise those above `coarse`, (k,) bool, and whether few."""
         few = TOLERANCES.few * np.count_nonzero(self.at_front)
         unconverged = self.residuals > TOLERANCES.fine
         if np.count_nonzero(unconverged) <= few:
@@ -180,11 +179,11 @@ class FrontProblem:
         return accuracy * self.front.critical_opening * float(np.clip(open_part / TOLERANCES.few, 1e-3, 1.0))
 
     def is_accurate(self, state: AdhesiveContact, accuracy: float) -> bool:
-        """Return whether the displacement errors of a state are at most `accuracy` times the critical opening."""
+        """Return whether a state was solved to displacement errors of `accuracy` times the critical opening."""
         return state.tolerance <= (1 + _WORK_ROUNDING) * self._tolerance(accuracy, state)
 
     def energy(self, state: AdhesiveContact) -> float:
-        """Return the elastic energy minus the work of adhesion, in E* times cell size^3."""
+        """Return the elastic energy minus the work of adhesion, also outside windows, in E* times cell size^3."""
         # A window cell and an outside cell are neighbours of each other, so the background counts twice.
         mean_fraction = state.mean_fraction
         if self.background is not None:
@@ -192,7 +191,7 @@ class FrontProblem:
         return state.energy - self.front.adhesion_energy(state.fraction, mean_fraction)
 
     def is_lower(self, new: AdhesiveContact, old: AdhesiveContact) -> bool:
-        """Return whether the energy of a new state is not higher than that of an old one, within their errors."""
+        """Return whether the energy of a new state is at most that of an old one plus the energy errors of both."""
         energy = self.energy(old)
         rounding = _ENERGY_ROUNDING * abs(energy) + NO_CONTACT * self.front.adhesion_length
         return self.energy(new) <= energy + new.energy_error + old.energy_error + rounding
@@ -216,8 +215,7 @@ def relax_front(
     nearby : whether the initial contact is near equilibrium.
     max_iterations : number of iterations after which the contact is returned, even if it has not converged. Each
         step, failed step, local relaxation and refinement is one iteration.
-    relax_around : function that relaxes the front of a state around given cells, (m,). The function returns None if
-        local relaxation would not save time.
+    relax_around : function that relaxes a front around given cells, (m,); it returns None if it did not relax it.
 
     Raises
     ------
@@ -247,7 +245,7 @@ def relax_front(
 
 
 class Stagnation(NotConverged):
-    """Error: no step of the front lowers the energy."""
+    """Raised when no step of the front lowers the energy."""
 
 
 class FrontRelaxation:
@@ -259,7 +257,7 @@ class FrontRelaxation:
     damping : damping of the bonds in the next step.
     start, coarsest : largest allowed error of displacements in critical openings: in the first solution, and in the
         next step. After a failed step `coarsest` is smaller than `start`.
-    local_relaxations : number of local relaxations since the last successful step; the largest number after a failure.
+    local_relaxations : number of local relaxations since the last successful step; the allowed maximum after a failure.
     steps : number of steps of the whole front that were tried.
     """
 
@@ -286,7 +284,7 @@ class FrontRelaxation:
     def relax_locally(self, active: ActiveCells, relax_around: Callable) -> bool:
         """Relax the front around cells far from equilibrium; keep the result and return True if the energy is lower.
 
-        Do this only a few times between two successful steps, and after a failure not before the next successful step.
+        Between two successful steps do this five times at most, once if the cells are many, and not after a failure.
         """
         far, few = active.cells_to_relax()
         if not far.any() or self.local_relaxations >= (_MAX_LOCAL_RELAXATIONS if few else 1):
@@ -307,7 +305,7 @@ class FrontRelaxation:
         return True
 
     def _moving_accuracy(self, active: ActiveCells) -> float:
-        """Return an error of displacements (critical openings) that fits the residual that a Newton step leaves."""
+        """Return the allowed displacement error after the next step, in critical openings; see `FrontTolerances`."""
         residual = active.residual
         return residual * min(TOLERANCES.moving_displacement, max(residual, TOLERANCES.linear[0]))
 
@@ -363,7 +361,7 @@ def newton_step(problem: FrontProblem, active: ActiveCells, damping: float) -> t
 def rates_with_separation(
     space: HalfSpace, front: Front, contact: Contact, mean_fraction: np.ndarray, accuracy: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return derivatives of fraction and pressure (E*), (k,), by separation (cell sizes); only partial cells change."""
+    """Return the changes of fraction and pressure (E*), (k,), per cell size of separation; closed cells stay closed."""
     linear = LinearisedFront(space, front, contact, mean_fraction, contact.fraction < 1, np.zeros(len(mean_fraction)))
     return linear.solve(np.full(len(mean_fraction), -1.0), accuracy)
 
@@ -438,8 +436,8 @@ class LinearisedFront:
         return pressure, stronger, fraction
 
     def _left_side(self, unknowns, operator=None):
-        """Return the left side of the equations: change of displacement minus change of the gap by the law."""
-        pressure, stronger, fraction = self._pressures(unknowns)
+        """Return the change of displacement, by `operator` if given, minus the change of the gap by the law."""
+        pressure, stronger, tension = self._pressures(unknowns)
         result = (operator or self.operator).displacement(pressure)
         law = self.local_strengths, self.fraction, stronger, fraction
         result[self.at_front] -= self.front.law_gap_change(*law, self.damping)
@@ -455,7 +453,7 @@ class LinearisedFront:
 # Some processors raise the flag of an invalid value in products of finite matrices (numpy/numpy issue 24067).
 @np.errstate(invalid="ignore")
 def gmres(matrix: Callable, preconditioner: Callable, right: np.ndarray, accuracy: float) -> np.ndarray:
-    """Solve by right-preconditioned GMRES to a relative accuracy, or until _MAX_KRYLOV steps; NaN if it breaks down."""
+    """Solve by right-preconditioned GMRES to a relative accuracy, or with _MAX_KRYLOV steps; NaN if it breaks down."""
     norm = float(np.linalg.norm(right))
     if norm == 0:
         return np.zeros_like(right)

@@ -16,7 +16,7 @@ from icha.boundary_elements.patches import CellState
 from icha.surfaces.summits import Asperities
 from icha.surfaces.surface import full_contact_pressure
 
-# Mean gap below which contact counts as full, divided by h_rms. Rounding would hide the pressures of smaller gaps.
+# Contact counts as full if the mean gap is below this part of h_rms. Rounding would hide pressures of smaller gaps.
 _SMALLEST_GAP = 1e-4
 # Relative rounding error of pressures in full contact.
 ROUNDING = 1e-9
@@ -55,7 +55,7 @@ class FullContactProblem(MaterialUnits):
 
     @property
     def interface_strength(self) -> float:
-        """Largest tension that the interface carries away from the front, Pa; closed cells open at this tension."""
+        """Largest tension of closed cells that are not at a front, Pa; above it they open."""
         return self.front.interface_strength * self.contact_modulus
 
     @property
@@ -79,14 +79,17 @@ class FullContactProblem(MaterialUnits):
         return state.separation == 0 and len(state.cells) == self.heights.size
 
     @property
-    def undetermined_pressure(self):
+    def undetermined_pressure(self) -> float:
         """Nominal pressure for full contact at zero separation, Pa: not determined, so an arbitrary large value."""
         return 10 * max(float(np.abs(self.full_contact_pressure).max()), self.interface_strength)
 
-    def open_most_tensile(self, mean_gap):
-        """Return a start: full contact, opened where tension is largest; a larger `mean_gap` (m) opens more cells."""
+    def open_most_tensile(self, mean_gap: float) -> CellState:
+        """Return a start for a search: full contact without its most tensile cells, at separation 0.
+
+        A larger `mean_gap` (m) opens more cells, at most half of them. All pressures are shifted so that the largest
+        tension before opening is the strength of a front.
+        """
         pressure = self.full_contact_pressure.ravel() - self.full_contact_pressure.min()
-        # Shift the pressures: around the first gap the tension is the strength of a front, not that which opened it.
         pressure -= self.front.straight_strength * self.contact_modulus
         largest_gap = max(self.front.critical_opening * self.spacing, mean_gap)
         count = int(min(1 + mean_gap / largest_gap * pressure.size, pressure.size / 2))

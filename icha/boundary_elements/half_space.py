@@ -69,7 +69,7 @@ class HalfSpace:
         cells : (k,) int, loaded cells, ascending.
         pressure : (k,), pressure on these cells, in E*; in single or double precision.
         at : (m,) int, ascending, the cells where the displacement is computed; None for the whole grid.
-        out : array that large grids use for the result; None for a new array. Always use the returned array.
+        out : array for the result; only large grids write to it, so use the returned array. None for a new array.
         """
         return self.filter(cells, pressure, self.compliance[pressure.dtype], at, out)
 
@@ -128,7 +128,7 @@ class FullGrid:
         return self.space.displacement(self.cells, pressure, self.cells)
 
     def approximate_inverse(self, displacement: np.ndarray) -> np.ndarray:
-        """Return pressures of the k cells by `stiffness`, plus a uniform pressure against the mean displacement."""
+        """Return `stiffness` applied to displacements plus, on a single grid, a uniform pressure against their sum."""
         pressure = self.space.filter(self.cells, displacement, self.space.stiffness, self.cells)
         if len(self.space.shape) == 2:
             # The contact is stiffer against a mean displacement if a larger share of the grid is in contact.

@@ -16,16 +16,15 @@ from icha.contact.models import AREA_TOLERANCE_CELLS, AREA_TOLERANCE_PART
 if TYPE_CHECKING:
     from icha.boundary_elements.contact import BoundaryElements
 
-# Relative error at which a load or area counts as met. A path recognises a stop at a larger error, 1e-9.
+# A load or area is met if its relative error is at most this. For a path, a target is met up to a larger error, 1e-9.
 _MET = 5e-10
 # Smallest difference of two separations, divided by h_rms.
 _SAME_SEPARATION = 1e-13
-# Least reference of errors if the target is zero load, divided by stiffness times h_rms. At zero load, attraction and
-# repulsion of about this size cancel.
+# If the target is zero load, errors are compared with at least this load, in units of stiffness times h_rms. At zero
+# load, attraction and repulsion of about this size cancel.
 _ZERO_LOAD = 1e-2
 _MAX_TRIALS, _MAX_ATTEMPTS = 30, 4
-# Largest decrease of the mean gap between trials on the way to full contact: _CLOSING is divided by the mean gap, and
-# _LONGEST by h_rms.
+# Largest decrease of the mean gap between trials on the way to full contact, in mean gaps, and (_LONGEST) in h_rms.
 _CLOSING, _LONGEST = 0.5, 0.1
 
 
@@ -57,21 +56,21 @@ class ControlProblem:
         return of(state)
 
     def scale(self, state: CellState) -> float:
-        """Return the reference of relative errors: |target|, or for zero load |p| in a state, at least `_ZERO_LOAD`."""
+        """Return the reference of relative errors: |target|, or for zero load |p| of a state (with `_ZERO_LOAD`)."""
         if self.control.target:
             return abs(self.control.target)
         unit = abs(self.contact.stiffness(state)) * self.contact.rms_height
         return max(abs(self.contact.pressure(state)), _ZERO_LOAD * unit if np.isfinite(unit) else 0.0)
 
     def tolerance(self, scale: float) -> float:
-        """Return the error up to which the target is met: a part of `scale`; cells for an area without adhesion."""
+        """Return the largest error that meets the target: a part of `scale`; cells for an area without adhesion."""
         if self.control.quantity == AREA_FRACTION and not self.contact.adhesive:
             cells = AREA_TOLERANCE_CELLS * self.contact.spacing**2 / self.contact.area
             return max(_MET * scale, min(cells, AREA_TOLERANCE_PART * scale))
         return _MET * scale
 
     def newton_separation(self, state: CellState, before: CellState | None = None) -> float:
-        """Predict the separation (m) of the target from the slope at a state, or from the secant through `before`."""
+        """Predict the target's separation (m) from the slope at a state or the secant through `before`; NaN if flat."""
         slope = self.contact.slope(self.control.quantity, state)
         if before is not None and before.separation != state.separation:
             # The slope of the area neglects cells that start to open or to close.
@@ -144,7 +143,7 @@ def solve_at_control(problem: ControlProblem, state: CellState, separation: floa
             trial = find_nearby_state(problem, bracket, separation, scale)
             if abs(problem.error(trial)) <= problem.tolerance(scale) and not contact.adhesive:
                 return trial
-            # Loose fronts shift the bracket, so the secant steps begin with the bracket of the initial state.
+            # States with loose fronts are not accurate bounds, so the secant steps begin with the initial bracket.
             found, met = iterate_secant(problem, initial, trial, scale)
             if met:
                 return found
@@ -160,7 +159,7 @@ def solve_at_control(problem: ControlProblem, state: CellState, separation: floa
 
 
 def find_nearby_state(problem: ControlProblem, bracket: Bracket, separation: float, scale: float) -> CellState:
-    """Find a state near the target: its error is at most TOLERANCES.fine times `scale` (final one without adhesion).
+    """Find a state with an error of at most TOLERANCES.fine times `scale`, or without adhesion the final error.
 
     The first trial relaxes the fronts to TOLERANCES.coarse, and later trials to TOLERANCES.fine. After a trial that
     passes the target with an event, the next trial starts again from the state before the target. Raise `FullContact`

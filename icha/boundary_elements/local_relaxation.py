@@ -25,15 +25,14 @@ from icha.boundary_elements.patches import label_patches
 from icha.contact.model import FullContact, NotConverged
 from icha.support.parallel import blocks, on_cores
 
-# Sides of windows in cells; cells may move in the inner half of this length. Side of the pieces into which wider
-# regions are cut, in cells.
+# Sides of windows, in cells; cells may move in the middle half of each side. Side of pieces of wider regions, in cells.
 _SIDES, _PIECE = (64, 128, 256), 64
 # Number of cells of the windows that are solved together; they fit in the cache.
 _BATCH = 65_536
 # Residual of the front at which a window stops early; the whole front is relaxed afterwards.
 _TOLERANCE = 1e-4
-# Distance from the given cells within which the front may move, in cells; largest total area of the windows, divided by
-# the area of the grid; largest number of iterations in a window. The first entry whose windows fit in its area is used.
+# Entries of three numbers: distance from the given cells within which the front may move, in cells; largest total area
+# of the windows, in grid areas; largest number of iterations. The first entry is used whose windows fit in its area.
 _EXTENTS = ((20, 0.05, 60), (4, 0.5, 20))
 
 
@@ -151,7 +150,7 @@ def _boxes(labels):
 
 
 def _cut(labels, boxes):
-    """Cut boxes wider than half the largest window; return all boxes, then the pieces, with new numbers in `labels`."""
+    """Cut boxes wider than half the largest window; number pieces in `labels`; return all boxes, then the pieces."""
     widest, step = _SIDES[-1] // 2 // BLOCK, _PIECE // BLOCK
     pieces = []
     for number, box in enumerate(boxes, 1):

@@ -25,11 +25,11 @@ class PatchObservables:
     surface: Surface
 
     def of_contact(self) -> dict:
-        """Return the tension at which a cell at a straight edge opens, Pa, the largest that this grid resolves."""
+        """Return the largest tension that the grid resolves, Pa: at this tension a cell at a straight edge opens."""
         return {"resolved_tension": self.contact.front.straight_strength * self.contact.contact_modulus}
 
     def of_step(self, state: CellState) -> dict:
-        """Return residuals (gap over h_rms), number of pending cells, and share of summits outside Wu's range."""
+        """Return residuals, number of pending cells, and share of summits in contact outside Wu's verified range."""
         contact = self.contact
         touched = np.isin(contact.summits.cell, state.cells)
         verified = contact.law.is_jump_in_verified(contact.asperities.radius_of_curvature[touched])
@@ -61,7 +61,7 @@ class PatchObservables:
         }
 
     def reasons_against(self, separations: Iterable[float], pressed: CellState | None) -> list[str]:
-        """Return why results may be invalid: too few grid cells for the shortest waves. The arguments are not used."""
+        """Return reasons against the results: too few grid cells for the shortest waves. The arguments are not used."""
         asperities, grid = self.contact.asperities, self.surface.grid
         cells = cells_per_short_wave(grid, len(asperities) + len(asperities.unsupported_height))
         if cells >= LEAST_CELLS_PER_WAVE:
@@ -77,7 +77,7 @@ class PatchObservables:
         return content / gap.size / np.diff(edges_of_bins)
 
     def _pressure_density(self, state, areas):
-        """Return the density of the pressure in contact, with the area fraction as integral, and means of the bins."""
+        """Return the density of the pressure in contact (its integral is A/A0), and the mean pressure of each bin."""
         edges_of_bins = PRESSURE_BINS * self.contact.pressure_unit
         # The force on a cell acts on its fraction in contact. One factor scales all fractions to the contact area.
         weight = state.fraction * (np.sum(areas) / (np.sum(state.fraction) or 1.0))

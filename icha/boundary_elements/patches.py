@@ -28,9 +28,9 @@ class CellState:
         to the separation; the fronts move.
     rates : changes of the fractions, (k,), and of the pressures in E*, (k,), when the separation increases by one cell
         size; None if unknown.
-    front_residual : largest |sqrt(G/dgamma) - 1| at the cells where the front can move; G is the energy release rate.
+    front_residual : largest residual of the cells where the front can move (`front_solver.ActiveCells.residuals`).
     gap_residual : largest gap of a closed cell, or largest overlap of the surfaces if that is larger, m.
-    pending : number of cells within reach of the attraction that stay open because contact there is not stable.
+    pending : number of cells within reach (of summits, or overlapping) that stay open, because contact is not stable.
     history : events of the path up to this state, one `Events` for each equilibrium with events.
     """
 
@@ -128,7 +128,7 @@ def patch_events(
     grid: int,
     spacing: float,
 ) -> Events:
-    """Find the jumps, coalescences and splits of patches between two states; patches with a common cell are the same.
+    """Find jumps, coalescences and splits between two states; a patch continues as each patch with a common cell.
 
     Parameters
     ----------
@@ -155,7 +155,7 @@ def patch_events(
 
 
 def _events_of_patches(kind, which, sign, state, labels, count, energy_of_cells, summits, grid, spacing):
-    """Return an event that releases sign * energy, at least 0, for each entry of `which`: patch number - 1, (e,)."""
+    """Return an event that releases sign * energy, at least 0, for each patch in `which`, (e,), counted from 0."""
     if not len(which):
         return Events.concatenate(())
     energy = np.bincount(labels, energy_of_cells(state), count + 1)[1:]

@@ -3,8 +3,7 @@
 The kernel 2/q is split as in `icha.half_space.ewald`. The term (2/q) erf(q/(2 alpha)), in real space erfc(alpha r)/(pi
 r), has a short range and is summed tile by tile. The term (2/q) erfc(q/(2 alpha)) is smooth, and is computed on a
 coarser grid; splines transfer values between both grids (R. W. Hockney & J. W. Eastwood, Computer Simulation Using
-Particles, 1988, ch. 8).
-The inverse of the kernel also has a short range. So a small contact needs few tiles, and no transform of the grid.
+Particles, 1988, ch. 8). The inverse kernel also has a short range. So a small contact needs only few tiles.
 """
 
 from __future__ import annotations
@@ -45,7 +44,7 @@ class TiledGrid:
     grid : number of cells along a side of the grid.
     count : number t of tiles.
     sources : cells inside each tile, including the margin.
-    targets : cells inside each tile, without the margin: each cell once, for results and for sums on the coarse grid.
+    targets : cells inside each tile without its margin, so that each cell is in one tile; for results and coarse sums.
     nodes : (m,) int, nodes of the coarse grid inside the tiles, ascending.
     covered : (t, _NODES, _NODES) int, indices in `nodes` of the coarse nodes inside each tile.
     """
@@ -61,7 +60,7 @@ class TiledGrid:
 
     @classmethod
     def of(cls, cells: np.ndarray, grid: int) -> TiledGrid | None:
-        """Return the tiles of cells (k,), ascending; None if empty or not faster, or if COARSENING does not fit."""
+        """Return tiles of cells (k,), ascending; None if empty, not faster, or `grid` is no multiple of COARSENING."""
         if grid % COARSENING:
             return None
         many = -(-grid // (TILE - 2 * RANGE))
@@ -129,7 +128,7 @@ class _CellsByTile:
     batches: tuple[tuple[np.ndarray, np.ndarray], ...]
 
     def of_batch(self, batch):
-        """Return the list indices and the flat positions of the cells in a batch of tiles."""
+        """Return list indices and flat positions of the cells in a batch: a slice from `blocks(count, _BATCH)`."""
         return self.batches[batch.start // _BATCH]
 
     def field(self, batch, values):
@@ -201,7 +200,7 @@ def _interpolate(coarse):
 
 @cache
 def _inverse_modes():
-    """Return the Fourier modes on a tile of the inverse kernel q/2, cut off at distance RANGE; all exceed 0.03."""
+    """Return the Fourier modes on a tile of the inverse kernel q/2, cut off at RANGE: positive, all above 0.03."""
     along = scipy.fft.fftfreq(TILE) * TILE
     table = scipy.fft.irfft2(_wave_numbers(TILE) / 2)
     return scipy.fft.rfft2(np.where(np.hypot(along[:, None], along) <= RANGE, table, 0.0)).real.astype(np.float32)
