@@ -361,4 +361,4 @@ def _print_checks(campaign, results: Path) -> None:
 
 def _print_validity(statements) -> None:
     for statement in statements:
-        echo(f"{statement.about + ':':<10}{statement.text}", fg=None if statement.good else "yellow")
+        echo(f"{statement.about + ':':<9} {statement.text}", fg=None if statement.good else "yellow")

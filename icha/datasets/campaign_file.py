@@ -48,7 +48,7 @@ _LAYOUT = (
 )
 _OWN_SLOPES = {"comment": "each surface has different slopes, in ascending order along the dimension rms_slope"}
 _STUDIES = "The runs of every study, with one group for each study."
-# Attribute of the root of the file, which has no variables.
+# Attribute of the root of the file. The root has no variables.
 _ACCESS = (
     "The file has one group for each study: {0}. To open a group with Python's xarray, use "
     "xarray.open_datatree(FILE)['{1}'].to_dataset(), or xarray.open_dataset(FILE, group='{1}')"

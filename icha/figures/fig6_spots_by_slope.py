@@ -88,7 +88,7 @@ def _draw_slopes(ax, runs, kind, colours, length):
 
     at = {slope: find_snapshot(run, kind) for slope, run in runs.items()}
     areas = {slope: float(state_of(run, at[slope])["contact_area_fraction"]) for slope, run in runs.items()}
-    # Spots that cover a smaller area are drawn on top.
+    # The slopes are drawn in the order of their contact areas, so that the slope with the smallest area is on top.
     for order, slope in enumerate(sorted(colours, key=areas.get, reverse=True)):
         run, look = runs[slope], {"facecolor": colours[slope], "edgecolor": "black", "lw": 0.25}
         side, spots = float(run["period"]) * length, spots_of(run, at[slope])

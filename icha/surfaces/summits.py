@@ -51,7 +51,7 @@ _SAME_SUMMIT = 1e-3
 _MAX_RISE = 1.8
 # Rounding error of a rise, divided by the range of heights.
 _ROUNDING = 1e-9
-# Curvature, divided by the mean curvature of the surface, below which a node is flat, as on a plateau.
+# A node counts as flat, as on a plateau, if its curvature is below this fraction of the mean curvature of the surface.
 _FLAT = 1e-6
 # Nodes added beyond the edges of a free square; nodes farther away have an influence of 0.43^32 = 2e-12.
 _MARGIN = 32
