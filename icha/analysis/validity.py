@@ -165,7 +165,7 @@ def _full_contact(cases):
     lowest = min(adhesive, key=lambda case: case.ratio)
     text = (
         f"{expected_behaviour(lowest.ratio)}; U_full/dgamma is about {lowest.ratio:.3g} or more "
-        f"({lowest.material} on {lowest.surface}), {MEANING}"
+        f"({lowest.material} on {lowest.surface}); {MEANING}"
     )
     if COMPLETE in lowest.facts:
         pressures = lowest.facts[COMPLETE], lowest.facts[COMPLETE] - lowest.facts[STRENGTH], lowest.facts[STRENGTH]

@@ -10,8 +10,8 @@ import math
 # pull-off tensions are expected.
 FULL_CONTACT_BELOW, HIGH_PULL_OFF_BELOW = 1.0, 2.0
 MEANING = (
-    f"below {FULL_CONTACT_BELOW:g} full contact has the lower energy; below about {HIGH_PULL_OFF_BELOW:g} high "
-    "pull-off is expected"
+    f"below {FULL_CONTACT_BELOW:g}, full contact has a lower energy than separated surfaces; below about "
+    f"{HIGH_PULL_OFF_BELOW:g}, a high pull-off tension is expected"
 )
 
 

@@ -1,4 +1,4 @@
-"""A campaign: surfaces, materials, and studies of contacts between the surfaces and half-spaces of the materials.
+"""A campaign: rough surfaces, elastic materials, and studies of the contacts between surface and material.
 
 Values are in SI units. `icha.configuration.load` reads a campaign from a configuration file,
 `icha.configuration.errors` writes the messages, and `icha.configuration.schema` generates the JSON schema of the file.
@@ -21,17 +21,17 @@ from icha.contact.models import MODELS
 from icha.support.input_files import read_columns
 from icha.support.values import ROUNDING, Name, Problem, Section, Text, distinct
 
-# Sections whose entries refer to a study.
+# Sections in which boundary elements solve contacts of a study.
 BESIDE_STUDIES = ("finite_range", "boundary_element_loops")
-# Largest number of entries in a section; a small number, because the check of each entry goes through all runs of a
-# study.
+# Largest number of entries in a section. The number is small, because the check of an entry goes through all runs of
+# its study.
 _FEW = Field(max_length=100)
-# Grid cells per shortest wavelength: the smallest number without a warning, and the recommended number.
+# Grid cells per shortest wavelength: the smallest number without a warning for asperities; the recommended number.
 _LEAST_CELLS, _ADVISABLE_CELLS = 4, 8
 
 
 class Contact(NamedTuple):
-    """Surface, seed, rms slope and material of a run; before the surface's file is read, the slope is `measured`."""
+    """Surface, seed, rms slope and material of a run. Until the surface's file is read, the slope may be `measured`."""
 
     surface: str
     seed: int
@@ -94,7 +94,8 @@ class Campaign(Section):
     studies: Annotated[dict[Name, Study], Field(min_length=1)]
     """Studies by name."""
     finite_range: Annotated[dict[Name, BoundaryElements], _FEW] = {}
-    """Solutions with boundary elements at a finite range of attraction, by name, for comparison with a study."""
+    """Solutions with boundary elements at a finite range of attraction, by name. ICHA compares the solutions with
+    the runs of a study."""
     boundary_element_loops: Annotated[dict[Name, BoundaryElementLoops], _FEW] = {}
     """Loops of loading and unloading with boundary elements at a finite range of attraction, by name. ICHA compares the
     loops with the runs of a study that unloads."""
@@ -110,7 +111,7 @@ class Campaign(Section):
     _origins: dict[tuple[str, str], str] = PrivateAttr(default={})
 
     def deposit_metadata(self) -> Publication:
-        """Return the metadata of a deposit; missing title, summary or licence are taken from the campaign."""
+        """Return the metadata of a deposit. A missing title, summary or licence is taken from the campaign."""
         given = self.publication
         return given.model_copy(
             update={key: getattr(given, key) or getattr(self, key) for key in ("title", "summary", "license")}
@@ -153,7 +154,7 @@ class Campaign(Section):
         return self._topographies.get(surface)
 
     def origin(self, section: str, name: str) -> str:
-        """Return the original name of a variant of a section (surfaces, materials); other names remain unchanged."""
+        """Return the name of the surface or material from which a variant was made; return other names unchanged."""
         return self._origins.get((section, name), name)
 
     def is_free(self, surface: str) -> bool:
@@ -236,7 +237,7 @@ class Campaign(Section):
             least = model.least_cells
             if model.periodic_only and self.is_free(name):
                 reason = f"need a periodic surface, but {name!r} has free edges; expected asperities, or "
-                yield ("models", index), label, f"{reason}another `boundary`, which makes the surface periodic"
+                yield ("models", index), label, f"{reason}a `boundary` that makes the surface periodic"
             if surface.cells_per_short_wave < least * (1 - ROUNDING):
                 enough, better = surface.grid_of_cells(least), surface.grid_of_cells(_ADVISABLE_CELLS)
                 yield (

@@ -111,7 +111,7 @@ def run_sha256(campaign: Campaign, case: RunLabels) -> str:
 def campaign_sha256(campaign: Campaign, of_run: Callable[[RunLabels], str] | None = None) -> str:
     """Compute the SHA-256 of all settings and files that determine the runs of a campaign; figures do not matter.
 
-    `of_run` returns known checksums of runs; by default `run_sha256` computes these checksums.
+    `of_run` returns the checksum of a run; the default is `run_sha256`.
     """
     of_run = of_run or partial(run_sha256, campaign)
     return _sha256({case.path: of_run(case) for case in run_cases(campaign)})

@@ -71,7 +71,7 @@ def expand_design(campaign: Campaign, content: Mapping) -> tuple[Campaign, list[
 
 
 def _lists(label: str, study: Study) -> dict[str, list[_Located]]:
-    """Return the lists and varied parameters of a study, in the order of the combinations; surfaces come first."""
+    """Return the lists and varied parameters of a study in the order `_ORDER`, in which surfaces come first."""
 
     def located(values, *keys):
         return [(("studies", label, *keys, index), value) for index, value in enumerate(values)]
@@ -101,7 +101,7 @@ def _cases(study: Study) -> list[dict[str, Any]]:
 
 
 def _axes(study: Study, lists: Mapping, fixed: Mapping) -> Iterator[list[str]]:
-    """Yield groups of lists. Lists in a group are combined entry by entry; groups are combined in all combinations."""
+    """Yield groups of lists. Lists in a group are combined entry by entry; the groups form all combinations."""
     groups = [[_LISTS.get(name, name) for name in group] for group in study.zip]
     done = set(fixed)
     for name in lists:
@@ -136,7 +136,7 @@ def _excess(section: str, count: int, what: str, most: int) -> Iterator[Problem]
 
 
 def _run_count(label: str, study: Study) -> int:
-    """Count the runs of a study with all models; equal runs count several times."""
+    """Count the runs of a study for all its models. Equal runs are counted each time."""
     lists = _lists(label, study)
     counts = (math.prod(len(lists[group[0]]) for group in _axes(study, lists, given)) for given in _cases(study))
     return len(study.models) * sum(counts)
@@ -201,7 +201,7 @@ class _Variants:
         self.problems: dict[tuple, Problem] = {}
 
     def contact(self, point: Mapping[str, _Located]) -> Contact:
-        """Return the labels of a run's contact; create the variants of its surface and material."""
+        """Return the labels of a contact; create the variants of surface and material that the contact needs."""
         surface, material = point["surface"][1], point["material"][1]
         fields = type(self._campaign.surfaces[surface]).model_fields
         varied = {name: point[name] for name in point if name in SCALARS}
@@ -211,7 +211,7 @@ class _Variants:
             if name in of_surface or name in of_material:
                 continue
             kinds = ", ".join(k for k, section in SURFACE_KINDS.items() if name in section.model_fields)
-            reason = f"is not a key of surface {surface!r}; expected surfaces of kind {kinds} only, or separate studies"
+            reason = f"is not a key of surface {surface!r}; expected only surfaces of kind {kinds}, or separate studies"
             self.problems[location[:4]] = (location[:4], value, reason)
         return Contact(
             self._variant("surfaces", surface, of_surface),
@@ -221,7 +221,7 @@ class _Variants:
         )
 
     def _variant(self, section: str, base: str, changes: Mapping[str, _Located]) -> str:
-        """Return the name of the variant of a surface or material with changed values; create new variants."""
+        """Return the name of the variant of a surface or material with changed values; create new variants first."""
         key = (section, base, *((name, repr(value)) for name, (_, value) in changes.items()))
         if changes and key not in self._names:
             self._names[key] = self._make(section, base, changes)
@@ -244,10 +244,8 @@ class _Variants:
             variant = variant.model_copy(update={"path": entries[base].path})
         name = "-".join([base, *(f"{key}{value_label(variant, key)}" for key in changes)])
         if name in entries or len(name) > LONGEST_LABEL:
-            reason = (
-                f"makes a variant of {base!r} with the name {name!r}; expected a name that no other entry has, of at"
-            )
-            reason += f" most {LONGEST_LABEL} characters. Rename an entry"
+            reason = f"makes a variant of {base!r} with the name {name!r}; expected a name that no other entry has, and"
+            reason += f" at most {LONGEST_LABEL} characters. Rename an entry"
             self.problems[section, name] = (*next(iter(changes.values())), reason)
         self.derived[section][name] = variant
         self.origin[section, name] = base
@@ -259,8 +257,7 @@ def value_label(section, name: str) -> str:
     value = getattr(section, name)
     if not isinstance(value, float):
         text = str(value)
-        # Some texts, such as names of channels, cannot be part of a file name; the name contains their checksum
-        # instead.
+        # The checksum of a text replaces a text that cannot be part of a file name, such as the name of a channel.
         return text if re.fullmatch(r"[A-Za-z0-9_.+-]{1,40}", text) else hashlib.sha256(text.encode()).hexdigest()[:8]
     unit = next((each.unit for each in type(section).model_fields[name].metadata if isinstance(each, FloatRange)), None)
     if unit is None:

@@ -18,12 +18,12 @@ from icha.support.values import NAME_PATTERN, NOTHING, Problem
 MOST_PROBLEMS = 50
 # Messages for keys that were renamed or removed, by section and key.
 _FORMER_KEYS = {
-    ("Campaign", "boundary_elements"): "was renamed; expected the same section with the name `finite_range` (`models: "
-    "[boundary_elements]` of a study keeps its name)",
+    ("Campaign", "boundary_elements"): "was renamed; expected the same section with the name `finite_range` (the "
+    "model `boundary_elements` of a study was not renamed)",
     ("Study", "united_until"): "was removed, because coalesced spots now split when their parts would no longer "
     "overlap. Remove the key",
 }
-# Messages by pydantic's type of error. For these errors, only programmers would understand the messages of pydantic.
+# Messages by pydantic's type of error, for errors whose messages by pydantic only programmers would understand.
 _NOT_A_SECTION = "is not a section; expected a mapping of keys to values"
 _REASONS = {
     "model_type": _NOT_A_SECTION,

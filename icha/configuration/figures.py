@@ -28,7 +28,7 @@ class Column(Section):
 
 
 class Measurement(Section):
-    """A table of measured contact areas, which figure 5 shows with the runs of a study."""
+    """A table of measured contact areas. Figure 5 shows these areas together with the runs of a study."""
 
     path: File
     """CSV file whose first line contains the headings of the columns. The path is relative to the configuration
@@ -40,10 +40,10 @@ class Measurement(Section):
     study: Name
     """Name of the study that is compared with the measurement."""
     load: Column
-    """Column of the loads: reduced pressures p/(E* h'rms) (unit `1`), or nominal pressures (unit `kPa`, …). Nominal
-    pressures need the keys `material` and `rms_slope`."""
+    """Column of the loads. Loads with the unit `1` are reduced pressures p/(E* h'rms). Loads with a unit of pressure,
+    such as `kPa`, are nominal pressures, and need the keys `material` and `rms_slope`."""
     area: Column
-    """Column of the contact area fractions A/A0 (unit `1` or `percent`)."""
+    """Column of the contact area fractions A/A0, with the unit `1` or `percent`."""
     material: Name | None = None
     """Material of the measurement. This key is required if the loads are nominal pressures."""
     rms_slope: Positive | None = None
@@ -68,7 +68,7 @@ class Measurement(Section):
         if _factor(area, "1") is None:
             raise ValueError(f"area: the unit is {area!r}; expected '1' or 'percent'")
         if self.load_is_pressure and (self.material is None or self.rms_slope is None):
-            raise ValueError(f"load in {load!r} without material and rms_slope; expected both, or loads of unit '1'")
+            raise ValueError(f"load in {load!r} without material and rms_slope; expected both keys, or the unit '1'")
         return self
 
     def problems(self, campaign: Any) -> Iterator[Problem]:

@@ -81,7 +81,7 @@ def load_configuration(
         location = "surfaces", campaign.origin("surfaces", name)
         unusual += unusual_topography(location, campaign.surfaces[name], each.period, each.rms_slope)
     sticky = list(sticky_runs(campaign))
-    # A low U_full/dgamma may be due to another unusual value.
+    # If other values are unusual, only these are reported, because they may cause the low U_full/dgamma.
     implausible = list(plausibility_problems(unusual, confirmed)) or plausibility_problems(sticky, confirmed)
     unusual += sticky
     refuse(origin, itertools.chain(campaign.problems(), implausible))
@@ -121,7 +121,7 @@ def _named_files(campaign: Campaign) -> dict[tuple[str, str], str]:
 
 
 def _files_outside(campaign: Campaign, folder: str | os.PathLike) -> list[Problem]:
-    """Return a problem for each file of a campaign that is outside a folder; links are resolved first."""
+    """Return a problem for each of a campaign's files that lies outside a folder; links are resolved first."""
     return [
         (
             (section, campaign.origin(section, name), "path"),

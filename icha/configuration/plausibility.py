@@ -71,7 +71,7 @@ class Unusual(NamedTuple):
     Attributes
     ----------
     location : keys that lead to the value in the configuration.
-    source : text for messages on the origin of a value that is not in the configuration; begins with a blank.
+    source : for a value that is not in the configuration, text about its origin; the text begins with a blank.
     """
 
     location: tuple
@@ -102,7 +102,7 @@ def _unusual(location: tuple, value: Any) -> Iterator[Unusual]:
 
 
 def unusual_topography(location: tuple, section: Any, period: float, rms_slope: float | None) -> Iterator[Unusual]:
-    """Yield an unusual size and an unusual rms slope of a topography from a file.
+    """Yield the size and the rms slope of a topography from a file, each if it is unusual.
 
     Parameters
     ----------

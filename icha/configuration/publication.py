@@ -86,7 +86,7 @@ def _matching(pattern: str) -> Callable[[str], str | None]:
 
 
 def _checked(read: Callable[[str], str | None], what: str, example: str):
-    """Return the type of a text; the function `read` returns the plain form of a text, or None for a wrong text."""
+    """Return the type of a checked text; `read` returns the plain form of a text, or None if the text is wrong."""
 
     def check(value: Any) -> str:
         # The YAML reader turns a date into a `datetime.date`, and a version such as 1.10 into the number 1.1.
@@ -140,7 +140,9 @@ class Author(Section):
                 "family_names and given_names of a person, or name of an organisation"
             )
         if (self.orcid and not person) or (self.ror and person and not self.affiliation):
-            raise ValueError("expected orcid only for a person; ror only for an organisation or with an affiliation")
+            raise ValueError(
+                "expected orcid only for a person, and ror only for an organisation or a person with affiliation"
+            )
         return self
 
     @property
@@ -197,8 +199,7 @@ class KnownFailure(Section):
     run: Line
     """Name of the run as in `verdict.txt`, such as `study/surface/seed1/slope1/material`."""
     reason: Prose
-    """Explanation for users of the data: the reason why the check failed, and the reason to publish the run
-    nevertheless."""
+    """Explanation for users of the data: why the check failed, and why you nevertheless publish the run."""
 
 
 class Publication(Section):

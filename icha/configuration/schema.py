@@ -59,7 +59,7 @@ def _table(heading: str, section: dict) -> str:
     lines = [f"### {heading}", "", section.get("description", ""), "", "| key | default | meaning |", "|---|---|---|"]
     for key, value in section["properties"].items():
         default = value.get("default")
-        # A default that is a section stands for a missing section.
+        # If the default is a section, the section may be missing from the file.
         shown = "none" if default is None or isinstance(default, dict) else f"`{json.dumps(default)}`"
         lines.append(f"| `{key}` | {'required' if key in required else shown} | {value['description']} |")
     return "\n".join([*lines, ""])

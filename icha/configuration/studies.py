@@ -1,4 +1,4 @@
-"""Section `studies`, and the sections `finite_range` and `boundary_element_loops`, whose entries refer to studies."""
+"""Sections `studies`, `finite_range` and `boundary_element_loops`; entries of the last two refer to a study."""
 
 import math
 from collections.abc import Callable, Iterator
@@ -222,8 +222,8 @@ class Study(Section):
     """States after the last target at which the loading direction changes. The first unloading ends at the first state,
     the next loading ends at the second state, and so on."""
     control: Literal["separation", "load"] = "separation"
-    """Controlled quantity: the mean separation or the load. With `load`, the separation jumps where the load has a
-    maximum or minimum along the path, and all targets and turning points must be loads."""
+    """Controlled quantity: the mean separation or the load. With `load`, all targets and turning points must be loads.
+    The separation then jumps where the load has a maximum or minimum along the path."""
     max_step: number(STEP) = DEFAULT_STEP
     """Largest change of the mean separation between two equilibria, in units of the rms height."""
 
@@ -312,8 +312,8 @@ class BesideStudy(Section):
     tolerance: number(TOLERANCE) = 1e-8
     """The solver stops when its relative error is below this value."""
     refinement: integer(REFINEMENT) = 1
-    """Number of nodes of the solver's grid for each node of the surface's grid, along a side. Heights between the
-    nodes of the surface are interpolated."""
+    """Number of nodes along a side of the solver's grid, divided by the number of nodes along a side of the surface's
+    grid. Heights between the nodes of the surface are interpolated."""
 
     def problems(self, campaign: Any) -> Iterator[Problem]:
         """Yield the problems of this entry: names that the campaign does not define, and unsolvable contacts."""

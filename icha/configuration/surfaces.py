@@ -118,8 +118,8 @@ class MeasuredSurface(_SurfaceFromFile):
     """Unit of the heights, such as `nm` or `0.1 mm`. Required for a file without this unit. The key replaces the
     unit in the file."""
     lateral_unit: UnitOfLength | None = None
-    """Unit of the coordinates x and y; with `format: fourier`, unit of 1/q. Default: the unit in the file or, if there
-    is none, the unit of the heights."""
+    """Unit of the coordinates x and y; with `format: fourier`, unit of 1/q. Default: the unit in the file. If the
+    file has no such unit, the default is the unit of the heights."""
     size: Sides | None = None
     """Size of the whole scan: one length, or a list of two lengths, along x and y. The size of a pixel is the size of
     the scan divided by the number of pixels. Required if the file does not contain the size. This key replaces the size
@@ -144,8 +144,8 @@ class MeasuredSurface(_SurfaceFromFile):
     mean height at the edges, and the topography repeats. `mirror`: the topography and its mirror images form a periodic
     cell of twice the side. `free`: the topography is a single square; the half-space is larger than the square."""
     taper: number(FloatRange(above=0, most=0.5)) | None = None
-    """Only with `boundary: window`: width of the strip along each edge in which the heights fall to the mean height,
-    divided by the side of the square. Default: 0.1."""
+    """Width of the strip along each edge, divided by the side of the square. In this strip the heights fall to the mean
+    height. Only with `boundary: window`. Default: 0.1."""
     grid: integer(GRID) | None = None
     """Number of nodes along a side of the prepared surface. Fourier interpolation resamples the heights to this grid. A
     coarser grid loses the shortest waves. Default: the number of nodes of the scan (with `mirror`, twice this
@@ -194,8 +194,8 @@ class SelfAffineSurface(Section):
     grid: integer(GRID)
     """Number of nodes along a side of the periodic cell."""
     amplitudes: Literal["fixed", "gaussian"] = "fixed"
-    """Amplitudes of the waves. `fixed`: every amplitude has the value of the spectrum, so all seeds have the same rms
-    height and slope. `gaussian`: amplitudes are random, and their mean square is the spectrum."""
+    """Amplitudes of the waves. `fixed`: the spectrum gives the square of each amplitude, so all seeds have the same rms
+    height and slope. `gaussian`: amplitudes are random, and the spectrum gives the mean square of each amplitude."""
 
     @property
     def lengths_and_hurst(self) -> tuple[float, float, float, float]:
@@ -238,8 +238,8 @@ class FileSurface(_SurfaceFromFile):
     kind: Literal["file"]
     """A height map from a file."""
     path: File
-    """File with a square array of heights, relative to the configuration file: `.npy`, or netCDF (`.nc`) with a
-    variable `height`. The first axis is y. Heights are positive towards the elastic body."""
+    """Path of a file with a square array of heights, relative to the configuration file. The file is `.npy`, or netCDF
+    (`.nc`) with a variable `height`. The first axis is y. Heights are positive towards the elastic body."""
     height_unit: UnitOfLength
     """Unit of the heights in the file, such as `um`. Each study scales the heights to the rms slopes of the study."""
     period: Length

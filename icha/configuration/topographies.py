@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 def inspect_topographies(campaign: Campaign) -> tuple[dict[str, Topography], list[Problem]]:
-    """Return the properties of the surfaces in studies that come from files, and the problems of these files."""
+    """Return the properties of all surfaces from files that studies use, and the problems of these files."""
     contacts = [each for study in campaign.studies for each in campaign.contacts(study)]
     of_measured_slope = {each.surface for each in contacts if each.rms_slope == MEASURED}
     facts, problems = {}, []
@@ -69,7 +69,7 @@ def inspect_file(section: MeasuredSurface | FileSurface) -> Topography:
 
 
 def read_surface(section: MeasuredSurface | FileSurface) -> Surface:
-    """Read a surface from a file, and prepare the surface as its section of the configuration describes."""
+    """Read a surface from a file, and prepare the surface with the keys of its section."""
     # The modules below import SciPy, which takes time; campaigns without surfaces from files do not need SciPy.
     if isinstance(section, MeasuredSurface):
         from icha.surfaces.measured.topography import prepared_topography

@@ -239,7 +239,7 @@ def _validate_turning_points(turning_points, previous):
         value = rule.validate(label, value)
         if kind == REDUCED_PRESSURE and 0 < abs(value) < LEAST_PRESSURE:
             expected = f"expected 0, or an absolute value of at least {LEAST_PRESSURE:g}"
-            raise ValueError(f"{label}: {value!r} is too small a load; {expected}")
+            raise ValueError(f"{label}: {value!r} is too close to zero; {expected}")
         falls = unloading != (kind == MEAN_SEPARATION)
         if kind == previous.kind and not (value < previous.value if falls else value > previous.value):
             leg, side = "unloading" if unloading else "loading", "less" if falls else "more"

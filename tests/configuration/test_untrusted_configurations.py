@@ -169,7 +169,7 @@ def test_values_to_vary_make_names_that_files_can_have(refused):
         "studies.one.surfaces": [surface],
         "studies.one.vary": varied,
     }
-    refused(None, changes, "of at most 200 characters")
+    refused(None, changes, "at most 200 characters")
 
 
 def test_of_a_thousand_problems_the_first_are_reported(load):
