@@ -32,7 +32,7 @@ def check(
             continue
         try:
             problems, count = _problems(kind, data)
-        except Exception as error:  # a file that another program wrote may lack anything
+        except Exception as error:  # a file of another program may lack any variable
             problems, count = [f"unknown format: {error!r}"], 0
         if problems:
             status = max(status, FAILED)

@@ -94,7 +94,7 @@ def reproduce(
     """Compute the results of a deposit again and compare every number with the published number.
 
     The command verifies the deposit and does not change it. The installed ICHA computes the configuration of the
-    deposit. The installed versions of ICHA and its packages must be those that made the deposit. No code of the deposit
+    deposit. The installed ICHA and its packages must have the versions that made the deposit. No code of the deposit
     is executed. The command reports each variable as identical, within tolerance, or different. With `--only smallest`
     the command takes some minutes.
 
@@ -141,8 +141,9 @@ def _introduce(deposit: Path, original: Path, folder: Path | None) -> None:
     echo(f"deposit:    {printable(deposit)}, {_contents(original)}")
     if differences := other_versions(original):
         raise RerunError(
-            "was made with other versions than those installed; expected the same versions. Run `make environment` in "
-            "a clone of the deposit's version, or in a copy of the deposit's source:\n" + "\n".join(differences)
+            "was made with versions that differ from the installed versions; expected the same versions. Run "
+            "`make environment` in a clone of the deposit's version, or in a copy of the deposit's source:\n"
+            + "\n".join(differences)
         )
     echo(f"program:    the installed ICHA {version('icha')}; nothing in the deposit is executed")
     echo(f"writes to:  {shorten_path(folder) if folder else 'a temporary folder'}")
@@ -262,7 +263,7 @@ def _send(server, files, metadata, number) -> None:
             if name in sums:
                 server.remove(draft, name)
             else:
-                echo(f"{name}: a file of the draft that is not in the deposit; not changed")
+                echo(f"{name}: is in the draft but not in the deposit; the file remains unchanged")
         # Metadata are sent before the files because the server reports errors in metadata at once.
         server.describe(draft, metadata)
         for path in files:

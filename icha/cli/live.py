@@ -1,4 +1,4 @@
-"""Progress of a running campaign. Events of Snakemake update the progress; a view prints it to a terminal or file."""
+"""Progress of a running campaign. Events of Snakemake update the progress; a view prints the progress."""
 
 import threading
 import time
@@ -33,7 +33,7 @@ class JobRecord:
     Attributes
     ----------
     rule : name of the Snakemake rule of the job.
-    title : message of the rule, printed for the job.
+    title : message of the rule about the job.
     outputs : paths of the files that the job writes.
     log : path of the log file; empty for a job without a log.
     started : time of the start, s.

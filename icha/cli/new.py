@@ -67,7 +67,7 @@ def new(
 
 
 def _schema() -> Path:
-    """Return the path of the schema of configurations; outside a clone, copy schema and README.md to config/."""
+    """Return the path of the schema of configurations; outside a clone, first copy schema and README.md to config/."""
     workflow, folder = find_workflow(), project()
     if workflow == folder:
         return folder / SCHEMA

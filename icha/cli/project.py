@@ -37,7 +37,7 @@ Cores = Annotated[int | None, option("Number of cores to use. Default: 2.", "--c
 Folder = Annotated[
     Path | None,
     option(
-        "Folder that contains results/. Default: the clone of ICHA, or outside a clone the working directory.",
+        "Folder that contains results/. Default: the clone of ICHA; outside a clone, the working directory.",
         "--directory",
         "-d",
         resolve_path=True,
@@ -46,7 +46,7 @@ Folder = Annotated[
 
 
 def echo(text: object = "", *, err: bool = False, **style) -> None:
-    """Print text; if `err` is true, print to standard error. `style` is passed to `typer.style`, such as `fg="red"`."""
+    """Print text; if `err` is true, print to standard error. `style` contains options such as `fg="red"`."""
     typer.secho(printable_lines(text), err=err, **style)
 
 
@@ -99,7 +99,7 @@ def find_workflow() -> Path:
 def list_campaigns() -> dict[str, Path]:
     """Return the configuration files of the project and of ICHA, by the name of the campaign.
 
-    This name is the file name without .yaml. For the default file, config/config.yaml, the file contains the name.
+    This name is the file name without .yaml. For config/config.yaml, the default file, the key `name` gives this name.
     """
     files: dict[str, Path] = {}
     for folder in (find_workflow(), project()):  # files of the project replace files of ICHA with the same name

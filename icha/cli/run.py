@@ -40,7 +40,7 @@ from icha.support.formatting import format_count
 
 STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 MOST_LINES = 12  # largest number of lines that are printed for the reason of a failure
-# Lines that every call of Snakemake prints; the reason of an error follows after these lines.
+# Lines that every call of Snakemake prints. The reason for an error comes after these lines.
 PREAMBLE = r"Using workflow specific profile|Assuming unrestricted|host: |Building DAG of jobs|total +\d+$"
 
 
@@ -92,12 +92,12 @@ def run(
     if reason := find_conflict(shorten_path(results), campaign.name, path, workflow):
         raise UserError(f"{reason} Nothing was started")
     command = [
-        # -P: a file in the working directory must not replace a module of the same name.
+        # With -P, a file in the working directory cannot replace a module of the same name.
         *(sys.executable, "-P", "-m", "snakemake", *targets),
         *("--snakefile", str(workflow / "Snakefile"), "--directory", str(folder)),
         *(["--configfile", str(path.resolve())] if path.resolve() != (workflow / DEFAULT).resolve() else []),
         *(["--cores", str(cores)] if cores else []),
-        # Snakemake finds profiles/default on its own.
+        # Snakemake finds profiles/default without this option.
         *(["--workflow-profile", str(profile_folder)] if profile else []),
     ]
     if dry_run:
@@ -155,7 +155,7 @@ def _refuse_if_too_large(items, targets: list[str], cores: int, results: Path, p
 
 
 def _dry_run(command: list[str], workflow: Path) -> str:
-    """Let Snakemake plan only; return the numbers of jobs that would run. After an error, print the error and exit."""
+    """Plan with Snakemake and run nothing; return how many jobs would run. After an error, print the error and exit."""
     done = subprocess.run(command, cwd=workflow, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
     if done.returncode == 0:
         return _planned_jobs(done.stdout)
@@ -209,7 +209,7 @@ _REPEAT_STOP = 15.0
 
 
 def _run_snakemake(command: list[str], workflow: Path, log: Path, progress, view) -> tuple[int, bool]:
-    """Run Snakemake and pass events to `progress` and `view`; return the exit status, and whether it was stopped."""
+    """Run Snakemake, update `progress` and `view`; return the exit status, and whether a signal stopped the run."""
     stopped = []
     reading, writing = os.pipe()
     # The plugins of this workflow replace installed plugins of the same name.
@@ -276,7 +276,7 @@ def _listen(reading: int, progress, view, stopped: list) -> None:
 
 
 def _print_outcome(status: int, stopped: bool, progress, campaign, folder: Path, log: Path) -> None:
-    """Print the numbers of finished jobs, the reasons of failures, and the paths of results and log."""
+    """Print the numbers of finished jobs, the reasons for failures, and the paths of results and log."""
     from icha.support.atomic_files import probe_folder
 
     results = folder / "results" / campaign.name
@@ -339,7 +339,7 @@ def _print_failure(heading: str, lines: list[str], **style) -> None:
     for line in lines[:MOST_LINES]:
         echo(f"    {line}")
     if len(lines) > MOST_LINES:
-        echo(f"    … and {len(lines) - MOST_LINES} more lines in its log")
+        echo(f"    … and {len(lines) - MOST_LINES} more lines in the log")
 
 
 def _print_checks(campaign, results: Path) -> None:

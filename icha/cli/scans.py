@@ -17,9 +17,9 @@ from icha.support.input_files import problem_with_path
 if TYPE_CHECKING:
     from icha.contact.models import Model
 
-# Fraction of filled points above which a warning recommends another measurement.
+# A warning recommends another measurement if more than this fraction of the points is filled.
 MOST_FILLED = 0.05
-# For keys that the file lacks: values in m that let ICHA read the file, and examples of what the user fills in.
+# For keys that the file lacks: values in m with which ICHA can read the file, and examples for the user.
 GUESSES = {"height_unit": 1e-9, "size": (1e-4, 1e-4)}
 EXAMPLES = {"height_unit": "nm", "lateral_unit": "um", "size": "[90 um, 90 um]"}
 
@@ -52,8 +52,8 @@ def _reading(scan) -> Iterator[str]:
         )
     if not scan.edges_fit:
         yield (
-            "warning: `boundary: periodic`, but opposite edges differ by much more than neighbouring nodes; there is a "
-            "step at the edges; use `boundary: window`, `mirror` or `free`"
+            "warning: `boundary: periodic`, but opposite edges differ by much more than neighbouring nodes, so there "
+            "is a step at the edges; use `boundary: window`, `mirror` or `free`"
         )
 
 
@@ -70,8 +70,8 @@ def _resolution(scan, to_scale: bool, models: list[Model]) -> Iterator[str]:
     )
     if unsupported := len(scan.asperities.unsupported_height):
         yield (
-            f"the asperity model excludes {unsupported} of these summits, because the nodes around them do not have "
-            "the shape of a smooth summit (steps, spikes, pits, plateaus)"
+            f"the asperity model excludes {unsupported} of these summits, because the nodes around them form steps, "
+            "spikes, pits or plateaus instead of smooth summits"
         )
     reasons = scan.reasons_against_asperities
     if reasons and (not models or any(model.by_summits for model in models)):
@@ -103,8 +103,8 @@ def _noise(scan) -> Iterator[str]:
     if scan.advice:
         keys = " and ".join(f"`{key}: {value}`" for key, value in format_advice(scan.advice).items())
         cutoff = scan.advice.get("cutoff")
-        effect = f", which keeps {filtered_slope_share(scan.measured, cutoff):.0%} of the rms slope" if cutoff else ""
-        yield f"recommended: {keys}{effect}"
+        kept = f"; filtering keeps {filtered_slope_share(scan.measured, cutoff):.0%} of the rms slope" if cutoff else ""
+        yield f"recommended: {keys}{kept}"
 
 
 def format_advice(advice: Mapping[str, float | int]) -> dict[str, str]:
@@ -120,7 +120,7 @@ def read_measured_section(path: Path, data: str | None, folder: Path) -> dict[st
     name : name of the surface.
     path : file of the topography, relative to `folder`.
     lines : lines of YAML, with the keys that the file determines and the keys that the user fills in.
-    to_fill_in : for each key that the user fills in, the reason.
+    to_fill_in : keys that the user must fill in, each with the reason.
     advice : recommended keys, with their values as text.
     scan : resolution of the scan (`icha.surfaces.measured.resolution.ScanResolution`).
 
@@ -184,7 +184,7 @@ def _load(path: Path, data: str | None):
         rows, columns = scan.heights.shape  # most scans have square pixels
         guessed["size"] = columns * 1e-6, rows * 1e-6
     elif "height_unit" in missing:
-        # Coordinates without a unit have the unit of the heights, which is unknown too.
+        # Coordinates without a unit have the unit of the heights. Here the unit of the heights is unknown, too.
         if load_scan(path, Preparation("auto", "free", data, **guessed, lateral_unit=1.0)).size != scan.size:
             missing["lateral_unit"] = "is missing, and the file does not contain it; default: unit of the heights"
     return scan, guessed, missing

@@ -90,7 +90,7 @@ def _print_surface(surface, file: Path) -> None:
     if scale != 1:
         height, slope = (float(surface[name]) * scale for name in ("rms_height", "rms_slope"))
         echo(f"as measured: rms height {format_quantity(height, 'm')}, rms slope {slope:.4g}")
-        echo("as stored, at the rms slope to which the heights are scaled:")
+        echo("as stored, after scaling to another rms slope:")
     for name, variable in surface.data_vars.items():
         if variable.ndim == 0 and variable.dtype.kind in "fiu":
             unit = variable.attrs.get("units", "1").removeprefix("1")

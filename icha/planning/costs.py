@@ -65,9 +65,9 @@ class PowerLaw:
         return self.base + self.scale * math.prod(quantities[name] ** power for name, power in self.powers.items())
 
 
-# Power laws by name. The name for a contact is the solver, with `adhesion` and `cycle` if they apply; the name for
-# another job is its Snakemake rule. Quantities are numbers of `nodes`, of `spots` at the largest load, of `stops`
-# (targets of the path) and of `runs`, the `load` p/(E* h'rms), and the `step` of the mean gap in h_rms.
+# Power laws by name. The law of a contact has the name of the solver, followed by `adhesion` and `cycle` if they apply.
+# The law of another job has the name of the Snakemake rule. Quantities: `nodes`, `spots` (at the largest load), `stops`
+# (targets of the path) and `runs` are numbers; `load` is p/(E* h'rms); `step` is a step of the mean gap in h_rms.
 LAWS = {
     "surface": PowerLaw(0.015, 2.4e-7, {"nodes": 1}),
     "asperities": PowerLaw(0.14, 1.6e-3, {"spots": 1.06}),
@@ -117,7 +117,7 @@ class Cost:
 
 
 def job_threads(grid: int) -> int:
-    """Return the number of cores for each job of a surface: two for large grids, where this saves time, else one."""
+    """Return the number of cores for each job of a surface: two for large grids, to save time, else one."""
     return 2 if grid >= LARGE_GRID else 1
 
 
@@ -146,8 +146,8 @@ class RunSize:
     ----------
     arrays : number of arrays of the size of the grid that are in memory at the same time.
     summit : memory for each summit, bytes.
-    maps : size of the compressed maps in the file, for each grid cell and snapshot, bytes.
-    sticky : value of U_full/dgamma below which the time of a run is proportional to dgamma/U_full.
+    maps : bytes of the compressed maps in the file, for each grid cell and snapshot.
+    sticky : if U_full/dgamma is below this value, the time of a run is proportional to dgamma/U_full.
     minutes : time limits in minutes for loading only, for a cycle, and for a run on several cores.
     """
 
@@ -191,7 +191,7 @@ def run_cost(
     adhesive : True if the surface energy is not zero.
     legs : number of unloadings and loadings after the first loading.
     max_step : longest step of the mean separation, in h_rms.
-    energy_ratio : elastic energy of full contact per area, divided by the work of adhesion, U_full/dgamma.
+    energy_ratio : U_full/dgamma, elastic energy of full contact per area divided by the work of adhesion.
     """
     most, nodes = spots(summits, load), grid**2
     law = _law(model, adhesive=adhesive, cycle=bool(legs))
@@ -221,12 +221,12 @@ def finite_range_cost(nodes: int, *, adhesive: bool, **quantity: float) -> Cost:
     return Cost(seconds, WORKFLOW.forked + 20 * _DOUBLE * nodes**2, 40e3 + 0.04 * nodes**2)
 
 
-# Memory for the campaign dataset: bytes for each byte in `values` of the runs, and upper limit, bytes. The limit exists
-# because arrays above `icha.datasets.results.LEFT_IN_FILE` are not read as a whole.
+# Memory of a job for the values of runs: bytes for each byte in `values`, and largest memory in bytes. The memory is
+# limited because arrays above `icha.datasets.results.LEFT_IN_FILE` are not read as a whole.
 _COPIES, _MOST_READ = 3.9, 1.9e9
 # Largest memory for values of runs in the job that writes the campaign dataset block by block, bytes.
 _BLOCKS = 35 * MiB
-# Number of arrays that a contact map needs, each with the size of the topography; by the number of models in the map.
+# A contact map needs this number of arrays of the size of the topography, by the number of models in the map.
 MAP_ARRAYS = {1: 2, 2: 7}
 # Memory for libraries and pages, by the rule of the job, bytes.
 _LIBRARIES = {"figure": 85 * MiB, "report_page": 18 * MiB}

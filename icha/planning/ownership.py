@@ -1,4 +1,4 @@
-"""Ownership of results: each folder belongs to one configuration file; no other file may replace its results.
+"""Ownership of results: a folder of results belongs to one configuration file; no other file may replace the results.
 
 A record in the folder of results contains the path of the configuration file. The recorded path is relative to the
 parent folder of results/. The path of a file that came with the workflow is relative to the folder of the workflow.

@@ -23,7 +23,7 @@ from icha.support.checksums import is_whole
 from icha.support.input_files import text
 
 DONE, TO_DO, CHANGED, FAILED, DAMAGED = "done", "to do", "changed", "failed", "damaged"
-# Largest number of jobs of one kind from whose measured times the correction is computed.
+# Largest number of measured times from which the correction for one kind of job is computed.
 _SAMPLE = 200
 # Reduced pressure that is assumed for targets that are mean separations.
 _UNKNOWN_LOAD = 0.03
@@ -212,7 +212,7 @@ def _cost_parameters(settings, rms_slope) -> dict:
 
 
 def run_state(file: Path, sha256: str) -> tuple[str, str]:
-    """Return the state of a run's file, and the reason of a failure; `sha256` is the checksum of the settings."""
+    """Return the state of a run's file, and the reason if the run failed; `sha256` is the checksum of the settings."""
     import h5py
 
     if not file.is_file():
@@ -266,7 +266,7 @@ def time_on(items: Iterable[Item], cores: int) -> float:
 
 
 def start_up(items: Collection[Item]) -> float:
-    """Return the time in s from the call to the first job, in which Snakemake starts and plans the jobs."""
+    """Return the time in s from the call to the first job. In this time Snakemake starts and plans the jobs."""
     if not any(item.to_do for item in items):
         return 0.0
     return WORKFLOW.start + WORKFLOW.planned * len(items)

@@ -16,7 +16,7 @@ from icha.support import formatting
 from icha.support.formatting import format_count
 
 TAMAAS = "tamaas"
-# Sections of a configuration whose entries Tamaas solves.
+# Sections of a configuration. Tamaas solves the entries of these sections.
 BY_TAMAAS = ("finite_range", "boundary_element_loops")
 
 

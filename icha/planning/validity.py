@@ -41,7 +41,7 @@ from icha.surfaces.moments import (
 # icha.references.summit_theories also contains this number, but takes long to import.
 _SUMMIT_RADIUS = 3 * math.sqrt(math.pi) / 8
 
-# About 5 % of the first contact spots have a Tabor parameter below this fraction of the mean summit's Tabor parameter.
+# About 5 % of the first contact spots have a Tabor parameter below this value times that of the mean summit.
 _SMALLEST_TABOR = 0.84
 
 
@@ -58,7 +58,7 @@ def self_affine_moments(
 
 
 def surface_facts(campaign: Campaign, name: str) -> dict[str, float]:
-    """Return the properties of a surface at rms slope 1 that decide the validity of the contact models, by name.
+    """Return, by name, the properties of a surface at rms slope 1. These decide the validity of the contact models.
 
     Random surfaces are assumed to be Gaussian and isotropic. Properties of surfaces from files are computed from
     heights.
@@ -67,7 +67,7 @@ def surface_facts(campaign: Campaign, name: str) -> dict[str, float]:
     -------
     Properties of `icha.analysis.validity.VALIDATED`, and four more. `summits` is the number of summits that the
     asperity model uses. `rms_curvature` is the rms curvature of profiles, 1/m. `rms_height` is the rms height, m.
-    `complete_contact_pressure` is the pressure of complete contact divided by E*, an estimate for random surfaces.
+    `complete_contact_pressure` is the pressure of complete contact, divided by E*; it is estimated for random surfaces.
     """
     section = campaign.surfaces[name]
     if isinstance(section, SelfAffineSurface):
