@@ -103,9 +103,9 @@ def simulate(
     Returns
     -------
     xarray.Dataset with dimensions step, snapshot, gap_bin, pressure_bin and spot; every variable has units and a long
-    name. If the path continues after the first loading, all its equilibria are steps, and there is a dimension
-    event (jumps, unions and splits of spots). Runs with boundary elements also have dimensions row and column. The
-    attribute `contact_model` names the model. `applicability` states why the model is not applicable, or is empty.
+    name. If the path continues after the first loading, every equilibrium is a step, and the dataset has a dimension
+    event (jumps, coalescence and splitting of spots). Runs with boundary elements also have dimensions row and column.
+    Attributes: `contact_model` names the model. `applicability` states why the model is not applicable, or is empty.
     `failed_checks` lists the checks that the run fails (`icha.checks.run.check_run`), and is absent if all checks pass.
 
     Warns
@@ -289,7 +289,7 @@ class _PathRecord:
 
 
 def _count_uphill_jumps_in(record: _PathRecord) -> int:
-    """Return the number of jumps into contact that cost energy, by the law of a spot or by the energy balance."""
+    """Return the number of jumps into contact that cost energy according to the law of a spot or the energy balance."""
     gained = np.diff([step["dissipated_by_jump_in"] for step in record.steps], prepend=0.0) < 0
     return sum(
         int(np.count_nonzero((events.kind == JUMP_IN) & ((events.energy < 0) | uphill)))
@@ -300,7 +300,7 @@ def _count_uphill_jumps_in(record: _PathRecord) -> int:
 def _record_path(contact, observables, path, reachable, progress) -> _PathRecord:
     """Follow a path and return the record of its steps, snapshots and events.
 
-    reachable : path without the targets outside the range of the model. The record ends before the first such target.
+    reachable : path without the targets outside the range of the model; the record ends before the first of these.
     """
     left_out = [target for target in path.targets if target not in reachable.targets]
     remaining = len(reachable.targets)
@@ -327,7 +327,7 @@ def _record_path(contact, observables, path, reachable, progress) -> _PathRecord
                 record.pressed, largest = state, step["contact_area_fraction"]
             if waypoint.target.snapshot:
                 record_snapshot(waypoint.target, state, index)
-            # Keep the state with the largest tension in the last leg. A leg of the path ends at a turning point.
+            # Keep the state with the largest tension in the last leg (loading or unloading up to a turning point).
             tension = waypoint.leg, -step["nominal_pressure"]
             if weakest is None or tension > weakest[0]:
                 weakest = tension, state, index
@@ -399,7 +399,7 @@ def _path_values(table: Table, path: Path, record: _PathRecord, grid: int) -> di
 
 
 def _describe_targets(table: Table, path: Path) -> Table:
-    """Return the descriptions of `step_target` and `snapshot_target`, whose units depend on the targets of the path."""
+    """Return the descriptions of `step_target` and `snapshot_target`; the units depend on the targets of the path."""
     steps = {target.kind for target in (*path.targets, *path.turning_points)} | ({BETWEEN} if path.cyclic else set())
     snapshots = {target.kind for target in path.targets if target.snapshot} | ({PULL_OFF} if path.unload else set())
     return {
@@ -409,7 +409,7 @@ def _describe_targets(table: Table, path: Path) -> Table:
 
 
 def _target_unit(kinds: set[str], named_by: str) -> dict:
-    """Return the unit of targets of given kinds; if their units differ, also a comment that names the kinds in m."""
+    """Return the unit of targets of given kinds; if their units differ, also a comment on the kinds in m."""
     metres = kinds.intersection(IN_METRES)
     if not metres or metres == kinds:
         return {"units": "m" if metres else "1"}

@@ -118,7 +118,7 @@ class CampaignResults:
             _warn(f"cannot write to {results}: missing results cannot be computed")
 
     def have_stale_made_again(self, paths: Iterable[str], rules: Iterable) -> None:
-        """Mark as incomplete the results that differ from the present settings, unless Snakemake detects this itself.
+        """Mark results of other settings or inputs as incomplete, unless Snakemake itself detects these results.
 
         Snakemake compares the settings with its own records. After a result was restored from a backup, the records may
         be missing or may describe another file. For inputs, Snakemake compares time stamps, not contents.
@@ -165,8 +165,9 @@ class CampaignResults:
     def begin(self, missing: str | None = None) -> None:
         """Make this call the owner of the results before its first job starts.
 
-        Afterwards, jobs of an earlier call cannot change the results. The results are inspected again, because such a
-        job may have changed results since the first inspection. Calls that only report do not use this method.
+        Afterwards, jobs of an earlier call cannot change the results. The results are inspected again, because jobs of
+        an earlier call may have changed results since the first inspection. Calls that only report do not use this
+        method.
 
         Parameters
         ----------
@@ -281,7 +282,7 @@ def _is_record(file: Path) -> bool:
         return False
 
 
-# Files whose locks end with this process.
+# Locked files. The locks end with this process.
 locks = []
 
 

@@ -27,7 +27,7 @@ JOB_MODULE = "job.py"
 def code_fingerprint(script: str | Path, *modules: str) -> str:
     """Return the fingerprint of a script with all modules that it imports (`files_of`), and with their data files.
 
-    A data file counts if it is in the folder of a module that contains the name of the file.
+    A data file counts if a module in the same folder contains the name of the file.
     """
     files = files_of(script, *modules)
     digest = hashlib.sha256("".join(files).encode())
@@ -41,13 +41,13 @@ def code_fingerprint(script: str | Path, *modules: str) -> str:
 def files_of(script: str | Path, *modules: str) -> dict[str, Path]:
     """Return a script and all modules that it imports from the package or from its folder, sorted by name.
 
-    The import of a module does not include the `__init__.py` of its package. `JOB_MODULE` is not included either, nor
-    are modules that only `JOB_MODULE` imports.
+    Importing a module does not add the `__init__.py` of its package. `JOB_MODULE` is left out, and so are modules that
+    only `JOB_MODULE` imports.
 
     Parameters
     ----------
     script : path of the script.
-    modules : names of further modules, which the script imports although their names are not in its text.
+    modules : names of further modules that the script imports; the text of the script does not contain these names.
     """
     job_module = Path(script).with_name(JOB_MODULE)
     files: set[Path] = set()
@@ -108,7 +108,7 @@ def _module_file(name: str, missing_ok: bool = False) -> Path | None:
 
 @cache
 def _data_files(file: Path) -> list[Path]:
-    """Return the data files next to a module; the module contains their names, or the name of their folder."""
+    """Return the data files next to a module if the module contains their names, or the name of their folder."""
     files = set()
     for name in _syntax_of(file).names:
         path = file.parent / name
@@ -136,7 +136,7 @@ class _Syntax(NamedTuple):
     names: list[str]
 
 
-# Reading the syntax trees of all modules takes a second, so what is read is cached in the folder of Python's bytecode.
+# Reading the syntax trees of all modules takes a second, so the results are cached in the folder of Python's bytecode.
 # The key is the checksum of the text of the module; the file name depends on the versions of Python and of this module.
 _READER = hashlib.sha256(Path(__file__).read_bytes() + sys.version.encode()).hexdigest()[:16]
 _CACHE = Path(importlib.util.cache_from_source(__file__)).with_suffix(f".{_READER}.json")

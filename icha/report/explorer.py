@@ -34,9 +34,9 @@ from icha.support.formatting import format_count, printable_lines
 
 # Labels that identify a contact, in the order of the lists on the page.
 CHOICES = ("study", "surface", "rms_slope", "material", "seed")
-# Largest numbers of cells along an edge of a topography, and along an edge of a contact map, which has finer details.
+# Largest numbers of cells along an edge of a topography, and along an edge of a contact map (it has finer details).
 MOST_HEIGHTS, MOST_CELLS = 256, 512
-# Smallest pressure density on the page, divided by the highest density. With the JKR law, the tail is infinite.
+# The page omits pressure densities below this fraction of the highest density. With the JKR law, the tail is infinite.
 LEAST_DENSITY = 1e-3
 LEVELS = 255  # largest grey level of a picture
 CONTACT_COLOUR = (230, 0, 13)  # red, green and blue of spots and patches
@@ -70,7 +70,7 @@ def write_explorer(
     ----------
     folder : folder of the results of the campaign.
     page : HTML file to write.
-    only : for names in `CHOICES`, such as "study", the values to include; all values of other names are included.
+    only : values to include, by a name in `CHOICES` such as "study"; for other names, all values are included.
     largest : largest size of the page, MB.
 
     Raises
@@ -217,8 +217,8 @@ def encode_run(run: xr.Dataset, maps: Sequence[str] | None) -> dict:
     Parameters
     ----------
     run : dataset of a run with at least one step.
-    maps : contact maps (from `encode_map`) at the snapshots of boundary elements. None for the asperity model, whose
-        spots are in `run`, and for boundary elements without a file of maps.
+    maps : contact maps (from `encode_map`) at the snapshots of a run with boundary elements; None if the file with the
+        maps is missing. For the asperity model, `maps` is None because `run` contains the spots.
     """
     stops = zip(run["step_kind"].values.astype(str), run["step_target"].values, strict=True)
     return {

@@ -71,7 +71,7 @@ def write_report(
     ----------
     path : HTML file to write; links to other files are relative to the folder of this file.
     campaign : campaign dataset, with title, summary and licence.
-    figures : figures in their order. A figure of one study is in the section of this study, other figures come first.
+    figures : figures in their order. A figure of one study is in the section of this study; the others come first.
     checks : results of `icha.analysis.checks.check_campaign`.
     model_error : result of `icha.analysis.model_error.model_error`; None for a campaign without boundary elements.
     surfaces : datasets of the surfaces, with or without heights, for statistics and power spectra.

@@ -109,7 +109,7 @@ def _run(labels: RunLabels, run: xr.Dataset) -> dict:
 
 
 def collect_states(run: xr.Dataset) -> dict[tuple[str, float], dict[str, float]]:
-    """Return reduced pressure, A/A0 and mean gap/h_rms at each target of a loading; keys: kind and value of target."""
+    """Return reduced pressure, A/A0 and mean gap/h_rms at each target of the loading, by kind and value of target."""
     stops = path_steps(run)
     keys = zip(stops["step_kind"].values.tolist(), stops["step_target"].values.tolist(), strict=True)
     values = {
@@ -150,7 +150,7 @@ def _table(runs) -> dict:
 def _ensembles(dataset: xr.Dataset, runs: list[RunLabels]) -> list[tuple[dict, list[RunLabels]]]:
     """Group runs that differ only in their seed; runs to which the model is not applicable form separate groups.
 
-    For each group, return the first cells of its table row (labels, numbers of seeds and requested seeds) and its runs.
+    For each group, return the first cells of the table row (labels and numbers of seeds) and the runs of the group.
     """
     groups: dict[tuple[RunLabels, bool], list[RunLabels]] = {}
     for run in runs:

@@ -111,7 +111,7 @@ rule model_error:
         attributes=as_it_is(ATTRIBUTES),
         code=code_of("measure_model_error.py"),
     message:
-        "Error of the model against boundary elements"
+        "Error of the model, compared with boundary elements"
     script:
         "../scripts/measure_model_error.py"
 

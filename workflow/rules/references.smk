@@ -1,5 +1,6 @@
 # References for runs. The first rule writes theories and published data points. The other rules solve the contact of a
-# run with boundary elements at a finite range, at one load or in a cycle of loading and unloading.
+# run with boundary elements at a finite range of attraction: one rule at one load, one rule in a cycle of loading and
+# unloading.
 
 from icha.configuration.cases import adhesive_contacts, loop_settings, solution_settings
 from icha.planning.requirements import solver_memory

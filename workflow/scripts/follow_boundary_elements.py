@@ -1,4 +1,4 @@
-"""Load one surface against one material and unload it, with boundary elements at a finite range."""
+"""Load and unload one surface against one material, with boundary elements at a finite range."""
 
 from job import attributes, job_context
 

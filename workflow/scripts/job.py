@@ -1,4 +1,4 @@
-"""Functions for the scripts of all jobs: write the log, report errors, verify checksums, end a job with Snakemake."""
+"""Functions for the scripts of all jobs: write the log, report errors, verify checksums, end when Snakemake ends."""
 
 import contextlib
 import os

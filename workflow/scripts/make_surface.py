@@ -1,4 +1,4 @@
-"""Generate a random topography or read a file, and write it at rms slope 1."""
+"""Generate a random topography or read a topography from a file; write the surface at rms slope 1."""
 
 from job import attributes, job_context, refuse_changed
 

@@ -203,7 +203,7 @@ function drawStop() {
     const side = run.period * unitOf(run.period)[0], node = side / run.grid, source = snapshot ? pictureOf(run, snapshot) : "";
     const image = { source, xref: "x", yref: "y", x: -node / 2, y: side - node / 2, sizex: side, sizey: side, sizing: "stretch", layer: "above", opacity: exact ? 1 : 0.3 };
     Plotly.relayout(`map-${model}`, { images: source ? [image] : [] });
-    byId(`map-${model}`).setAttribute("aria-label", `Topography with the contact of ${WORDS[model]}${exact ? "" : ", of an earlier state"}`);
+    byId(`map-${model}`).setAttribute("aria-label", `Topography and contact, computed with ${WORDS[model]}${exact ? "" : ", in an earlier state"}`);
   }
   const points = now.map((_, k) => now.length + k);
   for (const [id, name] of [["area", "area"], ["separation", "gap"]]) {
@@ -244,7 +244,7 @@ function noticesOf({ run, step, snapshot, exact }) {
   else if (!run.snapshots.length) found.push("the run has no snapshots, so spots and distributions are not available.");
   else if (!snapshot) found.push(`no snapshot up to this step, so spots and distributions are not shown. The first snapshot is at p* = ${format(run.pressure[Math.min(...run.snapshots.map((each) => each.step))])}.`);
   else if (!exact) found.push(`no snapshot at this step. The pale spots and distributions belong to the previous snapshot: ${legOf(run, snapshot.step)}, p* = ${format(run.pressure[snapshot.step])}.`);
-  if (snapshot && !snapshot.map && !snapshot.circles) found.push("the file of the run with the maps of contact was missing.");
+  if (snapshot && !snapshot.map && !snapshot.circles) found.push("contact maps are not shown, because the file of the run was missing.");
   return found;
 }
 

@@ -67,7 +67,7 @@ class Executor(LocalExecutor):
         """Start the fork server if necessary; return False if the fork server cannot be started."""
         if not self._without_server:
             try:
-                # The fork server ends with the thread that starts it, so this must be the main thread.
+                # The fork server ends with the thread that starts it, so the main thread must start the fork server.
                 forkserver.ensure_running()
             except OSError as error:  # such as a path of temporary files that is too long for a socket
                 self._without_server = True

@@ -23,6 +23,6 @@ def _modules():
 
 end_with_parent(os.getppid())
 for _name in [*_modules(), *_LATE]:
-    # A job reports a missing module.
+    # If a module is missing, the job that needs this module reports the error.
     with contextlib.suppress(Exception):
         import_module(_name)
