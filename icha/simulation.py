@@ -95,7 +95,7 @@ def simulate(
     path : loads, areas or separations to reach; at some of these targets, spots and distributions are stored.
     model : "asperities" or "boundary_elements". Boundary elements are slower, use the limit of a short range of
         attraction, and need a periodic surface.
-    seed : seed of the surface, which is recorded in the dataset; -1 for a surface without a seed.
+    seed : seed of the surface, for the record in the dataset; -1 for a surface without a seed.
     progress : function that is called with a line of text at every target.
     kept : folder of checkpoints (`icha.contact.checkpoints`), only with boundary elements. If a call was interrupted, a
         call with the same arguments resumes from the checkpoints.
@@ -183,8 +183,10 @@ def empty_run(
 def _dataset(surface, material, path, name, seed, record, summits, reasons, of_contact):
     """Build the dataset of a run from the record of its path, without the values of pull-off and hysteresis loss.
 
-    name : name of the model; summits : summits of the surface.
-    reasons : reasons why the model does not represent the surface; of_contact : values that are the same in all states.
+    name : name of the model.
+    summits : summits of the surface.
+    reasons : reasons why the model does not represent the surface.
+    of_contact : values that are the same in all states.
     """
     table = RUN | FURTHER[name]
     values = {
@@ -409,7 +411,7 @@ def _describe_targets(table: Table, path: Path) -> Table:
 
 
 def _target_unit(kinds: set[str], named_by: str) -> dict:
-    """Return the unit of targets of given kinds; if their units differ, also a comment on the kinds in m."""
+    """Return the unit of targets of some kinds; if the units differ, also a comment that lists the kinds in metres."""
     metres = kinds.intersection(IN_METRES)
     if not metres or metres == kinds:
         return {"units": "m" if metres else "1"}

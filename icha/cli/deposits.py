@@ -93,7 +93,7 @@ def reproduce(
 ) -> None:
     """Compute the results of a deposit again and compare every number with the published number.
 
-    The command verifies the deposit and does not change it. The installed ICHA computes the configuration of the
+    The command verifies the deposit and does not change any file. The installed ICHA computes the configuration of the
     deposit. The installed ICHA and its packages must have the versions that made the deposit. No code of the deposit
     is executed. The command reports each variable as identical, within tolerance, or different. With `--only smallest`
     the command takes some minutes.

@@ -24,7 +24,7 @@ def explore(
 
     On the page, choose a contact and a model, and move a slider along the path. The page shows the spots or patches on
     the topography, the state on the curves, and the distributions. The page is one HTML file and needs no network. If
-    the page with all contacts would exceed the largest size, contacts are omitted and the command prints their number.
+    the page with all contacts would exceed the largest size, contacts are omitted, and the command prints how many.
     """
     from icha.datasets.results import EXPLORER
     from icha.deposit.verify import CHECKSUMS

@@ -204,7 +204,7 @@ def _log_file(folder: Path, campaign: str) -> Path:
     return Path(name)
 
 
-# Seconds after which a signal to stop is repeated.
+# A signal to stop is repeated after this number of seconds.
 _REPEAT_STOP = 15.0
 
 
@@ -248,7 +248,7 @@ def _run_snakemake(command: list[str], workflow: Path, log: Path, progress, view
                 with contextlib.suppress(subprocess.TimeoutExpired):
                     status = process.wait(timeout=_REPEAT_STOP)
                 if status is None and stopped:
-                    # Snakemake can miss a signal that arrives while it starts a job.
+                    # Snakemake can miss a signal that arrives while Snakemake starts a job.
                     os.killpg(process.pid, stopped[-1])
             # A process that outlives its job may hold the pipe open.
             listener.join(timeout=2)

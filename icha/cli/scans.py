@@ -83,8 +83,8 @@ def _resolution(scan, to_scale: bool, models: list[Model]) -> Iterator[str]:
     error = error_of_cells(scan.cells_per_short_wave)
     if error and any(model.by_cells for model in models):
         yield (
-            f"boundary elements have about {scan.cells_per_short_wave:.2g} nodes per shortest wave, which causes an "
-            f"error of {error} in areas; recommended: {RESOLVED_CELLS} nodes, with a longer `cutoff` or a finer `grid`"
+            f"boundary elements have about {scan.cells_per_short_wave:.2g} nodes per shortest wave, so areas have an "
+            f"error of {error}; recommended: {RESOLVED_CELLS} nodes, with a longer `cutoff` or a finer `grid`"
         )
 
 

@@ -45,7 +45,7 @@ def expand_design(campaign: Campaign, content: Mapping) -> tuple[Campaign, list[
     Parameters
     ----------
     campaign : the campaign as written in the configuration file.
-    content : the configuration as nested mappings, from which variants of surfaces and materials are made.
+    content : the configuration as nested mappings; variants of surfaces and materials are made from this content.
 
     Returns
     -------

@@ -31,8 +31,7 @@ class Measurement(Section):
     """A table of measured contact areas. Figure 5 shows these areas together with the runs of a study."""
 
     path: File
-    """CSV file whose first line contains the headings of the columns. The path is relative to the configuration
-    file."""
+    """Path of a CSV file with headings in the first line. The path is relative to the configuration file."""
     label: Text
     """Name in the legend of the figure. Write formulas between two `$`."""
     citation: Text

@@ -81,7 +81,7 @@ def load_configuration(
         location = "surfaces", campaign.origin("surfaces", name)
         unusual += unusual_topography(location, campaign.surfaces[name], each.period, each.rms_slope)
     sticky = list(sticky_runs(campaign))
-    # If other values are unusual, only these are reported, because they may cause the low U_full/dgamma.
+    # Other unusual values are reported first, because they may cause the low U_full/dgamma.
     implausible = list(plausibility_problems(unusual, confirmed)) or plausibility_problems(sticky, confirmed)
     unusual += sticky
     refuse(origin, itertools.chain(campaign.problems(), implausible))

@@ -102,7 +102,7 @@ def _unusual(location: tuple, value: Any) -> Iterator[Unusual]:
 
 
 def unusual_topography(location: tuple, section: Any, period: float, rms_slope: float | None) -> Iterator[Unusual]:
-    """Yield the size and the rms slope of a topography from a file, each if it is unusual.
+    """Yield the size and the rms slope of a topography from a file, each only if unusual.
 
     Parameters
     ----------

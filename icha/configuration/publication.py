@@ -187,14 +187,13 @@ class RelatedIdentifier(Section):
     identifier: Identifier
     """DOI, `arXiv:…`, or web address of the other work."""
     relation: Literal[RELATIONS]
-    """Relation of the deposit to the other work, with a name that DataCite defines, such as `IsSupplementTo` or
-    `Cites`."""
+    """Relation of the deposit to the other work: a term of DataCite, such as `IsSupplementTo` or `Cites`."""
     resource: Literal[RESOURCES] | None = None
-    """Type of the other work, with a name that DataCite defines, such as `JournalArticle`."""
+    """Type of the other work: a term of DataCite, such as `JournalArticle`."""
 
 
 class KnownFailure(Section):
-    """A run that is published although one of its checks failed, with an explanation."""
+    """A run with a failed check that is published nevertheless, and an explanation."""
 
     run: Line
     """Name of the run as in `verdict.txt`, such as `study/surface/seed1/slope1/material`."""

@@ -193,13 +193,12 @@ class Study(Section):
     """Seeds of the random phases: a list, or a range such as `1..50`. A surface from a file has no seeds and is used
     once."""
     rms_slopes: Slopes = []
-    """Rms slopes h'rms to which the heights of each topography are scaled. With `measured`, a topography from a file
-    keeps its own slope."""
+    """Rms slopes h'rms. The heights of each topography are scaled to these slopes. With `measured`, a topography from a
+    file keeps its own slope."""
     materials: list_of_names() = []
     """Names of materials."""
     vary: Vary | None = None
-    """Values of parameters of surfaces and materials for this study. The study runs all combinations of these
-    values."""
+    """Values of parameters of surfaces and materials. The study runs all combinations of these values."""
     zip: list[Annotated[list[Text], Field(min_length=2)]] = []
     """Groups of lists that are combined entry by entry (first with first, second with second) instead of in all
     combinations. Example: `[[rms_slopes, surface_energy]]`."""
@@ -303,12 +302,12 @@ class BesideStudy(Section):
     surfaces: _Labels | None = None
     """Names of surfaces. Contacts on these surfaces are solved. Default: all surfaces of the study."""
     seeds: Seeds | None = None
-    """Seeds whose contacts are solved. Default: all seeds of the study."""
+    """Seeds. Contacts with these seeds are solved. Default: all seeds of the study."""
     rms_slopes: Annotated[list[Positive], Field(min_length=1), AfterValidator(distinct)] | None = None
-    """Rms slopes at which contacts are solved. Default: all rms slopes of the study."""
+    """Rms slopes. Contacts at these slopes are solved. Default: all rms slopes of the study."""
     materials: _Labels | None = None
-    """Names of materials whose contacts are solved. Default: all materials of the study. The grid must resolve the
-    `interaction_range` of materials with adhesion."""
+    """Names of materials. Contacts with these materials are solved. Default: all materials of the study. The grid must
+    resolve the `interaction_range` of materials with adhesion."""
     tolerance: number(TOLERANCE) = 1e-8
     """The solver stops when its relative error is below this value."""
     refinement: integer(REFINEMENT) = 1
@@ -316,7 +315,7 @@ class BesideStudy(Section):
     grid. Heights between the nodes of the surface are interpolated."""
 
     def problems(self, campaign: Any) -> Iterator[Problem]:
-        """Yield the problems of this entry: names that the campaign does not define, and unsolvable contacts."""
+        """Yield the problems of this entry: names that are not defined, and contacts that cannot be solved."""
         yield from unknown(("study",), self.study, campaign.studies)
         if self.study in campaign.studies:
             yield from self._study_problems(campaign, campaign.studies[self.study])
@@ -352,8 +351,8 @@ class BoundaryElements(BesideStudy):
     """Boundary elements that solve the contacts of a study at a finite range of attraction, for comparison."""
 
     reduced_pressures: stops(ReducedPressure, increasing)
-    """Reduced pressures p/(E* h'rms) at which the contact is solved, increasing. The runs of the study save a snapshot
-    at each reduced pressure."""
+    """Reduced pressures p/(E* h'rms), increasing. The contact is solved at each pressure, and the runs of the study save a
+    snapshot at each pressure."""
 
 
 class BoundaryElementLoops(BesideStudy):

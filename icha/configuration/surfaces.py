@@ -136,8 +136,8 @@ class MeasuredSurface(_SurfaceFromFile):
     """Trend to remove in addition to the mean height: `none`, the best plane (`tilt`), or the best paraboloid
     (`curvature`) in the least-squares sense. Default: `tilt`, or `none` with `boundary: periodic`."""
     cutoff: Length | None = None
-    """Cut-off wavelength (nesting index) of a Gaussian S-filter (ISO 25178-3, areal filter of ISO 16610-61). The filter
-    weakens short waves: a wave as long as the cut-off keeps half its amplitude. The edges are treated after the filter.
+    """Cut-off wavelength, or nesting index, of a Gaussian S-filter (ISO 25178-3 and ISO 16610-61). The filter weakens
+    short waves: a wave as long as the cut-off keeps half of its amplitude. The edges are treated after the filter.
     The cut-off must be at least 4 pixels. Default: no filter."""
     boundary: Literal["periodic", "window", "mirror", "free"]
     """Treatment of the edges. `periodic`: the unchanged topography repeats. `window`: the heights fall smoothly to the

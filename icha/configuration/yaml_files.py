@@ -84,7 +84,7 @@ class _Loader(yaml.SafeLoader):
     """A YAML loader that refuses repeated keys, and does not read numbers such as 064 as octal numbers."""
 
     def construct_unless_text(self, node, construct):
-        """Convert a scalar to a Python value; if this fails, return the text; the section refuses the text later.
+        """Convert a scalar to a Python value. If this fails, return the text; the section refuses the text later.
 
         Conversion fails for `0b_` (similar to a number), for 30 February (similar to a date), and for integers with
         thousands of digits.

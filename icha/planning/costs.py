@@ -200,7 +200,7 @@ def run_cost(
     seconds *= max(1.0, size.sticky / energy_ratio)
     steps: float = stops
     if legs:
-        # Every contact spot forms and detaches; with adhesion, the path resolves both jumps of each spot.
+        # Every contact spot forms and detaches; with adhesion, the path resolves jump-in and jump-off.
         further = DEFAULT_STEP / max_step
         steps = (1 + legs) / 2 * (120 * further + (40 if adhesive else 0.75) * most)
         seconds *= (1 + legs) / 2 * further
@@ -237,7 +237,7 @@ def derived_cost(rule: str, runs: int, disk: float, values: float = 0.0, *, node
 
     Parameters
     ----------
-    rule : Snakemake rule of the file, which is also the name of the power law in `LAWS`.
+    rule : name of the Snakemake rule of the file, and of the power law in `LAWS`.
     runs : number of runs that the file contains or shows.
     disk : size of the file, bytes.
     values : sum of the `values` of all runs of the campaign, bytes.

@@ -42,7 +42,7 @@ class CampaignFiles:
 
     @property
     def references(self) -> list[str]:
-        """Paths of theories and boundary-element solutions with which runs are compared."""
+        """Paths of theories and boundary-element solutions for comparison with runs."""
         return [*self.theories, *self.solutions, *self.loops]
 
     @property

@@ -192,7 +192,7 @@ def _loops(campaign: xr.DataTree, dataset: xr.Dataset, complete: list[RunLabels]
     if "hysteresis_loss" not in dataset:
         return {"rows": [], "parts": {}, "count": 0}
     runs = {labels: select_run(campaign, labels) for labels in complete}
-    # The path of a run that leaves the range of its model ends before unloading.
+    # If a run leaves the range of its model, the path ends before unloading.
     groups = _ensembles(dataset, [labels for labels, run in runs.items() if "hysteresis_loss" in run])
     rows = [row | _loop([runs[labels] for labels in members]) for row, members in groups[:MOST_ROWS]]
     shown = {name for row in rows for name, share in row["shares"].items() if share}

@@ -69,7 +69,7 @@ def case_of(wildcards):
 
 
 def by_case(value):
-    """Return a function from the wildcards of a run to a value, which `value` computes from the labels of the run.
+    """Return a function that finds the labels of a run by its wildcards, and returns `value` of these labels.
 
     If all runs have the same value, return this value, because Snakemake would call the function for every run.
     """

@@ -118,7 +118,7 @@ function alike(model, change) {
 }
 
 const PREFIXES = [[1, ""], [1e3, "m"], [1e6, "µ"], [1e9, "n"], [1e12, "p"]];
-// Largest unit of length in which the number of a value is at least 1: factor and name.
+// Factor and name of the unit for a length: the largest unit in which the number is at least 1.
 function unitOf(metres) {
   const [factor, prefix] = PREFIXES.find(([each]) => metres * each >= 1) || PREFIXES.at(-1);
   return [factor, `${prefix}m`];
