@@ -17,16 +17,16 @@ if TYPE_CHECKING:
     from icha.surfaces.surface import Surface
 
 
-# Number of cells per wavelength at which a grid resolves the summits of a wave.
+# A grid resolves the summits of a wave if the wave has at least this number of cells.
 RESOLVED_CELLS = 8
 # Number of cells per summit on a surface with RESOLVED_CELLS / 2 cells per shortest wave. Isotropic surfaces have about
 # 0.2 summits in a square with the side of the shortest wavelength.
 LEAST_CELLS_OF_SUMMIT = 80
 # Fewest cells per shortest wave with which boundary elements represent the surface.
 LEAST_CELLS_PER_WAVE = 1.5
-# Ratio of the mean square slopes along two directions, up to which the smaller slope is a rounding error.
+# The smaller of two mean square slopes is a rounding error if it is at most this fraction of the larger slope.
 _NO_SLOPE = 1e-12
-# Wave number, in units of 2 pi/L, above which an integral replaces the sum over the waves.
+# Waves up to this wave number, in units of 2 pi/L, are summed. An integral replaces the sum over shorter waves.
 _DENSE = 64
 
 
@@ -39,7 +39,7 @@ def error_of_cells(cells_per_short_wave: float) -> str:
     """Describe the error of the contact area that boundary elements compute on a coarse grid; "" if it is small.
 
     Contact areas of random surfaces at p* = 1e-3 and 1e-2 were compared with areas on grids four times as fine. The
-    largest errors were 93 %, 23 %, 15 % and 11 % for 1.1 (white noise), 2, 3 and 5 cells per shortest wave.
+    largest errors were 93 % with 1.1 cells per shortest wave (white noise), 23 % with 2, 15 % with 3, 11 % with 5.
     """
     if cells_per_short_wave >= 0.9 * RESOLVED_CELLS:  # estimates from summits have an error of 10 %
         return ""
@@ -70,7 +70,7 @@ def self_affine_integral(order: int, start: float, end: float, roll: float, hurs
 def self_affine_full_contact_energy(
     period: float, rolloff_wavelength: float, short_wavelength: float, hurst: float
 ) -> float:
-    """Compute the elastic energy of full contact of a self-affine surface of rms slope 1, divided by area and E*, m.
+    """Compute the elastic energy of full contact per area and E*, m, for a self-affine surface with rms slope 1.
 
     Lengths are in m. The result equals `Surface.full_contact_energy` of surfaces with the same `SelfAffineSpectrum`,
     but needs no heights. The function sums over the long waves and integrates the spectrum of the short waves.
@@ -90,7 +90,7 @@ def self_affine_full_contact_energy(
 
 
 class SpectralMoments(NamedTuple):
-    """Spectral moments: variances of height (m0, m^2), slope (m2, 1) and curvature (m4, m^-2) of profiles."""
+    """Spectral moments of profiles: variance m0 of height in m^2, m2 of slope, and m4 of curvature in m^-2."""
 
     m0: float
     m2: float

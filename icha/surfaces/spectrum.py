@@ -16,7 +16,7 @@ from icha.support.parallel import blocks, on_cores
 from icha.support.rules import GRID, HURST, LENGTH, SEED, SLOPE
 from icha.surfaces.surface import Surface
 
-# Relative rounding error of wave numbers in units of 2 pi / L. A band that ends at L/lambda_s = 64 excludes |k| = 64.
+# Relative rounding error of wave numbers. Because of this limit, a band that ends at L/lambda_s = 64 excludes |k| = 64.
 _ROUNDING = 1e-9
 
 # Rows or columns to transform at a time.
@@ -81,10 +81,10 @@ class SelfAffineSpectrum:
 
     @cached_property
     def _band(self):
-        """Wave vectors (kx, ky) of one half of the band, and their lengths |k|, in units of 2 pi / L.
+        """Wave vectors (kx, ky) and |k| of half the band, in units of 2 pi / L; and mask of the band.
 
-        The wave vectors are sorted by max(|kx|, |ky|). Therefore each mode gets the same random number on every grid
-        and with every short cut-off: with the same seed, a finer surface has the same long waves, and more short ones.
+        Wave vectors are sorted by max(|kx|, |ky|). Therefore each mode gets the same random number on every grid and
+        with every short cut-off: with the same seed, a finer surface has the same long waves, and more short ones.
         """
         m = math.ceil(self.period / self.short_wavelength)
         kx, ky = np.meshgrid(np.arange(m + 1), np.arange(-m, m + 1))
@@ -119,7 +119,7 @@ class SelfAffineSpectrum:
         ----------
         grid : nodes along a side; fewer than 2 per shortest wavelength raise an error, fewer than 4 cause a warning.
         seed : seed of the random phases, a non-negative integer.
-        amplitudes : "fixed" (each seed has the rms height and slope of the spectrum), or "gaussian" (random ones).
+        amplitudes : "fixed": each seed has the rms height and slope of the spectrum; "gaussian": random amplitudes.
 
         Returns
         -------

@@ -18,13 +18,13 @@ from icha.surfaces.surface import Surface
 # Degree of the spline. A quintic spline reproduces a parabola exactly; the influence of a node falls by a factor of
 # 0.43 per cell. At eight cells per wavelength, the second derivatives of a sine have an error of 4e-4.
 _DEGREE = 5
-# Weights with which the coefficients of five nodes give value, slope and curvature of the spline at the middle node.
+# Weights of the coefficients of five nodes in value, slope and curvature of the spline at the middle node.
 _VALUE = np.array([1.0, 26.0, 66.0, 26.0, 1.0]) / 120
 _SLOPE = np.array([-1.0, -10.0, 0.0, 10.0, 1.0]) / 24
 _CURVATURE = np.array([1.0, 2.0, -6.0, 2.0, 1.0]) / 6
 
-# Quintic B-splines of the six nodes around a point, as polynomials of the distance t of the point from the third node:
-# rows are nodes, columns are powers of t. The first and second derivatives of these polynomials follow.
+# Quintic B-splines of the six nodes around a point: polynomials of t, the distance from the third node to the point.
+# Rows are nodes, columns are powers of t. The first and second derivatives of these polynomials follow.
 _BASIS = np.array(
     [
         [1.0, -5.0, 10.0, -10.0, 5.0, -1.0],
@@ -40,27 +40,27 @@ _BASIS_SLOPE = _BASIS[:, 1:] * np.arange(1, 6)
 _BASIS_CURVATURE = _BASIS_SLOPE[:, 1:] * np.arange(1, 5)
 
 _MAX_NEWTON_STEPS = 30
-# Lengths in cells: last step of a converged search; largest distance of a summit from its node; largest distance at
-# which two summits count as one.
+# Lengths in cells. A search has converged if its last step is at most `_CONVERGED`. A summit lies at most `_FARTHEST`
+# from its start node. Two summits count as one if their distance is at most `_SAME_SUMMIT`.
 _CONVERGED = 1e-9
 _FARTHEST = 1.5
 _SAME_SUMMIT = 1e-3
-# Largest rise of a supported summit above the nodes around it, divided by the rise of a parabola with the same second
-# differences. On smooth random surfaces (H 0.8, six seeds of 128 x 128 nodes) 99.5 % of the summits have a ratio below
-# 0.91 with 12 nodes per shortest wave, 1.09 with 8, 1.16 with 6 and 1.69 with 5; 98 % are below 1.78 with 4 nodes.
+# The nodes support a summit if the ratio of its rise above the nodes to the rise of a parabola with the same second
+# differences is at most this value. On smooth random surfaces (H 0.8, six seeds of 128 x 128 nodes), 99.5 % of the
+# ratios are below 0.91 with 12 nodes per shortest wave, 1.09 with 8, 1.16 with 6, 1.69 with 5; 98 % below 1.78 with 4.
 _MAX_RISE = 1.8
 # Rounding error of a rise, divided by the range of heights.
 _ROUNDING = 1e-9
-# A node counts as flat, as on a plateau, if its curvature is below this fraction of the mean curvature of the surface.
+# A node counts as flat if its curvature, divided by the mean curvature of the surface, is below this value.
 _FLAT = 1e-6
-# Nodes added beyond the edges of a free square; nodes farther away have an influence of 0.43^32 = 2e-12.
+# Nodes added beyond each edge of a free square. Nodes farther away would have an influence of 0.43^32 = 2e-12.
 _MARGIN = 32
-# Number of rows or columns of the grid, and number of points between nodes, in memory at a time.
+# Number of rows or columns of the grid, and number of start nodes or summits, that are processed at a time.
 _LINES = 16
 _POINTS = 4096
-# Asperities represent a surface if two shares are not larger than this value: the share of the load on peaks without a
-# summit, and the share of the summits that the nodes do not support. On smooth random surfaces with at least 5 nodes
-# per shortest wave, both shares are below 0.1 (`tests/surfaces`).
+# Asperities represent a surface if two shares are at most this value: the share of the load that acts on peaks without
+# a summit, and the share of summits that the nodes do not support. On smooth random surfaces with at least 5 nodes per
+# shortest wave, both shares are below 0.1 (`tests/surfaces`).
 MAX_SHARE = 0.1
 
 
@@ -75,7 +75,7 @@ class Asperities:
     radius_of_curvature : (n,) array, 1/sqrt(kappa1 kappa2), the geometric mean of the principal radii of curvature, m.
     period : side of the square, m.
     free : True for a single square on a half-space, False for one cell of a periodic surface.
-    unsupported_height : (m,) array, m, heights of maxima of the spline that the nodes do not support; not asperities.
+    unsupported_height : (k,) array, heights (m) of maxima of the spline that the nodes do not support; no asperities.
     """
 
     position: np.ndarray
@@ -123,8 +123,8 @@ def locate_summits(surface: Surface) -> Asperities:
     every node whose local parabola has its top at most one cell away. ICHA ignores a start node if Newton's method
     converges far from the node, because steps can be very long where a principal curvature is nearly zero.
 
-    The edges of a free square have no maxima, because a crest that crosses an edge has its top outside the square.
-    Point reflection continues the heights at these edges, and only summits between the outermost nodes count.
+    Maxima on the edges of a free square do not count, because a crest that crosses an edge has its top outside the
+    square. Point reflection continues the heights at these edges, and only summits between the outermost nodes count.
 
     The spline rises above the surface near steps, pits, single pixels and plateaus. A maximum is a summit only if the
     nodes around it support its height (`_is_supported`).
@@ -166,9 +166,9 @@ def _is_supported(heights, summit, height):
     """Return whether the nodes around each of k summits support the height of the summit: (k,) bool array.
 
     Along each axis, a parabola through nodes with second difference -d rises at most d/8 above the higher of two
-    neighbouring nodes. The function uses the smaller second difference of the two nodes beside the summit. At the edge
-    of a plateau, only one of the two second differences is large. Source: the limiter `minmod` of A. Suresh and H. T.
-    Huynh, J. Comput. Phys. 136 (1997) 83-99, doi:10.1006/jcph.1997.5745.
+    neighbouring nodes. The function takes the smaller d of the two nodes beside the summit, because only one d is large
+    at the edge of a plateau. Source: the limiter `minmod` of A. Suresh and H. T. Huynh, J. Comput. Phys. 136 (1997)
+    83-99, doi:10.1006/jcph.1997.5745.
     """
     grid = len(heights)
     (row, column), (y, x) = np.floor(summit).astype(int).T, np.mod(np.rint(summit).astype(int), grid).T
@@ -248,7 +248,7 @@ def _nodes_near_summits(coefficients):
 
 
 def _spline(coefficients, at):
-    """Return the spline and its derivatives by y, x, yy, yx and xx at k points: six arrays of shape (k,)."""
+    """Return the spline h and its derivatives h_y, h_x, h_yy, h_yx, h_xx at k points: six (k,) arrays."""
     grid = len(coefficients)
     floor = np.floor(at).astype(int).T
     (ty, tx), nodes = at.T - floor, np.arange(-2, 4)[:, None]
@@ -279,13 +279,13 @@ def _newton_step(gy, gx, hyy, hyx, hxx, flat):
     return concave, determinant, step
 
 
-# Largest value of `paraboloid_departure` with which asperities represent a surface. Random surfaces of 5 to 12 nodes
-# per shortest wave stay below 0.25 at p* = 1e-3 to 0.1, and their contact areas differ from those of boundary elements
-# by less than 25 %. Worn, conical and pyramidal tops have values of 0.31 to 0.9 and areas up to 3 times too small.
+# Asperities represent a surface if `paraboloid_departure` is at most this value. Random surfaces of 5 to 12 nodes per
+# shortest wave stay below 0.25 at p* = 1e-3 to 0.1, and their contact areas differ from those of boundary elements by
+# less than 25 %. Worn, conical and pyramidal tops have values of 0.31 to 0.9 and areas up to 3 times too small.
 LARGEST_DEPARTURE = 0.3
 # Directions around a summit in which the surface is compared with its paraboloid.
 _DIRECTIONS = 16
-# Radius of a spot, in cells, below which the interpolated surface equals the paraboloid of the summit.
+# Within this distance from a summit, in cells, the surface equals the paraboloid. Smaller spots are ignored.
 _SMALLEST_SPOT = 0.25
 # Smallest ratio of the depth around a summit to the depth of its paraboloid; it replaces all smaller ratios.
 _LEAST_DROP = 1e-2
@@ -356,7 +356,7 @@ class SummitCoverage:
 
     @classmethod
     def of(cls, surface: Surface, asperities: Asperities) -> SummitCoverage:
-        """Find the peaks of a surface and the summits near the peaks; the edges of a free square have no peaks."""
+        """Find the peaks of a surface and the summits near the peaks; edge nodes of a free square do not count."""
         heights, grid = surface.heights, surface.grid
 
         def examine(rows):
@@ -378,8 +378,8 @@ class SummitCoverage:
     def uncovered_share(self, separation: float) -> float:
         """Return the share (0 to 1) of the load that acts on peaks without a summit, at a mean separation (m).
 
-        The load on a peak is estimated by Hertz: proportional to (peak height - separation)^(3/2). If no peak is higher
-        than the separation, only the highest peak counts.
+        The load on a peak is estimated with Hertz's law: it is proportional to (peak height - separation)^(3/2). If no
+        peak is higher than the separation, only the highest peak counts.
         """
         load = np.maximum(self.peak_height - separation, 0.0) ** 1.5
         if not load.any():

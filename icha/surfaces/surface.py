@@ -1,7 +1,7 @@
 """A square height map of the rigid rough surface that faces the elastic half-space.
 
-Heights are in metres and positive towards the elastic body. The first axis of an array of heights is y, the second x;
-node (iy, ix) lies at (x, y) = (ix, iy) * spacing.
+Heights are in metres and positive towards the elastic body. The first axis of an array of heights is y, the second is
+x. Node (iy, ix) lies at (x, y) = (ix, iy) * spacing.
 """
 
 from __future__ import annotations
@@ -26,14 +26,14 @@ PERIODIC, FREE = "periodic", "free"
 _STEEPNESS = FloatRange(least=1e-24, most=1e9)
 # Rows or columns that are transformed at a time.
 _LINES = 64
-# Largest number of lines inside a cell at which `edges_fit` compares steps with the step between cells.
+# Largest number of lines inside a cell whose steps `edges_fit` compares with the step between cells.
 _COMPARED_LINES = 256
-# Largest misfit between cells, divided by the largest misfit inside a cell, at which edges fit. The misfit is a step
-# minus the mean of the two steps beside it, rms along a line. Measured ratios are up to 1.3 on periodic surfaces, up to
+# Edges fit if the misfit between cells is at most this value times the largest misfit inside a cell. The misfit is a
+# step minus the mean of the two steps beside it, rms along a line. Measured ratios are up to 1.3 on periodic surfaces,
 # 2.4 on white noise of 8 x 8 nodes, and at least 3.2 on halves of periodic surfaces with 4 nodes per shortest wave.
 _MISFIT = 3.0
-# Largest step between cells, divided by the largest step inside a cell, at which edges fit; steps are rms along a line.
-# The ratio is 1.03 for a symmetric dome, whose opposite edges meet without a step.
+# Edges also fit if the step between cells is at most this value times the largest step inside a cell; steps are rms
+# along a line. The ratio is 1.03 for a symmetric dome, whose opposite edges meet without a step.
 _STEP = 1.1
 MISFIT_OF_EDGES = (
     f"boundary: {PERIODIC!r}, but there is a step at the edges: heights differ much more between opposite edges than "
@@ -58,8 +58,8 @@ class Surface:
     Raises
     ------
     ValueError
-        If the heights are not a square array of at least 8 x 8 finite numbers, or are all the same; if the range of
-        heights divided by the period is not in [1e-24, 1e9]; or if the period or the boundary is invalid.
+        If the heights are not a square array of at least 8 x 8 finite numbers, or are all the same. Also if the range
+        of heights divided by the period is not in [1e-24, 1e9], or if the period or the boundary is invalid.
     """
 
     heights: np.ndarray
@@ -115,8 +115,8 @@ class Surface:
     def by_wave_vector(self, function) -> list:
         """Call `function(k2, count, power)` for blocks of all wave vectors, and return the list of the results.
 
-        Wave vectors are 2 pi/L (kx, ky) with integers kx and ky. k2 is the array of kx^2 + ky^2, and power the array of
-        |h_q|^2 in m^2, 0 for k2 = 0. count is 2 in columns where power is the sum over two opposite wave vectors,
+        Wave vectors are 2 pi/L (kx, ky) with integers kx and ky. k2 is the array of kx^2 + ky^2. power is the array of
+        |h_q|^2 in m^2, with 0 for k2 = 0. count is 2 in columns where power is the sum over two opposite wave vectors,
         else 1. A free square is treated as one cell of a periodic surface.
         """
         n = self.grid
@@ -130,7 +130,7 @@ class Surface:
         def along_y(columns):
             modes = scipy.fft.fft(half[:, columns], axis=0, norm="forward", workers=1)
             power = modes.real**2 + modes.imag**2
-            # Of two opposite wave vectors, only the first column and, on even grids, the last one contain both.
+            # Only the first column and, on even grids, the last column contain both of two opposite wave vectors.
             kx = np.arange(columns.start, columns.stop)
             count = np.where((kx > 0) & (2 * kx < n), 2.0, 1.0)
             power *= count
@@ -146,7 +146,7 @@ class Surface:
         """Sums of |h_q|^2, q^2 |h_q|^2 and q^4 |h_q|^2 over all wave vectors, in m^2, 1 and m^-2.
 
         The sums equal the mean squares of height, of slope |grad h| and of the Laplacian. A free square has no
-        spectrum; a quintic spline gives its mean squares at the nodes.
+        spectrum; a quintic spline gives the mean squares at the nodes.
         """
         if self.free:
             return _mean_squares(self.heights, self.spacing)
@@ -179,7 +179,7 @@ class Surface:
         """Elastic energy of full contact per nominal area, divided by E*: U_full/E* = 1/4 sum q |h_q|^2, m.
 
         In full contact the pressure q E* h_q/2 flattens a wave of amplitude h_q. A free square counts as a quarter of a
-        periodic surface that consists of the square and its mirror images: it has no steps at the edges.
+        periodic surface that consists of the square and its mirror images. This surface has no steps at the edges.
         """
         if not self.free:
             sums = self.by_wave_vector(lambda k2, _, power: float(np.sum(np.sqrt(k2) * power)))

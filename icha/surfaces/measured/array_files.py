@@ -19,9 +19,9 @@ from icha.surfaces.measured.settings import (
     put_y_first,
 )
 
-# Number of copies of an array, as floats, in memory while the array is read.
+# Memory for reading an array: this number of copies of the array, with 8 bytes per number.
 _COPIES = 3
-# Formats without a signature: any file of a certain length fits, so the ending of the file name must name the format.
+# Formats without a signature: any file of a certain length fits, so the file name must have the ending of the format.
 _WITHOUT_SIGNATURE = ("hgt", "nms")
 # Formats that do not identify an instrument. SurfaceTopography reads any text with numbers as `asc`, and then drops
 # fields that are not numbers.
@@ -55,7 +55,7 @@ def _require_room(declared):
 
 
 def read_netcdf(source, settings: Preparation) -> FileContent:
-    """Read heights, unit and size from a netCDF variable: `settings.data`, else one of a usual name or the only map."""
+    """Read a netCDF variable, unit and size: `settings.data`, else `height`, `heights` or `z`, else the only map."""
     import netCDF4
 
     with netCDF4.Dataset(source.path) as file:
@@ -100,7 +100,7 @@ def _side(coordinate, count):
 def read_hdf5(source, settings: Preparation) -> FileContent:
     """Read heights and unit from an HDF5 dataset: `settings.data`, else the only map.
 
-    MATLAB (from version 7.3) stores arrays column by column, so the HDF5 file contains their transpose.
+    HDF5 files from MATLAB (7.3 or later) contain the transpose of each array, because MATLAB stores arrays by column.
     """
     import h5py
 
@@ -126,10 +126,10 @@ def read_hdf5(source, settings: Preparation) -> FileContent:
 
 
 def _unpack(dataset):
-    """Read a dataset with its scale, offset and fill value as in netCDF; missing numbers become nan."""
+    """Read a dataset with the netCDF attributes for scale, offset and fill value; missing numbers become nan."""
     stored, attributes = dataset[...], dataset.attrs
     fills = [each for name in ("_FillValue", "missing_value") for each in np.ravel(attributes.get(name, []))]
-    # The fill value 0 is the default of HDF5, so zeros are heights.
+    # HDF5 uses 0 as the default fill value. Therefore zeros count as heights, not as missing numbers.
     fills += [dataset.fillvalue] if dataset.fillvalue else []
     scale, offset = (float(np.ravel(attributes.get(*each))[0]) for each in (("scale_factor", 1.0), ("add_offset", 0.0)))
     if not fills and (scale, offset) == (1.0, 0.0):
@@ -139,7 +139,7 @@ def _unpack(dataset):
 
 
 def format_of_hdf5(path: Path) -> str | None:
-    """Return the format of an HDF5 file: netCDF-4, instrument (Zygo) or hdf5; None for other files."""
+    """Return the format of an HDF5 file: "netcdf", "hdf5", or "instrument" for Zygo files; None for other files."""
     import h5py
 
     if not h5py.is_hdf5(path):
@@ -166,7 +166,7 @@ def find_maps(shapes: Mapping[Any, tuple[int, ...]]) -> list:
 
 
 def _unit_of(attributes):
-    """Return the unit of a variable in metres, from its attributes; None without a unit of length."""
+    """Return the unit of length (m) in the attributes of a variable; None if the attributes have no unit of length."""
     text = attributes.get("units", attributes.get("unit"))
     if isinstance(text, bytes):
         text = text.decode("utf-8", "replace")
@@ -212,7 +212,7 @@ def read_instrument(file, settings: Preparation) -> FileContent:
 
 
 def _choose_channel(opened, settings):
-    """Return the channel `settings.data` or the default channel, and its name ("" if the file has only one map)."""
+    """Return the channel `settings.data` or the default channel, and the channel's name ("" if only one map)."""
     channels = opened.channels
     names = [channel.name for channel in channels]
     maps = find_maps({k: tuple(channel.nb_grid_pts) for k, channel in enumerate(channels)})

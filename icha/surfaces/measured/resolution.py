@@ -14,10 +14,10 @@ from icha.surfaces.moments import LEAST_CELLS_OF_SUMMIT, RESOLVED_CELLS, cells_p
 from icha.surfaces.summits import Asperities, SummitCoverage, locate_summits
 from icha.surfaces.surface import FREE, PERIODIC, Surface, edges_fit
 
-# A noise floor falls less steeply than q^x, where x is the first value; its last wave number is at least the second
-# value times its first. A self-affine spectrum falls at least as q^-2; the spectrum of uncorrelated noise is flat.
+# Conditions for a noise floor: it falls less steeply than q^_FLOOR_FALLS, and spans a factor of _FLOOR_SPANS in wave
+# number. A self-affine spectrum falls at least as q^-2; the spectrum of uncorrelated noise is flat.
 _FLOOR_FALLS, _FLOOR_SPANS = -1.0, 1.3
-# Power of a noise floor, divided by the largest power, below which the floor is a rounding error.
+# A noise floor counts as a rounding error if its power, divided by the largest power, is below this value.
 _ROUNDING = 1e-20
 # A coarser grid is recommended if it has at most this fraction of the nodes along a side.
 _WORTH = 0.75
@@ -59,12 +59,12 @@ class ScanResolution(PreparedTopography):
 
     @cached_property
     def asperities(self) -> Asperities:
-        """Summits of the prepared surface, supported and unsupported."""
+        """Summits of the prepared surface; `Asperities` explains which summits are unsupported."""
         return locate_summits(self.surface)
 
     @property
     def summits(self) -> int:
-        """Number of summits of the prepared surface, supported or not."""
+        """Number of summits of the prepared surface, including unsupported summits."""
         return len(self.asperities) + len(self.asperities.unsupported_height)
 
     @property
@@ -90,7 +90,7 @@ class ScanResolution(PreparedTopography):
 
     @property
     def advice(self) -> dict[str, float | int]:
-        """Recommended `cutoff` (m) and `grid` that let the grid resolve the surface; empty if none are needed."""
+        """Recommended `cutoff` (m) and `grid` for a grid that resolves the surface; empty if no change is needed."""
         found = {}
         cutoff, pixel = self.cutoff or 0.0, self.measured.spacing
         if self.noise is not None and cutoff < self.noise.wavelength * (1 - 1e-9):
@@ -127,8 +127,8 @@ def examine_scan(path: str | os.PathLike, preparation: Mapping) -> ScanResolutio
 def noise_floor(surface: Surface) -> NoiseFloor | None:
     """Find the noise floor at the end of the radial power spectrum of a surface; None if the spectrum has no floor.
 
-    The floor is the longest tail of the spectrum whose best power law falls less steeply than 1/q. The power of the
-    floor is the geometric mean of the powers in the short-wave half of the tail.
+    The floor is the longest tail of the spectrum in which the best-fitting power law falls less steeply than 1/q. The
+    power of the floor is the geometric mean of the powers in the short-wave half of the tail.
     """
     q, power, edges = radial_power_spectrum(surface)
     log_q, log_power = np.log(q), np.log(np.maximum(power, np.finfo(float).tiny))
@@ -140,7 +140,7 @@ def noise_floor(surface: Surface) -> NoiseFloor | None:
     if floor < _ROUNDING * power.max():
         return None
     above = np.flatnonzero(power > 2 * floor)
-    # Interpolate the logarithm of the power between ring k and the next one. If all is noise, take the longest wave.
+    # Interpolate the logarithm of the power between rings k and k + 1. If all rings are noise, take the longest wave.
     k = above[-1] if len(above) else 0
     limit = q[k]
     if len(above) and k + 1 < len(q):

@@ -24,7 +24,7 @@ READERS = {
     "fourier": read_fourier,
     "instrument": read_instrument,
 }
-# Libraries of the readers, imported before the memory is limited, so that the memory of a library does not count.
+# Libraries of the readers. They are imported before the memory is limited, so their own memory does not count.
 _LIBRARIES = {"netcdf": "netCDF4", "hdf5": "h5py", "instrument": "SurfaceTopography"}
 
 
@@ -61,7 +61,7 @@ class Scan:
 
     @property
     def remark_on_unit(self) -> str:
-        """Remark for messages about lengths of the scan: the assumed unit of coordinates; "" if the unit is known."""
+        """Remark for messages about lengths: the unit that is assumed for coordinates; "" if the unit is known."""
         if self.coordinate_unit is None:
             return ""
         unit = formatting.length(self.coordinate_unit)
@@ -107,13 +107,13 @@ def load_scan(path: Path, settings: Preparation) -> Scan:
     scan = Scan(found.heights.astype(float) * unit, tuple(size), steps, coordinate_unit, format_, found.data)
     if not all(np.isfinite(each) and LENGTH.contains(each) for each in size):
         raise UnfitTopography(
-            "size", f"is {size[0]:g} m by {size[1]:g} m in the file{scan.remark_on_unit}; expected the size here"
+            "size", f"is {size[0]:g} m by {size[1]:g} m in the file{scan.remark_on_unit}; expected the size in this key"
         )
     return scan
 
 
 def read_height_map(path: str | Path, metres_per_unit: float) -> np.ndarray:
-    """Read the heights (ny, nx), m, of a surface of kind `file`; raise UnfitTopography if the file has no heights.
+    """Read the heights (m) of a surface of kind `file`: (ny, nx) array; raise UnfitTopography if there are no heights.
 
     Parameters
     ----------

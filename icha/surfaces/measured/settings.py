@@ -12,7 +12,7 @@ from icha.support.values import conversion_factor
 WINDOW, MIRROR = "window", "mirror"
 # Message for a file of one profile.
 LINE_SCAN = "is a line scan, one profile of {} points; expected a topography, with heights over x and y"
-# Largest difference of coordinates that count as equal, divided by the range of coordinates; numbers may be rounded.
+# Coordinates count as equal if their difference, divided by the range of the coordinates, is at most this value.
 _ROUNDING = 1e-6
 # Largest distance of a coordinate from its grid line, in steps.
 _OFF_GRID = 0.05
@@ -38,14 +38,14 @@ class Preparation:
     data : name of the variable, dataset or channel to read; None if the file has only one, or has a default.
     first_axis : "y" or "x", the first axis of arrays whose dimensions have no names.
     height_unit : unit of the heights, m; None for the unit in the file.
-    lateral_unit : unit of the coordinates, m; None for the unit in the file or, without it, the unit of the heights.
+    lateral_unit : unit of the coordinates, m; None for the unit in the file, else the unit of the heights.
     size : sides (x, y) of the whole scan, m; None for the size in the file.
     touches_first : "high" or "low": points with high or with low numbers touch the elastic body first.
     missing : treatment of points without a height, "refuse" or "fill".
     crop : x, y and side (m) of the square to cut out; None for the largest square in the middle of the scan.
     detrend : trend to remove, "none", "tilt" or "curvature".
     cutoff : nesting index of the S-filter, m; None for no filter.
-    taper : width of the strip at each edge in which the window reduces the heights, divided by the side.
+    taper : width, divided by the side, of the strip at each edge in which the window reduces the heights.
     grid : nodes along a side of the surface; None for the number of nodes of the scan.
     columns : numbers, from 1, of the columns x, y and z of a text file; None if the file has only three columns.
     """
@@ -92,7 +92,7 @@ class FileContent:
 
 
 def put_y_first(heights: np.ndarray, settings: Preparation) -> np.ndarray:
-    """Return the array with y as its first axis; the first axis in the file is a setting."""
+    """Return the array with y as the first axis; `settings.first_axis` is the first axis in the file."""
     return heights.T if settings.first_axis == "x" else heights
 
 

@@ -31,17 +31,17 @@ _TITLE = re.compile(r"([a-z]+)\s*(?:[\[(]\s*([^\])]+?)\s*[\])])?", re.IGNORECASE
 _NAMES_OF_Z = ("z", "h", "height")
 # Relative error of numbers with seven digits, or of single precision.
 _FEW_DIGITS = 1e-6
-# Bytes per node of spectrum, conjugate spectrum, their difference, heights and masks of waves.
+# Bytes per node for the spectrum, the conjugate spectrum, their difference, the heights and the masks of waves.
 _BYTES_OF_NODE = 64
-# Largest difference of amplitudes that should be conjugate, divided by the largest amplitude.
+# Opposite waves count as conjugate if the error, divided by the largest amplitude, is at most this value.
 _CONJUGATE = 1e-4
-# First word of the line with the width of an image that Gwyddion exported, in the languages of its menus. The next line
-# contains the height of the image.
+# Text images from Gwyddion have a line with the width of the image, and then a line with the height. The pattern
+# contains the first word of the line with the width, in the languages of Gwyddion.
 _WIDTH = re.compile(r"^#?\s*(Width|Šířka|Breite|Anchura|Largeur|Larghezza|幅|폭|Largura|Ширина)\s*[:：]\s*(.*)$")
 _NUMBER = r"([-+]?\d+(?:[.,]\d+)?(?:[eE][-+]?\d+)?)"
 # One length or two, such as 12 µm x 12 µm.
 _LENGTHS = re.compile(rf"{_NUMBER}\s*(\S+?)?(?:\s*[x×*]\s*{_NUMBER}\s*(\S+)?)?$")
-# A name; a colon, an equals sign, a delimiter or blanks; and a value.
+# A line of the heading: a name, then a colon, an equals sign, a delimiter or blanks, then a value.
 _ENTRY = re.compile(r"^[#%/\s\"']*([A-Za-z][A-Za-z _./()-]*?)\s*(?:[:=,;\t]\s*|\s+(?=[-+]?\d))(.+?)[\s\"']*$")
 # Names in small letters, without punctuation.
 _SIZES = ("size", "scan size", "scan range", "scan area", "field of view")
@@ -76,7 +76,7 @@ class _Heading:
 
 
 def format_of_text(file: SourceFile) -> str:
-    """Find the format of a text file by its columns; "instrument" for a text of an instrument or without numbers."""
+    """Find the format of a text file from its columns; "instrument" for texts of instruments or without numbers."""
     layout = file.layout
     if layout is not None and _titles(layout):
         return "xyz"
@@ -106,7 +106,7 @@ def read_matrix(file: SourceFile, settings: Preparation) -> FileContent:
 
 
 def _as_instrument_file(file, settings):
-    """Read a text with SurfaceTopography; None if it finds no unit, or if the heights disagree with the numbers."""
+    """Read a text with SurfaceTopography; None if no unit is found, or if the heights disagree with `file.values`."""
     try:
         found = read_instrument(file, settings)
     except Exception:  # SurfaceTopography raises many types of errors for texts of other formats
@@ -209,7 +209,7 @@ def _read_heading(lines: Sequence[str], shape: tuple[int, int], decimal_comma: b
     if commas and not decimal_comma and settings.size is None:
         raise UnfitTopography(
             "size",
-            f"is {commas[0]!r} in the file, where the comma may be a decimal or thousands sign; expected the size here",
+            f"is {commas[0]!r} in the file, where the comma may be decimal or not; expected the size in this key",
         )
     size, coordinates = _size([*([" x ".join(sides)] if sides else []), *sizes], pixels, shape)
     return _Heading(
@@ -264,7 +264,7 @@ def _size(sizes, pixels, shape):
 
 
 def _lengths(text):
-    """Return two lengths x and y from a text, and whether they are in m (False: unknown unit); None without lengths."""
+    """Return lengths x and y from a text, and True if they are in m, else False; None if the text has no lengths."""
     if not (found := _LENGTHS.match(text)):
         return None
     x, y, units = _number(found[1]), _number(found[3] or found[1]), (found[2] or found[4], found[4] or found[2])
@@ -318,7 +318,7 @@ def _not_waves(problem):
 
 
 def _wave_numbers(q, settings):
-    """Return the wave vectors (n, 2) as integer multiples of 2 pi/period; integers in the file are such multiples."""
+    """Return integer wave vectors, (n, 2) array, in units of 2 pi/period; integers in the file have this unit."""
     largest = np.max(np.abs(q))
     if settings.size is not None and settings.size[0] != settings.size[1]:
         raise UnfitTopography("size", "has two different sides, but a Fourier series needs one; expected one length")
@@ -331,7 +331,7 @@ def _wave_numbers(q, settings):
         k = q
     else:
         unit = np.min(np.abs(q)[np.abs(q) > 1e-9 * largest])
-        # The unit from the longest wave has few digits in the file; the unit from the shortest wave has more.
+        # The longest wave has few digits in the file. Therefore the unit is computed from the shortest wave.
         k = np.rint(q * (np.max(np.abs(np.rint(q / unit))) / largest))
         if np.max(np.abs(q * (np.max(np.abs(k)) / largest) - k)) > 0.01:
             raise _not_waves("expected wave vectors that are multiples of the smallest one")

@@ -16,7 +16,7 @@ _MISSING = frozenset(
     "undefined undef #value! #num! #div/0! #null! #ref!".split()
 ) | {"", "no data"}
 _NO_DATA = re.compile(r"\bno data\b", re.IGNORECASE)
-# Remarks begin with #; but Windows writes nan as 1.#IND and 1.#QNAN, and Excel writes errors such as #N/A.
+# A remark begins with #. But Windows writes nan as 1.#IND and 1.#QNAN, and Excel writes errors such as #N/A.
 _REMARK = re.compile(r"(?<!1\.)#(?!N/A|NA\b|VALUE!|NUM!|DIV/0!|NULL!|REF!)", re.IGNORECASE)
 _NAN = re.compile(r"[-+]?(1\.#(ind|qnan|snan)\d*|nan\(.*\))|\*+", re.IGNORECASE)
 # An exponent of double precision in Fortran, such as 1.5D-3.
@@ -120,8 +120,8 @@ def are_decimal_between_blanks(text: str) -> bool:
 def are_halves_of_decimals(rows: list[list[str]]) -> bool:
     """Return whether columns alternate between digits before and digits after decimal commas.
 
-    Digits after a comma have no sign, and their number is the same in all rows of a column. This may also hold for
-    columns of integers. Leading zeros after a comma, or numbers of other lengths before a comma, show decimals.
+    Digits after a comma have no sign, and their number is the same in all rows. Columns of integers may look the same.
+    So the function needs evidence: a leading zero after a comma, or another number of digits before the comma.
     """
     # A row is shorter if its last field is empty.
     width = max(map(len, rows))

@@ -19,17 +19,17 @@ from icha.surfaces.measured.text_lines import (
     strip_remark,
 )
 
-# The first line of numbers must lie within this number of characters, and within this number of lines.
+# The first line of numbers must lie within the first `_BEGINNING` characters and `_LONGEST_HEADING` lines.
 _BEGINNING, _LONGEST_HEADING = 2**20, 1000
-# A line with at least this number of fields, most of them numbers, counts as a damaged row, not as titles of columns.
+# A line is a damaged row, not titles, if it has at least this number of fields, and at least half resemble numbers.
 _FEWEST_FIELDS = 8
-# Largest relative difference of steps that count as equal, if rounding does not cause a larger difference.
+# Steps count as equal if their relative difference is at most this value, or if rounding explains the difference.
 _EQUAL_STEPS = 1e-2
 # Smallest range of coordinates, in units of the last digit.
 _FEWEST_UNITS = 4
-# Limits in `_resembles` for the first three lines of a table. The first two lines differ by at most `_DIFFERENCE` times
-# the difference of the second and third. In addition, at least the fraction `_SAME_SIGN` of the steps has the same sign
-# in the first and second line, or the second and third differ by at most `_SMOOTH` times their heights.
+# Limits in `_resembles` for the first three lines of a table. Lines 1 and 2 differ by at most `_DIFFERENCE` times the
+# difference of lines 2 and 3. In addition, the fraction `_SAME_SIGN` of the steps has the same sign in lines 1 and 2,
+# or lines 2 and 3 differ by at most `_SMOOTH` times their heights.
 _DIFFERENCE, _SAME_SIGN, _SMOOTH = 3, 0.8, 0.2
 # Fewest numbers in a row or column of coordinates.
 _FEWEST_COORDINATES = 8
@@ -228,8 +228,8 @@ def drop_coordinates(values: np.ndarray) -> tuple[np.ndarray, tuple[float, float
     -------
     heights, steps of the coordinates along x and y (None unless the table has both), and a remark on removed parts.
 
-    Raises UnfitTopography if the first row or column seems to contain coordinates in unequal steps, or the last row or
-    column seems to contain coordinates in equal steps.
+    Raises UnfitTopography if a row or column seems to contain coordinates that cannot be removed. These are coordinates
+    with unequal steps in the first row or column, or with equal steps in the last row or column.
     """
     heights, steps = values, {}
     for name in ("row", "column"):

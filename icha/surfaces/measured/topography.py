@@ -29,13 +29,13 @@ from icha.surfaces.surface import FREE, PERIODIC, Surface
 
 # Relative rounding error of the quotient of two lengths.
 _ROUNDING = 1e-9
-# Range of the heights after removal of the trend, divided by the largest height, below which the surface is flat.
+# A surface is flat if the range of prepared heights, divided by the largest height in the file, is at most this value.
 _FLAT = 1e-13
-# Largest relative difference of the two sides of a square pixel.
+# A pixel counts as square if the relative difference of its sides is at most this value.
 SQUARE = 1e-3
 # Standard deviation of the filter, divided by the nesting index: alpha/sqrt(2 pi), alpha = sqrt(ln 2/pi), ISO 16610-61.
 DEVIATION = math.sqrt(math.log(2) / 2) / math.pi
-# Smallest nesting index, in pixels, at which the filter has the transmission of the standard.
+# Smallest nesting index, in pixels. With a smaller index, the filter would not have the transmission of the standard.
 LEAST_PIXELS = 4
 # Distance, in standard deviations, at which the weights of the filter are cut off; the omitted share is 2e-9.
 _REACH = 6
@@ -210,10 +210,10 @@ def _harmonic(heights, missing, *, periodic):
 
 
 def resample_to_square_pixels(scan: Scan, settings: Preparation) -> Scan:
-    """Resample a scan to square pixels, whose side is the shorter side of the original pixels.
+    """Resample a scan to square pixels. Their side is the shorter side of the original pixels.
 
-    Heights along the longer side of the pixels are interpolated by a cosine series. The series keeps all measured waves
-    and their rms slope, and adds no wave shorter than two pixels. This function leaves periodic scans to `treat_edges`.
+    A cosine series interpolates the heights along the longer side of the pixels. The series keeps all measured waves
+    and their rms slope, and adds no wave shorter than two pixels. `treat_edges` resamples periodic scans.
     """
     dx, dy = scan.pixel
     if settings.boundary == PERIODIC or abs(dx / dy - 1) <= SQUARE:
