@@ -7,7 +7,7 @@ erf(alpha r)/r, is summed as a Fourier series with non-uniform FFTs. Each Fourie
 summed over pairs of close points. A point may also have moments of a pressure. The displacement by the k-th moment is
 proportional to the k-th power of the plane Laplacian, applied to 1/r (`icha.half_space.grid_displacement`).
 
-A single square on a free half-space has no images. The square is placed in a periodic cell of twice its side, in which
+A single square on a free half-space has no images. The square is placed in a periodic cell of twice its side. There,
 two points of the square are closer to each other than to any image. Then `icha.half_space.free_square` subtracts the
 displacement by images and counter-pressure. The sum of F/(pi E* r) over the square remains.
 """
@@ -26,7 +26,7 @@ from scipy.special import erf, erfc
 from icha.half_space.free_square import basis, image_field
 from icha.surfaces.square import cell_of, periodic_difference
 
-# Value of alpha r at which both halves of the Ewald sum are cut off, erfc(4.3) = 1.2e-9. Tolerance of the FFTs.
+# Cut-off for alpha r and, in the smooth half, for q/(2 alpha); erfc(4.3) = 1.2e-9. Then the tolerance of the FFTs.
 _CUT = 4.3
 _NUFFT_TOLERANCE = 1e-9
 # The same two values for the approximate sum that linear solves use, erfc(2.75) = 1e-4.
@@ -35,8 +35,8 @@ _LOOSE_NUFFT_TOLERANCE = 1e-4
 # Mean number of points in the near field of a point: first for pairs that are used in many sums, then for one sum only.
 NEIGHBOURS = 60
 NEIGHBOURS_ONCE = 20
-# Distance, in mean spacings of the points, below which the fields of the moments are set constant. The true fields are
-# singular at r = 0, and exact displacements replace the constant values.
+# Within this distance, in mean spacings of the points, the fields of the moments are constant, because the true fields
+# are singular at r = 0. Exact displacements replace the constant values.
 _FLOOR = 0.05
 
 
@@ -57,12 +57,12 @@ def _smooth_kernel(r, alpha):
 
 
 def smooth_mode(q, alpha, contact_modulus, period):
-    """Return the Fourier mode of the smooth half of the displacement by a unit force, at wave number q > 0, m/N."""
+    """Return the Fourier mode of the displacement by a unit force at wave number q > 0: smooth half only, m/N."""
     return 2 / (contact_modulus * q * period**2) * erfc(q / (2 * alpha))
 
 
 def short_mean(alpha, contact_modulus, period):
-    """Return the mean over the cell of the short-ranged half of the displacement by a unit force, m/N."""
+    """Return the mean over the cell of the displacement by a unit force: short-ranged half only, m/N."""
     return 2 / (np.sqrt(np.pi) * contact_modulus * alpha * period**2)
 
 
@@ -84,7 +84,7 @@ class _SmoothSum:
         self._unit = float(green.max())
         self._green = (green / self._unit).astype(self._real)
         self._laplacian = -q2 * self._green
-        # With one thread, the order of summation is fixed, and therefore every bit of the result.
+        # One thread fixes the order of summation, and therefore every bit of the result.
         options = {"eps": tolerance, "nthreads": 1, "upsampfac": 1.25, "dtype": self._dtype.name}
         self._plans = [finufft.Plan(kind, q2.shape, isign=sign, **options) for kind, sign in ((1, -1), (2, 1))]
         self._points = [None, None]
@@ -126,7 +126,7 @@ class Ewald:
     contact_modulus : E*, Pa.
     reach : radius of the near field, in which the short-ranged half is summed, m.
     floor : distance below which the fields of the moments are constant, m.
-    free : True for a free half-space, whose points lie in the quarter [0, period/2]^2 of the cell.
+    free : True for a free half-space; its points lie in the quarter [0, period/2]^2 of the cell.
     """
 
     period: float
@@ -156,7 +156,7 @@ class Ewald:
         return (basis(points[:, 1], self.period), basis(points[:, 0], self.period)) if self.free else None
 
     def image_displacement(self, sources, targets, moments):
-        """Return the displacement (m) at targets by the images of sources, whose `bases` are given."""
+        """Return the displacement (m) at targets by images of sources; both are given by their `bases`."""
         field = image_field(*sources, moments, self.period, self.contact_modulus)
         by, bx = targets
         return np.einsum("ia,ia->i", by @ field, bx)
@@ -185,12 +185,12 @@ class Ewald:
 
     @cached_property
     def mean(self):
-        """Mean of the short-ranged half of the displacement by a unit force, m/N."""
+        """Mean over the cell of the displacement by a unit force: short-ranged half only, m/N."""
         return short_mean(self.alpha, self.contact_modulus, self.period)
 
     @cached_property
     def self_displacement(self):
-        """Smooth half of a point's displacement at r = 0: by a unit force (m/N), by a unit second moment (1/(N m))."""
+        """Displacement of a point by its own unit force, m/N, and unit second moment, 1/(N m): smooth half only."""
         value, laplacian = _smooth_kernel(np.zeros(1), self.alpha)
         scale = 1 / (np.pi * self.contact_modulus)
         return scale * value[0], scale * laplacian[0]

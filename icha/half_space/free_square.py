@@ -1,9 +1,9 @@
 """Single square on a free half-space: removal of the images from a periodic sum.
 
 The square lies in a periodic cell of twice its side. The nearest image of a point is at least one side of the square
-away, so that the displacement by images is smooth. The smooth displacement is interpolated by Lagrange polynomials
-through n Chebyshev nodes along each side; the error falls as 5.8^-n. If the displacement by images is subtracted from
-the periodic sum, the plain sum of 1/r remains.
+away, so that the displacement by images is smooth. Lagrange polynomials through n Chebyshev nodes along each side
+interpolate the smooth displacement; the error falls as 5.8^-n. The periodic sum minus the displacement by images is the
+plain sum of 1/r.
 """
 
 from functools import lru_cache
@@ -43,7 +43,7 @@ def image_field(by, bx, moments, cell: float, contact_modulus: float) -> np.ndar
     Parameters
     ----------
     by, bx : (m, nodes) float, `basis` of the y and x coordinates of the spots.
-    moments : for k = 0, 1, …: (m,) float, integral of p s^(2k) / (4^k k!^2) at distances s from a centre, N m^(2k).
+    moments : (m,) arrays for k = 0, 1, …: integrals of p s^(2k) / (4^k k!^2), s the distance from a centre, N m^(2k).
     cell : period of the sum, m.
     """
     _, _, second = _chebyshev()

@@ -26,19 +26,19 @@ from icha.half_space.free_square import basis, image_field
 from icha.support.parallel import blocks, on_cores
 from icha.surfaces.square import cell_of
 
-# Value of alpha r at which both halves of the Ewald sum are cut off, erfc(4.6) = 8e-11. Tolerance of the FFTs.
+# Cut-off for alpha r and, in the smooth half, for q/(2 alpha); erfc(4.6) = 8e-11. Then the tolerance of the FFTs.
 _CUT = 4.6
 _NUFFT_TOLERANCE = 1e-12
-# Distance from a spot, in contact radii, beyond which four moments represent the spot. The error is then 1e-8 of the
-# displacement at the edge of the spot.
+# Farther from a spot than this distance, in contact radii, four moments represent the spot. The error is then 1e-8 of
+# the displacement at the edge of the spot.
 _WINDOW = 5.0
 _MOMENTS = 4
-# Ratio of the widths of windows of neighbouring groups of spots.
+# Ratio of the window widths of two successive groups of spots.
 _LADDER = math.sqrt(2)
 # Number of nodes in a block of rows. Number of nodes in windows that are evaluated together. Both fit into the cache.
 _BLOCK = 2**19
 _BATCH = 2**15
-# Value of (alpha r)^2 below which the smooth half is computed as a power series. Number of terms of this series.
+# If (alpha r)^2 is below the first value, a power series of `_SERIES_LENGTH` terms gives the smooth half.
 _SERIES_BELOW = 0.25
 _SERIES_LENGTH = 15
 
@@ -97,7 +97,7 @@ class DisplacementField:
         """Return the displacement (m) at the nodes of a range of rows: array of shape (number of rows, grid)."""
         if not len(self.contact_radius):
             return np.zeros((rows.stop - rows.start, self.grid))
-        # If the grid is too coarse for the Fourier series, a finer grid is used, which contains all nodes of the grid.
+        # If the grid is too coarse for the Fourier series, use a finer grid that contains all nodes of the grid.
         finer, half = self._smooth_half
         nodes = np.arange(rows.start, rows.stop) * finer
         w = scipy.fft.irfft(half[nodes], n=finer * self._nodes, axis=1, norm="forward", workers=1)[:, ::finer]
@@ -282,9 +282,9 @@ _SMOOTH_HALF = _smooth_half_table()
 
 
 def windows(centres, reach: float, grid: int, period: float, rows: slice):
-    """Yield the nodes in some rows that lie in squares around `centres`, an (m, 2) array in m.
+    """Yield the nodes that lie in some rows and in squares around `centres`, an (m, 2) array in m.
 
-    The half width of a square is `reach`, m. Some nodes lie a little outside. No node occurs twice for the same centre.
+    The half width of a square is `reach`, m; some nodes lie a little outside. No node occurs twice for the same centre.
 
     Yields
     ------

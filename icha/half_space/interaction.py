@@ -1,8 +1,8 @@
 """Elastic interaction of contact spots: the displacement at each spot by all other spots, the sum in eq. (4).
 
-Within eight radii of a spot, the exact displacement is used. Farther away, moments of the axisymmetric pressure
-represent the spot: force, second moment and fourth moment, whose fields fall as 1/r, 1/r^3 and 1/r^5. The fourth moment
-acts only in the near field of the Ewald sum. Most of the sum depends only on the positions of the spots, and
+Within eight radii of a spot, the exact displacement is used. Farther away, the force, second moment and fourth moment
+of the axisymmetric pressure represent the spot. Their fields fall as 1/r, 1/r^3 and 1/r^5. The fourth moment acts only
+in the near field of the Ewald sum. Most of the sum depends only on the positions of the spots, and
 `icha.half_space.ewald` computes this part once. Only the exact displacements depend on the contact radii.
 """
 
@@ -18,7 +18,7 @@ from icha.asperity.jkr import JKR
 from icha.half_space.ewald import NEIGHBOURS_ONCE, Ewald, PointHalfSpace
 
 # Distances from a spot, in contact radii. Up to the first distance, the exact displacement is used. Beyond the second
-# distance, force and second moment are enough: the error is below 1e-6 of the displacement, and 1e-7 of the approach.
+# distance, force and second moment are enough: the error is below 1e-6 of the displacement and 1e-7 of the approach.
 _WINDOW = 8.0
 _WINDOW_OF_MOMENTS = 16.0
 
@@ -43,7 +43,7 @@ def _find_distant_pairs(tree, position, radius, ewald):
 
 
 def _exact_window(a, ewald):
-    """Return the distance within which the displacement of each spot is exact, m; -1 for spots of radius zero."""
+    """Return the distance within which the displacement by each spot is exact, m; -1 for spots of radius zero."""
     return np.where(a > 0, np.maximum(_WINDOW * a, ewald.floor), -1.0)
 
 
@@ -56,9 +56,9 @@ class Interaction:
     law : law of one spot.
     half_space : half-space with a point at every spot.
     radius_of_curvature : (n,) float, radii of curvature of the spots, m.
-    largest_radius : (n,) float, largest contact radii for which the list of exact pairs is complete, m.
+    largest_radius : (n,) float, m: the list of exact pairs is complete for contact radii up to these values.
     target, source : (k,) int, exact pairs: at the spot `target`, the displacement by the spot `source` is exact.
-    r : (k,) float, distances of these pairs, m.
+    r : (k,) float, distances between the two spots of these pairs, m.
     by_moments : three (k,) arrays, displacements by unit moments of the source; the exact displacements replace them.
     """
 
@@ -97,7 +97,7 @@ class Interaction:
         return self.half_space.displacement(*moments) + np.bincount(self.target, exact, len(a))
 
     def tangent(self, a) -> tuple[Callable, Callable]:
-        """Linearise the displacement at contact radii a, (n,) array in m; ignore changes of spots of radius zero.
+        """Linearise the displacement around contact radii a, (n,) array in m; spots of radius zero do not change.
 
         Return two functions that compute changes of the displacement from changes of the radii, both (n,) arrays in m.
         The first function is exact. The second function has a relative error of about 1e-3 and is several times faster.
@@ -112,7 +112,7 @@ class Interaction:
         counts = np.flatnonzero(present[self.source])
         j, r, target = self.source[counts], self.r[counts], self.target[counts]
         fields = [moment[j] * field[counts] for moment, field in zip(moments, self.by_moments, strict=True)]
-        # Exact derivatives at the pairs, minus derivatives by the forces. The second array subtracts all moments.
+        # Exact derivatives at the pairs, minus the contribution of the forces. The second array subtracts all moments.
         beyond_forces = law.displacement_derivative(r, a[j], R[j]) - fields[0]
         beyond_moments = beyond_forces - fields[1] - fields[2]
 
@@ -141,7 +141,7 @@ def displacement_at(
     points : (n, 2) float, positions of the points, m.
     position : (m, 2) float, centres of the spots, m.
     a, R : (m,) float, contact radii and radii of curvature of the spots, m.
-    ewald : split of the sum, whose `period` and `free` replace the arguments; None for a suitable split.
+    ewald : split of the sum; its `period` and `free` replace the arguments. None: choose a suitable split.
     free : whether the square is on a free half-space, without periodic images.
     """
     if not len(points) or not len(a):
