@@ -36,7 +36,7 @@ def overlapping_pairs(position, a, first, second, r):
 
 
 def disjoint_pairs(pairs):
-    """Select pairs in the given order, without each pair that shares a spot with a pair selected before."""
+    """Select pairs in the given order; skip a pair if one of its spots is already in a selected pair."""
     taken, chosen = set(), []
     for i, j in pairs.tolist():
         if i not in taken and j not in taken:
@@ -61,8 +61,8 @@ def covering_spot(points, position, a, period, larger_than=None):
     ----------
     points : (k, 2) float, positions of the points, m.
     position, a : (m, 2) and (m,) float, centres and contact radii of the spots, m.
-    larger_than : (k,) float, contact radii of the points, m, only if the points are the centres of the spots. Then only
-        a larger spot covers a point; if two spots are equal, the first spot covers the second.
+    larger_than : (k,) float, contact radii of the points, m; given only if the points are the centres of the spots.
+        Then only a larger spot covers a point. If two spots are equal, the first spot covers the second.
     """
     covering = np.full(len(points), -1)
     if not len(points) or not len(position):

@@ -10,7 +10,7 @@ import math
 
 from icha.asperity.material import Material
 
-# Smallest strength number at which nodes jump into contact one at a time. ICHA refuses such a grid.
+# If `strength_number` is this value or larger, nodes jump into contact one at a time. ICHA refuses such a grid.
 MAX_STRENGTH_NUMBER = 0.5
 
 

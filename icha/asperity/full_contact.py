@@ -1,4 +1,4 @@
-"""Energy of full contact, which shows whether a surface is sticky, and pressure at which contact is complete.
+"""Energy of full contact and pressure of complete contact. The energy shows whether a surface is sticky.
 
 In full contact the pressure p(q) = q E* h(q)/2 flattens the wave h(q) of wave number q. Source: B. N. J. Persson and
 E. Tosatti, J. Chem. Phys. 115 (2001) 5597-5610, doi:10.1063/1.1398300.
@@ -19,7 +19,7 @@ def full_contact_energy_ratio(full_contact_energy: float, contact_modulus: float
     """Return the ratio U_full/dgamma of elastic energy of full contact to work of adhesion; infinite without adhesion.
 
     full_contact_energy : U_full/E* of the surface (`icha.surfaces.surface.Surface.full_contact_energy`), m.
-    contact_modulus, surface_energy : E*, Pa, and dgamma, J/m^2.
+    contact_modulus, surface_energy : E* (Pa) and dgamma (J/m^2).
     """
     return full_contact_energy * contact_modulus / surface_energy if surface_energy > 0 else math.inf
 

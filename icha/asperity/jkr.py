@@ -102,9 +102,9 @@ class JKR:
     def jump_in_approach(self, R):
         """Return the approach at which contact forms, (1 - 2.641 mu^(3/7)) epsilon, eq. (3), m; negative for a gap.
 
-        For mu below about 1.06 the formula gives less than the jump-off approach, where no JKR state exists. For very
-        small mu the formula gives more than zero. The result is limited to the interval from the jump-off approach to
-        zero. Without adhesion the result is zero.
+        For Tabor parameters mu below about 1.06, the formula gives less than the jump-off approach, where no JKR state
+        exists. For very small mu, the formula gives more than zero. The result is limited to the interval from the
+        jump-off approach to zero. Without adhesion the result is zero.
         """
         if self.material.surface_energy == 0:
             return np.zeros(np.shape(R))
@@ -118,8 +118,8 @@ class JKR:
     def displacement(self, r, a, R):
         """Return the normal displacement of the half-space at distance r from the centre of the spot, m.
 
-        Outside the spot (r >= a) the displacement is eq. (5), inside it is a^2/(2R) (2 - r^2/a^2) - sqrt(2 pi a
-        gamma/E*). The displacement is zero for a = 0.
+        Outside the spot (r >= a), eq. (5) gives the displacement. Inside, the displacement is a^2/(2R) (2 - r^2/a^2) -
+        sqrt(2 pi a gamma/E*). For a = 0, the displacement is zero.
         """
         r, a = np.asarray(r, float), np.asarray(a, float)
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -138,8 +138,8 @@ class JKR:
     def displacement_derivative(self, r, a, R):
         """Return the derivative of `displacement` with respect to a, for a > 0.
 
-        The adhesive part, sqrt(a)/sqrt(r^2 - a^2), is singular at the edge. Within 2.5 % of the radius from the edge,
-        this part is kept constant. In equilibrium no centre of another spot is so close to the edge.
+        The adhesive part, sqrt(a)/sqrt(r^2 - a^2), is singular at the edge. If r exceeds a by less than 2.5 %, the
+        square root is kept constant. In equilibrium no centre of another spot is so close to the edge.
         """
         outside = r > a
         arc = np.arcsin(np.where(outside, a / np.maximum(r, a), 1.0))
@@ -175,7 +175,7 @@ class JKR:
     def moments(self, a, R, count):
         """Return the integrals of p (r/a)^(2k) over m spots for k = 0 ... count-1: array of shape (m, count), N."""
         order = np.arange(count)
-        # Means of (r/a)^(2k), weighted with Hertz's pressure and with that of the flat punch.
+        # Means of (r/a)^(2k), weighted with Hertz's pressure and with the pressure of the flat punch.
         hertz, punch = 1.5 * beta(order + 1, 1.5), 0.5 * beta(order + 1, 0.5)
         return self.repulsive_force(a, R)[:, None] * hertz - self.adhesive_force(a)[:, None] * punch
 
@@ -206,7 +206,7 @@ class JKR:
         return np.pi * a**2 * s**2, 2 * np.pi * a**2 * (peak * s**3 / 3 - neck * s)
 
     def union(self, a_i, R_i, a_j, R_j):
-        """Return contact radius (m), radius of curvature (m) and position of the centre of the union of two spots.
+        """Return the union of two spots: contact radius (m), radius of curvature (m), and position of the centre.
 
         a^2 = a_i^2 + a_j^2 and R^2 = R_i^2 + R_j^2. The centre is the centroid of the cap volumes pi a^4/(4R). Its
         position is given as a fraction of the distance from the first spot to the second.

@@ -56,7 +56,7 @@ class Material:
 
     @property
     def interface_strength(self) -> float:
-        """Tension at which closed contact opens, Pa: the lower one of theoretical strength and strength with the flaw.
+        """Tension at which closed contact opens, Pa: the smaller of theoretical strength and strength with the flaw.
 
         The flaw, a penny-shaped crack of radius a, grows at the tension sigma = sqrt(pi E* dgamma/(2 a)). Its stress
         intensity K = 2 sigma sqrt(a/pi) then gives the energy release rate K^2/(2 E*) = dgamma, because one of the two
