@@ -27,15 +27,15 @@ _OF = "of.txt"
 
 @dataclass(frozen=True, eq=False)
 class CheckpointedContact:
-    """Contact model that loads an equilibrium from its checkpoint, or solves for it and saves a checkpoint.
+    """Contact model that loads an equilibrium from a checkpoint, or finds the equilibrium and saves a checkpoint.
 
     Attributes
     ----------
     contact : `icha.contact.model.ContactModel`.
     of : text that identifies the contact.
     folder : folder of the checkpoints, one file each.
-    packed : function of a new state and the state before it; it returns arrays by name, to be saved.
-    unpacked : function of these arrays and the state before; it returns the new state.
+    packed : function that converts a new state to named arrays; its second argument is the state before.
+    unpacked : function that converts these arrays to the state; its second argument is the state before.
     """
 
     contact: Any
@@ -46,7 +46,7 @@ class CheckpointedContact:
     _solves: Any = field(default_factory=hashlib.sha256)
 
     def equilibrium(self, state: Any, separation: float, control: Control | None = None, *, let_go: int = 0) -> Any:
-        """Load the equilibrium from its checkpoint, or find it and save it; see `ContactModel.equilibrium`."""
+        """Load an equilibrium from a checkpoint, or find and save the equilibrium; see `ContactModel.equilibrium`."""
         target = control and (control.quantity, float(control.target))
         self._solves.update(repr((float(separation), target, let_go)).encode())
         file = self.folder / f"{self.of}-{self._solves.hexdigest()[:32]}.npz"
@@ -69,7 +69,7 @@ class CheckpointedContact:
 
 
 def prepare_checkpoints(folder: Path, of: str) -> Path:
-    """Remove the folder of checkpoints if it belongs to another contact, create it, and return its path.
+    """Return the folder of checkpoints of a contact; first remove checkpoints of another contact in this folder.
 
     of : text that identifies surface, material, path and code. Raise `OSError` if the folder is not writable.
     """

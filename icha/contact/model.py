@@ -50,7 +50,7 @@ EVENT_KINDS = ("jump_in", "jump_off", "coalescence", "split")
 
 @dataclass(frozen=True, eq=False)
 class Events:
-    """The k events between two equilibria.
+    """The k events (jumps, coalescences and splits) between two equilibria.
 
     Attributes
     ----------
@@ -114,7 +114,7 @@ class ContactModel(Protocol):
     rms_height : rms height h_rms of the surface, the unit of separations, m.
     asperities : summits of the surface; there may be none if the model does not need them.
     area : nominal contact area A0, m^2.
-    largest_area_fraction : contact area, divided by nominal area, above which the model is not valid.
+    largest_area_fraction : the model is not valid if contact area divided by nominal area exceeds this value.
     path_accuracy : accuracy with which a path resolves its events.
     """
 
@@ -139,7 +139,7 @@ class ContactModel(Protocol):
         ----------
         separation : mean separation, or its first guess if there is a `control`, m.
         control : load or area that is prescribed instead of the separation.
-        let_go : number of spots that are made to break contact before the search: those closest to jump-off.
+        let_go : number of spots that break contact before the search; they are the spots closest to jump-off.
         """
 
     def continue_from(self, state: State, before: State) -> State:
@@ -155,7 +155,7 @@ class ContactModel(Protocol):
         """Return the contact area divided by the nominal area."""
 
     def mean_gap(self, state: State) -> float:
-        """Return the mean of the gap in the nominal area, m; on a periodic surface the mean separation."""
+        """Return the mean gap over the nominal area, m; on a periodic surface, this is the mean separation."""
 
     def spot_count(self, state: State) -> int:
         """Return the number of contact spots."""
@@ -164,20 +164,20 @@ class ContactModel(Protocol):
         """Return the contact stiffness -dp/du of the present spots, Pa/m."""
 
     def slope(self, quantity: str, state: State) -> float:
-        """Return the derivative of PRESSURE or AREA_FRACTION by the mean separation as long as no event occurs."""
+        """Return d(quantity)/d(mean separation) while no event occurs; `quantity` is PRESSURE or AREA_FRACTION."""
 
     def stored_energy(self, state: State) -> float:
         """Return elastic energy minus energy of adhesion per nominal area, J/m^2; zero without contact."""
 
     def is_unstable(self, state: State) -> bool:
-        """Return whether a spot is on an unstable branch: its approach grows while the surfaces move apart."""
+        """Return whether a spot is unstable: the approach of the spot grows while the surfaces move apart."""
 
     def observables(self, surface: Surface) -> Observables:
         """Return the object that computes the values that a run records of its states."""
 
 
 class Observables(Protocol):
-    """Values that a run records of a contact, each by the name of a variable in `icha.datasets.variables.run`."""
+    """Values that a run records of a contact. The keys are names of variables in `icha.datasets.variables.run`."""
 
     def of_contact(self) -> dict[str, Any]:
         """Return the values that are the same in all states."""

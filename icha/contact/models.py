@@ -83,7 +83,7 @@ class Model:
     references : publications on the method, separated by "; ".
     module : module whose `contact_of(surface, material)` returns an `icha.contact.model.ContactModel`.
     folder : folder for the runs of this model, with a slash at the end; empty for the default model.
-    variables : variables that only runs of this model have: dimensions, unit, long name and type by name.
+    variables : variables that only runs of this model have; by name: dimensions, unit, long name and type.
     stiffness_error : largest relative error of the contact stiffness.
     by_summits : whether summits represent the surface. If so, spots unite by a rule, which may lose or gain energy.
     by_cells : whether contact is counted in cells of the grid; runs then contain a map of the contact.
@@ -174,5 +174,5 @@ def model_of(attributes: Mapping[str, str]) -> Model:
 
 
 def first_model(models: Iterable[str]) -> str:
-    """Return the one of several models that comes first in `MODELS`, for a figure or text that shows only one."""
+    """Return the model that comes first in `MODELS`, for a figure or text that shows only one of `models`."""
     return min(models, key=list(MODELS).index)
