@@ -14,7 +14,7 @@ LOSSES = ("loss_by_jump_in", "loss_by_jump_off", "loss_by_coalescence", "loss_by
 # Counts of events in a run, in the order of the flags of `event_kind`.
 EVENT_COUNTS = ("jump_in_count", "jump_off_count", "coalescence_count", "split_count")
 
-# A loop must not gain more energy than this, divided by its largest work, even if the error of its work is larger.
+# Largest gain of energy in a loop, divided by the largest work, even if the error of the work is larger.
 LARGEST_UNKNOWN_WORK = 1e-2
 # Largest gain of energy in a loop of boundary elements, divided by the largest work. This value is the error of the
 # losses, because a path limits the error of the work in every step (docs/short_range.md).
@@ -44,7 +44,7 @@ LOOP_CHECKS = {
 
 
 def check_events(run) -> Iterator[tuple]:
-    """Yield the check of the events of a run that continues after its first loading: name, value and limit."""
+    """Yield the check of events, for a run that continues after the first loading: name, value and limit."""
     logged = np.bincount(run["event_kind"], minlength=len(EVENT_COUNTS))
     counted = np.array([int(run[name][-1]) for name in EVENT_COUNTS])
     yield "events", np.abs(logged - counted).sum(), 0
@@ -99,9 +99,9 @@ def _check_losses(run, scale):
 
 
 def count_unshared_separations(run) -> int:
-    """Count the separations of later legs that the first loading does not have.
+    """Count the separations in later legs (unloading, reloading) at which the first loading has no step.
 
-    Each of these separations divides one step of the first loading into two steps of the later leg. The work of each
+    At each of these separations, one step of the first loading becomes two steps of the later leg. The work of each
     step has an error.
     """
     first, later = (np.unique(run["mean_separation"][run["leg"] == 0]), run["mean_separation"][run["leg"] > 0])
@@ -133,9 +133,9 @@ def _event_error_bound(run):
     """Return an upper bound (J/m^2) of the work error due to unknown positions of events within their steps.
 
     The bound of a step is the sum of `event_error` and `integration_error`. The jump of the pressure causes
-    `event_error`. The change of the stiffness causes `integration_error`. The path limits the error of the work of each
-    step, so the total is at most the number of steps times the larger of two energies: EVENT_ERROR_OVER_LOSS times the
-    energy of all jumps, and the model's accuracy of a loss times the sum of all changes of work and loss.
+    `event_error`. The change of the stiffness causes `integration_error`. The path also limits the error of the work of
+    each step to the larger of two energies. The first energy is EVENT_ERROR_OVER_LOSS times the energy of all jumps.
+    The second energy is the model's accuracy of a loss times the sum of all changes of work and loss.
     """
     events = sum(np.diff(run[name]) for name in EVENT_COUNTS) > 0
     events &= np.diff(run["dissipated_by_load_jump"]) == 0  # in a jump at constant load the pressure is constant

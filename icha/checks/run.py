@@ -16,10 +16,10 @@ from icha.path.targets import AREA_FRACTION, BETWEEN
 # Largest error of an equilibrium, in h_rms, and largest relative error of a target.
 RESIDUAL_LIMIT = 1e-8
 TARGET_LIMIT = 1e-8
-# Largest residual of contact edges (fronts) of boundary elements. It converges to 1e-6 or stagnates below this limit.
+# Largest residual of contact edges (fronts) of boundary elements. Residuals reach 1e-6, or stagnate below this limit.
 FRONT_LIMIT = 1e-3
 # Largest decrease of the contact area of boundary elements, divided by the largest area. The position of a front within
-# a cell is less accurate, so the computed area may decrease a little when a front enters another cell.
+# a cell has an error, so the computed area may decrease a little when a front enters another cell.
 CELL_LIMIT = 1e-3
 # Largest rise of the mean separation in a step in which spots unite, in h_rms. After a union, the same load may need a
 # larger separation.
@@ -52,7 +52,7 @@ _CHECKS = LOOP_CHECKS | {
 
 
 def check_run(run: xr.Dataset, subject: str = "") -> tuple[Check, ...]:
-    """Return the results of all checks of a dataset of `icha.simulate`; `subject` is the name of the run."""
+    """Return the results of all checks of a run from `icha.simulate`; `subject` is the name of the run."""
     return check_variables(run.variables, run.attrs, subject)
 
 
@@ -91,12 +91,12 @@ def _check(run: RunArrays) -> Iterator[tuple]:
 
 
 def _check_loading(run) -> Iterator[tuple]:
-    """Yield name, value and limit of the checks of the first loading; later legs may follow other curves."""
+    """Yield name, value and limit of the checks of the first loading; unloading may follow other curves."""
     first = run["leg"] == 0
     names = ("contact_area_fraction", "nominal_pressure", "mean_separation", "step_kind", "coalescence_count")
     loading = {name: run[name][first] for name in names}
     adhesive, height = float(run["surface_energy"]) > 0, float(run["rms_height"])
-    # Two targets of different kinds may be the same state up to the accuracy of the solver.
+    # Two targets of different kinds may lead to the same state, except for the error of the solver.
     limit = CELL_LIMIT if model_of(run.attrs).by_cells else TARGET_LIMIT
     yield "area rises", _largest_fall_in_loading(loading, "contact_area_fraction"), limit
     if not adhesive:
@@ -110,7 +110,7 @@ def _check_loading(run) -> Iterator[tuple]:
 
 
 def _largest_fall_in_loading(loading, name):
-    """Return the largest decrease of a variable between targets or steps, divided by its largest magnitude.
+    """Return the largest decrease of a variable between targets or steps, divided by the largest magnitude.
 
     At the same separation, two spots may carry less load after their union than before. Therefore the variable may
     decrease in a step in which spots unite, but not from one target to the next.
@@ -154,7 +154,7 @@ def _target_error(run):
         error = np.where(of_area, np.maximum(error - cells, 0.0), error)
     # If the target is zero load, the error is relative to the largest load of the run.
     largest = np.array([np.max(np.abs(reached[kind])) for kind in kinds])
-    # With adhesion a load may be a small difference of attraction and repulsion. Both are about as large as the
+    # With adhesion a load may be a small difference of attraction and repulsion. Both forces are about as large as the
     # stiffness times h_rms, and the error of the load is relative to this product.
     gross = np.abs(finite_stiffness(run)) * float(run["rms_height"]) * adhesive
     unit = {"reduced_pressure": scale * float(run["rms_slope"]), "relative_load": scale}
