@@ -41,10 +41,10 @@ class Job(NamedTuple):
     Attributes
     ----------
     rule : name of the rule in the workflow.
-    inputs, outputs : paths in the deposit of the files that the job read and wrote; a job writes at least one file.
+    inputs, outputs : files that the job read and wrote, as paths in the deposit; a job writes at least one file.
     parameters : names and values of the settings of the job.
     description : sentence on what the script does.
-    script : path in the deposit of the script that the job ran.
+    script : script that the job ran, as a path in the deposit.
     """
 
     rule: str
@@ -109,7 +109,7 @@ def _steps(jobs: Sequence[Job]) -> list[Job]:
     maker = {path: job for job in jobs for path in job.outputs}
     # Lists and not sets, because the order must be the same in every process.
     before = {job.outputs: [maker[path].outputs for path in job.inputs if path in maker] for job in jobs}
-    # Place of the last job of each rule, if every job follows the jobs that made its inputs.
+    # Position of the last job of each rule, in an order where every job follows the jobs that made its inputs.
     latest = {maker[outputs[0]].rule: k for k, outputs in enumerate(TopologicalSorter(before).static_order())}
     first = {job.rule: job for job in reversed(jobs)}
     return [first[rule] for rule in sorted(latest, key=latest.get)]

@@ -30,9 +30,9 @@ from icha.support.atomic_files import moving, sync_folder, whole_file
 from icha.support.checksums import is_whole, recorded_hash, sha256_of, stale
 
 _BLOCK = 2**20
-# Time of every file in the zip, the earliest that the format allows, so that the same files give the same zip.
+# All files in the zip have the earliest time that the format allows, so that the same files give the same zip.
 _NO_TIME = (1980, 1, 1, 0, 0, 0)
-# Number in an entry of a zip which states that file permissions are those of Unix.
+# Number for Unix in an entry of a zip; file permissions then have the meaning of Unix.
 _UNIX = 3
 
 
@@ -103,8 +103,8 @@ def refuse_mixed(results: Path, campaign: Campaign, recorded: Mapping[str, str])
     ----------
     results : folder of results of the campaign.
     campaign : configuration of the campaign.
-    recorded : checksums of the parameters of jobs, as recorded by the workflow
-        (`icha.support.checksums.hash_parameters`), by path of the result in `results`.
+    recorded : checksum of the job's parameters (`icha.support.checksums.hash_parameters`) that the workflow has
+        recorded for each result, by path in `results`.
 
     Raises
     ------

@@ -201,7 +201,7 @@ def zenodo_metadata(publication: Publication) -> dict[str, Any]:
 
 
 def read_zenodo_metadata(folder: Path) -> dict[str, Any]:
-    """Read the metadata for Zenodo from a deposit of unknown origin; raise ValueError if they are not a mapping."""
+    """Read the metadata for Zenodo from a deposit of unknown origin; raise ValueError if the content is invalid."""
     try:
         metadata = json.loads(read_text(folder, ZENODO))
     except (ValueError, RecursionError) as error:

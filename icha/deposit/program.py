@@ -26,9 +26,9 @@ from icha.support.program import INSTALLED, is_installed, own_workflow, package_
 
 # Files and folders of the program that computes results. Every file in these folders must be committed.
 PROGRAM = ("Snakefile", "icha/", "workflow/", "profiles/default/")
-# Folder of configurations, which need not be committed, because a deposit contains the configuration that was used.
+# Folder of configurations. They need not be committed, because a deposit contains the configuration that was used.
 _CONFIGURATIONS = "config/"
-# File in the folder of results that lists all package versions with which results of the campaign may have been made.
+# File in the folder of results. It lists all package versions that were installed when results were computed.
 MADE_WITH = "made_with.txt"
 # With this environment, settings of the user or the system do not change what git reads.
 _GIT_ENVIRONMENT = {"GIT_CONFIG_GLOBAL": os.devnull, "GIT_CONFIG_NOSYSTEM": "1", "GIT_NO_REPLACE_OBJECTS": "1"}
@@ -122,7 +122,7 @@ def _git(project: Path, *arguments: str) -> bytes:
 
 
 def _changes(recorded: Mapping[str, str], present: Mapping[str, Path], added: str) -> list[str]:
-    """List changed or missing files of `recorded`, and files that are only in `present`, with the label `added`."""
+    """List changed or missing files of `recorded`, then files that are only in `present` (label `added`)."""
     changed = [
         f"changed: {name}"
         for name, digest in recorded.items()
@@ -134,7 +134,7 @@ def _changes(recorded: Mapping[str, str], present: Mapping[str, Path], added: st
 def _installed_source(packages: Path) -> Source:
     """Return the source of the program that was installed from a wheel into the folder `packages`.
 
-    The revision is the version and a checksum, computed from the list of all files that `sha256sum` prints.
+    The revision contains the version and a checksum: the SHA-256 of the list that `sha256sum` prints for all files.
     """
     installed = next(iter(importlib.metadata.distributions(name="icha", path=[str(packages)])), None)
     if installed is None:

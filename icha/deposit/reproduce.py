@@ -37,7 +37,7 @@ class RerunError(ValueError):
 
 
 def campaign_name(deposit: Path) -> str:
-    """Return the name of the campaign in a deposit; raise `RerunError` if the deposit lacks what a rerun needs."""
+    """Return the name of the campaign in a deposit; raise `RerunError` if files are missing or invalid."""
     for file in (CONFIGURATION, _PYPROJECT, _LOCK):
         if not (deposit / file).is_file():
             raise RerunError(f"the deposit has no {file}, which is necessary to compute the results again")

@@ -13,7 +13,7 @@ from requests.adapters import HTTPAdapter
 from urllib3 import Retry
 
 ZENODO = "https://zenodo.org"
-# Longest times in s to wait for the connection, and for an answer, which takes long after the upload of a large file.
+# Longest times in s to wait: for the connection, then for an answer. The answer to a large upload takes long.
 _TIMEOUT = (20, 900)
 # HTTP statuses of a server that is busy or has failed.
 _FAILING = (429, 500, 502, 503, 504)
@@ -66,8 +66,8 @@ def server_address(address: str) -> str:
     Raises
     ------
     ValueError
-        If `address` is not the address of a server. Also if it begins with http and is not on this machine, because
-        others could then read the token.
+        If `address` is not the address of a server; or if it begins with http, because others could then read the
+        token. A server on this machine may have an address with http.
     """
     parts = urlsplit(address if "//" in address else f"https://{address}")
     plain = not (parts.username or parts.query or parts.fragment) and parts.path.rstrip("/") in ("", "/api")

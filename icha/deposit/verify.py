@@ -1,8 +1,8 @@
 """Verify deposits of unknown origin.
 
-No file is read before names, kinds and sizes of all files have been inspected. A zip is extracted into an empty folder,
-if its size is within limits. Then every file is compared with its checksum in `SHA256SUMS`. No program in a deposit is
-executed.
+A zip is extracted into an empty folder, if its size and number of files are within limits. Names and kinds of all files
+in the folder are inspected before a file is read. Then every file is compared with its checksum in `SHA256SUMS`. No
+program in a deposit is executed.
 """
 
 import contextlib
