@@ -1,7 +1,7 @@
 """Check input files from unknown sources (kind of file, memory for reading, dangerous HDF5 files); read CSV tables.
 
 A small file can declare a very large array, or contain a large array in compressed form. Readers compare the declared
-size with a limit (`require_room`), and limit the memory of the libraries that read the file (`bounded_memory`).
+size with a limit (`require_room`). `bounded_memory` limits the memory of the libraries that read the file.
 """
 
 import csv

@@ -4,7 +4,7 @@ import os
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 
-# Smallest number of nodes along a side of a grid at which several threads save time.
+# Several threads save time if a grid has at least this number of nodes along a side.
 LARGE_GRID = 2048
 
 

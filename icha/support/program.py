@@ -35,7 +35,7 @@ if __name__ == "__main__":
 
 
 def beginning_of(process: int) -> str:
-    """Return the start time of a process, in ticks of the system clock. Number and start time identify a process.
+    """Return the start time of a process, in clock ticks. The number and the start time together identify a process.
 
     Raises FileNotFoundError or ProcessLookupError if the process does not exist.
     """

@@ -6,8 +6,8 @@ import numpy as np
 
 # Probability that the confidence interval contains the mean of infinitely many surfaces.
 CONFIDENCE = 0.95
-# Smallest number of members for which figures show means. With fewer members, the confidence interval is wider than the
-# scatter of the members, so figures show every member.
+# Figures show means if an ensemble has at least this number of members. With fewer members, the confidence interval is
+# wider than the scatter of the members, so figures show every member.
 ENOUGH = 5
 
 
