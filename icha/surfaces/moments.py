@@ -22,7 +22,7 @@ RESOLVED_CELLS = 8
 # Number of cells per summit on a surface with RESOLVED_CELLS / 2 cells per shortest wave. Isotropic surfaces have about
 # 0.2 summits in a square with the side of the shortest wavelength.
 LEAST_CELLS_OF_SUMMIT = 80
-# Fewest cells per shortest wave with which boundary elements represent the surface.
+# Boundary elements represent a surface only if its shortest wave has at least this number of cells.
 LEAST_CELLS_PER_WAVE = 1.5
 # The smaller of two mean square slopes is a rounding error if it is at most this fraction of the larger slope.
 _NO_SLOPE = 1e-12

@@ -16,7 +16,7 @@ from icha.support.parallel import blocks, on_cores
 from icha.support.rules import GRID, HURST, LENGTH, SEED, SLOPE
 from icha.surfaces.surface import Surface
 
-# Relative rounding error of wave numbers. Because of this limit, a band that ends at L/lambda_s = 64 excludes |k| = 64.
+# Relative rounding error of wave numbers. With this tolerance, a band that ends at L/lambda_s = 64 excludes |k| = 64.
 _ROUNDING = 1e-9
 
 # Rows or columns to transform at a time.

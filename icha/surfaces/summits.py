@@ -308,7 +308,7 @@ def paraboloid_departure(
     float, the mean of abs(ln(d / (a^2 / 2R))) over the spots, weighted by their areas. Here d is the mean depth of the
     surface below the summit on the circle of radius a. Near the top of an elongated summit, d follows the arithmetic
     mean of the principal curvatures, not 1/R. The function compares d with both curvatures and returns the smaller
-    result. It returns 0 if no spot is wider than half a cell.
+    result. The result is 0 if no spot is wider than half a cell.
     """
     mode = "mirror" if surface.free else "grid-wrap"
     spline = scipy.ndimage.spline_filter(surface.heights, order=3, mode=mode)

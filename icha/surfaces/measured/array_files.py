@@ -26,7 +26,7 @@ _WITHOUT_SIGNATURE = ("hgt", "nms")
 # Formats that do not identify an instrument. SurfaceTopography reads any text with numbers as `asc`, and then drops
 # fields that are not numbers.
 _OF_ANY_TEXT = ("asc", *_WITHOUT_SIGNATURE)
-# Formats with several arrays, none of which is the default.
+# Formats with several arrays and no default array.
 _ARRAYS = ("mat", "npz")
 _UNKNOWN = (
     "cannot be read as instrument: the file is damaged, or its format is not known here; expected another `format`, or "
@@ -50,7 +50,7 @@ def _read_variable(variable) -> np.ndarray:
 
 
 def _require_room(declared):
-    """Refuse an array that is too large according to its declared shape, before it is read."""
+    """Raise `TooLarge` if the declared shape of an array needs too much memory; the array is not read."""
     require_room(_COPIES * 8 * math.prod(declared.shape))
 
 

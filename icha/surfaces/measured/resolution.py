@@ -15,7 +15,7 @@ from icha.surfaces.summits import Asperities, SummitCoverage, locate_summits
 from icha.surfaces.surface import FREE, PERIODIC, Surface, edges_fit
 
 # Conditions for a noise floor: it falls less steeply than q^_FLOOR_FALLS, and spans a factor of _FLOOR_SPANS in wave
-# number. A self-affine spectrum falls at least as q^-2; the spectrum of uncorrelated noise is flat.
+# number. A self-affine spectrum falls at least as steeply as q^-2; the spectrum of uncorrelated noise is flat.
 _FLOOR_FALLS, _FLOOR_SPANS = -1.0, 1.3
 # A noise floor counts as a rounding error if its power, divided by the largest power, is below this value.
 _ROUNDING = 1e-20
@@ -45,7 +45,7 @@ class ScanResolution(PreparedTopography):
 
     Attributes
     ----------
-    measured : the square of the scan before filter, treatment of edges and change of grid.
+    measured : square that is cut out of the scan, before filter, treatment of edges and change of grid.
     cutoff : nesting index of the filter, m; None without a filter.
     """
 

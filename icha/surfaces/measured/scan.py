@@ -77,7 +77,7 @@ def load_scan(path: Path, settings: Preparation) -> Scan:
     if unit is None:
         raise UnfitTopography(
             "height_unit",
-            "is missing, and the file does not contain the unit of the heights; expected one such as 'um'",
+            "is missing, and the file does not contain the unit of the heights; expected a unit such as 'um'",
         )
     size, coordinate_unit = settings.size or found.size, None
     if size is None and found.coordinates is not None:

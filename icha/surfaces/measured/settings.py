@@ -14,7 +14,7 @@ WINDOW, MIRROR = "window", "mirror"
 LINE_SCAN = "is a line scan, one profile of {} points; expected a topography, with heights over x and y"
 # Coordinates count as equal if their difference, divided by the range of the coordinates, is at most this value.
 _ROUNDING = 1e-6
-# Largest distance of a coordinate from its grid line, in steps.
+# Largest distance of a coordinate from its grid line, divided by the distance of the grid lines.
 _OFF_GRID = 0.05
 
 
@@ -47,7 +47,7 @@ class Preparation:
     cutoff : nesting index of the S-filter, m; None for no filter.
     taper : width, divided by the side, of the strip at each edge in which the window reduces the heights.
     grid : nodes along a side of the surface; None for the number of nodes of the scan.
-    columns : numbers, from 1, of the columns x, y and z of a text file; None if the file has only three columns.
+    columns : numbers (from 1) of the columns with x, y and z in a text file; None if the file has only three columns.
     """
 
     format: str

@@ -193,7 +193,7 @@ def _mark_missing(heights, heading):
 
 
 def _read_heading(lines: Sequence[str], shape: tuple[int, int], decimal_comma: bool, settings: Preparation) -> _Heading:
-    """Read units, size and missing heights from the heading of a table of this shape (rows, columns).
+    """Read units, size and missing heights from the heading of a table with the given shape (rows, columns).
 
     Raises UnfitTopography if the size in the heading has an ambiguous comma and the settings have no size.
     """
@@ -230,7 +230,7 @@ def _image_sides(lines: Sequence[str]) -> list[str]:
 
 
 def _check_counts(lines: Sequence[str], shapes: Sequence[tuple[int, int]]) -> None:
-    """Raise UnfitTopography unless one of the shapes has the numbers of rows and columns in the heading."""
+    """Raise UnfitTopography unless one of the shapes has the rows and columns that the heading states."""
     entries = _entries(lines)
     for axis, (what, names) in enumerate(_COUNTS.items()):
         counts = [int(entries[name]) for name in names if entries.get(name, "").isdecimal()]
@@ -321,7 +321,7 @@ def _wave_numbers(q, settings):
     """Return integer wave vectors, (n, 2) array, in units of 2 pi/period; integers in the file have this unit."""
     largest = np.max(np.abs(q))
     if settings.size is not None and settings.size[0] != settings.size[1]:
-        raise UnfitTopography("size", "has two different sides, but a Fourier series needs one; expected one length")
+        raise UnfitTopography("size", "has different sides, but a Fourier series needs a square; expected one length")
     if np.all(q == np.rint(q)):
         if settings.size is None:
             raise UnfitTopography(

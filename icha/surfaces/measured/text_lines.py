@@ -19,7 +19,7 @@ _NO_DATA = re.compile(r"\bno data\b", re.IGNORECASE)
 # A remark begins with #. But Windows writes nan as 1.#IND and 1.#QNAN, and Excel writes errors such as #N/A.
 _REMARK = re.compile(r"(?<!1\.)#(?!N/A|NA\b|VALUE!|NUM!|DIV/0!|NULL!|REF!)", re.IGNORECASE)
 _NAN = re.compile(r"[-+]?(1\.#(ind|qnan|snan)\d*|nan\(.*\))|\*+", re.IGNORECASE)
-# An exponent of double precision in Fortran, such as 1.5D-3.
+# A number in double precision, as Fortran writes it, such as 1.5D-3.
 _FORTRAN = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)[dD][-+]?\d+")
 _DECIMAL_COMMA = re.compile(r"[-+]?\d+,\d+([eE][-+]?\d+)?$")
 # A number with three digits after a comma. The comma may be a decimal sign, or it may separate thousands.

@@ -277,7 +277,7 @@ def _resembles(line, others):
 
 
 def _equal_step(line: np.ndarray, *, rounded: bool = True) -> float | None:
-    """Return the step from number to number in a line; None if the steps differ. The first number may be arbitrary.
+    """Return the step from number to number in a line; None if the steps differ, even without the first number.
 
     rounded : True if steps may differ because numbers are rounded to few digits.
     """
