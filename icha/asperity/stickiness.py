@@ -5,7 +5,7 @@ import numpy as np
 from icha.asperity.material import Material
 from icha.surfaces.moments import SpectralMoments
 
-# Contact area divided by load, A E* h'_rms/F, in the limit of small areas, in the theory of Pastewka & Robbins.
+# Reduced contact area divided by load, A E* h'_rms/F, for small areas in the theory of Pastewka & Robbins.
 REPULSIVE_AREA_SLOPE = 2.0
 
 

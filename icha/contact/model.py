@@ -99,7 +99,7 @@ class State(Protocol):
 
 
 def events_between(before: State, after: State) -> Events:
-    """Return the events on the path from one state to a later one."""
+    """Return the events on the path from one state to a later state."""
     return Events.concatenate(after.history[len(before.history) :])
 
 

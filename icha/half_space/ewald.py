@@ -32,7 +32,7 @@ _NUFFT_TOLERANCE = 1e-9
 # The same two values for the approximate sum that linear solves use, erfc(2.75) = 1e-4.
 _LOOSE_CUT = 2.75
 _LOOSE_NUFFT_TOLERANCE = 1e-4
-# Mean number of points in the near field of a point: first for pairs that are used in many sums, then for one sum only.
+# Mean number of points in the near field of a point: for pairs that are used in many sums, and for pairs used once.
 NEIGHBOURS = 60
 NEIGHBOURS_ONCE = 20
 # Within this distance, in mean spacings of the points, the fields of the moments are constant, because the true fields

@@ -15,7 +15,7 @@ from pathlib import Path
 # Number of bytes in a test of free disk space; libraries write about as many bytes at once.
 _PROBE = 2**20
 _ENDING = ".part"
-# Environment variable for programs that an owner starts: the content and the path of the file that records the owner.
+# Environment variable with content and path of the file that records the owner. Started programs inherit the variable.
 _OWNER_VARIABLE = "ICHA_OWNER"
 _moving: Callable[[], AbstractContextManager] = nullcontext
 _SUPERSEDED = "a later call of this campaign owns this result; this job wrote nothing"

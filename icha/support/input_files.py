@@ -1,4 +1,4 @@
-"""Check input files from unknown sources (kind of file, memory for reading, dangerous HDF5 files); read CSV tables.
+"""Check input files from unknown sources: kind of file, memory for reading, dangerous HDF5 files. Read CSV tables.
 
 A small file can declare a very large array, or contain a large array in compressed form. Readers compare the declared
 size with a limit (`require_room`). `bounded_memory` limits the memory of the libraries that read the file.
