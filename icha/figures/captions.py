@@ -1,4 +1,4 @@
-"""Captions of the figures, and sentences with the numbers of runs that are missing in a figure or drawn pale."""
+"""Captions of the figures, and sentences that count missing runs and runs that are drawn pale."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def caption_of(name: str) -> str:
 
 
 def count_runs(campaign: xr.DataTree, studies: Sequence[str]) -> str:
-    """Return sentences for the end of a caption, with the number of missing runs and of runs that are drawn pale.
+    """Count the missing runs and the runs that are drawn pale, in sentences for the end of a caption.
 
     The text is empty if no run is missing and no run is drawn pale.
     """

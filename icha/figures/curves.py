@@ -1,4 +1,4 @@
-"""Curves of a study against load: means over the seeds, boundary elements, unloading, and legends."""
+"""Draw curves of a study against load: means over the seeds, boundary elements, unloading, and a legend."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ _UNLOADING = {"ls": BRANCH_DASHES["unloading"], "lw": 0.7, "zorder": 2.2}
 
 
 def gap_label(data: xr.Dataset) -> str:
-    """Return the axis label of the mean gap; on periodic surfaces, the mean gap equals the mean separation."""
+    """Return the axis label "mean gap", or the label "mean separation" if all surfaces are periodic."""
     return GAP_LABEL if (data["boundary"] == "free").any() else SEPARATION_LABEL
 
 
@@ -51,7 +51,7 @@ class Curve(NamedTuple):
     Attributes
     ----------
     runs : the runs.
-    stops : steps of the runs at the targets of the study, by seed.
+    stops : for each seed, the steps of the run at targets of the study.
     look : arguments of `Axes.plot` for the markers.
     """
 
@@ -66,7 +66,7 @@ class Curves(NamedTuple):
     Attributes
     ----------
     lines : curves of the model that figures of the study show (`shown_model`).
-    crosses : curves of boundary elements, if `lines` are curves of the asperity model; otherwise empty.
+    crosses : curves of boundary elements that are drawn in addition to `lines`; may be empty.
     looks : colours and markers of the lines.
     handles : legend entries by name: materials, surfaces, slopes and models.
     """
@@ -121,7 +121,7 @@ def model_name(dataset: xr.Dataset) -> str:
 
 
 def snapshot_looks(campaign: xr.DataTree, study: str, lines: Sequence[select.Snapshots]) -> tuple[list[dict], Looks]:
-    """Return, for a figure of one snapshot, the arguments of `Axes.plot` for each line, and the `Looks`."""
+    """Return the arguments of `Axes.plot` for each line in a figure of one snapshot, and the `Looks` of the figure."""
     dataset = campaign[study].to_dataset()
     groups = [line.runs for line in lines]
     looks = Looks(campaign, dataset, [group.contact for group in groups])
@@ -145,7 +145,7 @@ def add_snapshot_legend(
     legend_below(figure, handles)
 
 
-# Function that returns load and value of each step of a run.
+# Type of a function that returns the loads and the values of all steps of a run.
 Points = Callable[["xr.Dataset"], tuple[np.ndarray, np.ndarray]]
 
 
@@ -189,7 +189,7 @@ def draw_curves(
 
 
 def _draw_line(axes, line, points):
-    """Draw a single run with markers, or the mean of several seeds at common loads with the scatter of the seeds."""
+    """Draw a single run with markers; for several seeds, draw the mean at common loads and the scatter."""
     from icha.analysis.common_loads import at_common_loads
 
     members, asked = [points(run) for run in line.stops.values()], line.runs.asked
@@ -198,7 +198,7 @@ def _draw_line(axes, line, points):
         if len(load):
             draw_members(axes, load, values, line.look, positive=True, asked=asked)
             return np.tile(load, len(values)), values.ravel()
-    # A single run, or runs that have no mean because they have no load in common.
+    # A single run, or several runs without a mean, because these runs have no load in common.
     for load, values in members:
         axes.plot(load, values, **line.look)
         if len(members) < asked:
@@ -240,5 +240,5 @@ def drop_rounding_errors(values: np.ndarray) -> np.ndarray:
     return values[values > _ROUNDING * values.max(initial=0.0)]
 
 
-# Largest rounding error, divided by the largest value.
+# A value counts as a rounding error if it is at most this fraction of the largest value.
 _ROUNDING = 1e-7

@@ -26,7 +26,7 @@ from icha.support.values import Label, Name, Positive, Problem, Section, Seed, l
 # Stands for the class `icha.configuration.campaign.Campaign`, which modules of this folder must not import.
 Campaign = Any
 _NOT_UNLOADED = "is not unloaded; expected a study with `unload: true`"
-# For each argument of `figure` that is read from files: one path, or a list of paths.
+# Input files by argument of the function `figure`: one path or a list of paths for each argument.
 Inputs = dict[str, str | list[str]]
 
 
@@ -58,7 +58,7 @@ def dataset_and_theories(campaign: Campaign, options: StudyFigure, files: result
 
 
 def dataset_and_model_error(campaign: Campaign, options: ComparedFigure, files: results.ResultFiles) -> Inputs:
-    """Return the paths of the campaign dataset, which determines the colours, and of the model error."""
+    """Return the paths of the model error and of the campaign dataset. The campaign dataset determines the colours."""
     return {"campaign": files.path(results.DATASET), "model_error": files.path(results.MODEL_ERROR)}
 
 
@@ -69,9 +69,9 @@ class Declaration:
     Parameters
     ----------
     description : what the figure shows, in one line, for authors of configurations.
-    options : class of the options; the first line of the docstring is the description in the schema.
-    inputs : function that returns paths of input files; ICHA reads netCDF files before `figure` is called.
-    holds_topography : True if drawing needs memory for arrays of the size of the surface.
+    options : class of the options. The first line of the docstring of the class is the description in the schema.
+    inputs : function that returns paths of input files. `figure` receives netCDF files as datasets, others as paths.
+    holds_topography : True if drawing needs memory for all heights of the surface.
     """
 
     description: str
@@ -121,7 +121,7 @@ class TruthFigure(StudyFigure):
     )
 
     def studies_of(self, campaign: Campaign) -> tuple[str, ...]:
-        """Return the name of the study, and the name of the study with boundary elements if it is another study."""
+        """Return the name of the study and, if different, the name of the study with boundary elements."""
         return tuple(dict.fromkeys(filter(None, (self.study, self.boundary_elements))))
 
     def problems(self, campaign: Campaign) -> Iterator[Problem]:

@@ -45,7 +45,7 @@ def draw_members(axes: Axes, x: np.ndarray, members: np.ndarray, look: dict, *, 
 
 
 def _break_lines(known, *rows):
-    """Interrupt lines with NaN between means over different members; `known` is True where a member has a value."""
+    """Insert NaN between neighbouring means over different members; `known` is True where a member has a value."""
     breaks = 1 + np.flatnonzero((known[:, 1:] != known[:, :-1]).any(axis=0))
     return [np.insert(np.asarray(row, float), breaks, np.nan, axis=-1) for row in rows]
 
@@ -71,10 +71,10 @@ def mark_fewer(
 
 
 def _draw_scatter(axes, x, members, colour, *, positive):
-    """Draw a confidence band, or every member if there are few; the band does not change the limits of the axes."""
+    """Draw a confidence band, or every member if members are few; the band does not change the limits of the axes."""
     over = ensemble(members)
     if over.count.min(initial=len(members)) < ENOUGH:
-        # A single point has no line.
+        # A line with a single point would be invisible.
         look = _SEED_DOT if members.shape[1] == 1 else _SEED_LINE
         for member in members:
             axes.plot(x, np.where(member > 0, member, np.nan) if positive else member, color=colour, **look)
@@ -86,7 +86,7 @@ def _draw_scatter(axes, x, members, colour, *, positive):
 
 
 def join_bins(edges: np.ndarray, contents: np.ndarray, least: float) -> tuple[np.ndarray, np.ndarray]:
-    """Join neighbouring bins until the sum over all members is at least `least` in every bin.
+    """Join neighbouring bins until the content of every bin, summed over all members, is at least `least`.
 
     Empty bins at both ends are left out. The last joined bin also contains the remaining bins.
 
@@ -98,7 +98,7 @@ def join_bins(edges: np.ndarray, contents: np.ndarray, least: float) -> tuple[np
 
     Returns
     -------
-    Edges of the joined bins; content divided by bin width, array of shape (members, joined bins).
+    The edges of the joined bins; and an array of shape (members, joined bins), the content divided by the bin width.
     """
     filled = np.flatnonzero(contents.any(axis=0))
     if not len(filled):
@@ -156,7 +156,7 @@ class Points:
 
     Attributes
     ----------
-    members : (quantities, seeds, k) float, values of every seed; NaN if a point does not have the seed.
+    members : (quantities, seeds, k) float, values of every seed; NaN if a point has no run with the seed.
     same_seeds : True if all points are means over the same seeds.
     asked : (k,) int, number of requested seeds of each point.
     """

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 # All materials share a panel if each material has at most this number of lines.
 _MOST_LINES = 2
-# Points at the same load are drawn side by side, so that no bar hides another. Neighbouring positions have this ratio.
+# Points at the same load are drawn side by side. The positions of two neighbours on the load axis have this ratio.
 _APART = 1.025
 # The load axis extends beyond all loads by the factor _MARGIN. The end of the axis is at least _LEAST_REACH times the
 # middle of the axis, which leaves room for a tick label.
@@ -38,7 +38,7 @@ def draw_errors(
     ----------
     campaign : the campaign dataset; the order of the materials in the dataset determines the colours.
     model_error : the errors of the campaign, from `icha.analysis.model_error.model_error`.
-    study : name of the study; all comparisons of runs of the study are drawn.
+    study : name of the study; the figure shows all errors of this study.
     labels : axis label of each variable, by name of the variable.
     percent : True for relative errors, which are drawn in per cent; False for variables that are never negative.
     """

@@ -93,7 +93,7 @@ def figure(
     ----------
     campaign : the campaign dataset.
     loops : datasets of loading and unloading with boundary elements at finite ranges, if there are any. Only loops on
-        the same topography are shown.
+        the topography of the figure are shown.
     surface, seed : labels of the topography. Default: surface and seed of the first complete run.
     """
     from icha.analysis.model_error import difference_of_contacts
@@ -133,7 +133,7 @@ def figure(
 
 
 def _draw(ax, loop, names, *, turn):
-    """Draw a loop with a marker at pull-off; with `turn`, also draw a marker at the end of the first loading."""
+    """Draw a loop with a marker at pull-off; if `turn` is True, also mark the end of the first loading."""
     run, colour = loop.run, loop.look["color"]
     for branch, leg in select.branches(run):
         ax.plot(*(leg[name] for name in names), ls=BRANCH_DASHES[branch], color=colour, **_LOOP)

@@ -47,12 +47,12 @@ PARTS = {
     "loss_by_load_jump": ("jumps at controlled load", {"fc": "0.85", "hatch": "xxxx"}),
     "loss_unattributed": ("unattributed", {"fc": "white", "hatch": "...."}),
 }
-# A line is fitted only to this number of points or more, because a straight line passes through any two points.
+# Smallest number of points for a fitted line, because a straight line passes through any two points.
 _LEAST_POINTS = 3
 _FIT_POINTS = 100
-# The axes are logarithmic if the ratio of the largest to the smallest value exceeds this number, for both axes.
+# Both axes are logarithmic if, on each axis, the ratio of the largest to the smallest value exceeds this number.
 _SPAN = 30.0
-# A part of the loss has an entry in the legend if it is at least this fraction of the sum of all parts.
+# A part of the loss is drawn if the magnitude of its share is at least this number in one bar or more.
 _LEAST_SHARE = 1e-6
 # Opacity of the bars of runs for which the asperity model is not applicable.
 _PALE = 0.35
@@ -127,7 +127,7 @@ def shares(line: Sequence[ContactRuns]) -> dict[str, float]:
 
 
 def _draw_parts(ax, runs, looks):
-    """Draw the parts of the loss of every line as a stacked bar; return the names of the parts that are not zero."""
+    """Draw the parts of the loss of every line as a stacked bar; return the names of the drawn parts."""
     bars = {key: shares(line) for key, line in runs.items()}
     shown = [name for name in PARTS if any(abs(bar[name]) >= _LEAST_SHARE for bar in bars.values())]
     for position, ((contact, applicable), bar) in enumerate(bars.items()):

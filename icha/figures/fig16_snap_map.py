@@ -40,16 +40,16 @@ DECLARATION = Declaration(
 
 
 _RED = (0.9, 0.0, 0.05)
-# For each kind of event: name in the legend, branch whose events the map shows, and look of the marks. Marks are black
-# if spots form or unite, and red if spots break or separate. Other colours stand for materials.
+# Each kind of event has a name in the legend, a branch for which the map shows the events, and a look of the marks.
+# Marks are black if spots form or unite, and red if spots break or separate. Other colours stand for materials.
 _KINDS = {
     "jump_in": ("spot formed", "loading", {"marker": "o", "mfc": BLACK, "mec": BLACK}),
     "jump_off": ("spot broken", "unloading", {"marker": "o", "mfc": "none", "mec": _RED}),
     "coalescence": ("union", "loading", {"marker": "D", "mfc": "none", "mec": BLACK}),
     "split": ("union undone", "unloading", {"marker": "+", "mec": _RED}),
 }
-# Size of the marks in points, for up to _FEW events. With more events the marks are smaller, so that the total area
-# of the marks is about the same. The smallest size is _LEAST_SIZE.
+# For up to _FEW events, marks have the size _SIZE, in points. For more events, marks are smaller, so that the total
+# area of all marks remains about the same. No mark is smaller than _LEAST_SIZE.
 _FEW = 60
 _SIZE = 5.0
 _LEAST_SIZE = 1.6
@@ -118,7 +118,7 @@ def _draw_counts(ax, events):
 
 
 def _events(run):
-    """Return kind, branch, position in m and separation u/h_rms of events in the first loading and last unloading."""
+    """Return kind, branch, position (m) and separation u/h_rms of the events in first loading and last unloading."""
     steps = run["event_step"].values.astype(int)
     leg = run["leg"].sel(step=steps).values
     shown = (leg == 0) | (leg == unloading_legs(run)[-1]["leg"].values[-1])

@@ -73,6 +73,6 @@ def figure(*, tabor_parameter: float = 3.0) -> Figure:
 
 
 def _arrow(ax, x, start, end, colour):
-    """Draw an arrow head in the middle of a jump, a vertical line at x."""
+    """Draw an arrow head in the middle of a jump; the jump is a vertical line at x."""
     tail, tip = ((x, start + share * (end - start)) for share in (0.45, 0.55))
     ax.annotate("", tip, tail, arrowprops={"arrowstyle": "-|>", "color": colour, "shrinkA": 0, "shrinkB": 0})

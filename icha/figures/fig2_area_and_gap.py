@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 
 def inputs(campaign: Campaign, options: StudyFigure, files: results.ResultFiles) -> Inputs:
-    """Return the paths of the campaign dataset, the theories, and the model error if the study has finite ranges."""
+    """Return the paths of dataset and theories; add the model error if the study has solutions at a finite range."""
     found = dataset_and_theories(campaign, options, files)
     if is_solved_at_finite_range(campaign, options.study):
         found["model_error"] = files.path(results.MODEL_ERROR)
@@ -43,11 +43,11 @@ DECLARATION = Declaration(
     inputs=inputs,
 )
 
-# Height of the lower panels, which show differences, divided by the height of the upper panels.
+# Height of the lower panels divided by the height of the upper panels. The lower panels show differences.
 _LOWER = 0.42
 # Loads of two models count as equal up to this relative difference, because each model has its own load tolerance.
 _SAME_LOAD = 1e-6
-# Ticks of the separation axis if the axis spans less than two decades.
+# Ticks of the separation axis, if the ratio of the ends of this axis is less than 60.
 _SEPARATIONS = (0.05, 0.1, 0.2, 0.3, 0.5, 0.7, 1, 1.5, 2, 3, 5)
 # Each entry has two parts: the function that returns the points of a run, and the symbol of the quantity.
 _QUANTITIES = ((curves.area_points, "A"), (curves.gap_points, r"\bar{u}"))
@@ -69,7 +69,7 @@ def figure(
     if solved := _finite_range_curves(model_error, study, shown.looks):
         shown.crosses.extend(solved)
         shown.handles[FINITE_RANGE] = model_handle(FINITE_RANGE, ms=8)
-    # Solutions at a finite range are only bounds. If there are solutions in the limit of a short range, these are used.
+    # Solutions in the limit of a short range are preferred, because solutions at a finite range are only bounds.
     truths = {truth.runs.contact: truth for truth in reversed(shown.crosses)}
     compared = [(line, truths[line.runs.contact]) for line in shown.lines if line.runs.contact in truths]
     fig, axes = new_panels(4.5, 2, sharex=True, height_ratios=(1, _LOWER)) if compared else new_panels(3.3)

@@ -64,8 +64,8 @@ def figure(
     ----------
     campaign : the campaign dataset.
     tables : files of measured curves; panel (b) shows only curves with a known rms slope.
-    measurements : for each table, the legend `label`, the `columns` (headings and factors), the `load_unit` (load
-        divided by reduced pressure), the `material` and the `rms_slope`; unknown values are None.
+    measurements : for each table, the values of `label`, `columns` (headings and factors), `load_unit`, `material` and
+        `rms_slope`. The `load_unit` is the load divided by the reduced pressure. Unknown values are None.
     """
     # Open markers do not hide each other where curves coincide.
     curves = study_curves(campaign, study, boundary_elements, mfc="none")

@@ -88,7 +88,7 @@ def _draw_slopes(ax, runs, kind, colours, length):
 
     at = {slope: find_snapshot(run, kind) for slope, run in runs.items()}
     areas = {slope: float(state_of(run, at[slope])["contact_area_fraction"]) for slope, run in runs.items()}
-    # The slopes are drawn in the order of their contact areas, so that the slope with the smallest area is on top.
+    # Slopes with less contact area are drawn on top of slopes with more contact area.
     for order, slope in enumerate(sorted(colours, key=areas.get, reverse=True)):
         run, look = runs[slope], {"facecolor": colours[slope], "edgecolor": "black", "lw": 0.25}
         side, spots = float(run["period"]) * length, spots_of(run, at[slope])
@@ -97,7 +97,7 @@ def _draw_slopes(ax, runs, kind, colours, length):
         if kind == "relative_load":
             draw_spots(ax, circles, zorder=2 + order, **look)
         else:
-            # The spots of all slopes nearly coincide. Each slope fills a sector of the circle, so that all are visible.
+            # The spots of all slopes nearly coincide. Each slope fills a sector of the circle, so that all slopes show.
             share = 360 / len(runs)
             start = 90 + share * list(colours).index(slope)
             ax.add_collection(PatchCollection([Wedge((x, y), r, start, start + share) for x, y, r in circles], **look))

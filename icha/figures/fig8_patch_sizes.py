@@ -82,8 +82,8 @@ def patch_density(areas: Sequence[np.ndarray], nominal_area: float) -> tuple[np.
 
     Returns
     -------
-    Patch areas (k values), and densities of every member, an array of shape (members, k). The number of patches in a
-    bin is density times bin width times nominal area.
+    The patch areas in the middle of k bins, and an array of shape (members, k): the densities of every member. The
+    number of patches in a bin is density times bin width times nominal area.
     """
     pooled = np.sort(np.concatenate(areas))
     if not len(pooled):
@@ -96,7 +96,7 @@ def patch_density(areas: Sequence[np.ndarray], nominal_area: float) -> tuple[np.
 
 
 def patches_above(areas: Sequence[np.ndarray], nominal_area: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return patch areas, and for each member the number of patches with at least this area, per nominal area.
+    """Return patch areas, and for each member the number of patches of at least each area, divided by the nominal area.
 
     The parameter `areas` has the same meaning as in `patch_density`.
     """

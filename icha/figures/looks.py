@@ -39,12 +39,12 @@ BRANCH_DASHES = {"loading": "-", "unloading": (0, (4, 2))}
 # Look of lines of boundary elements in figures that also have lines of the asperity model.
 TRUTH_LINE = {"ls": (0, (3, 2)), "lw": 0.8, "ms": 5, "mew": 0.8, "zorder": 5}
 
-# Largest number of materials, or of surfaces and slopes, with distinct colours. A larger number has graded colours.
+# Colours are distinct for up to this number of materials, or of surfaces and slopes. For more, colours are graded.
 MOST_COLOURS = len(COLOURS)
 # In a figure with more than this number of lines, all lines are thin.
 FEW_LINES = 6
 # Marker sizes in points, and line width divided by marker size. Curves without adhesion are widest, and the curve of
-# each material is narrower than the curve of the previous material. Thus all curves are visible where they coincide.
+# each material is narrower than the curve of the previous material. Thus coinciding curves are all visible.
 _BARE_SIZE, _ADHESIVE_SIZE, _LEAST_SIZE, _NARROWER = 6.0, 4.6, 1.8, 0.75
 _LINE_WIDTH = 0.22
 # End of the range of graded colours (0 dark, 1 bright); brighter colours are invisible on white.
@@ -69,7 +69,7 @@ class Looks:
     campaign : the campaign dataset; the order of the materials in the dataset determines the colours.
     interfaces : modulus, surface energy and range of attraction of the materials.
     contacts : material, surface and rms slope of every line.
-    by_place : True if colours distinguish places instead of materials. Beyond `MOST_COLOURS` places, they always do.
+    by_place : True if colours distinguish places instead of materials; always True for more than `MOST_COLOURS` places.
     """
 
     def __init__(
@@ -130,7 +130,7 @@ class Looks:
     def handles(self, **changed: object) -> dict[str, Line2D]:
         """Return the legend entries of materials, surfaces and slopes by name.
 
-        If there are many names, only some have an entry. `changed` are arguments of `Axes.plot` that replace others.
+        If there are many names, only some have an entry. `changed` replaces some arguments of `Axes.plot`.
         """
         material, place = self.materials[0], self.places[0]
         if self.by_place:
@@ -143,7 +143,7 @@ class Looks:
             found = {self.material_name(each): self.look((each, *place)) | changed for each in some_of(self.materials)}
             grey = {"ls": "none", "color": GREY, "mfc": "white", "mew": 0.9, "ms": 5}
             found |= {self.place_name(each): grey | {"marker": marker} for each, marker in self._markers.items()}
-            found.pop("", None)  # in a figure with a single surface and slope, their name is empty
+            found.pop("", None)  # the name is empty if the figure has a single surface and slope
         return {name: legend_handle(**look) for name, look in found.items()}
 
     def material_name(self, material: str) -> str:
@@ -208,7 +208,7 @@ def some_of(names: Sequence) -> list:
 # --- legends ---
 
 FEWER_SEEDS = "crossed out: mean over fewer seeds than requested"
-# Largest number of legend entries for which the legend has the larger font.
+# A legend with more than this number of entries has a smaller font.
 _MANY_NAMES = 12
 _MOST_COLUMNS = 4
 

@@ -86,7 +86,7 @@ def average_blocks(nodes: np.ndarray, most: int = _MOST_CELLS) -> np.ndarray:
 
 
 def wrap_circles(x, y, radius, period: float, boundary: str) -> np.ndarray:
-    """Return all circles and periodic images of circles that overlap the square [0, L)²: columns x, y and radius."""
+    """Return the circles and their periodic images that overlap the square [0, period)²; columns are x, y, radius."""
     steps = (-period, 0.0, period) if boundary == "periodic" else (0.0,)
     shifts = np.array([(dx, dy) for dx in steps for dy in steps])
     centres = np.column_stack([x, y])[:, None, :] + shifts

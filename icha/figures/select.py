@@ -139,7 +139,7 @@ def select_complete_run(campaign: xr.DataTree, labels: RunLabels) -> xr.Dataset:
 
 
 def path_steps(run: xr.Dataset) -> xr.Dataset:
-    """Return the steps of the first loading at targets of the study that are of the most frequent kind."""
+    """Return the steps of the first loading at targets of the study, only for the most frequent kind of target."""
     from icha.datasets.campaign import loading_stops
 
     run = run.isel(step=loading_stops(run).values)
@@ -149,7 +149,7 @@ def path_steps(run: xr.Dataset) -> xr.Dataset:
 
 
 def branches(run: xr.Dataset) -> Iterator[tuple[str, xr.Dataset]]:
-    """Yield branch (loading or unloading) and steps of every leg; the last step of the previous leg comes first."""
+    """Yield branch (loading or unloading) and steps of every leg of a run, from the end of the previous leg on."""
     legs = run["leg"].values
     for leg in np.unique(legs):
         steps = np.flatnonzero(legs == leg)
@@ -223,7 +223,7 @@ def select_errors(model_error: xr.DataTree | None, study: str) -> Iterator[tuple
 
     Yields
     ------
-    Material, surface and rms slope; dataset of the errors, all NaN if the entry lacks this combination.
+    Material, surface and rms slope; and the dataset of the errors, with NaN if the entry lacks this combination.
     """
     for node in model_error.children.values() if model_error is not None else ():
         if node.attrs["study"] != study:
@@ -275,8 +275,8 @@ def select_detached_lines(
 
     Returns
     -------
-    Runs of the points of each line. The key of a line is material, surface and slope, and whether the asperity model is
-    applicable.
+    For each line, the runs at every point. A key has two parts: a tuple of material, surface and slope; and True if the
+    asperity model is applicable.
 
     Raises
     ------
