@@ -46,7 +46,7 @@ def file_attributes(
 
     Parameters
     ----------
-    title, summary : content of the file, in one line and in sentences.
+    title, summary : content of the file, in one line and in full sentences.
     level : one of the processing levels of this module.
     programs : names of the Python packages that computed the content; the installed versions are added.
     sources : names and versions of the programs that computed the content. Default: the installed `programs`.

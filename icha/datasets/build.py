@@ -19,7 +19,7 @@ def build_dataset(table: Table, values: Mapping[str, Any], attrs: Mapping[str, s
     Parameters
     ----------
     table : descriptions of the variables (`icha.datasets.variables`).
-    values : numbers, texts or arrays, by name of each variable of the dataset.
+    values : numbers, texts or arrays, by name of the variable.
     attrs : global attributes.
 
     Raises
@@ -57,7 +57,7 @@ def get_values(thing: Any, *names: str) -> dict[str, Any]:
 def stack_rows(
     table: Table, rows: Sequence[Mapping[str, Any]], dim: str, sizes: Mapping[str, int] = {}
 ) -> dict[str, np.ndarray]:
-    """Stack rows to arrays, for variables with `dim` as first dimension; each row contains the values at one index.
+    """Stack rows to arrays of the variables whose first dimension is `dim`; a row has the values at one index of `dim`.
 
     `sizes` are the sizes of the other dimensions.
     """
@@ -70,7 +70,7 @@ def stack_rows(
 def concatenate_rows(table: Table, rows: Sequence[Mapping[str, Any]], dim: str, instance: str) -> dict[str, np.ndarray]:
     """Concatenate the arrays of all rows along `dim`; the rows may have different numbers of values (ragged dimension).
 
-    The variable `<dim>_<instance>` gives the number of the row to which each value belongs.
+    The variable `<dim>_<instance>` gives the row number of each value.
     """
     index = f"{dim}_{instance}"
     names = [name for name, described in table.items() if described.dims == (dim,) and name != index]

@@ -57,7 +57,7 @@ def run_place(study: xr.Dataset, labels: RunLabels) -> dict[str, int]:
     Raises
     ------
     ValueError
-        If the study does not have the value of a label; the message lists the values that it has.
+        If the study does not have the value of a label; the message lists the values in the study.
     """
     wanted = {label: getattr(labels, label) for label in LABELS}
     try:
@@ -82,7 +82,7 @@ def select_run(tree: xr.DataTree, labels: RunLabels | tuple) -> xr.Dataset:
     Raises
     ------
     ValueError
-        If the campaign does not have the run; the message lists the values of the label that it has.
+        If the campaign does not have the run; the message lists the available values of the label.
     """
     variables, attrs = variables_of_run(tree, labels)
     of_study = tree.children[RunLabels(*labels).study].dataset.coords
@@ -141,10 +141,10 @@ def _ragged_slice(study: xr.Dataset, dim: str, place: tuple[int, ...]) -> slice:
 
 
 def reduced_gap(data: xr.Dataset) -> xr.DataArray:
-    """Return the mean gap divided by the rms height, which figures show as the separation.
+    """Return the ratio of the mean gap to the rms height; figures show this ratio as the separation.
 
-    On a periodic surface, mean gap and mean separation are equal. The mean separation of a free square is measured to
-    the half-space far away. Therefore only the mean gap of a free square can be compared with other surfaces.
+    On a periodic surface, mean gap and mean separation are equal. The mean separation of a free square is the
+    distance to the half-space far away. Therefore only the mean gap can be compared with that of other surfaces.
     """
     gap = (data["mean_gap"] / data["rms_height"]).transpose(*data["reduced_separation"].dims)
     return data["reduced_separation"].where(data["boundary"] != "free", gap)
@@ -161,7 +161,7 @@ def find_snapshot(run: xr.Dataset, kind: str | None = None, target: float | None
     Raises
     ------
     ValueError
-        If the run does not have the snapshot; the message lists the snapshots that it has.
+        If the run does not have the snapshot; the message lists the snapshots of the run.
     """
     snapshots = list(zip(run["snapshot_kind"].values.astype(str), run["snapshot_target"].values, strict=True))
     for k, (found, value) in enumerate(snapshots):

@@ -34,7 +34,7 @@ from icha.datasets.variables.campaign import CAMPAIGN, RAGGED, index_variable
 from icha.datasets.variables.run import FURTHER
 from icha.support.atomic_files import whole_file
 
-# Largest number of runs in a block, and largest number of values of a variable. A block needs some megabytes of memory.
+# A block has at most _RUNS_IN_BLOCK runs and VALUES_IN_BLOCK values of each variable, so it needs some megabytes.
 _RUNS_IN_BLOCK = 256
 VALUES_IN_BLOCK = 2**18
 _VALUES_IN_CHUNK = 2**16
@@ -91,7 +91,7 @@ class Group(NamedTuple):
     Attributes
     ----------
     study : the runs of the study.
-    block : number of neighbouring runs along every label that are written at once.
+    block : for every label, number of neighbouring runs that are written at once.
     columns : variables of the runs, by name.
     ragged : variables along ragged dimensions, by dimension and name.
     known : variables that do not depend on the content of runs, with their values.
@@ -197,7 +197,7 @@ def _block(sizes, along, values):
 
 
 def _why_lacking(study, name):
-    """Return the attribute `missing`, which names models without the variable; {} if all models have the variable."""
+    """Return the attribute `missing`, which names the models without this variable; {} if there are none."""
     owners = [model for model, names in FURTHER.items() if name in names]
     lacking = [model for model in study.known["model"] if owners and model not in owners]
     return {"missing": f"in runs with the model {' or '.join(lacking)}"} if lacking else {}
@@ -217,9 +217,9 @@ def write_campaign(
 
     Parameters
     ----------
-    runs : for each run, a pair: labels (study, model, surface, seed, rms_slope, material), and dataset or path. In the
-        file, names have the order of the design; seeds and slopes are sorted. A run counts as incomplete if it has the
-        attribute `incomplete`, or if it lacks a snapshot that another run of its study has.
+    runs : for each run, its labels (study, model, surface, seed, rms_slope, material), and its dataset or path. Names
+        in the file have the order of the design. Seeds and slopes are sorted. A run counts as incomplete if it has the
+        attribute `incomplete`, or if it lacks a snapshot of another run of the study.
     path : the file to write. A file appears only when it is complete. The same runs give the same bytes.
     design : labels of all runs of the campaign. Default: the labels in `runs`. Other combinations of these labels have
         the status `not_in_design`.
@@ -300,7 +300,7 @@ def _write_ragged(
 ) -> int:
     """Write the values of a run along a ragged dimension, beginning at index `begin`; return the number of values.
 
-    Spots have the order of the snapshots in the file.
+    The spots of a run are sorted by the index of the snapshot in the file.
     """
     found = {name: values[name] for name in variables if name in values}
     count = len(next(iter(found.values()), ()))

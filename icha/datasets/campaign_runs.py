@@ -91,7 +91,7 @@ class Entry(NamedTuple):
 
     @property
     def extent(self) -> tuple[bool, int]:
-        """Sort key: True if the run reached its end, number of steps. A run with the largest key has all variables."""
+        """Sort key: True if the run reached its end; number of steps. A run with the largest key has all variables."""
         return self.status not in _ENDED_EARLY, self.sizes.get("step", 0)
 
 
@@ -329,7 +329,7 @@ def _sizes(entries: list[Entry], dim: str) -> np.ndarray:
 def _snapshots(entries: list[Entry]) -> dict[tuple[bytes, float], int]:
     """Assign a number to each snapshot of a study; kind and target identify a snapshot.
 
-    Runs may reach their targets in different orders: one run a load before an area, another run the area first.
+    Runs may reach their targets in different orders. For example, one run reaches a load before an area, another after.
     """
     longest = max(entries, key=lambda entry: entry.extent)
     known = dict.fromkeys(itertools.chain(longest.snapshots, *(entry.snapshots for entry in entries)))

@@ -1,7 +1,7 @@
 """Write and read datasets as netCDF-4 files, with the conventions that all files of ICHA share.
 
-A file never appears before it is complete. The same values always give the same bytes. All values are finite, except
-values of missing runs and values after the last step of a run.
+A file never appears before it is complete. The same values always give the same bytes. All values are finite,
+except where `write_dataset` allows missing or infinite values.
 
 Files of runs contain many small variables. The netCDF library is slow if a program alternates between defining and
 writing variables. Therefore ICHA defines all variables before it writes the first one.
@@ -33,8 +33,8 @@ TEXT = {"_Encoding": "utf-8"}
 def write_dataset(data: xr.Dataset | xr.DataTree, path: str | os.PathLike) -> None:
     """Write a dataset or a tree of datasets to the netCDF-4 file `path`.
 
-    Missing values are written as the `_FillValue` of the variable. Missing values are allowed in runs whose `status` is
-    not complete, after the last step of a run (`step_count`), and in variables with the attribute `missing`.
+    Missing values are written as `_FillValue`. Values may be missing in runs whose `status` is not complete, after the
+    last step of a run, and in variables with the attribute `missing`. The attribute `infinite` allows infinite values.
 
     Raises
     ------
@@ -97,7 +97,7 @@ def _refuse_values_not_finite(dataset: xr.Dataset, where: str) -> None:
         if "missing" in variable.attrs:
             bad &= ~np.isnan(variable.values)
         if excused is not None and set(variable.dims) & set(excused.dims):
-            # A value that several runs share may be missing if all these runs are incomplete or missing.
+            # A value for several runs may be missing if all these runs are incomplete or missing.
             may_lack = excused.all([dim for dim in excused.dims if dim not in variable.dims]).variable
             if "step" in variable.dims:
                 may_lack = may_lack | (dataset["step"] >= dataset["step_count"]).variable
@@ -231,7 +231,7 @@ def coordinates_of(
     ----------
     variables : all variables of a group, by name. Bounds of coordinates do not get the attribute.
     coordinates : names of the variables that are coordinates.
-    dims : dimensions in the file by name of variable, if they differ from those in `variables`.
+    dims : dimensions in the file by name of the variable, only for dimensions that differ from `variables`.
     """
     dims = {name: variable.dims for name, variable in variables.items()} | dict(dims)
     without = {*coordinates, *(variable.attrs.get("bounds") for variable in variables.values())}

@@ -43,7 +43,7 @@ class UnknownFile(ValueError):
     """A file that ICHA does not write, or that is not a readable netCDF file."""
 
 
-# Variables of a study: variables that list the runs, and variables along the steps of every run.
+# Variables of a study: first those that list the runs, then those along the steps of every run.
 _STUDY = {name: CAMPAIGN_TABLE[name] for name in ("status", "step_count", "failure")} | {
     name: each._replace(dims=(*LABELS, "step"))
     for name, each in of_run.RUN.items()
@@ -127,8 +127,8 @@ def _problems_with_run(run: xr.Dataset) -> Iterator[str]:
                 yield f"{name}: the edges do not increase; expected edges in ascending order"
     unit = run["contact_modulus"] * run["rms_slope"]
     for name, expected, formula in (
-        ("reduced_pressure", run["nominal_pressure"] / unit, "nominal_pressure over contact_modulus and rms_slope"),
-        ("reduced_separation", run["mean_separation"] / run["rms_height"], "mean_separation over rms_height"),
+        ("reduced_pressure", run["nominal_pressure"] / unit, "nominal_pressure/(contact_modulus rms_slope)"),
+        ("reduced_separation", run["mean_separation"] / run["rms_height"], "mean_separation/rms_height"),
     ):
         error = abs(run[name] - expected)
         if expected.size and float(error.max()) > _ROUNDING * float(abs(expected).max()):
@@ -139,7 +139,7 @@ def _problems_with_surface(surface: xr.Dataset) -> Iterator[str]:
     problems = list(_problems_with_variables(surface, *SURFACE_TABLES))
     yield from problems
     if not problems and surface["height"].shape != (grid := int(surface["grid"]), grid):
-        yield f"height: has the shape {surface['height'].shape}; expected ({grid}, {grid}), as `grid` is {grid}"
+        yield f"height: has the shape {surface['height'].shape}; expected ({grid}, {grid}), because `grid` is {grid}"
 
 
 def _problems_with_variables(data: xr.Dataset, table: Table, *further: Table) -> Iterator[str]:

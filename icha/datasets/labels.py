@@ -18,7 +18,7 @@ from icha.contact.models import DEFAULT_MODEL, MODELS
 if TYPE_CHECKING:
     import xarray as xr
 
-# Patterns of paths inside the folder for a kind of file, without file extension. Fields stand in braces.
+# Patterns of paths in the folder of a kind of file, without file extension. Fields stand in braces.
 RUN = "{study}/{surface}/seed{seed}/slope{slope}/{model_folder}{material}"
 CONTACT = "{entry}/{surface}/seed{seed}/slope{slope}/{material}"
 SOLUTION = CONTACT + "/p{pressure}"
@@ -119,7 +119,7 @@ def number_label(value: float) -> str:
 
 
 def arrange_slopes(pairs: Iterable[tuple[str, float]]) -> np.ndarray:
-    """Arrange rms slopes in ascending order: in one row for all surfaces, or in shorter rows, one for each surface.
+    """Arrange rms slopes in ascending order: in one row for all surfaces or, if shorter, in one row for each surface.
 
     Parameters
     ----------
@@ -127,7 +127,7 @@ def arrange_slopes(pairs: Iterable[tuple[str, float]]) -> np.ndarray:
 
     Returns
     -------
-    Slopes: an array along slope; or an array along surface and slope, with NaN after the last slope of a surface.
+    The slopes in an array of shape (slopes,) or (surfaces, slopes), with NaN after the last slope of a surface.
     """
     found: dict[str, set[float]] = {}
     for surface, slope in pairs:

@@ -30,7 +30,7 @@ LEAST_COMPRESSED = 1024
 # a sixth of the space, and take 13 s for 8192 x 8192 nodes.
 COMPRESSED_SIZES = range(LEAST_COMPRESSED, 2**22)
 COMPRESSION = {"zlib": True, "complevel": 4, "shuffle": True}
-# Arrays of a campaign dataset up to this size in bytes are read as a whole.
+# An array of a campaign dataset is read as a whole if its size in bytes is at most this number.
 LEFT_IN_FILE = 2**26
 
 
@@ -53,7 +53,7 @@ def job_file(path: str, kind: str, ending: str) -> str:
     Parameters
     ----------
     path : path of the file, relative to the folder of results.
-    kind, ending : folder and file extension, `logs` and `.log`, or `benchmarks` and `.jsonl`.
+    kind, ending : folder and file extension: either `logs` and `.log`, or `benchmarks` and `.jsonl`.
     """
     folder, _, rest = path.partition("/")
     # Each kind of reference solution has a folder in `references`; the files of theories are directly in `references`.

@@ -92,7 +92,7 @@ def read_surface(path: str | os.PathLike) -> Surface:
     Raises
     ------
     ValueError
-        If the file cannot be read, lacks heights or period, or has heights that are not finite, not square or flat.
+        If the file cannot be read, lacks heights or period, or has heights that are flat, not square or not finite.
     """
     dataset = read_dataset(path)
     for name in ("height", "period"):
