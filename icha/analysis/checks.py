@@ -91,7 +91,7 @@ def _findings(solution) -> Iterator[Finding]:
     words = "integral of P(u) over u, plus the fraction of nodes in contact, minus 1"
     yield "P(u) complete", complete, IDENTITY_LIMIT, words
     from_pressures = abs(pressures.sum() - area) / max(area, np.finfo(float).tiny)
-    words = "integral of P(p) over p, relative to the fraction of nodes in contact, minus 1"
+    words = "integral of P(p) over p, divided by the fraction of nodes in contact, minus 1"
     yield "area from P(p)", from_pressures, IDENTITY_LIMIT, words
     load = abs(loads.sum() + float(solution["outside_pressure"]) - nominal) / max(np.abs(loads).sum(), target)
     words = "F/A0 minus (integral of p P(p) over p plus mean traction outside contact), divided by mean |p|"
@@ -116,7 +116,7 @@ def describe_failure(check: Check) -> str:
 
 
 def refuse_unknown_failures(checks: Iterable[Check], known: Iterable[str]) -> None:
-    """Raise ValueError if a run failed that is not a known failure, or if a known failure passed all checks."""
+    """Raise ValueError if a run that is not in `known` failed, or if a run in `known` passed all checks."""
     failed = [check for check in checks if not check.passed]
     known = list(known)
     passing = sorted(set(known) - {check.subject for check in failed})

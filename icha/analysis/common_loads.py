@@ -81,7 +81,7 @@ def compare_runs(study: xr.Dataset) -> xr.Dataset:
     - `contact_area_fraction` and `reduced_separation` along the labels of the runs;
     - the mean of both variables over the seeds, the standard deviation, and half the width of the 95 % confidence
       interval (`area_mean`, `area_deviation`, `area_confidence`, `separation_mean`, …; `icha.support.statistics`);
-    - `material_spread`: largest area of all materials divided by the smallest, minus one; `slope_spread` for slopes.
+    - `material_spread`: largest area of all materials divided by the smallest, minus 1; `slope_spread`: by slope.
 
     Incomplete runs (`status`) have no values and do not contribute to means. Runs that left the range of the model have
     values up to the limit of the model. Runs for which the asperity model is not applicable have values, but do not

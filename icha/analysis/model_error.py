@@ -113,7 +113,7 @@ def _short_range_entries(select, runs, origins):
             raise ValueError(f"{labels}: {error}") from None
         origins.setdefault(labels.study, []).extend((run.attrs, truth.attrs))
     for states in entries.values():
-        # Where only other runs of the study have a state at a load, the state of a run is None.
+        # If a run has no state at a load of other runs of the study, its state at this load is None.
         loads = {labels.reduced_pressure for labels in states}
         for place in [labels._replace(reduced_pressure=load) for labels in states for load in loads]:
             states.setdefault(place, None)
@@ -160,7 +160,7 @@ def compare_state(run: xr.Dataset, snapshot: int, solution: xr.Dataset) -> dict[
 
 
 def _compare_stops(labels, run, truth):
-    """Compare the asperity and boundary-element run at each load; None if a state is missing or contact is full."""
+    """Compare an asperity run with boundary elements at each load; None if a state is missing or if contact is full."""
     if difference := difference_of_contacts(run, truth):
         raise ValueError(difference)
     failed = why_no_result(run.attrs) or why_no_result(truth.attrs)
@@ -221,7 +221,7 @@ def _amounts(state, solution):
         if not value > 0:
             raise ValueError(f"the {name} of boundary elements is {value:g}; expected a positive value")
     # At a finite range, attraction also acts outside the area of zero gap. As the range decreases, both the energetic
-    # area and the area of zero gap approach the area of JKR theory. The energetic area approaches it faster.
+    # area and the area of zero gap approach the area of JKR theory. The energetic area is closer to this limit.
     adhesive = float(solution["surface_energy"]) > 0
     raw, energetic = float(solution["contact_area_fraction_raw"]), float(solution["energetic_area_fraction"])
     return {

@@ -34,15 +34,15 @@ VALIDATION = {
 _VALIDATED = "on seven self-affine surfaces, p* from 0.001 to 0.1 (page on validation)"
 
 _RATIO = "full_contact_energy_ratio"
-# Keys of `Case.facts` that may be missing: pressure for complete contact (Pa), strength of the interface with and
-# without a flaw (Pa), largest tension that the grid resolves (Pa), size of the grid cells (m), rms height (m), and
-# largest rms height at which the surface sticks according to the bearing area model (m).
+# Keys of `Case.facts` that may be missing. The first four are in Pa: pressure for complete contact, strength of the
+# interface, strength without flaws, and largest tension that the grid resolves. The other three are in m: size of the
+# grid cells, rms height, and largest rms height at which the surface sticks in the bearing area model.
 COMPLETE, STRENGTH, THEORETICAL = "complete_contact_pressure", "interface_strength", "theoretical_strength"
 RESOLVED, SPACING = "resolved_tension", "spacing"
 RMS_HEIGHT, STICKY_HEIGHT = "rms_height", "sticky_rms_height"
 _OF_FULL_CONTACT = (COMPLETE, STRENGTH, THEORETICAL, RESOLVED)
 
-# Above this fraction of single spots outside the range of Wu's formula, there is a warning. Every surface has some.
+# ICHA warns if a larger fraction of the single-asperity spots than this is outside the range of Wu's formula.
 _FEW = 0.05
 # Largest number of cases that a statement names.
 _MOST_NAMES = 4
@@ -173,8 +173,8 @@ def _full_contact(cases):
         if lowest.facts[STRENGTH] < lowest.facts[THEORETICAL]:
             strength += f" with its flaw, {format_quantity(lowest.facts[THEORETICAL], 'Pa')} without the flaw"
         text += (
-            f"; full contact is complete at about {complete} without adhesion and opens at {opening} (strength of the "
-            f"interface: {strength}){_unresolved_strength(lowest.facts)}"
+            f"; contact is complete at about {complete} without adhesion; full contact opens at {opening} (strength of "
+            f"the interface: {strength}){_unresolved_strength(lowest.facts)}"
         )
     if STICKY_HEIGHT in lowest.facts:
         heights = (format_quantity(lowest.facts[name], "m") for name in (STICKY_HEIGHT, RMS_HEIGHT))
@@ -208,7 +208,7 @@ def _resolution(cases):
         surfaces = join_first(f"{cells:.2g} on {surface}" for surface, cells in few.items())
         text = (
             f"boundary elements have few grid cells per shortest wave ({surfaces}), so the error of areas is "
-            f"{error_of_cells(min(few.values()))}; {RESOLVED_CELLS} recommended"
+            f"{error_of_cells(min(few.values()))}; {RESOLVED_CELLS} cells are recommended"
         )
         yield Statement("grid", text, False)
 
@@ -303,7 +303,7 @@ def describe_sticky(stickiness: Mapping[tuple[str, str], float]) -> list[str]:
 
 
 def _describe_shares(shares):
-    """Describe surfaces and materials with many single spots outside the range of Wu's formula, most spots first."""
+    """Describe surfaces and materials with many single-asperity spots outside Wu's range, largest fraction first."""
     cases = [
         f"{material} on {surface} ({100 * share:.0f} % of single spots)"
         for (surface, material), share in sorted(shares.items(), key=lambda item: -item[1])
@@ -313,9 +313,9 @@ def _describe_shares(shares):
 
 
 def _shares_outside(study):
-    """Return the fraction of single spots outside the range of Wu's formula, by surface and material.
+    """Return the fraction of single-asperity spots outside the range of Wu's formula, by surface and material.
 
-    The fraction is the value at the end of the first loading; of all seeds and slopes, the largest value is used.
+    The fraction is the largest value of all seeds and slopes, at the end of the first loading.
     Materials without adhesion are left out, because their spots do not jump into contact.
     """
     runs = study[["status", "leg", "outside_wu_fraction", "surface_energy"]].sel(model=DEFAULT_MODEL).load()

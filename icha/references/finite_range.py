@@ -38,16 +38,16 @@ from icha.datasets.variables.terms import MATERIAL, ROUGHNESS
 from icha.support.rules import POSITIVE, REFINEMENT, TOLERANCE
 from icha.surfaces.surface import Surface
 
-# Relative error of the minimised energy at which Tamaas stops.
+# Tamaas stops at this relative error of the energy that it minimises.
 DEFAULT_TOLERANCE = 1e-8
-# The search for the mean gap at a load stops at this relative error of the load, or fails after _MAX_SOLVES solutions.
+# The search for the mean gap at a load ends at this relative error of the load. It fails after _MAX_SOLVES solutions.
 LOAD_TOLERANCE = 2e-4
 _MAX_SOLVES = 20
 _MAX_ITERATIONS = 100_000
 # Numbers of iterations between two checks of the gap: while no node is in contact, and while nodes are in contact.
 _OPEN_ITERATIONS, _TOUCHING_ITERATIONS = 50, 1000
-# Lengths in h_rms. Over the distance _DECAY, the load on rough surfaces decreases by about a factor e; this gives the
-# first step of a search. No step is longer than _LONGEST_STEP.
+# Lengths in h_rms. If the mean gap increases by _DECAY, the load on rough surfaces decreases by about a factor e. The
+# first step of a search follows from this decay. No step is longer than _LONGEST_STEP.
 _DECAY, _LONGEST_STEP = 0.4, 0.3
 
 REFERENCES = (
@@ -72,7 +72,7 @@ class NodalState:
     surface : rough surface on the grid of the solution.
     gap : (n, n) float, m.
     traction : (n, n) float, Pa, positive in compression.
-    contact : (n, n) bool, whether the gap is zero.
+    contact : (n, n) bool, True where the gap is zero.
     residual : relative error that the solver reports.
     solves : number of solutions by Tamaas until this state was found.
     """
@@ -135,7 +135,7 @@ def finite_range_solution(
     reduced_pressure : p/(E* h'_rms), positive.
     refinement : number of nodes of the solver per node of the surface, along a side.
     tolerance : relative error at which the solver stops.
-    seed : number that is recorded in the dataset.
+    seed : number that the dataset records.
     progress : function that is called with a line of text for every mean gap of the search.
 
     Returns
@@ -222,7 +222,7 @@ def _solve_nonadhesive(fine, material, pressure, tolerance):
     traction = np.array(solver.model.traction)
     contact = traction > 0
     gap = solver.model.displacement - solver.heights
-    # Tamaas gives the displacement up to a constant.
+    # Tamaas gives the displacement only up to an additive constant.
     gap -= gap[contact].mean()
     return NodalState(fine, gap * solver.unit, traction * material.contact_modulus, contact, residual)
 
@@ -284,13 +284,13 @@ class GapContact:
         return self.solver.require_converged(residual)
 
     def _is_open(self):
-        """Return whether no node is in contact."""
+        """Return True if no node is in contact."""
         return np.min(self.solver.model["gap"]) > 0
 
     def _imbalance(self):
-        """Return the error of a state without contact: largest difference of traction and attraction, in dgamma/rho.
+        """Return the error of a state without contact: the largest difference between traction and attraction.
 
-        Each mode of the traction is E* q/2 times the same mode of the displacement; the mean traction is unknown.
+        The unit is dgamma/rho. The traction is E* q/2 times the displacement for every mode with a wave number q > 0.
         """
         gap, n = np.array(self.solver.model["gap"]), self.fine.grid
         q = np.pi * np.hypot(scipy.fft.fftfreq(n, 1 / n)[:, None], scipy.fft.rfftfreq(n, 1 / n)) / self.fine.period
@@ -319,7 +319,7 @@ def _find_gap_at_load(contact, pressure, separation, progress):
     raise NotSolved(
         f"no mean gap was found at which the contact carries the load: after {len(tried)} attempts the smallest "
         f"relative error of the load is {min(abs(e) for _, e in tried):.2g}; expected at most {LOAD_TOLERANCE:g}. The "
-        f"last mean gap was {tried[-1][0]:.8g} h_rms, with {1 + tried[-1][1]:.6g} times this load"
+        f"last mean gap {tried[-1][0]:.8g} h_rms gave {1 + tried[-1][1]:.6g} times this load"
     )
 
 

@@ -33,10 +33,10 @@ from icha.surfaces.surface import Surface
 _APART = 5.0
 # Mean gap at the start of the loop minus the height of the highest summit, in ranges of attraction.
 _START = 6.0
-# A step is halved, at most _MAX_HALVINGS times, if the error of its work divided by the surface energy exceeds this.
+# A step is halved, at most _MAX_HALVINGS times, if its work error exceeds _WORK_TOLERANCE times the surface energy.
 _WORK_TOLERANCE = 1e-4
 _MAX_HALVINGS = 5
-# The search for the largest load stops at this relative error, or after _MAX_LOAD_SEARCHES attempts (load in a jump).
+# The search for the largest load stops at this relative error or, for a load in a jump, after _MAX_LOAD_SEARCHES tries.
 _LOAD_TOLERANCE = 1e-3
 _MAX_LOAD_SEARCHES = 12
 # A loop with more solutions than this is aborted.
@@ -98,7 +98,7 @@ class _LoopSolver:
         return self.solve(separation - self.fine.heights, separation)
 
     def is_apart(self, state):
-        """Return whether no node is in contact and the attraction is negligible everywhere."""
+        """Return True if no node is in contact and the attraction is negligible everywhere."""
         return not state.contact.any() and state.gap.min() >= _APART * self.range
 
     def solve(self, gap, separation):
@@ -182,7 +182,7 @@ def _load(solver, _, start, step, target):
     while state.nominal_pressure < target * (1 - _LOAD_TOLERANCE):
         count += 1
         if start - count * step <= 0:
-            raise NotSolved("the mean gap closed before the load was reached; use a smaller load or step")
+            raise NotSolved("the mean gap closed before the load was reached; use a smaller load or separation_step")
         for after in solver.steps(state, start - count * step):
             if after.nominal_pressure > target * (1 + _LOAD_TOLERANCE):
                 yield from _search_load(solver, state, after, target)
@@ -234,7 +234,7 @@ def _dissipated(records):
 
 
 def _jump_position_error(records):
-    """Return the work error (J/m^2) of each step if the pressure jumps at an end of the step: (n - 1,) array."""
+    """Return the work error of each step, in J/m^2, if the pressure jumps at an end of the step: (n - 1,) array."""
     return np.abs(np.diff(_column(records, "mean_separation")) * np.diff(_column(records, "nominal_pressure"))) / 2
 
 
@@ -270,6 +270,6 @@ def _dataset(surface, solver, legs, separation_step, seed):
     attrs = attributes(
         material,
         "Loading and unloading of a rough contact {} adhesion, boundary elements at finite range",
-        "A periodic rough surface against an elastic half-space, from apart to a load and apart again.",
+        "A periodic rough surface against an elastic half-space, loaded from separation and unloaded to separation.",
     )
     return build_dataset(LOOP, values, attrs)

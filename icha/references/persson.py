@@ -14,8 +14,8 @@ from scipy.special import erf
 PERSSON = "B. N. J. Persson, J. Chem. Phys. 115 (2001) 3840, doi:10.1063/1.1388626"
 XU = "Y. Xu, L. Zhu, F. Xiao and Y. Zhou, Tribol. Lett. 72 (2024), doi:10.1007/s11249-024-01838-4, gamma = 0.45"
 YANG_PERSSON = "C. Yang and B. N. J. Persson, J. Phys.: Condens. Matter 20 (2008) 215214, gamma = 0.45"
-# Two parameters gamma. Yang & Persson: elastic energy of a small contact divided by that of full contact on the same
-# area. Xu et al.: the same ratio for the variance of the pressure.
+# The gamma of Yang & Persson is the elastic energy of a small contact divided by the energy of full contact on the same
+# area. The gamma of Xu et al. is the same ratio of the variances of the pressure.
 YANG_PERSSON_GAMMA, XU_GAMMA = 0.45, 0.45
 # Iterations for the area of Xu et al. Each iteration reduces the error of the area to less than a quarter.
 _AREA_ITERATIONS = 40

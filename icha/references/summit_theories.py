@@ -28,13 +28,13 @@ FULLER_TABOR = (
     "K. N. G. Fuller and D. Tabor, Proc. R. Soc. Lond. A 345 (1975) 327, doi:10.1098/rspa.1975.0138, on loading: "
     "summits are in contact from approach 0 on"
 )
-# Contact area fraction above which summits are no longer separate.
+# Summits count as separate if the contact area fraction is at most this value.
 SEPARATE_SUMMITS_AREA_LIMIT = 0.1
 
-# McCool's 0.8968: alpha times the relative difference between the variances of all heights and of the summit heights.
+# McCool's 0.8968: the variance of the summit heights is (1 - 0.8968/alpha) times the variance of all heights.
 _SUMMIT_VARIANCE = 1 - 3 * math.sqrt(3) + 16 / math.pi
 
-# Largest distances from the mean summit height, in standard deviations: for summits in the sum, and for the plane.
+# Largest distances of summits in the sum, and of the plane, from the mean summit height, in standard deviations.
 _FARTHEST_SUMMIT = 12.0
 _FARTHEST_PLANE = 10.0
 # Gauss-Legendre quadrature of the sum, on [-1, 1].
@@ -129,12 +129,12 @@ def separation_at(quantity: Callable, value, moments: SpectralMoments, *argument
     middle, reach = summits.mean_height / moments.rms_height, _FARTHEST_PLANE * summits.deviation / moments.rms_height
     value = np.asarray(value, float)
     if np.any(value <= 0):
-        raise ValueError(f"{value.min():g}; expected values greater than 0")
+        raise ValueError(f"the smallest value is {value.min():g}; expected values greater than 0")
     low, high = middle - reach, middle + reach
     ends = [float(quantity(end, moments, *arguments)) for end in (low, high)]
     if value.size and not (value.max() <= ends[0] and value.min() >= ends[1]):
         raise ValueError(
-            f"{value.min():g} to {value.max():g} exceeds the range of the theory; expected {ends[1]:g} to {ends[0]:g}"
+            f"{value.min():g} to {value.max():g} is out of range of the theory; expected {ends[1]:g} to {ends[0]:g}"
         )
 
     def root(wanted):
