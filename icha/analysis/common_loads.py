@@ -39,7 +39,7 @@ def interpolate(load, values, at, *, logarithmic: bool) -> np.ndarray:
 
     Parameters
     ----------
-    load, values : points of the curve, in any order; loads are positive. Of points at equal loads, the first is used.
+    load, values : points of the curve at positive loads, in any order. Only the first of several equal loads is used.
     at : loads within the range of the curve.
     logarithmic : True to interpolate the logarithm of the values, which must then be positive.
 
@@ -81,7 +81,7 @@ def compare_runs(study: xr.Dataset) -> xr.Dataset:
     - `contact_area_fraction` and `reduced_separation` along the labels of the runs;
     - the mean of both variables over the seeds, the standard deviation, and half the width of the 95 % confidence
       interval (`area_mean`, `area_deviation`, `area_confidence`, `separation_mean`, …; `icha.support.statistics`);
-    - `material_spread`: largest area of all materials divided by the smallest, minus 1; `slope_spread`: by slope.
+    - `material_spread` and `slope_spread`: largest area of all materials or slopes divided by the smallest, minus 1.
 
     Incomplete runs (`status`) have no values and do not contribute to means. Runs that left the range of the model have
     values up to the limit of the model. Runs for which the asperity model is not applicable have values, but do not

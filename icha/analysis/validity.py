@@ -42,7 +42,7 @@ RESOLVED, SPACING = "resolved_tension", "spacing"
 RMS_HEIGHT, STICKY_HEIGHT = "rms_height", "sticky_rms_height"
 _OF_FULL_CONTACT = (COMPLETE, STRENGTH, THEORETICAL, RESOLVED)
 
-# ICHA warns if a larger fraction of the single-asperity spots than this is outside the range of Wu's formula.
+# ICHA warns if more than this fraction of the single-asperity spots is outside the range of Wu's formula.
 _FEW = 0.05
 # Largest number of cases that a statement names.
 _MOST_NAMES = 4
@@ -336,7 +336,7 @@ def _used(models):
 
 
 def _error(adhesive):
-    """Describe the errors in the validation; `adhesive` has True for runs with adhesion, False for runs without."""
+    """Describe the errors in the validation; `adhesive` contains True for runs with adhesion, False for others."""
     found = []
     for quantity in VALIDATION[True]:
         ranges = (VALIDATION[each][quantity] for each in sorted(adhesive, reverse=True))

@@ -28,7 +28,7 @@ def why_no_result(attrs: Mapping) -> str:
 
 
 def reasons_not_applicable(study: Mapping) -> Counter[str]:
-    """Count the runs of a study to which the asperity model is not applicable, by reason."""
+    """Return the number of runs of a study for each reason why the asperity model is not applicable."""
     return Counter(filter(None, study["applicability"].values.ravel().astype(str).tolist()))
 
 

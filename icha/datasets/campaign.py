@@ -1,4 +1,4 @@
-"""Build the campaign dataset, with arrays of the runs of each study along labels, and select its runs and snapshots."""
+"""Build the campaign dataset, and select runs and snapshots. The dataset has arrays along the labels of the runs."""
 
 import tempfile
 from collections.abc import Collection, Iterable, Mapping

@@ -175,7 +175,7 @@ def define_group(group: netCDF4.Dataset, study: Arrangement, attrs: Mapping[str,
 
 
 def _storage(sizes, block, along, dims, width):
-    """Return the storage options of a variable: large variables are compressed, with a chunk per block of runs."""
+    """Return the storage options of a variable: a large variable is compressed, one chunk per block of runs."""
     shape = (*(sizes[dim] for dim in dims), *([width] if width > 1 else []))
     if math.prod(sizes[dim] for dim in along) * math.prod(shape) < LEAST_COMPRESSED:
         return {}

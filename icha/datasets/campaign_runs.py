@@ -91,7 +91,7 @@ class Entry(NamedTuple):
 
     @property
     def extent(self) -> tuple[bool, int]:
-        """Sort key: True if the run reached its end; number of steps. A run with the largest key has all variables."""
+        """Sort key: (run reached its end, number of steps). A run with the largest key has all variables."""
         return self.status not in _ENDED_EARLY, self.sizes.get("step", 0)
 
 

@@ -1,7 +1,7 @@
 """Write and read datasets as netCDF-4 files, with the conventions that all files of ICHA share.
 
-A file never appears before it is complete. The same values always give the same bytes. All values are finite,
-except where `write_dataset` allows missing or infinite values.
+A file never appears before it is complete. The same values always give the same bytes. All values are finite, except
+where `write_dataset` allows missing or infinite values.
 
 Files of runs contain many small variables. The netCDF library is slow if a program alternates between defining and
 writing variables. Therefore ICHA defines all variables before it writes the first one.
@@ -231,7 +231,7 @@ def coordinates_of(
     ----------
     variables : all variables of a group, by name. Bounds of coordinates do not get the attribute.
     coordinates : names of the variables that are coordinates.
-    dims : dimensions in the file by name of the variable, only for dimensions that differ from `variables`.
+    dims : dimensions in the file by name of the variable, for variables with other dimensions in the file.
     """
     dims = {name: variable.dims for name, variable in variables.items()} | dict(dims)
     without = {*coordinates, *(variable.attrs.get("bounds") for variable in variables.values())}

@@ -140,7 +140,7 @@ def arrange_slopes(pairs: Iterable[tuple[str, float]]) -> np.ndarray:
 
 
 def slope_dims(slopes: np.ndarray) -> tuple[str, ...]:
-    """Return the dimensions of the coordinate `rms_slope` whose values are from `arrange_slopes`."""
+    """Return the dimensions of the coordinate `rms_slope` for values from `arrange_slopes`."""
     return ("surface", "rms_slope") if slopes.ndim == 2 else ("rms_slope",)
 
 

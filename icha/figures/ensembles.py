@@ -98,7 +98,7 @@ def join_bins(edges: np.ndarray, contents: np.ndarray, least: float) -> tuple[np
 
     Returns
     -------
-    The edges of the joined bins; and an array of shape (members, joined bins), the content divided by the bin width.
+    Edges of the k joined bins, (k + 1,); and contents of these bins divided by the bin width, (members, k).
     """
     filled = np.flatnonzero(contents.any(axis=0))
     if not len(filled):
@@ -119,7 +119,7 @@ def draw_points(
 ) -> ErrorbarContainer:
     """Draw the means of an ensemble as points with confidence bars; draw few members as dots without bars.
 
-    A line joins neighbouring points only if they are means over the same members.
+    A line joins two neighbouring points only if both points are means over the same members.
 
     Parameters
     ----------

@@ -39,7 +39,7 @@ DECLARATION = Declaration(
     options=LossFigure,
 )
 
-# Parts of the loss, with names and looks of their bars. No bar has the colour of a material.
+# For each part of the loss: name in the legend, and look of the bars. No bar has the colour of a material.
 PARTS = {
     "loss_by_jump_in": ("jump into contact", {"fc": "0.25"}),
     "loss_by_jump_off": ("jump off", {"fc": "0.65"}),
@@ -52,7 +52,7 @@ _LEAST_POINTS = 3
 _FIT_POINTS = 100
 # Both axes are logarithmic if, on each axis, the ratio of the largest to the smallest value exceeds this number.
 _SPAN = 30.0
-# A part of the loss is drawn if the magnitude of its share is at least this number in one bar or more.
+# A part of the loss is drawn if the magnitude of its share reaches this number in at least one bar.
 _LEAST_SHARE = 1e-6
 # Opacity of the bars of runs for which the asperity model is not applicable.
 _PALE = 0.35

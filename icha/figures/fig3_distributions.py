@@ -27,7 +27,7 @@ DECLARATION = Declaration(
 
 # Smallest number of grid cells in a bin of P(u). Bins with fewer cells are joined with their neighbours.
 _LEAST_CELLS = 100
-# Smallest number of nodes in a bin of P(p) of boundary elements. It is small, because few nodes are in contact.
+# Smallest number of nodes in a bin of P(p) of boundary elements. The number is small, since few nodes are in contact.
 _LEAST_NODES = 25
 # Approximate number of markers on a line of boundary elements.
 _BESIDE_MARKERS = 14

@@ -40,14 +40,14 @@ DECLARATION = Declaration(
 )
 
 # The surface is _ZOOM times as wide as the enlarged window. If the window is wider than _WIDEST_IN_RADII mean radii of
-# the spots, it is halved repeatedly. The window keeps at least _LEAST_CELLS cells along a side.
+# the spots, the window is halved repeatedly. The window keeps at least _LEAST_CELLS cells along a side.
 _ZOOM = 4
 _WIDEST_IN_RADII = 40
 _LEAST_CELLS = 64
 # Largest number of spots that are drawn as vector graphics. More spots become an image, so that PDF files stay small.
 _MANY_SPOTS = 2000
 _RED = (0.9, 0.0, 0.05)
-# Names and colours of nodes that are in contact in no model, in one of the models, and in both models.
+# Names and colours of nodes in contact: in no model, only with asperities, only with boundary elements, in both models.
 _STATES = (("", "white"), ("asperities only", _RED), ("boundary elements only", "black"), ("both", "0.72"))
 
 

@@ -37,7 +37,7 @@ class SlopesAndMaterialsFigure(TruthFigure):
 
 
 def inputs(campaign: Campaign, options: SlopesAndMaterialsFigure, files: results.ResultFiles) -> Inputs:
-    """Return the paths of the campaign dataset and of the tables of measurements that belong to the study, if any."""
+    """Return the paths of the campaign dataset and of the tables of measurements for the study, if any."""
     tables = [measurement.path for measurement in options.measurements(campaign)]
     return {"campaign": files.path(results.DATASET)} | ({"tables": tables} if tables else {})
 

@@ -72,7 +72,7 @@ def patch_areas(run: xr.Dataset, snapshot: int) -> np.ndarray:
 
 
 def patch_density(areas: Sequence[np.ndarray], nominal_area: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return the number of patches per nominal area and per interval of the patch area, in bins of the patch area.
+    """Return densities in bins of the patch area: number of patches, divided by nominal area and by bin width.
 
     Bins with few patches are joined.
 

@@ -243,7 +243,7 @@ def asked_of_entry(errors: xr.Dataset) -> int:
 
 # --- runs that were unloaded ---
 
-# Tension below this fraction of the largest pressure is a rounding error.
+# A tension counts as a rounding error if it is below this fraction of the largest pressure.
 ROUNDING = 1e-9
 
 

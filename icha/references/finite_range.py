@@ -107,7 +107,7 @@ class NodalState:
         return raw - self.outside_pressure * material.interaction_range / material.surface_energy
 
     def stored_energy(self, material: Material) -> float:
-        """Return elastic energy minus energy of adhesion, per nominal area, J/m^2; 0 if surfaces do not interact.
+        """Return elastic energy minus energy of adhesion, in J/m^2 of nominal area; 0 if surfaces do not interact.
 
         The elastic energy is half the mean of traction times displacement.
         """
@@ -236,7 +236,7 @@ class GapContact:
     """
 
     def __init__(self, fine, material, tolerance, gap=None):
-        """Set up the solver; the first solution starts from the gaps `gap`, (n, n) array in m."""
+        """Set up the solver; the first solution starts from `gap`, an (n, n) array of gaps in m."""
         self.fine, self.material = fine, material
         self.solver = _Solver(fine, tamaas.PolonskyKeerRey.gap, tolerance)
         unit = self.solver.unit
@@ -303,7 +303,7 @@ class GapContact:
 
 
 def _find_gap_at_load(contact, pressure, separation, progress):
-    """Search from a first guess (m) for the mean gap with the mean traction `pressure` (Pa); return the state."""
+    """Return the state with the mean traction `pressure` (Pa); the search begins at the mean gap `separation` (m)."""
     unit = contact.fine.rms_height
     tried: list[tuple[float, float]] = []
     mean_gap = separation / unit
@@ -344,7 +344,7 @@ def _next_gap(tried):
 
 
 def perimeter_correction(contact: np.ndarray) -> tuple[float, float]:
-    """Return the area fraction of a periodic contact map, corrected for the grid error, and the contact perimeter.
+    """Return the area fraction and the perimeter of a periodic contact map; the area is corrected for the grid error.
 
     Counts of nodes overestimate the area by (pi - 1 + ln 2)/24 times perimeter times spacing (Yastrebov, Anciaux &
     Molinari 2017, eq. 9). The unit of the perimeter is the grid spacing.

@@ -3,7 +3,7 @@
 Pressures are reduced, p* = p/(E* h'_rms). The constants in this file name the sources. The form of Persson's theory
 with the rms slope is in M. H. Muser et al., Tribol. Lett. 65 (2017) 118, doi:10.1007/s11249-017-0900-2. The equation
 and the gamma of Xu et al. are from the programs in the public data of Xu et al.,
-https://github.com/xylcsi/PerssonModelFudgeFactor. The stiffness that is proportional to the pressure is in B. N. J.
+https://github.com/xylcsi/PerssonModelFudgeFactor. The proportionality of stiffness to pressure is in B. N. J.
 Persson, Phys. Rev. Lett. 99 (2007) 125502, doi:10.1103/PhysRevLett.99.125502.
 """
 
