@@ -48,8 +48,8 @@ _KINDS = {
     "coalescence": ("union", "loading", {"marker": "D", "mfc": "none", "mec": BLACK}),
     "split": ("union undone", "unloading", {"marker": "+", "mec": _RED}),
 }
-# For up to _FEW events, marks have the size _SIZE, in points. For more events, marks are smaller, so that the total
-# area of all marks remains about the same. No mark is smaller than _LEAST_SIZE.
+# If every kind has at most _FEW events, marks have the size _SIZE, in points. Otherwise marks are smaller, so that the
+# total area of the marks remains about the same. No mark is smaller than _LEAST_SIZE.
 _FEW = 60
 _SIZE = 5.0
 _LEAST_SIZE = 1.6

@@ -40,7 +40,7 @@ DECLARATION = Declaration(
 )
 
 # The surface is _ZOOM times as wide as the enlarged window. If the window is wider than _WIDEST_IN_RADII mean radii of
-# the spots, the window is halved repeatedly. The window keeps at least _LEAST_CELLS cells along a side.
+# the spots, the window is halved repeatedly, but not to fewer than _LEAST_CELLS cells along a side.
 _ZOOM = 4
 _WIDEST_IN_RADII = 40
 _LEAST_CELLS = 64
