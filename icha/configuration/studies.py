@@ -351,8 +351,8 @@ class BoundaryElements(BesideStudy):
     """Boundary elements that solve the contacts of a study at a finite range of attraction, for comparison."""
 
     reduced_pressures: stops(ReducedPressure, increasing)
-    """Reduced pressures p/(E* h'rms), increasing. The contact is solved at each pressure, and the runs of the study save
-    a snapshot at each pressure."""
+    """Reduced pressures p/(E* h'rms), increasing. The contact is solved at each pressure, and the runs of the study
+    save a snapshot at each pressure."""
 
 
 class BoundaryElementLoops(BesideStudy):
