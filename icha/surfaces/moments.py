@@ -117,7 +117,7 @@ class SpectralMoments(NamedTuple):
         return (8 / 3 * self.m4) ** 0.5
 
     def scaled_to_rms_slope(self, rms_slope: float) -> SpectralMoments:
-        """Return the moments of the surface with all heights scaled to the rms slope `rms_slope`."""
+        """Return the moments for heights that are scaled so that the rms slope is `rms_slope`."""
         factor = (rms_slope / self.rms_slope) ** 2
         return SpectralMoments(*(moment * factor for moment in self))
 
@@ -153,7 +153,7 @@ def radial_power_spectrum(surface: Surface) -> tuple[np.ndarray, np.ndarray, np.
     """Compute the radial power spectrum: the mean power C of the wave vectors in each ring around the origin.
 
     The integral of C over the plane of wave vectors is the mean square height. The first ten rings are 2 pi/L wide; the
-    width of the others is a tenth of their wave number. The last ring ends at the largest circle in the grid of wave
+    width of each other ring is a tenth of its wave number. The last ring ends at the largest circle in the grid of wave
     vectors. The heights of a free square are first multiplied by Hann's window, because a step between opposite edges
     would add waves. C is then divided by the mean square of the window.
 

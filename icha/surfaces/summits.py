@@ -254,7 +254,7 @@ def _spline(coefficients, at):
     (ty, tx), nodes = at.T - floor, np.arange(-2, 4)[:, None]
     row, column = np.mod(floor[0] + nodes, grid), np.mod(floor[1] + nodes, grid)
     around = coefficients[row[:, None], column[None, :]]
-    # Sum along y first, so that the six nodes of a row remain.
+    # Sum along y first; then only the six nodes of a row remain.
     by = [np.einsum("ik,ijk->jk", basis, around) for basis in _basis(ty)]
     bx = _basis(tx)
     return [np.einsum("jk,jk->k", by[i], bx[j]) for i, j in ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))]
@@ -342,11 +342,11 @@ class SummitCoverage:
 
     Attributes
     ----------
-    peak_height : (k,) array, m, heights of the peaks: nodes that are not lower than any of their eight neighbours.
+    peak_height : (k,) array, heights (m) of the peaks: nodes that are not lower than any of their eight neighbours.
         Every node of a plateau is a peak.
     covered : (k,) bool, True if a summit lies at most two rows and two columns from the peak.
     summit_height : (n,) array, heights of the summits, m.
-    unsupported_height : (m,) array, m, heights of the unsupported maxima of the spline.
+    unsupported_height : (m,) array, heights of the unsupported maxima of the spline, m.
     """
 
     peak_height: np.ndarray

@@ -28,8 +28,8 @@ _STEEPNESS = FloatRange(least=1e-24, most=1e9)
 _LINES = 64
 # Largest number of lines inside a cell whose steps `edges_fit` compares with the step between cells.
 _COMPARED_LINES = 256
-# Edges fit if the misfit between cells is at most this value times the largest misfit inside a cell. The misfit is a
-# step minus the mean of the two steps beside it, rms along a line. Measured ratios are up to 1.3 on periodic surfaces,
+# Edges fit if the misfit between cells is at most this value times the largest misfit inside a cell. The misfit is the
+# rms, along a line, of a step minus the mean of the steps beside it. Ratios are up to 1.3 on periodic surfaces, up to
 # 2.4 on white noise of 8 x 8 nodes, and at least 3.2 on halves of periodic surfaces with 4 nodes per shortest wave.
 _MISFIT = 3.0
 # Edges also fit if the step between cells is at most this value times the largest step inside a cell; steps are rms
@@ -200,7 +200,7 @@ class Surface:
         return -float(full_contact_pressure(self.heights, self.period, free=self.free).min())
 
     def scaled_to_rms_slope(self, rms_slope: float) -> Surface:
-        """Return the surface with all heights scaled to the rms slope `rms_slope`."""
+        """Return the surface with heights that are scaled so that the rms slope is `rms_slope`."""
         rms_slope = SLOPE.validate("rms_slope", rms_slope)
         factor = rms_slope / self.rms_slope
         scaled = replace(self, heights=self.heights * factor)
