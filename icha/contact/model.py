@@ -208,7 +208,7 @@ PRESSURE_BINS = np.concatenate([-np.logspace(8, 0, 161)[:-1], np.linspace(-1, 5,
 
 
 def gap_bins(surface: Surface) -> np.ndarray:
-    """Return the edges of the bins of the gap on a surface, m.
+    """Return the edges of the gap bins for a surface, m.
 
     When the surfaces just touch, the largest gap is the height from the deepest pit to the highest peak. If this gap is
     more than 31.6 h_rms, the last bin ends at this gap. At separations up to 9 h_rms, the last bin contains less than

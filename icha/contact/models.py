@@ -83,7 +83,7 @@ class Model:
     references : publications on the method, separated by "; ".
     module : module whose `contact_of(surface, material)` returns an `icha.contact.model.ContactModel`.
     folder : folder for the runs of this model, with a slash at the end; empty for the default model.
-    variables : variables that only runs of this model have; by name: dimensions, unit, long name and type.
+    variables : names of variables that only runs of this model have, with dimensions, unit, long name and type.
     stiffness_error : largest relative error of the contact stiffness.
     by_summits : whether summits represent the surface. If so, spots unite by a rule, which may lose or gain energy.
     by_cells : whether contact is counted in cells of the grid; runs then contain a map of the contact.

@@ -263,7 +263,7 @@ def format_comparison(comparison: Comparison) -> str:
 
 
 def _lines(comparison: Comparison, within: bool) -> list[str]:
-    """Return one line for each variable within tolerance if `within` is True, else for each different variable."""
+    """Return one line for each unequal variable: those within tolerance if `within` is True, else the others."""
     grouped = defaultdict(list)
     for file in comparison.files:
         for each in file.differences:

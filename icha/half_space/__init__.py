@@ -1,1 +1,1 @@
-"""Elastic half-space: the displacement by contact spots at each other and on a grid."""
+"""Elastic half-space: displacement by contact spots, at the other spots and on a grid."""

@@ -26,10 +26,10 @@ from scipy.special import erf, erfc
 from icha.half_space.free_square import basis, image_field
 from icha.surfaces.square import cell_of, periodic_difference
 
-# Cut-off for alpha r and, in the smooth half, for q/(2 alpha); erfc(4.3) = 1.2e-9. Then the tolerance of the FFTs.
+# The short-ranged half ends at this value of alpha r, the smooth half at this value of q/(2 alpha); erfc(4.3) = 1.2e-9.
 _CUT = 4.3
 _NUFFT_TOLERANCE = 1e-9
-# The same two values for the approximate sum that linear solves use, erfc(2.75) = 1e-4.
+# Cut-off, and tolerance of the FFTs, for the approximate sum that linear solves use; erfc(2.75) = 1e-4.
 _LOOSE_CUT = 2.75
 _LOOSE_NUFFT_TOLERANCE = 1e-4
 # Mean number of points in the near field of a point: for pairs that are used in many sums, and for pairs used once.
@@ -125,7 +125,7 @@ class Ewald:
     period : period of the sum, m; on a free half-space twice the side of the square.
     contact_modulus : E*, Pa.
     reach : radius of the near field, in which the short-ranged half is summed, m.
-    floor : distance below which the fields of the moments are constant, m.
+    floor : within this distance, m, the fields of the moments are constant.
     free : True for a free half-space; its points lie in the quarter [0, period/2]^2 of the cell.
     """
 

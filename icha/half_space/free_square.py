@@ -73,7 +73,7 @@ def _chebyshev():
 
 @lru_cache(maxsize=1)
 def _image_potential_matrix():
-    """Return `image_potential` at every node by a unit source at every node: array of shape (nodes^2, nodes^2)."""
+    """Return the matrix of `image_potential` at node i by a unit source at node j: shape (nodes^2, nodes^2)."""
     nodes, _, _ = _chebyshev()
     distance, index = np.unique(np.round(np.abs(nodes[:, None] - nodes), 15), return_inverse=True)
     index = index.reshape(_NODES, _NODES)

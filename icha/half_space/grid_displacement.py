@@ -26,7 +26,7 @@ from icha.half_space.free_square import basis, image_field
 from icha.support.parallel import blocks, on_cores
 from icha.surfaces.square import cell_of
 
-# Cut-off for alpha r and, in the smooth half, for q/(2 alpha); erfc(4.6) = 8e-11. Then the tolerance of the FFTs.
+# The short-ranged half ends at this value of alpha r, the smooth half at this value of q/(2 alpha); erfc(4.6) = 8e-11.
 _CUT = 4.6
 _NUFFT_TOLERANCE = 1e-12
 # Farther from a spot than this distance, in contact radii, four moments represent the spot. The error is then 1e-8 of
@@ -156,7 +156,7 @@ class DisplacementField:
             half[np.arange(-k, k + 1) % len(half), : k + 1] += each
 
         def transform_along_y(columns):
-            """Replace some columns of Fourier coefficients by their values at the rows."""
+            """Transform some columns of Fourier coefficients along y; then they contain values at the rows."""
             half[:, columns] = scipy.fft.ifft(half[:, columns], axis=0, norm="forward", workers=1)
 
         on_cores(transform_along_y, blocks(half.shape[1], 64))
