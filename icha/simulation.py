@@ -63,7 +63,7 @@ _STICKINESS_PAPER = "L. Pastewka and M. O. Robbins, PNAS 111 (2014) 3298-3303, d
 class ConvergenceError(RuntimeError):
     """Error: the path could not be computed to its end, for example because it leaves the range of the model.
 
-    `dataset` contains the targets that were reached; its attribute `incomplete` or `beyond_model` states the reason.
+    `dataset` contains the targets that were reached. The attribute `incomplete` or `beyond_model` states the reason.
     """
 
     def __init__(self, message: str, dataset: xr.Dataset):

@@ -61,7 +61,7 @@ def plan_without_collecting() -> None:
 
 
 def start_jobs_freely(workflow) -> None:
-    """Enable garbage collection, except for the plan; remove Snakemake's limit of jobs started per second.
+    """Enable garbage collection, except for the plan; remove Snakemake's limit of job starts per second.
 
     With Snakemake's limit, each finished local job wakes the scheduler once a second until all jobs are done. After a
     thousand short jobs, the scheduler uses most of a core. Snakemake has no option to disable the limit.
@@ -85,7 +85,7 @@ class CampaignResults:
 
         Parameters
         ----------
-        results : folder of the results, relative to the working directory; it must not belong to another configuration.
+        results : folder of the results, relative to the working directory; no other configuration may own the folder.
         name : name of the campaign.
         file : configuration file of the campaign.
         workflow : folder of the workflow.
@@ -114,7 +114,7 @@ class CampaignResults:
         if not METADATA.is_dir() or not os.access(".snakemake", os.W_OK):
             self._refuse_unwritable()  # nothing was computed yet, or Snakemake could not write its records
         elif os.path.isdir(results) and not os.access(results, os.W_OK):
-            # Snakemake reports missing files in such a folder only as protected.
+            # In such a folder, Snakemake reports missing files only as protected.
             _warn(f"cannot write to {results}: missing results cannot be computed")
 
     def have_stale_made_again(self, paths: Iterable[str], rules: Iterable) -> None:

@@ -90,7 +90,7 @@ def _settings(params: list[str]) -> tuple[tuple[str, str], ...]:
     """Return names and values of the settings of a job, from its recorded parameters.
 
     Snakemake records parameters without their names. Therefore only parameters that are mappings are included, because
-    their keys are names. The attributes of datasets, and paths of this machine, are omitted.
+    the keys of mappings are names. The attributes of datasets, and paths of this machine, are omitted.
     """
     settings: dict[str, str] = {}
     for text in params:

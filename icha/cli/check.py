@@ -14,7 +14,7 @@ def check(
 ) -> None:
     """Check the variables, units and attributes of files, and whether results satisfy physical identities.
 
-    One such identity: the areas of all spots add up to the contact area. The command prints all problems of all files.
+    For example, the areas of all spots must add up to the contact area. The command prints all problems of all files.
     Exit status: 0 if no file has problems, 1 if a file has problems, 2 if ICHA cannot read a file.
     """
     from icha.datasets.format import CAMPAIGN, RUN, SOLUTION, SURFACE, UnknownFile, identify_file

@@ -19,7 +19,7 @@ DEFAULT = Path("config/config.yaml")
 TARGETS = ("all", "surfaces", "runs", "references", "figures", "dataset", "report", "publish")
 # Exit statuses.
 FAILED, WRONG = 1, 2
-DEFAULT_CORES = 2  # of profiles/default
+DEFAULT_CORES = 2  # number of cores in profiles/default
 
 
 def option(help_text: str, *names: str, **settings):

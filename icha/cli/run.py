@@ -39,7 +39,7 @@ from icha.support import formatting
 from icha.support.formatting import format_count
 
 STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-MOST_LINES = 12  # largest number of lines that are printed for the reason of a failure
+MOST_LINES = 12  # largest number of lines that are printed about a failure
 # Lines that every call of Snakemake prints. The reason for an error comes after these lines.
 PREAMBLE = r"Using workflow specific profile|Assuming unrestricted|host: |Building DAG of jobs|total +\d+$"
 

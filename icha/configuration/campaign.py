@@ -26,7 +26,7 @@ BESIDE_STUDIES = ("finite_range", "boundary_element_loops")
 # Largest number of entries in a section. The number is small, because the check of an entry goes through all runs of
 # its study.
 _FEW = Field(max_length=100)
-# Grid cells per shortest wavelength: the smallest number without a warning for asperities; the recommended number.
+# Grid cells per shortest wavelength: ICHA warns below the first number for asperities, below the second otherwise.
 _LEAST_CELLS, _ADVISABLE_CELLS = 4, 8
 
 
@@ -170,7 +170,7 @@ class Campaign(Section):
         return (self.topography(surface) or self.surfaces[surface]).period
 
     def snapshots_of(self, study: str) -> list[tuple[str, float]] | None:
-        """Return kind and value of all states that the runs of a study save; None if runs save only the last state.
+        """Return kind and value of all states that the runs of a study save; None if runs save only the last target.
 
         The result includes the loads at which entries of `finite_range` solve contacts of this study.
         """
@@ -206,7 +206,7 @@ class Campaign(Section):
             if not (unknown_slopes and any(str(key).startswith("rms_slope") for key in location)):
                 yield location, value, reason
         if not unknown_slopes:
-            # The names of runs contain slopes.
+            # The names of runs, which this check compares, contain slopes.
             yield from _within(("publication",), self.publication.problems(self))
 
     def _problems(self):

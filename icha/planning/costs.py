@@ -26,7 +26,7 @@ class Workflow:
 
     Attributes
     ----------
-    start : time from the call to the first job; `icha run`, Snakemake and the parent process of jobs start.
+    start : time from the call to the first job, for the start of `icha run`, Snakemake and the parent process of jobs.
     planned : additional start time for each file of the campaign.
     job : time of a job in addition to its computation: scheduling, fork, log, checksums.
     memory : memory of `icha run`, Snakemake and the parent process of jobs.
@@ -134,7 +134,7 @@ def surface_cost(grid: int) -> Cost:
 
 
 def spots(summits: float, load: float) -> float:
-    """Estimate the number of contact spots at a reduced pressure; right within a factor of 2 for 10 to 2e5 summits."""
+    """Estimate the number of contact spots at a reduced pressure, within a factor of 2 for 10 to 2e5 summits."""
     return max(1.0, summits * min(0.6, math.sqrt(load)))
 
 

@@ -197,7 +197,7 @@ def _derived_files(campaign, files: CampaignFiles, computed: list[Item]) -> Iter
 def _cost_parameters(settings, rms_slope) -> dict:
     """Convert the settings of a run to arguments of `run_cost`."""
     path, snapshots = settings["path"], settings["path"]["snapshots"]
-    # Factors from targets to reduced pressures, about 1/2 for area fractions. 0 means the reduced pressure is unknown.
+    # Reduced pressure divided by the value of a target; about 1/2 for area fractions. 0 means that it is unknown.
     factors = {"reduced_pressure": 1, "relative_load": 1 / rms_slope, "area_fraction": 1 / 2, "mean_separation": 0}
     stops = {(kind, value) for kind in factors for value in path.get(f"{kind}s") or ()}
     stops |= {tuple(snapshot) for snapshot in snapshots or ()}

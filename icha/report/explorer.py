@@ -121,7 +121,7 @@ def _dataset(folder: Path) -> Path:
 
 
 def _contacts(labels: list[RunLabels], only: Mapping[str, Collection]) -> list[list[RunLabels]]:
-    """Group the chosen runs that differ only in their model. First come the groups with the first seed of a contact."""
+    """Group the chosen runs that differ only in their model. Groups with the first seed of a contact come first."""
     for name, values in only.items():
         known = list(dict.fromkeys(getattr(run, name) for run in labels))
         if unknown := [value for value in values if value not in known]:

@@ -19,7 +19,7 @@ from icha.figures.style import COLOURS, TWO_COLUMNS, in_style, logarithmic_axes,
 from icha.report.template import format_mean, per_cent
 from icha.support.formatting import format_quantity
 
-LEAST_POWER = 1e-16  # smallest power that is not a rounding error, divided by the largest power
+LEAST_POWER = 1e-16  # powers below this fraction of the largest power are rounding errors
 
 
 def read_surface_statistics(path: str | os.PathLike) -> xr.Dataset:
@@ -85,7 +85,7 @@ def draw_spectra(members):
 
 
 def summarise_errors(errors: xr.Dataset) -> dict:
-    """Return the values for the section on one comparison of models: ranges of errors, and a table row per state."""
+    """Return what the report shows for one comparison of models: ranges of errors, and a table row for each state."""
     rows = []
     for (surface, slope), material in itertools.product(
         surfaces_and_slopes(errors), errors["material"].values.tolist()

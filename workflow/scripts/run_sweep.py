@@ -25,7 +25,7 @@ def run_sweep(
 ):
     """Compute a run and write its dataset.
 
-    The file of a failed run contains the states at the targets that were reached, and the reason of the failure. The
+    The file of a failed run contains the states at the targets that were reached, and the reason for the failure. The
     campaign continues, and its verdict lists the run. The campaign also continues after an unexpected error, because
     only the surface, the material and the path of this run can be the cause.
 
