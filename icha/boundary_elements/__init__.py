@@ -7,8 +7,9 @@ fraction of contact of this cell is f = t/s = 1 - g/g_c. The tension t does the 
 Open cells carry neither pressure nor tension. New contact forms at summits within reach of the attraction, and where
 the surfaces would overlap.
 
-The energy has many local minima. The model finds the minimum to which the energy falls from the previous state of the
-path: fronts advance or recede until the energy release rate equals the work of adhesion along all edges.
+The energy has many local minima. The model finds a minimum to which the energy falls from the previous state of the
+path; if a front jumps, more than one minimum may be possible. Fronts advance or recede until the energy release rate
+equals the work of adhesion along all edges.
 
 Read the modules in this order:
 

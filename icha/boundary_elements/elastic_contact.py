@@ -42,7 +42,8 @@ class Contact:
     Parameters
     ----------
     cells : (k,) int, flat indices of the cells in contact, ascending.
-    fraction : (k,), part f of the area of each cell that is in contact, 0 < f <= 1; 0 for rim cells of `ActiveCells`.
+    fraction : (k,), fraction of contact f of each cell, 0 < f <= 1: tension over strength at the front;
+        0 for rim cells of `ActiveCells`.
     pressure : (k,), force on each cell divided by the area of the whole cell, in E*; negative in tension.
     """
 

@@ -316,7 +316,7 @@ class FrontRelaxation:
             self.damping = 2 * TOLERANCES.damping
         self.steps += 1
         change, pressure_change = newton_step(problem, active, self.damping)
-        # The step would raise the energy to first order: the sum of (G - w) df is positive, w the local work of adhesion.
+        # The step would raise the energy to first order: the sum of (G/w - 1) w df is positive, with local adhesion w.
         adhesion = (problem.front.local_strengths(active.mean_fraction) / problem.front.straight_strength) ** 2
         if np.sum((active.intensity**2 - 1) * adhesion * change) > _WORK_ROUNDING * np.abs(change).sum():
             self._damp(2, active.residual)

@@ -21,7 +21,7 @@ class CellState:
     ----------
     separation : mean separation u, m.
     cells : (k,) int, flat indices of the grid cells in contact, ascending.
-    fraction : (k,), part f of the area of each cell that is in contact, 0 < f <= 1.
+    fraction : (k,), fraction of contact f of each cell, 0 < f <= 1: tension over strength at the front.
     pressure : (k,), force on each cell divided by the area of the whole cell, Pa; negative in tension.
     mean_fraction : (k,), Gaussian average of the fractions of each cell and its neighbours; without adhesion not used.
     pressure_slope, area_slope : derivatives of the nominal pressure (Pa/m) and of the area fraction (1/m) with respect
