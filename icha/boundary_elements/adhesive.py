@@ -25,7 +25,7 @@ class Summits:
     cell : (k,) int, grid cell of each summit.
     above : (k,), height of the summit above the grid node of its cell.
     reach : (k,), largest gap at which the summit jumps into contact.
-    radius : (k,), radius of the disc that closes: that of a single summit after its jump. A smaller one could shrink.
+    radius : (k,), radius of the disc that closes: that of a single summit after its jump. A smaller disc could open.
     """
 
     cell: np.ndarray
@@ -48,7 +48,7 @@ class Summits:
         """Find open summits with gap < reach - margin, (k,) bool, and cells away from contact with gap < -margin."""
         gap, touched = state.gap.ravel(), mask_of(state.cells, state.gap.shape).ravel()
         within = (gap[self.cell] - self.above - self.reach < -margin) & ~touched[self.cell]
-        # The surfaces also touch where they overlap without a summit; neighbours of contact belong to the front solver.
+        # The surfaces also touch where they overlap without a summit. The front solver closes neighbours of contact.
         # Overlaps above the displacement error have already joined the contact, so only margin 0 finds such cells.
         touched[state.rim] = True
         return within, np.flatnonzero((gap < -margin) & ~touched)
@@ -58,8 +58,8 @@ class Summits:
     ) -> tuple[np.ndarray, np.ndarray, int]:
         """Find new contact at summits and overlapping cells within reach by more than a margin, if not `tried` before.
 
-        Return the cells to close, the cells among them that count as tried (the discs count as the cells of their
-        summits), and the number of all cells within reach, tried before or not.
+        Return the cells to close, the cells that count as tried from now on (cells of summits, not their discs, and
+        overlapping cells), and the number of all cells within reach, tried before or not.
         """
         within, overlapping = self.find_within_reach(state, margin)
         candidates = np.union1d(self.cell[within], overlapping)

@@ -59,7 +59,7 @@ class BoundaryElements(FullContactProblem):
 
     @cached_property
     def path_accuracy(self) -> PathAccuracy:
-        """Accuracy of a path; without adhesion no energy is lost, so that errors of the work do not control steps."""
+        """Accuracy of a path, with `least_work` of the material; without adhesion the work does not control steps."""
         least_work = _SMALLEST_WORK * self.law.material.surface_energy
         return replace(MODELS[REFERENCE_MODEL].accuracy, least_work=least_work, error_controlled_steps=self.adhesive)
 

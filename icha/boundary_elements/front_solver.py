@@ -41,10 +41,10 @@ class FrontTolerances:
     ----------
     front : largest residual of a converged front. (The grid causes relative errors of areas and loads of about 1e-3.)
     stagnation : largest residual at which a front is accepted although no step lowers its energy.
-    coarse : residual above which cells are relaxed locally and damped. It is also the residual of the front in the
+    coarse : cells with a larger residual are relaxed locally and damped. It is also the residual of the front in the
         first stage of `solve_adhesive_contact` and in the first trial for a load. In this stage, contact forms where
         the gap is below the reach of the attraction by at least `coarse` critical openings.
-    fine : residual of the front in the second stage, where contact forms wherever the gap is below the reach, and in
+    fine : residual of the front in the second stage, in which contact forms if the gap is below the reach, and in
         later trials for a load. Cells above it are relaxed locally if they are few. It is also the relative error of a
         load at which the trials end, and the steps to the final tolerances begin.
     few : largest share that counts as few cells: of the front for local relaxation, of the grid for open cells.
@@ -396,7 +396,7 @@ class LinearisedFront:
         """Solve for the changes of fraction and pressure, (k,) each, with a right-hand side, by GMRES.
 
         The residual is reduced to the relative `accuracy`. If tiles are too inaccurate for this, residuals of the full
-        grid correct the solution, as long as each correction halves them; so the accuracy may not be reached.
+        grid correct the solution, as long as each correction halves them. So the accuracy may not be reached.
 
         Raises
         ------

@@ -36,8 +36,8 @@ class ControlProblem:
     ----------
     contact : the contact model.
     control : the controlled quantity (nominal pressure or area fraction) and its target.
-    solve : function that solves the equilibrium at a separation (m), from a state, to a residual of the front, with the
-        options of `BoundaryElements._solve`.
+    solve : `BoundaryElements._solve`, a function of a state, the separation (m) and the largest residual of the front;
+        it returns the equilibrium.
     events : function that finds the events between two states.
     """
 
@@ -200,6 +200,7 @@ def iterate_secant(problem: ControlProblem, bracket: Bracket, trial: CellState, 
         separation = bracket.limit(problem.newton_separation(trial, before))
         if separation < problem.contact.smallest_gap:
             raise FullContact("the mean gap vanishes")
+        # The first trial may have a loose front, too inaccurate for a secant.
         start, before = trial, trial if before is not None or trial.front_residual <= TOLERANCES.front else None
         reuse_slopes = before is not None and abs(error) < TOLERANCES.linear[0] * scale
         trial = problem.solve(start, separation, TOLERANCES.front, nearby=True, reuse_slopes=reuse_slopes)

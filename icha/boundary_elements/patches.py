@@ -24,8 +24,7 @@ class CellState:
     fraction : (k,), fraction of contact f of each cell, 0 < f <= 1: tension over strength at the front.
     pressure : (k,), force on each cell divided by the area of the whole cell, Pa; negative in tension.
     mean_fraction : (k,), Gaussian average of the fractions of each cell and its neighbours; without adhesion not used.
-    pressure_slope, area_slope : derivatives of the nominal pressure (Pa/m) and of the area fraction (1/m) with respect
-        to the separation; the fronts move.
+    pressure_slope, area_slope : slopes dp/du of nominal pressure (Pa/m) and of area fraction (1/m), with moving fronts.
     rates : changes of the fractions, (k,), and of the pressures in E*, (k,), when the separation increases by one cell
         size; None if unknown.
     front_residual : largest residual of the cells where the front can move (`front_solver.ActiveCells.residuals`).

@@ -28,7 +28,7 @@ _NODES = TILE // COARSENING
 # Ewald parameter alpha, per cell size. With this value the cut-off part of the short kernel and the error of the coarse
 # grid are both below `error`.
 _ALPHA = 2.3 / RANGE
-# Largest total area of the tiles, divided by the area of the grid, for which tiles are faster than the whole grid; the
+# If the total area of the tiles, divided by the area of the grid, is larger than this, the whole grid is faster. The
 # second value is for grids whose transforms run on several cores.
 _LARGEST_COVER, _LARGEST_COVER_LARGE = 0.6, 1.2
 # Number of tiles that are transformed together; they fit in the cache.

@@ -18,7 +18,7 @@ class IterationState:
     ----------
     contact : contact of the asperities.
     start : equilibrium from which the search starts.
-    unloading : whether the separation, prescribed or first guessed, is larger than the separation of `start`.
+    unloading : whether the separation, given or as first guess, is larger than the separation of `start`.
     sites : table of sites.
     site_of_asperity, last_approach, last_separation, barred_count : as in `ContactState`.
     released_from : (asperities,) int, site of the union that has released the asperity since the last call of

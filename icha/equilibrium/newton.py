@@ -41,7 +41,7 @@ def newton_step(equations: Equations, evaluation: Evaluation, size: float) -> tu
 
     The error must fall by at least 10 % after the full step, 5 % after half the step, and so on. If eight trials with
     the approximate matrix fail, eight with the exact matrix follow. Return the evaluation after the step (the old one
-    if all trials fail), whether a trial succeeded, and whether the exact matrix was needed. `_solve_step` may raise.
+    if all fail), whether a trial succeeded, and whether the exact matrix was needed. Errors are those of `_solve_step`.
     """
     for exact in (False, True):
         step, separation_step = _solve_step(equations, evaluation, exact)
