@@ -104,7 +104,7 @@ class BoundaryElements(FullContactProblem):
         return solve_at_control(ControlProblem(self, control, self._solve, self._events), state, separation)
 
     def _from_full_contact(self, state, separation, control):
-        """Find the next equilibrium from full contact, which opens below its opening pressure; see `equilibrium`."""
+        """Find the next equilibrium from full contact. It opens below its opening pressure; see `equilibrium`."""
         if control is None and separation <= 0:
             return self.full_contact(self.undetermined_pressure)
         if control is None and self.pressure(state) > self.opening_pressure + ROUNDING * self.contact_modulus:

@@ -3,8 +3,8 @@
 Every step lowers the energy U(f) - dgamma A(f), the elastic energy minus the work of adhesion. So the result is a local
 minimum of the energy. An unstable front runs until it is in equilibrium. A step solves three linearised equations: the
 gap of closed cells is zero, the tension at the front is fraction times strength, and the strength depends on the
-fractions of neighbours. A step that raises the energy is repeated with more damping, that is with softer bonds, which
-shortens the step (Levenberg-Marquardt method).
+fractions of neighbours. A step that raises the energy is repeated with more damping: softer bonds shorten the step
+(Levenberg-Marquardt method).
 """
 
 from __future__ import annotations
@@ -41,12 +41,12 @@ class FrontTolerances:
     ----------
     front : largest residual of a converged front. (The grid causes relative errors of areas and loads of about 1e-3.)
     stagnation : largest residual at which a front is accepted although no step lowers its energy.
-    coarse : cells with a larger residual are relaxed locally and damped. It is also the residual of the front in the
-        first stage of `solve_adhesive_contact` and in the first trial for a load. In this stage, contact forms where
-        the gap is below the reach of the attraction by at least `coarse` critical openings.
-    fine : residual of the front in the second stage, in which contact forms if the gap is below the reach, and in
-        later trials for a load. Cells above it are relaxed locally if they are few. It is also the relative error of a
-        load at which the trials end, and the steps to the final tolerances begin.
+    coarse : cells with a larger residual are relaxed locally and damped. Allowed residual of the front in the first
+        stage of `solve_adhesive_contact` and in the first trial for a load. In both cases, contact forms where the gap
+        is below the reach of the attraction by at least `coarse` critical openings.
+    fine : allowed residual of the front in later trials for a load and in the second stage, in which contact forms if
+        the gap is below the reach. Cells with a larger residual are relaxed locally if they are few. The trials for a
+        load end, and the steps to the final tolerances begin, when the relative error of the load is at most `fine`.
     few : largest share that counts as few cells: of the front for local relaxation, of the grid for open cells.
     displacement : largest error of displacements, divided by the allowed residual of the front.
     moving_displacement : largest error of displacements in the first steps. After a step, the allowed error is

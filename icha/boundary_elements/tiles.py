@@ -20,7 +20,7 @@ from icha.boundary_elements.transforms import filter_by_blocks, reusable_field
 from icha.support import parallel
 from icha.support.parallel import blocks, on_cores
 
-# Number of cells along a side of a tile; range of the short kernel in cells, which is also the margin of a tile.
+# Number of cells along a side of a tile. Range of the short kernel in cells; tiles have a margin of this width.
 TILE, RANGE = 128, 16
 # Spacing of the coarse grid in cells, and order of its splines; their support is at most RANGE.
 COARSENING, _ORDER = 4, 4
@@ -185,7 +185,7 @@ for _node in range(_NODES):
 _SPLINES = _SPLINES[_HALF:-_HALF]
 
 
-# These matrices are small, so that no library computes their products on several threads, which could change rounding.
+# Products on several threads could change rounding, but no library uses several threads for such small matrices.
 def _restrict(field):
     """Distribute values of the cells of tiles to coarse nodes, (t, _NODES, _NODES): transpose of `_interpolate`."""
     rows = (field.reshape(-1, _NODES, TILE) @ _SPLINES).reshape(-1, TILE, _NODES)

@@ -95,7 +95,7 @@ class Equations:
     ----------
     contact : contact of the asperities.
     sites : table of n sites.
-    control : prescribed load or area, for which the separation is one more unknown; None for a given separation.
+    control : prescribed load or area (the separation is then one more unknown); None for a given separation.
     """
 
     contact: AsperityContact

@@ -142,7 +142,7 @@ def _solve_step(equations, evaluation, exact):
 
 
 def _take_step(equations, evaluation, step):
-    """Return the approaches (n,) after a Newton step (n,), m, which is modified for three kinds of spots.
+    """Return the approaches (n,) after a Newton step (n,), m; three kinds of spots take modified steps.
 
     The modifications apply only with adhesion. The equations are smooth functions of the contact radius, but near
     jump-off the radius changes as s, the square root of delta - delta_off.

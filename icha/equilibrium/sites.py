@@ -55,7 +55,7 @@ class MergeRecord:
     Attributes
     ----------
     union_radius : contact radius of the union when the spots united, m.
-    touching_radius : contact radius of the union below which the two spots would no longer overlap, m.
+    touching_radius : contact radius of the union, m, at which the two spots would just touch; below it they separate.
     contact_radius : (2,) float, contact radii of the two spots, m.
     columns : other properties of the two spots: for each name in `Sites.UNITED` an array of two rows.
     """
@@ -81,7 +81,7 @@ class Sites:
     ----------
     position : (n, 2) float, positions of the asperities, or the centres of unions, m.
     height, radius_of_curvature : (n,) float, heights and radii of curvature of asperities and unions, m.
-    jump_off_approach : (n,) float, approaches below which the spots have no stable state and break contact, m.
+    jump_off_approach : (n,) float, lowest approaches with a stable state of contact, m; below them spots break contact.
     asperity : (n,) int, index of the asperity; -1 for a union.
     members : (n,) int, number of asperities that united to this spot; asperities that it only covers do not count.
     union : (n,) object, `MergeRecord` of a union; None for other sites.

@@ -48,7 +48,7 @@ def follow_cycle(
     branch leads back to a target. The waypoints have no energy balances. Raise the errors of `icha.path.follow.follow`.
 
     longest : longest step of the separation, m.
-    progress : record of the path's progress, which counts and reports the targets.
+    progress : record of the path's progress; it counts and reports the targets.
     """
     start, targets = contact.untouched(), [TargetFunction(target, contact) for target in path.targets]
     # Targets at separations above first contact, where nothing touches.

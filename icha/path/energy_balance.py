@@ -36,8 +36,8 @@ def integration_error(du, slope, end_slope):
     return du**2 * abs(end_slope - slope) / 24
 
 
-# If the loss of a step exceeds this fraction of its work, jumps cause the loss. A smaller loss may be an error of the
-# interaction, which in the asperity model is not exactly reciprocal between spots of different size.
+# If the loss of a step exceeds this fraction of its work, jumps cause the loss. A smaller loss may be an error: in the
+# asperity model, the interaction of spots of different size is not exactly reciprocal.
 _CERTAIN_LOSS = 0.1
 
 
