@@ -13,7 +13,7 @@ from icha.figures.curves import drop_rounding_errors
 from icha.figures.declaration import Campaign, Declaration, StudyFigure, problems_of_unloading
 from icha.figures.ensembles import Points, points_handles
 from icha.figures.looks import legend_below, looks_of_studies
-from icha.figures.select import name_model, select_detached_lines
+from icha.figures.select import name_models, select_detached_lines
 from icha.figures.style import GREY, ONE_COLUMN, TWO_COLUMNS, in_style, logarithmic_axes, new_panels
 from icha.support.formatting import choose_unit
 from icha.support.values import Problem, list_of_names
@@ -58,7 +58,7 @@ def figure(campaign: xr.DataTree, *, study: str, load_studies: Sequence[str] = (
     by_slope = select_detached_lines(campaign, [study], along_slopes=True)
     by_load = select_detached_lines(campaign, load_studies)
     looks = looks_of_studies(campaign, [study, *load_studies], [contact for contact, _ in (*by_slope, *by_load)])
-    points = itertools.chain(*by_slope.values(), *by_load.values())
+    points = list(itertools.chain(*by_slope.values(), *by_load.values()))
     factor, unit = choose_unit(max(float(run[_Y]) for point in points for run in point.by_seed.values()), "Pa")
 
     fig, [panels] = new_panels(2.9, columns=2 if by_load else 1, width=TWO_COLUMNS if by_load else ONE_COLUMN)
@@ -81,7 +81,7 @@ def figure(campaign: xr.DataTree, *, study: str, load_studies: Sequence[str] = (
         if loads.min() > 0:
             logarithmic_axes(panels[1], "x")
             panels[1].set_xlim(loads.min() / 1.6, loads.max() * 1.6)
-    name_model(panels[0], campaign, [study, *load_studies])
+    name_models(panels[0], points)
     legend_below(fig, looks.handles(**_LINE) | points_handles(counts))
     return fig
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
@@ -10,7 +11,7 @@ import numpy as np
 from icha.figures.declaration import Campaign, Declaration, FigureOptions, problems_of_unloading
 from icha.figures.ensembles import Points, points_handles
 from icha.figures.looks import legend_below, looks_of_studies
-from icha.figures.select import ContactRuns, NothingToDraw, name_model, select_detached_lines
+from icha.figures.select import ContactRuns, NothingToDraw, name_models, select_detached_lines
 from icha.figures.style import GREY, in_style, logarithmic_axes, new_panels
 from icha.support.values import Problem, list_of_names
 
@@ -72,7 +73,7 @@ def figure(campaign: xr.DataTree, *, studies: Sequence[str]) -> Figure:
 
     fig, [(loss, parts)] = new_panels(3.1, width_ratios=(1.25, 1))
     handles, counts = _draw_losses(loss, sticky, looks)
-    name_model(loss, campaign, studies)
+    name_models(loss, itertools.chain(*runs.values()))
     shown = _draw_parts(parts, sticky, looks)
     handles |= {PARTS[name][0]: Patch(ec="black", lw=0.5, **PARTS[name][1]) for name in shown}
     legend_below(fig, handles | points_handles(counts))

@@ -258,10 +258,22 @@ def select_unloaded_runs(campaign: xr.DataTree, study: str) -> list[tuple[RunLab
     NothingToDraw
         If no run is complete, or if no run unloads.
     """
-    runs = [(labels, run) for labels, run in select_runs(campaign, study, ragged=False) if unloading_legs(run)]
+    runs = _select_runs_with(unloading_legs, campaign, study)
     if not runs:
         raise NothingToDraw(f"study {study}: no run was unloaded; expected a study that unloads")
     return [(labels, run.assign(reduced_separation=run["mean_separation"] / run["rms_height"])) for labels, run in runs]
+
+
+def _select_runs_with(condition, campaign, study):
+    """Return the runs of the `shown_model` that fulfil a condition; or, if there are none, those of boundary elements.
+
+    Runs with boundary elements may unload from full contact, where runs with asperities end before their last stop.
+    """
+    for model in (None, REFERENCE_MODEL):
+        runs = select_runs(campaign, study, ragged=False, model=model)
+        if found := [(labels, run) for labels, run in runs if condition(run)]:
+            break
+    return found
 
 
 def select_detached_lines(
@@ -285,7 +297,7 @@ def select_detached_lines(
     """
     found = {}
     for study in studies:
-        runs = [each for each in select_runs(campaign, study, ragged=False) if "hysteresis_loss" in each[1]]
+        runs = _select_runs_with(lambda run: "hysteresis_loss" in run, campaign, study)
         for point in group_by_contact(campaign, runs):
             material, surface, slope = point.contact
             line = (material, surface, None if along_slopes else slope), point.applicable
@@ -304,7 +316,7 @@ def pull_off_step(run: xr.Dataset) -> int | None:
     return int(step) if pressure[step] < -ROUNDING * pressure.max() else None
 
 
-def name_model(axes: Axes, campaign: xr.DataTree, studies: Iterable[str]) -> None:
-    """Write the name of the `shown_model` of the studies above a panel."""
-    models = dict.fromkeys(shown_model(campaign[study].to_dataset()) for study in studies)
+def name_models(axes: Axes, points: Iterable[ContactRuns]) -> None:
+    """Write the names of the models of some runs above a panel."""
+    models = dict.fromkeys(point.labels.model for point in points)
     axes.set_title(", ".join(MODELS[model].words for model in models), loc="right")

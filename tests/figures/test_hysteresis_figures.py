@@ -8,6 +8,7 @@ import xarray as xr
 from drawn import legend
 from matplotlib.colors import to_hex
 
+from icha.contact.models import REFERENCE_MODEL
 from icha.datasets.campaign import campaign_tree
 from icha.datasets.labels import RunLabels
 from icha.figures import fig13_loops, fig14_pull_off, fig15_loss, fig16_snap_map
@@ -372,6 +373,20 @@ def test_figures_of_several_cycles_show_the_first_loading_and_the_last_unloading
     assert formed > broke > 0
     names = legend(snap_map(tree, surface))
     assert {f"spot formed ({formed})", f"spot broken ({broke})"} <= set(names)
+
+
+def test_boundary_elements_are_drawn_where_no_run_with_asperities_unloads():
+    ((labels, run),) = separate.study("one", materials=("sticky",), slopes=(0.5,), seeds=(1,))
+    run = run.assign(overlap_fraction=("snapshot", [0.0]))
+    first = run.isel(step=run["leg"].values == 0).drop_vars([name for name in run if "loss" in name])
+    first = first.assign_attrs(beyond_model="the contact area is too large")
+    truth = run.assign_attrs(contact_model=REFERENCE_MODEL)
+    tree = campaign_tree([(labels, first), (labels._replace(model=REFERENCE_MODEL), truth)])
+    figure = draw(fig14_pull_off, tree, "one")
+    assert figure.axes[0].get_title(loc="right") == "boundary elements"
+    (line, *_) = [line for line in figure.axes[0].lines if line.get_marker() == "o"]
+    assert 1e3 * line.get_ydata()[0] == pytest.approx(float(run["pull_off_pressure"]))  # kPa
+    assert len(curves(fig13_loops.figure(tree, study="one").axes[0])[1]) == 1
 
 
 # --- all of them ------------------------------------------------------------------------------------------------
