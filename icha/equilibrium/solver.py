@@ -102,7 +102,11 @@ def apply_events(state: IterationState, evaluation: Evaluation, margin: float) -
     area = pressure_or_area_fraction(contact, AREA_FRACTION, evaluation.a, state.sites.radius_of_curvature)
     if area > _FULL_CONTACT:
         raise FullContact(f"the contact area reached {area:.2f} of the nominal area, above the limit {_FULL_CONTACT}")
-    before = state = state.with_approach(evaluation.approach)
+    state = state.with_approach(evaluation.approach)
+    if not contact.adhesive:
+        # A candidate that has covered asperities may be out of contact now.
+        state = _free_asperities(state, (state.sites.status == CANDIDATE) & (evaluation.approach <= 0))
+    before = state
     state = apply_jump_off(state, evaluation, margin)
     changed = state is not before
     # Without adhesion, probable contacts are already candidates. Others are added when the equations are solved.
@@ -177,12 +181,17 @@ def _update_candidates(state, evaluation):
     made = np.flatnonzero((status == CANDIDATE) & (evaluation.approach > 0))
     status[made] = CONTACT
     site_of_asperity[sites.asperity[made]] = made
-    lost = np.flatnonzero((status == CONTACT) & (evaluation.approach <= 0))
+    lost = (status == CONTACT) & (evaluation.approach <= 0)
+    state = _free_asperities(replace(state, site_of_asperity=site_of_asperity), lost)
     status[lost] = CANDIDATE
-    freed = np.isin(site_of_asperity, lost)
-    site_of_asperity[freed] = -1
     state = state.with_events(JUMP_IN, sites.position[made], 1, 0.0, sites.asperity[made])
     state = state.with_events(JUMP_OFF, sites.position[lost], 1)
+    return replace(state, sites=replace(sites, status=status))
+
+
+def _free_asperities(state, sites):
+    """Return the state in which asperities under the given sites, (n,) bool, have no site."""
+    freed = np.isin(state.site_of_asperity, np.flatnonzero(sites))
+    site_of_asperity = np.where(freed, -1, state.site_of_asperity)
     last_separation = np.where(freed, np.inf, state.last_separation)  # the present approach is not known
-    sites = replace(sites, status=status)
-    return replace(state, sites=sites, site_of_asperity=site_of_asperity, last_separation=last_separation)
+    return replace(state, site_of_asperity=site_of_asperity, last_separation=last_separation)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from few_asperities import counts
+from few_asperities import BARE, HEIGHT, contact_of, counts
 from half_space import all_pairs, spot_of_asperity
 
 from icha import Material
@@ -167,3 +167,17 @@ def test_the_deepest_cover_counts():
     np.testing.assert_array_equal(covering_spot(twins, twins, a, PERIOD, larger_than=a), [-1, 0, 1])
     assert len(covering_spot(points[:0], spots, a, PERIOD)) == 0
     np.testing.assert_array_equal(covering_spot(points, spots[:0], a[:0], PERIOD), [-1, -1, -1])
+
+
+def test_asperity_under_a_candidate_out_of_contact_makes_contact_itself():
+    """One long step from first contact, in which a blunt asperity first covers a sharp one and then loses contact."""
+    angles = np.arange(5) * 2 * np.pi / 5
+    ring = 30.68 * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    heights = HEIGHT + np.array([0.0, 0.4947, *5 * [0.7919]])
+    contact = contact_of(heights, [(0, 0), (2.492, 0), *ring], [46.78, 1.0, *5 * [54.31]], material=BARE)
+    stepwise = start = contact.untouched()
+    for part in np.linspace(0.05, 1, 20):
+        stepwise = contact.equilibrium(stepwise, start.separation - 1.3163 * part)
+    at_once = contact.equilibrium(start, stepwise.separation)
+    assert contact.spot_count(at_once) == contact.spot_count(stepwise) == 6
+    assert contact.pressure(at_once) == pytest.approx(contact.pressure(stepwise), rel=1e-9)
