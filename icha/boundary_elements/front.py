@@ -168,9 +168,17 @@ class Front:
         """Return the gap g = C s (1 - f) of cells at the front from their strengths and fractions, in cell sizes."""
         return COMPLIANCE * strengths * (1 - fraction)
 
-    def law_gap_change(self, strengths_change: np.ndarray, tension_change: np.ndarray) -> np.ndarray:
-        """Return the change of the gap g = C (s - t) for given changes of strength and tension, in single precision."""
-        return np.float32(COMPLIANCE) * (strengths_change - tension_change)
+    def law_gap_change(
+        self,
+        strengths: np.ndarray,
+        fraction: np.ndarray,
+        strengths_change: np.ndarray,
+        fraction_change: np.ndarray,
+        damping: np.ndarray,
+    ) -> np.ndarray:
+        """Return the first-order change of the gap g = C (s - t), in single precision; damping lengthens dt."""
+        tension_change = self.tension_change(strengths, fraction, strengths_change, fraction_change)
+        return np.float32(COMPLIANCE) * (strengths_change - (1 + damping) * tension_change)
 
     def intensity(self, fraction: np.ndarray, pressure: np.ndarray, mean_fraction: np.ndarray) -> np.ndarray:
         """Return K/K_c of cells in contact: their tension divided by the tension of the law at the same fraction."""

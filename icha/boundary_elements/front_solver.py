@@ -437,7 +437,7 @@ class LinearisedFront:
 
     def _left_side(self, unknowns, operator=None):
         """Return the change of displacement, by `operator` if given, minus the change of the gap by the law."""
-        pressure, stronger, tension = self._pressures(unknowns)
+        pressure, stronger, fraction = self._pressures(unknowns)
         result = (operator or self.operator).displacement(pressure)
         law = self.local_strengths, self.fraction, stronger, fraction
         result[self.at_front] -= self.front.law_gap_change(*law, self.damping)
