@@ -182,7 +182,7 @@ def test_another_call_continues_a_draft_and_sends_nothing_twice(server, deposit)
     server.files["photo.jpg"] = b"of the author's"
     status, output = upload(deposit, "--url", server.address, "--draft", "77", "--yes")
     assert status == 0 and f"{deposit.name}: already sent" in output
-    assert "photo.jpg: a file of the draft that is not in the deposit" in output
+    assert "photo.jpg: is in the draft but not in the deposit" in output
     sent = [path for method, path, _ in server.requests if method == "PUT" and "/files/" in path]
     assert sent == ["/api/files/b-77/README.md"] and server.files["README.md"] == FILES["README.md"]
     assert set(server.files) == SENT | {"photo.jpg"}
