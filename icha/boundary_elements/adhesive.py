@@ -25,7 +25,8 @@ class Summits:
     cell : (k,) int, grid cell of each summit.
     above : (k,), height of the summit above the grid node of its cell.
     reach : (k,), largest gap at which the summit jumps into contact.
-    radius : (k,), radius of the disc that closes: that of a single summit after its jump. A smaller disc could open.
+    radius : (k,), radius of the disc that closes, equal to the contact radius of a lone summit after its jump. A
+        smaller disc could open.
     """
 
     cell: np.ndarray
@@ -49,7 +50,7 @@ class Summits:
         gap, touched = state.gap.ravel(), mask_of(state.cells, state.gap.shape).ravel()
         within = (gap[self.cell] - self.above - self.reach < -margin) & ~touched[self.cell]
         # The surfaces also touch where they overlap without a summit. The front solver closes neighbours of contact.
-        # Overlaps above the displacement error have already joined the contact, so only margin 0 finds such cells.
+        # Overlaps larger than the displacement error are already in contact, so only margin 0 finds overlapping cells.
         touched[state.rim] = True
         return within, np.flatnonzero((gap < -margin) & ~touched)
 
@@ -58,8 +59,8 @@ class Summits:
     ) -> tuple[np.ndarray, np.ndarray, int]:
         """Find new contact at summits and overlapping cells within reach by more than a margin, if not `tried` before.
 
-        Return the cells to close, the cells that count as tried from now on (cells of summits, not their discs, and
-        overlapping cells), and the number of all cells within reach, tried before or not.
+        Return the cells to close, the cells that count as tried from now on, and the number of all cells within reach,
+        tried before or not. Of a summit, only its own cell counts as tried, not the disc around it.
         """
         within, overlapping = self.find_within_reach(state, margin)
         candidates = np.union1d(self.cell[within], overlapping)
@@ -81,7 +82,7 @@ def solve_adhesive_contact(
     problem : the surface, the law of its front, and the separation.
     summits : summits at which contact may form.
     contact : initial contact.
-    tolerance : largest allowed residual of the fronts. If it is larger than TOLERANCES.fine, the stage with this value
+    tolerance : largest allowed residual of the fronts. If it exceeds TOLERANCES.fine, the stage to TOLERANCES.fine
         is left out, and contact forms only where the gap is below the reach by TOLERANCES.coarse critical openings.
     nearby : whether the initial contact is near equilibrium; then the coarser stages are skipped.
 
@@ -115,7 +116,7 @@ def solve_adhesive_contact(
             contact = solved
             continue
         stage = first
-        # New contact can bring further summits clearly within reach. They touch before the whole front is relaxed.
+        # New contact can bring further summits clearly within reach. Close these before relaxing the whole front.
         while len(new):
             rounds += 1
             if rounds > _MAX_ROUNDS:

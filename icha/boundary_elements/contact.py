@@ -39,7 +39,7 @@ from icha.surfaces.surface import Surface
 _SMALLEST_OPENING = 1e-4
 # The rates of a state predict the next state if no fraction of contact changes by more than this.
 _LARGEST_PREDICTION = 1.0
-# Errors of the work in a loop are compared with at least this work, in units of `surface_energy` times A0.
+# Least energy to which errors of the work in a loop are relative, in units of `surface_energy` times A0.
 _SMALLEST_WORK = 1e-3
 
 
@@ -93,7 +93,7 @@ class BoundaryElements(FullContactProblem):
         return replace(state, history=(*before.history, events) if len(events) else before.history)
 
     def _next_equilibrium(self, state, separation, control):
-        """Find the equilibrium from a state with gaps; areas, adhesive loads and loads before contact need a search."""
+        """Find the equilibrium from a state with gaps. Areas, loads with adhesion and a first contact need a search."""
         if control is None:
             closed = separation < self.smallest_gap
             return self.full_contact(self.undetermined_pressure) if closed else self._solve(state, separation)
@@ -176,7 +176,7 @@ class BoundaryElements(FullContactProblem):
         return False
 
     def _predict(self, state, separation):
-        """Predict the contact at a separation (m) by a state's rates; it stays the same without rates or far away."""
+        """Predict the contact at a separation (m) by the rates of a state; without valid rates return its contact."""
         contact = Contact(state.cells, state.fraction, state.pressure / self.contact_modulus)
         if state.rates is None:
             return contact
@@ -234,7 +234,7 @@ class BoundaryElements(FullContactProblem):
             gradient = reported_area_gradient(state.fraction, state.mean_fraction)
             area_slope = float(np.sum(gradient * fraction)) / scale
         else:
-            # The area changes by whole cells. On average it is nearly proportional to the load.
+            # The area changes by whole cells, but on average it is nearly proportional to the load.
             area_slope = self.area_fraction(state) * pressure_slope / self.pressure(state)
         return replace(state, pressure_slope=pressure_slope, area_slope=area_slope, rates=(fraction, pressure))
 
@@ -275,7 +275,7 @@ def contact_of(surface: Surface, material: Material) -> BoundaryElements:
 
 
 def resumable(contact: BoundaryElements, folder: pathlib.Path) -> CheckpointedContact:
-    """Return the contact with checkpoints to resume a path; each surface, material and program version has its own."""
+    """Return the contact with checkpoints to resume a path, separate for each surface, material and program version."""
     programs = [(name, version(name)) for name in ("icha", "numpy", "scipy")]
     settings = repr((contact.spacing, contact.law.material, programs, CellState.__match_args__)).encode()
     identity = hashlib.sha256(contact.heights.tobytes() + settings).hexdigest()

@@ -8,11 +8,16 @@ g_c, t = s (1 - g/g_c) with g_c = C s, and does the work dgamma. The range g_c d
 compliance of a row of cells at a straight front, times a factor. The factor lets the front move across cells without
 being trapped, and makes the front about two cells wide.
 
+Any cohesive law t(f), g(f) must fulfil three conditions. (1) The compliance of a bond is c = g/t, with t = s and g = 0
+at f = 1. (2) dc/df = -C (s/t)^2. (3) s^2 = 2 W/C is proportional to the local work of adhesion W, because C and t/s do
+not depend on W. Then (K/K_c)^2 = G/W. Here K/K_c is the tension of a cell divided by t(f), and G is the energy release
+rate. Other modules use the law only through `bond_compliance` and `Front`.
+
 The sum of the fractions overestimates the contact radius by a constant part of a cell. So the area
 
     A = sum f - b sum f (1 - w*f),   b = `PERIMETER`, w a Gaussian stencil,
 
-subtracts a term in proportion to the perimeter. By this term, the work of adhesion per area is lower at convex fronts.
+subtracts a term in proportion to the perimeter. This term lowers the work of adhesion per area at convex fronts.
 
 Lengths are in units of the cell size, pressures in E*.
 """
@@ -120,9 +125,7 @@ def reported_area_gradient(fraction: np.ndarray, mean_fraction: np.ndarray) -> n
 
 @dataclass(frozen=True)
 class Front:
-    """Linear cohesive law of cells at the front; other modules use only its methods and `bond_compliance`.
-
-    Fraction f, strength s, tension t and gap g of a cell obey t = f s and g = C s (1 - f).
+    """Linear cohesive law of cells at the front: tension t = f s and gap g = C s (1 - f), with the module's symbols.
 
     Parameters
     ----------
@@ -185,7 +188,7 @@ class Front:
         return -pressure / self.tension(self.local_strengths(mean_fraction), fraction)
 
     def relative_gap(self, gap: np.ndarray, mean_fraction: np.ndarray) -> np.ndarray:
-        """Return the gap of open cells divided by C s, where their tension becomes zero; below 1 the cells close."""
+        """Return the gap of open cells, divided by the gap C s of zero tension; below 1 the cells close."""
         return gap / (COMPLIANCE * self.local_strengths(mean_fraction))
 
     def adhesion_energy(self, fraction: np.ndarray, mean_fraction: np.ndarray) -> float:

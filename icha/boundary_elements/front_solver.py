@@ -34,8 +34,8 @@ from icha.contact.models import MODELS, REFERENCE_MODEL
 class FrontTolerances:
     """Tolerances of the solver; `docs/short_range.md` justifies them by measurements.
 
-    The residual of a cell is |intensity - 1|, see `ActiveCells`. In contact, the intensity is K/K_c = sqrt(G/dgamma).
-    Errors of displacements are divided by the critical opening.
+    The residual of a cell is |intensity - 1|, see `ActiveCells`. In contact, the intensity is K/K_c = sqrt(G/W); W is
+    the local work of adhesion. Errors of displacements are divided by the critical opening.
 
     Parameters
     ----------
@@ -50,11 +50,11 @@ class FrontTolerances:
     few : largest share that counts as few cells: of the front for local relaxation, of the grid for open cells.
     displacement : largest error of displacements, divided by the allowed residual of the front.
     moving_displacement : largest error of displacements in the first steps. After a step, the allowed error is
-        residual * min(moving_displacement, max(residual, linear[0])), about the residual after the next step.
+        residual * min(moving_displacement, max(residual, linear[0])). The next step leaves about this residual.
     certain_displacement : error of displacements at which the energies of two similar states can be compared.
     linear : smallest and largest relative error of the linearised equations; between them, it equals the residual.
     damping : damping of the bonds after a first step that would raise the energy. If most of the front is far from
-        equilibrium, the damping starts at twice this value. Cells above `coarse` always have at least twice this value.
+        equilibrium, the damping starts at 2 * `damping`. Cells with a residual above `coarse` have no smaller damping.
     """
 
     front: float = 1e-6
@@ -86,9 +86,9 @@ class ActiveCells(Contact):
     ----------
     gap : (k,), gap of each cell, in cell sizes.
     mean_fraction : (k,), Gaussian average of the fractions around each cell.
-    intensity : (k,), above 1 the fraction of a free cell falls, below 1 it grows. For cells in contact it is the stress
-        intensity divided by the critical one, K/K_c = sqrt(G/dgamma). For open cells it is the gap divided by the gap
-        at which the tension vanishes.
+    intensity : (k,), the fraction of a free cell falls if its intensity is above 1, and grows if it is below 1. In
+        contact the intensity is K/K_c = sqrt(G/W), the stress intensity divided by its critical value, with the local
+        work of adhesion W. For open cells it is the gap divided by the gap at which the tension vanishes.
     free : (k,) bool, whether the fraction of a cell may change.
     """
 
@@ -220,8 +220,8 @@ def relax_front(
     Raises
     ------
     NotConverged
-        If no step lowers the energy, or after _MAX_ITERATIONS without `max_iterations`, while the residual is above
-        TOLERANCES.stagnation.
+        If no step lowers the energy, or if the front has not converged after _MAX_ITERATIONS and `max_iterations` is
+        None; in both cases only if the residual is above TOLERANCES.stagnation.
     FullContact
         If the contact covers the surface.
     """
@@ -256,7 +256,7 @@ class FrontRelaxation:
     state : contact after the last step.
     damping : damping of the bonds in the next step.
     start, coarsest : largest allowed error of displacements in critical openings: in the first solution, and in the
-        next step. After a failed step `coarsest` is smaller than `start`.
+        next step. After a failed step `coarsest` is at most TOLERANCES.certain_displacement.
     local_relaxations : number of local relaxations since the last successful step; the allowed maximum after a failure.
     steps : number of steps of the whole front that were tried.
     """
@@ -271,10 +271,7 @@ class FrontRelaxation:
         self.state = contact
 
     def refine(self, accuracy: float) -> bool:
-        """Solve the pressures again unless displacement errors are at most `accuracy` (in critical openings).
-
-        Return whether the pressures were solved again.
-        """
+        """Solve the pressures again, and return True, if displacement errors exceed `accuracy` critical openings."""
         accuracy = max(accuracy, _SMALLEST_ERROR)
         if self.problem.is_accurate(self.state, accuracy):
             return False
@@ -296,7 +293,7 @@ class FrontRelaxation:
             try:
                 new = self.problem.solve_elastic(contact, max(_SMALLEST_ERROR, accuracy))
             except FullContact:
-                # In a window, pressures outside are fixed. So the last gap can close although it should stay open.
+                # The fixed pressures outside a window can close the last gap, although it should stay open.
                 contact = None
         if contact is None or not self.problem.is_lower(new, self.state):
             self.local_relaxations = _MAX_LOCAL_RELAXATIONS
@@ -316,7 +313,7 @@ class FrontRelaxation:
             self.damping = 2 * TOLERANCES.damping
         self.steps += 1
         change, pressure_change = newton_step(problem, active, self.damping)
-        # The step would raise the energy to first order: the sum of (G/w - 1) w df is positive, with local adhesion w.
+        # To first order the step changes the energy by the sum of (G/W - 1) W df, with the local work of adhesion W.
         adhesion = (problem.front.local_strengths(active.mean_fraction) / problem.front.straight_strength) ** 2
         if np.sum((active.intensity**2 - 1) * adhesion * change) > _WORK_ROUNDING * np.abs(change).sum():
             self._damp(2, active.residual)
@@ -361,7 +358,7 @@ def newton_step(problem: FrontProblem, active: ActiveCells, damping: float) -> t
 def rates_with_separation(
     space: HalfSpace, front: Front, contact: Contact, mean_fraction: np.ndarray, accuracy: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the changes of fraction and pressure (E*), (k,), per cell size of separation; closed cells stay closed."""
+    """Return changes of fraction and pressure in E*, (k,) each, per cell size of separation; no closed cell opens."""
     linear = LinearisedFront(space, front, contact, mean_fraction, contact.fraction < 1, np.zeros(len(mean_fraction)))
     return linear.solve(np.full(len(mean_fraction), -1.0), accuracy)
 
@@ -436,7 +433,7 @@ class LinearisedFront:
         return pressure, stronger, fraction
 
     def _left_side(self, unknowns, operator=None):
-        """Return the change of displacement, by `operator` if given, minus the change of the gap by the law."""
+        """Return the change of displacement minus the change of the gap by the law; use `operator` if it is given."""
         pressure, stronger, fraction = self._pressures(unknowns)
         result = (operator or self.operator).displacement(pressure)
         law = self.local_strengths, self.fraction, stronger, fraction

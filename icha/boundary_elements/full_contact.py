@@ -30,7 +30,7 @@ class FullContactProblem(MaterialUnits):
     ----------
     heights : (n, n), heights of the surface, m.
     spacing : size of a cell, m.
-    law : contact law of a single summit, for the distance of jump into contact.
+    law : contact law of a single summit; it gives the gap at which a summit jumps into contact.
     rms_height, rms_slope : root-mean-square height (m) and slope of the surface.
     asperities : summits of the surface.
     space, topography, front, summits : half-space, heights, law of the front and summits for the solver, in units of

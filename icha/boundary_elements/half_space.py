@@ -128,7 +128,7 @@ class FullGrid:
         return self.space.displacement(self.cells, pressure, self.cells)
 
     def approximate_inverse(self, displacement: np.ndarray) -> np.ndarray:
-        """Return `stiffness` applied to displacements plus, on a single grid, a uniform pressure against their sum."""
+        """Apply `stiffness` to displacements; on a single grid, add a uniform pressure in proportion to their sum."""
         pressure = self.space.filter(self.cells, displacement, self.space.stiffness, self.cells)
         if len(self.space.shape) == 2:
             # The contact is stiffer against a mean displacement if a larger share of the grid is in contact.

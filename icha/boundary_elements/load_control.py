@@ -16,15 +16,15 @@ from icha.contact.models import AREA_TOLERANCE_CELLS, AREA_TOLERANCE_PART
 if TYPE_CHECKING:
     from icha.boundary_elements.contact import BoundaryElements
 
-# A load or area is met if its relative error is at most this. For a path, a target is met up to a larger error, 1e-9.
+# A load or area is met if its relative error is at most this. Paths allow a larger error, 1e-9 (`icha.path.stops`).
 _MET = 5e-10
 # Smallest difference of two separations, divided by h_rms.
 _SAME_SEPARATION = 1e-13
-# If the target is zero load, errors are compared with at least this load, in units of stiffness times h_rms. At zero
-# load, attraction and repulsion of about this size cancel.
+# Least load to which errors at zero load are relative, in units of stiffness times h_rms: about the size of attraction
+# and repulsion, which cancel at zero load.
 _ZERO_LOAD = 1e-2
 _MAX_TRIALS, _MAX_ATTEMPTS = 30, 4
-# Largest decrease of the mean gap between trials on the way to full contact, in mean gaps, and (_LONGEST) in h_rms.
+# Largest decrease of the mean gap in a trial towards full contact, in units of the mean gap, and (_LONGEST) of h_rms.
 _CLOSING, _LONGEST = 0.5, 0.1
 
 
@@ -56,14 +56,14 @@ class ControlProblem:
         return of(state)
 
     def scale(self, state: CellState) -> float:
-        """Return the reference of relative errors: |target|, or for zero load |p| of a state (with `_ZERO_LOAD`)."""
+        """Return the unit of relative errors: |target|; for zero load |p| of a state, with a limit by `_ZERO_LOAD`."""
         if self.control.target:
             return abs(self.control.target)
         unit = abs(self.contact.stiffness(state)) * self.contact.rms_height
         return max(abs(self.contact.pressure(state)), _ZERO_LOAD * unit if np.isfinite(unit) else 0.0)
 
     def tolerance(self, scale: float) -> float:
-        """Return the largest error that meets the target: a part of `scale`; cells for an area without adhesion."""
+        """Return the largest error of a met target: a part of `scale`; for areas without adhesion, some cell areas."""
         if self.control.quantity == AREA_FRACTION and not self.contact.adhesive:
             cells = AREA_TOLERANCE_CELLS * self.contact.spacing**2 / self.contact.area
             return max(_MET * scale, min(cells, AREA_TOLERANCE_PART * scale))
@@ -96,13 +96,11 @@ class Bracket:
     beyond: CellState | None = None
 
     def with_state(self, state: CellState, error: float) -> Bracket:
-        """Return the bracket with a new state in place of `before` or `beyond`; its error (value - target) decides."""
+        """Return the bracket with a new state as `before` or `beyond`; the sign of `error` (value - target) decides."""
         return replace(self, before=state) if self.sign * error < 0 else replace(self, beyond=state)
 
     def limit(self, separation: float) -> float:
-        """Return a predicted separation (m), or the middle of the bracket if the prediction lies outside.
-
-        Without `beyond`, any finite prediction is returned.
+        """Return a predicted separation (m) or, if it lies outside a bracket with `beyond`, the middle of the bracket.
 
         Raises
         ------
@@ -122,7 +120,7 @@ class Bracket:
 def solve_at_control(problem: ControlProblem, state: CellState, separation: float) -> CellState:
     """Find the equilibrium with the target load or area, starting from a nearby state.
 
-    Return full contact if the target load is larger than all loads down to the smallest mean gap.
+    Return full contact if the target load is larger than the loads of all states down to the smallest mean gap.
 
     separation : first guess of the mean separation, m; if it is not positive, half the separation of the state is used.
 

@@ -25,14 +25,14 @@ from icha.boundary_elements.patches import label_patches
 from icha.contact.model import FullContact, NotConverged
 from icha.support.parallel import blocks, on_cores
 
-# Sides of windows, in cells; cells may move in the middle half of each side. Side of pieces of wider regions, in cells.
+# Sides of windows, in cells; fronts move only in the middle half of a side. Side of pieces of wider regions, in cells.
 _SIDES, _PIECE = (64, 128, 256), 64
 # Number of cells of the windows that are solved together; they fit in the cache.
 _BATCH = 65_536
 # Residual of the front at which a window stops early; the whole front is relaxed afterwards.
 _TOLERANCE = 1e-4
-# Entries of three numbers: distance from the given cells within which the front may move, in cells; largest total area
-# of the windows, in grid areas; largest number of iterations. The first entry is used whose windows fit in its area.
+# Settings of three numbers: distance from the given cells within which the front may move, in cells; largest total area
+# of the windows, in grid areas; largest number of iterations. The first setting whose windows fit in this area is used.
 _EXTENTS = ((20, 0.05, 60), (4, 0.5, 20))
 
 
@@ -128,7 +128,7 @@ class Regions(NamedTuple):
         return cls(labels, np.sum(ends, axis=2) * BLOCK // 2, sides)
 
     def windows(self, grid: int) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        """Yield batches of windows: grid cells of each window, (t, w, w), and whether each cell may move there."""
+        """Yield batches of windows: grid cells of each window, (t, w, w), and whether the front may move at a cell."""
         for side in _SIDES:
             numbers, offset = np.flatnonzero(self.sides == side), np.arange(side) - side // 2
             for batch in blocks(len(numbers), _BATCH // side**2):

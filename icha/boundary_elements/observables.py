@@ -34,7 +34,7 @@ class PatchObservables:
         touched = np.isin(contact.summits.cell, state.cells)
         verified = contact.law.is_jump_in_verified(contact.asperities.radius_of_curvature[touched])
         outside = np.count_nonzero(~verified) / max(len(verified), 1)
-        # The first residual is the one that every model has; here it is that of the gap.
+        # Every model has the first residual, "residual". In this model it is the residual of the gap.
         return {
             "residual": state.gap_residual / contact.rms_height,
             "front_residual": state.front_residual,

@@ -48,7 +48,7 @@ class CellState:
 
 
 def pack(state: CellState, before: CellState) -> dict[str, np.ndarray]:
-    """Convert a state to named arrays for a checkpoint; of its events, only those since the state `before`."""
+    """Convert a state to named arrays for a checkpoint, with only those events that follow the state `before`."""
     arrays = {each.name: getattr(state, each.name) for each in fields(state) if each.name not in ("rates", "history")}
     arrays |= {f"rates_{k}": rate for k, rate in enumerate(state.rates or ())}
     events = Events.concatenate(state.history[len(before.history) :])
@@ -127,7 +127,7 @@ def patch_events(
     grid: int,
     spacing: float,
 ) -> Events:
-    """Find jumps, coalescences and splits between two states; a patch continues as each patch with a common cell.
+    """Find jumps, coalescences and splits between two states; a patch continues in every patch that shares a cell.
 
     Parameters
     ----------

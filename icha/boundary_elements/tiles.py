@@ -22,7 +22,7 @@ from icha.support.parallel import blocks, on_cores
 
 # Number of cells along a side of a tile. Range of the short kernel in cells; tiles have a margin of this width.
 TILE, RANGE = 128, 16
-# Spacing of the coarse grid in cells, and order of its splines; their support is at most RANGE.
+# Spacing of the coarse grid in cells, and order of its splines. The support of a spline is at most RANGE.
 COARSENING, _ORDER = 4, 4
 _NODES = TILE // COARSENING
 # Ewald parameter alpha, per cell size. With this value the cut-off part of the short kernel and the error of the coarse
@@ -60,7 +60,7 @@ class TiledGrid:
 
     @classmethod
     def of(cls, cells: np.ndarray, grid: int) -> TiledGrid | None:
-        """Return tiles of cells (k,), ascending; None if empty, not faster, or `grid` is no multiple of COARSENING."""
+        """Return tiles of cells (k,), ascending; None without cells, if not faster, or if `grid` % COARSENING > 0."""
         if grid % COARSENING:
             return None
         many = -(-grid // (TILE - 2 * RANGE))
@@ -171,7 +171,7 @@ def _window(field, row, column):
 
 
 def _indices_and_positions(tiles):
-    """Return list indices and flat positions of the cells in tiles, (t, TILE, TILE), of list indices + 1, or 0."""
+    """Return list indices and flat positions of cells in `tiles`, (t, TILE, TILE): index + 1 at cells, 0 elsewhere."""
     positions = np.flatnonzero(tiles)
     return tiles.ravel()[positions].astype(int) - 1, positions
 

@@ -80,6 +80,6 @@ def reusable_field(shape: tuple[int, int], dtype: np.dtype) -> np.ndarray:
 
 
 def _one_by_one(function, items):
-    """Call a function with each item in turn, without results; small grids use it instead of `on_cores`."""
+    """Call a function with each item in turn, and ignore the results; used for small grids instead of `on_cores`."""
     for item in items:
         function(item)
