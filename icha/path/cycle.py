@@ -43,8 +43,8 @@ def follow_cycle(
     """Follow a path that continues after the first loading, and yield a waypoint for each equilibrium.
 
     After each waypoint the caller may send one additional target for the next step (`generator.send`). If the step
-    meets this target first, the generator yields the waypoint at this target. A sent target is ignored if it lies
-    inside a jump, or if it is sent up to first contact, after the last waypoint of a leg, or at a state from which the
+    meets this target first, the generator yields the waypoint at this target. Sent targets inside jumps are
+    ignored. So are targets sent up to first contact, after the last waypoint of a leg, or at a state from which the
     branch leads back to a target. The waypoints have no energy balances. Raise the errors of `icha.path.follow.follow`.
 
     longest : longest step of the separation, m.
@@ -96,10 +96,10 @@ class _Cycle:
     step_length : length of the next trial step, m, if `ahead` is empty and no station follows in this direction.
     accuracy : sums over all steps so far, and the accuracy that further steps need.
     leg : number of the leg, even on loading and odd on unloading.
-    event_at : position, direction times separation, m, at the end of the shortest trial step that contained the next
-        event: the event happens before it. It is inf if no event is known, and always with error-controlled steps.
+    event_at : direction times separation, m, at the end of the shortest trial step that contained the next event. The
+        event happens earlier. The value is inf if no event is known, or with error-controlled steps.
     ahead : with error-controlled steps, equilibria found at the ends of too long trial steps; the nearest is last.
-    longest_part : a trial step that is too long is divided; length of the longest part accepted so far, m.
+    longest_part : length (m) of the longest part accepted so far of a trial step that was too long and was divided.
     stations : separations of a loading that all later legs, in both directions, visit again, ascending, m.
     """
 
@@ -182,7 +182,7 @@ class _Cycle:
                 step = Step.between(self.contact, self.state, met)
             listed = None if target is sent else target
             self.progress.require_valid_state(self.state, met, listed, pending, self.loading)
-            # With adhesion, leg 0 starts with `event_length`; a step may be the longest until a separation is kept.
+            # In leg 0, the first step is `event_length` with adhesion. Then try `longest` until a separation is kept.
             self.step_length = self._choose_next_length(step) if leg or len(visited) > 1 else self.longest
             between, length_limit = self._advance(step, met), np.inf
             if self._is_new_station(met.separation, visited[-1]):
@@ -219,7 +219,7 @@ class _Cycle:
         (a) is true and the tension has a new maximum within the step, the step ends at the maximum. With
         error-controlled steps, the ends of too long steps are kept in `ahead`, and tried again as ends of later steps.
 
-        length : largest length of the first trial step, m. It ends at the next state of `ahead` if that is closer.
+        length : largest length of the first trial step, m. The next state of `ahead` limits it if that is closer.
         """
         start, accuracy, keeps = self.state, self.accuracy, self.contact.path_accuracy.error_controlled_steps
         ahead = None
@@ -258,8 +258,8 @@ class _Cycle:
 
         If the state `ahead` is given, this state is the equilibrium, and only its events are found. On unloading with
         adhesion, the spots together may lose their equilibrium before any single spot has reached its own jump-off. If
-        this happens in a step shorter than `CLOSE_TO_A_JUMP` h_rms, the spot closest to jump-off is made to break
-        contact. If there is still no equilibrium, the same is tried with two, four, … spots, up to the number of spots.
+        this happens in a step shorter than `CLOSE_TO_A_JUMP` * h_rms, the spot closest to jump-off is made to break
+        contact. If there is still no equilibrium, two, four, … spots are made to break contact, at most all spots.
         On unloading, an unstable equilibrium counts as no equilibrium, unless spots were made to break contact. Raise
         the first `NotConverged` if there is no equilibrium.
         """
@@ -289,9 +289,9 @@ class _Cycle:
     def _choose_next_length(self, step):
         """Return the new `step_length` after an accepted step, m, at most `longest`; update `longest_part`.
 
-        Without error-controlled steps, `step_length` doubles. With them, it stays the same until `ahead` is empty: then
-        the last trial step is complete, and the new value is twice `longest_part`. But if the last step is the longest
-        part, and twice its length would make the error of the work too large, the new value is `longest_part`.
+        Without error-controlled steps, `step_length` doubles. Error-controlled steps do not change it until `ahead` is
+        empty, when all parts of a trial step are accepted. The new value is then twice `longest_part`. But if the last
+        part is the longest, and a step of twice its length would be too inaccurate, the new value is `longest_part`.
         """
         if not self.contact.path_accuracy.error_controlled_steps:
             return min(self.longest, 2 * self.step_length)

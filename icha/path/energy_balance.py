@@ -36,8 +36,8 @@ def integration_error(du, slope, end_slope):
     return du**2 * abs(end_slope - slope) / 24
 
 
-# If the loss of a step exceeds this fraction of its work, jumps cause the loss. A smaller loss may be an error: in the
-# asperity model, the interaction of spots of different size is not exactly reciprocal.
+# If the loss of a step exceeds this fraction of its work, jumps cause the loss. Below this fraction it may be an error:
+# in the asperity model, the interaction of spots of different size is not exactly reciprocal.
 _CERTAIN_LOSS = 0.1
 
 
@@ -46,7 +46,7 @@ def _extrapolate_to_full_contact(du, p, q, slope, end_slope):
 
     Full contact is infinitely stiff, so its pressure does no work. This pressure jumps when the last gap closes or the
     first gap opens. Therefore it is replaced by an extrapolation along the tangent at the other end of the step.
-    If both ends are full contact, the pressures stay, and the slopes and the error are 0.
+    If both ends are full contact, return the given pressures, and 0 for the slopes and the error.
     """
     if np.isinf(slope) and np.isinf(end_slope):
         return p, q, 0.0, 0.0, 0.0
@@ -84,8 +84,8 @@ class Step:
         """Return the step from one state to the next.
 
         The work is the integral of the cubic polynomial that has the pressures and stiffnesses of both states. If the
-        stiffness is constant, it is exact also for a jump of the pressure in the middle of the step. For a step from or
-        to full contact see `_extrapolate_to_full_contact`.
+        stiffness is constant, the work is exact even if the pressure jumps in the middle of the step. For a step from
+        or to full contact see `_extrapolate_to_full_contact`.
         """
         events = events_between(before, after)
         du = after.separation - before.separation
@@ -118,14 +118,14 @@ class Step:
 
     @property
     def event_error(self) -> float:
-        """Largest error of the work by events anywhere in the step, J/m^2; 0 if `may_change_pressure` is False."""
+        """Largest error of the work if events can be anywhere in the step, J/m^2; 0 if not `may_change_pressure`."""
         return event_error(self.separation_change, self.pressure_jump) if self.may_change_pressure else 0.0
 
     @property
     def work_error(self) -> float:
         """Upper bound of the error of the work, J/m^2, as if the pressure could jump anywhere, even without an event.
 
-        It is the larger one of the errors by such a jump and by the integration, but at most the computed loss. Because
+        It is the larger of two errors, by such a jump and by the integration, but at most the computed loss. Because
         the stored energy is exact, the computed loss of a step that loses no energy is the error of the work.
         """
         jump_error = event_error(self.separation_change, self.pressure_jump)
@@ -146,7 +146,7 @@ class EnergyBalance:
     jump_in, jump_off : losses by jumps into and out of contact.
     coalescence : loss by the coalescence of spots and by the splitting of unions.
     load_jump : loss by jumps at constant load, which happen only under load control.
-    unattributed : all other losses, due to errors of the integration, and to the interaction (see `_CERTAIN_LOSS`).
+    unattributed : all other losses, caused by errors of the integration and of the interaction (see `_CERTAIN_LOSS`).
     """
 
     work: float = 0.0
@@ -159,7 +159,7 @@ class EnergyBalance:
     def add_step(self, contact: ContactModel, step: Step) -> EnergyBalance:
         """Return the balance after one more step.
 
-        1. Jumps have the whole loss if the step has no coalescence and no split, if the sum of the reference losses is
+        1. Jumps cause the whole loss if the step has no coalescence and no split, if the sum of the reference losses is
            not zero, and if the loss is within a factor of two of this sum or more than a tenth of the work. Jumps in
            and jumps off share the loss in proportion to their reference losses, which must not have different signs.
         2. In all other cases, jumps in and jumps off have their reference losses. The rest of the loss is attributed to
@@ -236,7 +236,7 @@ def summarise_loop(
     ----------
     rows : one row per equilibrium, in order: pressures, separation, area, energies and spot_count by variable name.
     pull_off_row : index of the row with the largest tension of the last unloading.
-    material : material of the contact; without adhesion, values relative to its adhesion are 0.
+    material : material of the contact; ratios to the adhesion of the material are 0 if it has no adhesion.
     summit_pull_off_pressure : nominal tension if all summits had their pull-off force at the same time, Pa.
     unattributed : loss that is not attributed to any kind of event, J/m^2.
     """

@@ -29,7 +29,7 @@ def follow(contact: ContactModel, path: Path, report: Callable[[str], None] | No
     NotConverged
         If an equilibrium is not found even with short steps, if the path makes no progress, if the model is not valid
         in a state of the path, if the surfaces separate before a turning point, or if a leg starts beyond its turning
-        point. Also if a target lies inside a jump: at a turning point at once, and on the first loading after the other
+        point. Targets inside jumps also raise it: turning points at once, targets of the first loading after the other
         targets have been met. On the last unloading, targets inside jumps are left out without an error.
     """
     longest = path.max_step * contact.rms_height

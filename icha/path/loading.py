@@ -23,13 +23,13 @@ from icha.path.targets import Target
 
 # Shortest step after halvings, relative to the longest step.
 _SMALLEST_STEP = 2.0**-14
-# Largest number of equilibria without progress: without a target, and with a change of less than the longest step.
+# Largest number of equilibria in which no target is met and the separation changes by less than the longest step.
 _MOST_EQUILIBRIA = 2000
 
 
 @dataclass(eq=False)
 class PathProgress:
-    """Progress of a path: counts equilibria and targets, reports targets, and makes the exceptions of the path.
+    """Progress of a path: count equilibria and targets, report targets, and build the exceptions that the path raises.
 
     Attributes
     ----------
@@ -39,7 +39,7 @@ class PathProgress:
     report : function that is called with each line of a report; None for no reports.
     reached : number of targets of the first loading met so far.
     skipped : errors of the targets that lie inside jumps.
-    progress_from : separation, m; a change from it by at least a longest step, up or down, counts as progress.
+    progress_from : separation, m; progress means a change from it, up or down, of at least the longest step.
     idle : number of equilibria since the last progress: since the last target, or since `progress_from` was set.
     """
 
@@ -80,14 +80,14 @@ class PathProgress:
     def require_valid_state(
         self, before: State, after: State, target: TargetFunction | None, pending: list[TargetFunction], loading: bool
     ) -> None:
-        """Raise `NotConverged` if the model is not valid in the state `after` a step.
+        """Raise `NotConverged` if the model is not valid in the state `after`, at the end of a step.
 
         The contact area must not be larger than `contact.largest_area_fraction`. Between targets the mean gap must be
         positive, unless the model is valid up to full contact. At a target the mean gap may be negative, because the
         range of targets is already limited.
 
         target : target that the state after the step meets; None if there is no such target.
-        before, pending, loading : start of the step, and all targets not met yet, sorted; only for the message.
+        before, pending, loading : only for the message; start of the step, targets not met yet (sorted), and direction.
         """
         contact = self.contact
         ahead = target or (pending[0] if pending else None)
@@ -128,7 +128,7 @@ class PathProgress:
 # After this number of failed attempts to solve directly for a target, an ordinary step brackets the target.
 _DIRECT_ATTEMPTS = 2
 # After the first failed attempt, the path goes this fraction of the distance to the target, and then tries again. If
-# the distance is less than `_LONG` longest steps, there is no second attempt.
+# the distance is at most `_LONG` times the longest step, there is no second attempt.
 _FIRST_FRACTION, _LONG = 0.6, 0.1
 # Number of equilibria after a failed step before steps become longer again, because a longer step usually fails again.
 _PATIENCE = 8
@@ -159,7 +159,7 @@ def first_loading(
                 target = nearest
                 after = _solve_within_step(nearest, expected, following, state, step)
                 if after is None:
-                    # Try a shorter step first. If this fails too, two states bracket the target.
+                    # Next try a shorter step. After a second failed attempt, two states bracket the target.
                     failed_trials = failed_trials + 1 if distance > _LONG * longest else _DIRECT_ATTEMPTS
                     if failed_trials < _DIRECT_ATTEMPTS:
                         step, successes = _FIRST_FRACTION * distance, 0
@@ -192,7 +192,7 @@ def first_loading(
 def _solve_within_step(target, expected, following, state, step) -> State | None:
     """Return the state at a target, near the `expected` separation, m; None if the solver finds none.
 
-    Also None if a load or area is not met within a step, m, or if another target of `following` is met before.
+    Also return None if the state lies beyond another target of `following` or, for a load or area, outside a `step`, m.
     """
     try:
         found = target.solve(state, expected)

@@ -58,11 +58,11 @@ class StepAccuracy:
     def is_work_known(self, state, step):
         """Return whether the work of a step that ends in a state is known accurately enough.
 
-        With error-controlled steps, `Step.work_error` must be small enough. Without them the work is not known in three
-        cases. First, `Step.event_error` is too large. Second, spots unite or split in a long step. Third, in a step
-        without events that may change the pressure, the integral of the pressure is inaccurate and differs from the
-        change of the stored energy; its limits are smaller on unloading in tension. The third case is not checked for
-        steps up to 1/256 of the longest step.
+        With error-controlled steps, `Step.work_error` must be small enough. Other steps are inaccurate in three cases.
+        First, `Step.event_error` is too large. Second, spots unite or split in a long step. Third, in a step without
+        events that may change the pressure, the integral of the pressure is inaccurate and differs from the change of
+        the stored energy. The limits of the third case are smaller on unloading in tension. The third case is not
+        checked for steps up to 1/256 of the longest step.
         """
         if self.contact.path_accuracy.error_controlled_steps:
             return step.work_error <= self.allowed_work_error(step)
@@ -75,7 +75,7 @@ class StepAccuracy:
         accuracy = self.contact.path_accuracy
         scale = energy_scale = self.energy_scale_after(step)
         if step.separation_change > 0 and self.contact.pressure(state) < 0:
-            # In compression, loading and unloading visit the same stations, so that their errors cancel. In tension
+            # In compression, loading and unloading visit the same separations, so their errors cancel. In tension
             # these errors do not cancel, so that they must be small relative to the losses.
             scale = min(energy_scale, max(_LOSS_SCALE * self.reference_loss, _LEAST_LOSS * energy_scale))
         unbalanced = step.integration_error > _INTEGRATION_ERROR * scale and abs(step.loss) > accuracy.balance * scale
@@ -99,7 +99,7 @@ class StepAccuracy:
         """Return False if the tension inside a step may be larger than in any state of the path so far.
 
         A larger tension is only possible on unloading with events that may change the pressure: the tension just before
-        the event may be up to that of the tangent at the start. An excess of `_MISSED_TENSION` over the tension in both
+        the event may be as large as the tangent at the start. An excess of `_MISSED_TENSION` over the tension in both
         states of the step is accepted. With adhesion also return False if the last contact breaks in the step.
         """
         contact = self.contact
@@ -114,11 +114,11 @@ class StepAccuracy:
     def locate_largest_tension(self, start, state, step):
         """Return the separation at which the tension is largest between two states, m, or None.
 
-        The size of the largest tension is estimated where the tangents at both states meet. Its separation is that of
-        the minimum of the cubic polynomial with the pressures and slopes of both states, or where the tangents meet if
-        there is no minimum. Return None on loading, from or to full contact, with events that may change the pressure,
-        or if the tension has no maximum between the states. Also return None if the tension was larger earlier on the
-        path, or if the tension in one of the two states equals the estimate within the required accuracy.
+        The tangents at both states meet at an estimate of the largest tension. The separation is at the minimum of the
+        cubic polynomial with the pressures and slopes of both states, or without a minimum where the tangents meet.
+        Return None on loading, from or to full contact, with events that may change the pressure, or if the tension has
+        no maximum between the states. Also return None if the tension was larger earlier on the path, or if the tension
+        in one of the two states equals the estimate within the required accuracy.
         """
         contact = self.contact
         slope, end_slope = (-contact.stiffness(each) for each in (start, state))

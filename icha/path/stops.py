@@ -141,7 +141,7 @@ def find_target_state(target: TargetFunction, before: State, after: State) -> St
 
 
 def _is_reachable(target, before, after):
-    """Return whether, from one of the states, `_LARGEST_BEND` times slope times distance is enough for the target."""
+    """Return whether the target is within `_LARGEST_BEND` times slope times distance of one of the states."""
     control, contact, width = target.control, target.contact, abs(after.separation - before.separation)
     value = contact.pressure if control.quantity == PRESSURE else contact.area_fraction
     return any(

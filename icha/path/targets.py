@@ -17,13 +17,13 @@ MAX_REDUCED_PRESSURE = 0.15
 MAX_AREA_FRACTION = 0.25
 # Largest reduced pressure of any target. Rough surfaces are in full contact at a reduced pressure of about 1.
 LARGEST_REDUCED_PRESSURE = 100.0
-# Smallest reduced pressure (other than zero) and area fraction. Smaller values are below the error of an equilibrium.
+# Smallest nonzero reduced pressure and smallest area fraction. Smaller values are below the error of an equilibrium.
 LEAST_PRESSURE, LEAST_AREA = 1e-12, 1e-9
 # Limits and default of the longest step of the separation, in h_rms. With 1e-4 a path has some 10 000 equilibria.
 MIN_STEP, MAX_STEP = 1e-4, 0.5
 DEFAULT_STEP = 0.15
-# Events may happen anywhere in a step. Largest error of the work of one step due to this, relative to the sum of the
-# absolute reference losses of all jumps so far. Paths use it in `step_accuracy`, and checks use it in finished runs.
+# Largest error of the work of one step because its events may happen anywhere in the step, relative to the sum of the
+# absolute reference losses of all jumps so far. Used for paths in `step_accuracy`, and for checks of finished runs.
 EVENT_ERROR_OVER_LOSS = 5e-4
 
 STEP = FloatRange("h_rms", least=MIN_STEP, most=MAX_STEP)
@@ -35,7 +35,7 @@ class TargetQuantity:
 
     Attributes
     ----------
-    name : name in targets and in files; except for relative loads, `Path` has an argument with this name and an s.
+    name : name in targets and in files. Except for relative loads, this name plus an s is an argument of `Path`.
     rule : range of values that a target may have.
     controlled : PRESSURE or CONTROLLED_AREA if the solver prescribes this quantity; None for the mean separation.
     unit_attribute : name of the attribute of the contact that is the unit of a pressure; empty for other quantities.
@@ -133,8 +133,8 @@ class Path:
         start and complete separation, except targets inside jumps. If the number of turning points is odd, the last one
         lies on the last unloading: there the path does not turn, but continues to complete separation.
     control : "separation": the mean separation is prescribed. "load": the load is prescribed. All targets and turning
-        points must then be loads, and the path must unload or have turning points. It follows the same pressure curve
-        against separation, but jumps at constant load where the pressure falls on loading or rises on unloading.
+        points must then be loads, and the path must unload or have turning points. Load control follows the curve of
+        separation control, but jumps at constant load where the pressure falls on loading or rises on unloading.
     max_step : longest change of the mean separation between two equilibria, in units of h_rms, in [1e-4, 0.5].
 
     Raises

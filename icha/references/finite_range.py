@@ -12,8 +12,8 @@ The gap is zero in contact, and attraction acts in a cohesive zone around the co
 and Roberts (JKR), a contact area A lowers the energy by dgamma A. At a finite range, the energetic area replaces A. The
 energetic area is the integral of exp(-u/rho) over the nominal area. At fixed mean gap, the derivative of the energy
 with respect to dgamma equals minus the energetic area. The energetic area is larger than the area of zero gap. As the
-range decreases, both areas tend to the contact area of JKR. The energetic area is close to this limit already at a much
-larger range.
+range decreases, both areas tend to the contact area of JKR. The energetic area is close to this limit at much larger
+ranges than the area of zero gap.
 """
 
 import math
@@ -253,7 +253,7 @@ class GapContact:
         self.solves = 0
 
     def start_from(self, gap):
-        """Start the next solution from the given gaps, (n, n) array in m."""
+        """Start the next solution from the given gaps, (n, n), in m."""
         self.solver.model["gap"][:] = np.maximum(gap, 0.0) / self.solver.unit
 
     def solve(self, separation):

@@ -60,7 +60,7 @@ def finite_range_loop(
     ----------
     surface, material, refinement, tolerance, seed, progress : as for
         `icha.references.finite_range.finite_range_solution`.
-    largest_reduced_pressure : p/(E* h'_rms) at which unloading begins, positive. A jump may end at a larger pressure.
+    largest_reduced_pressure : p/(E* h'_rms) at which unloading begins, positive; a final jump may exceed it.
     separation_step : largest step of the mean gap, in h_rms; a step with a jump is divided into up to 32 smaller steps.
 
     Returns

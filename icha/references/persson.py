@@ -17,7 +17,7 @@ YANG_PERSSON = "C. Yang and B. N. J. Persson, J. Phys.: Condens. Matter 20 (2008
 # The gamma of Yang & Persson is the elastic energy of a small contact divided by the energy of full contact on the same
 # area. The gamma of Xu et al. is the same ratio of the variances of the pressure.
 YANG_PERSSON_GAMMA, XU_GAMMA = 0.45, 0.45
-# Iterations for the area of Xu et al. Each iteration reduces the error of the area to less than a quarter.
+# Number of iterations for the area of Xu et al. Each iteration reduces the error of the area to less than a quarter.
 _AREA_ITERATIONS = 40
 # Number of wave numbers of the quadrature on either side of the roll-off; odd for Simpson's rule.
 _POINTS = 401
