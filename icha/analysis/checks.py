@@ -17,7 +17,7 @@ from icha.datasets.labels import RunLabels
 from icha.datasets.variables.campaign import MISSING
 from icha.support.atomic_files import whole_file
 
-# Largest relative error of a load. The search for the mean gap stops at an error of 2e-4.
+# Largest relative error of a load. The search for the mean gap stops if this error is at most 2e-4.
 LOAD_LIMIT = 1e-3
 # Name of the check that a run reached the end of its path and passed the checks of its job.
 COMPLETED = "completed"
@@ -60,7 +60,7 @@ def check_campaign(tree: xr.DataTree, expected: Iterable[RunLabels | tuple] | No
 
 
 def check_solution(solution: xr.Dataset, subject: str = "") -> tuple[Check, ...]:
-    """Check that a boundary-element solution is finite, converged, resolved by the grid, at its load, and consistent.
+    """Check a boundary-element solution: finite values, convergence, load, resolution by the grid, and consistency.
 
     Parameters
     ----------

@@ -49,8 +49,8 @@ def interpolate(load, values, at, *, logarithmic: bool) -> np.ndarray:
         If a load lies outside the range of the curve.
     """
     load, first = np.unique(np.asarray(load, float), return_index=True)
-    # Two targets of different kinds may define the same state. Their loads then differ only by rounding, and the slope
-    # of the curve between these loads is meaningless.
+    # If two targets of different kinds define the same state, the loads of the targets differ only by rounding, and
+    # the slope of the curve between these loads is meaningless.
     distinct = np.concatenate([[True], np.diff(load) > 1e-9 * load[1:]])
     load, values = load[distinct], np.asarray(values, float)[first][distinct]
     at = np.asarray(at, float)

@@ -102,7 +102,7 @@ def model_error(
 
 
 def _short_range_entries(select, runs, origins):
-    """Compare studies with boundary-element runs in the limit of a short range; collect run attributes in `origins`."""
+    """Compare asperity runs of studies with `runs` in the limit of a short range; collect attributes in `origins`."""
     entries: dict[str, dict[SolutionLabels, dict | None]] = {}
     for labels, truth in runs:
         labels = RunLabels(*labels)
@@ -121,7 +121,7 @@ def _short_range_entries(select, runs, origins):
 
 
 def _finite_range_entries(select, solutions, origins):
-    """Compare entries with boundary-element solutions at finite ranges; collect run attributes in `origins`."""
+    """Compare asperity runs of entries with `solutions` at finite ranges; collect attributes in `origins`."""
     entries: dict[str, dict[SolutionLabels, dict | None]] = {}
     for labels, solution in solutions:
         labels = SolutionLabels(*labels)
@@ -248,7 +248,7 @@ def _shapes(run, snapshot, solution):
     height, nominal = float(solution["rms_height"]), float(state["nominal_pressure"])
     pressure = float(solution["contact_modulus"]) * float(solution["rms_slope"])
     gaps = solution["gap_density"].values * height
-    # The last bin of gaps contains all larger gaps. For a deep surface, this bin of the solution is wider than usual.
+    # The last bin of the solution contains all larger gaps, so it may be wider than the last bin of `GAP_BINS`.
     gaps[-1] *= np.diff(solution["gap_bin_edges"].values)[-1] / np.diff(GAP_BINS * height)[-1]
     return {
         "gap_distribution_distance": distribution_distance("gap", state, solution) / height,
@@ -290,7 +290,7 @@ def jaccard(one: np.ndarray, other: np.ndarray) -> float:
 
 
 def shared(one: np.ndarray, other: np.ndarray) -> float:
-    """Return the number of nodes in contact in both maps, divided by that in map `one`; 1 if `one` has no contact."""
+    """Return the fraction of the contact nodes of `one` that are also in contact in `other`; 1 if `one` has none."""
     count = np.count_nonzero(one)
     return np.count_nonzero(one & other) / count if count else 1.0
 
@@ -298,7 +298,7 @@ def shared(one: np.ndarray, other: np.ndarray) -> float:
 def distribution_distance(quantity: str, one: xr.Dataset, other: xr.Dataset) -> float:
     """Return the first Wasserstein distance between two distributions of the gap (in m) or of the pressure (in Pa).
 
-    The distributions are over the nominal area. The distance is the area between the cumulative distributions. The gap
+    Both distributions cover the nominal area. The distance is the area between the cumulative distributions. The gap
     counts as zero in contact, and where surfaces overlap outside contact. The pressure counts as zero outside contact,
     also where attraction acts. All gaps in a bin count as the geometric mean of the edges of the bin. All pressures in
     a bin count as the mean pressure of the bin.

@@ -36,7 +36,7 @@ _VALIDATED = "on seven self-affine surfaces, p* from 0.001 to 0.1 (page on valid
 _RATIO = "full_contact_energy_ratio"
 # Keys of `Case.facts` that may be missing. The first four are in Pa: pressure for complete contact, strength of the
 # interface, strength without flaws, and largest tension that the grid resolves. The other three are in m: size of the
-# grid cells, rms height, and largest rms height at which the surface sticks in the bearing area model.
+# grid cells, rms height, and largest rms height of a sticky surface in the bearing area model.
 COMPLETE, STRENGTH, THEORETICAL = "complete_contact_pressure", "interface_strength", "theoretical_strength"
 RESOLVED, SPACING = "resolved_tension", "spacing"
 RMS_HEIGHT, STICKY_HEIGHT = "rms_height", "sticky_rms_height"
@@ -65,7 +65,7 @@ class Range(NamedTuple):
 # Ranges of quantities in study `short_range` of campaign `validation`, rounded outwards. A test compares these ranges
 # with the campaign.
 VALIDATED = {
-    # Surfaces in the validation have 1, because their spectra have fixed amplitudes. Random amplitudes give up to 1.2.
+    # Surfaces in the validation have 1, because their amplitudes are fixed. Random amplitudes give values up to 1.2.
     "slope_anisotropy": Range("anisotropy of slopes", 1.0, 1.2),
     "height_skewness": Range("skewness of heights", -0.2, 0.2),
     "height_kurtosis": Range("kurtosis of heights", 2.3, 3.5),

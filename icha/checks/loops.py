@@ -14,7 +14,7 @@ LOSSES = ("loss_by_jump_in", "loss_by_jump_off", "loss_by_coalescence", "loss_by
 # Counts of events in a run, in the order of the flags of `event_kind`.
 EVENT_COUNTS = ("jump_in_count", "jump_off_count", "coalescence_count", "split_count")
 
-# Largest gain of energy in a loop, divided by the largest work, even if the error of the work is larger.
+# With asperities, a loop may gain as much energy as the error of the work, up to this fraction of the largest work.
 LARGEST_UNKNOWN_WORK = 1e-2
 # Largest gain of energy in a loop of boundary elements, divided by the largest work. This value is the error of the
 # losses, because a path limits the error of the work in every step (docs/short_range.md).
@@ -90,8 +90,8 @@ def _check_losses(run, scale):
 
     yield "loop loses energy", gain(float(run["hysteresis_loss"])), with_unions
     yield "jumps lose energy", gain(into + out), tolerance
-    # A jump into contact may need energy, due to the law of a spot or due to the forces of other spots. Then only the
-    # sum of the losses by jumps into and out of contact must be positive.
+    # A jump into contact may need energy, due to the law of a spot or due to the forces of other spots. In a run with
+    # such a jump, the check requires only that jumps into and out of contact together lose energy.
     if int(run["uphill_jump_in_count"]) == 0:
         yield "jumps off lose energy", gain(out), tolerance
     yield "unions lose energy", gain(unions), with_unions
@@ -101,8 +101,8 @@ def _check_losses(run, scale):
 def count_unshared_separations(run) -> int:
     """Count the separations in later legs (unloading, reloading) at which the first loading has no step.
 
-    At each of these separations, one step of the first loading becomes two steps of the later leg. The work of each
-    step has an error.
+    Each of these separations divides one step of the first loading into two steps of the later leg. Each step adds an
+    error of the work.
     """
     first, later = (np.unique(run["mean_separation"][run["leg"] == 0]), run["mean_separation"][run["leg"] > 0])
     same = 10 * RESIDUAL_TOLERANCE * float(run["rms_height"])
@@ -112,7 +112,7 @@ def count_unshared_separations(run) -> int:
 
 
 def finite_stiffness(run) -> np.ndarray:
-    """Return the contact stiffness, Pa/m; zero in full contact, where no work is done."""
+    """Return the contact stiffness, Pa/m; zero instead of infinity in full contact, whose pressure does no work."""
     return np.where(np.isfinite(run["contact_stiffness"]), run["contact_stiffness"], 0.0)
 
 
@@ -132,10 +132,10 @@ def work_error(run) -> float:
 def _event_error_bound(run):
     """Return an upper bound (J/m^2) of the work error due to unknown positions of events within their steps.
 
-    The bound of a step is the sum of `event_error` and `integration_error`. The jump of the pressure causes
-    `event_error`. The change of the stiffness causes `integration_error`. The path also limits the error of the work of
-    each step to the larger of two energies. The first energy is EVENT_ERROR_OVER_LOSS times the energy of all jumps.
-    The second energy is the model's accuracy of a loss times the sum of all changes of work and loss.
+    The bound of a step with an event is the sum of two errors: the jump of the pressure causes `event_error`, and the
+    change of the stiffness causes `integration_error`. The path also limits the error of each step to the larger of two
+    energies. The first is EVENT_ERROR_OVER_LOSS times the energy of all jumps. The second is the sum of the magnitudes
+    of all changes of work and of loss, multiplied by the model's accuracy of a loss.
     """
     events = sum(np.diff(run[name]) for name in EVENT_COUNTS) > 0
     events &= np.diff(run["dissipated_by_load_jump"]) == 0  # in a jump at constant load the pressure is constant

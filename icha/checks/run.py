@@ -91,8 +91,8 @@ def _check(run: RunArrays) -> Iterator[tuple]:
 
 
 def _check_loading(run) -> Iterator[tuple]:
-    """Yield name, value and limit of the checks of the first loading; unloading may follow other curves."""
-    first = run["leg"] == 0
+    """Yield name, value and limit of the checks of the first loading, and of the stiffness check in all steps."""
+    first = run["leg"] == 0  # unloading may follow other curves
     names = ("contact_area_fraction", "nominal_pressure", "mean_separation", "step_kind", "coalescence_count")
     loading = {name: run[name][first] for name in names}
     adhesive, height = float(run["surface_energy"]) > 0, float(run["rms_height"])
@@ -125,8 +125,8 @@ def _largest_fall_in_loading(loading, name):
 def _largest_rises_of_separation(loading):
     """Return the largest rise of the mean separation, m, in steps without unions, and in steps with unions.
 
-    Steps to area targets are ignored, because the separation may rise in such a step. If the area jumps past a target,
-    the path meets the target on the branch after the jump.
+    Steps in which the area increases to an area target are ignored, because the separation may rise in such a step. If
+    the area jumps past a target, the path meets the target on the branch after the jump.
     """
     rise = np.diff(loading["mean_separation"])
     given_area = (loading["step_kind"][1:] == AREA_FRACTION) & (np.diff(loading["contact_area_fraction"]) > 0)
@@ -154,8 +154,8 @@ def _target_error(run):
         error = np.where(of_area, np.maximum(error - cells, 0.0), error)
     # If the target is zero load, the error is relative to the largest load of the run.
     largest = np.array([np.max(np.abs(reached[kind])) for kind in kinds])
-    # With adhesion a load may be a small difference of attraction and repulsion. Both forces are about as large as the
-    # stiffness times h_rms, and the error of the load is relative to this product.
+    # With adhesion a load may be a small difference of attraction and repulsion. Each of them is about as large as the
+    # stiffness times h_rms. Therefore the error of a very small load is relative to SMALLEST_LOAD times this product.
     gross = np.abs(finite_stiffness(run)) * float(run["rms_height"]) * adhesive
     unit = {"reduced_pressure": scale * float(run["rms_slope"]), "relative_load": scale}
     least = np.array([SMALLEST_LOAD * gross[k] / unit.get(kind, math.inf) for k, kind in enumerate(kinds)])
@@ -173,7 +173,7 @@ def _identity_errors(run):
     pressure_content = run["pressure_density"] * np.diff(run["pressure_bin_edges"])
     load = pressure_content * run["pressure_bin_mean"]
     gap_content = run["gap_density"] * np.diff(run["gap_bin_edges"])
-    # With adhesion tension and compression nearly cancel: errors are relative to the sum of both.
+    # With adhesion, tension and compression nearly cancel. Therefore errors are relative to the sum of magnitudes.
     load_scale = np.maximum(np.abs(load).sum(axis=1), np.finfo(float).tiny)
 
     cell = float(run["period"]) ** 2

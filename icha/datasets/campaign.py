@@ -144,7 +144,7 @@ def reduced_gap(data: xr.Dataset) -> xr.DataArray:
     """Return the ratio of the mean gap to the rms height; figures show this ratio as the separation.
 
     On a periodic surface, mean gap and mean separation are equal. The mean separation of a free square is the
-    distance to the half-space far away. Therefore only the mean gap can be compared with that of other surfaces.
+    distance to the half-space far from the square. Therefore only the mean gap is comparable among all surfaces.
     """
     gap = (data["mean_gap"] / data["rms_height"]).transpose(*data["reduced_separation"].dims)
     return data["reduced_separation"].where(data["boundary"] != "free", gap)

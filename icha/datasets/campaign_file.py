@@ -197,7 +197,7 @@ def _block(sizes, along, values):
 
 
 def _why_lacking(study, name):
-    """Return the attribute `missing`, which names the models without this variable; {} if there are none."""
+    """Return the attribute `missing`, which names the models without the variable; {} if every model has it."""
     owners = [model for model, names in FURTHER.items() if name in names]
     lacking = [model for model in study.known["model"] if owners and model not in owners]
     return {"missing": f"in runs with the model {' or '.join(lacking)}"} if lacking else {}
@@ -219,7 +219,7 @@ def write_campaign(
     ----------
     runs : for each run, its labels (study, model, surface, seed, rms_slope, material), and its dataset or path. Names
         in the file have the order of the design. Seeds and slopes are sorted. A run counts as incomplete if it has the
-        attribute `incomplete`, or if it lacks a snapshot of another run of the study.
+        attribute `incomplete`, or if it lacks a snapshot that another run of its study has.
     path : the file to write. A file appears only when it is complete. The same runs give the same bytes.
     design : labels of all runs of the campaign. Default: the labels in `runs`. Other combinations of these labels have
         the status `not_in_design`.
@@ -230,7 +230,7 @@ def write_campaign(
     ------
     ValueError
         If a run is given twice, is not in the design, or was computed with other settings than expected; if runs differ
-        in a value that must be the same for them; if a file cannot be read. The message names the run.
+        in a value that they must share; if a file cannot be read. The message names the run.
     """
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)

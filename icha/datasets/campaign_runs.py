@@ -329,7 +329,7 @@ def _sizes(entries: list[Entry], dim: str) -> np.ndarray:
 def _snapshots(entries: list[Entry]) -> dict[tuple[bytes, float], int]:
     """Assign a number to each snapshot of a study; kind and target identify a snapshot.
 
-    Runs may reach their targets in different orders. For example, one run reaches a load before an area, another after.
+    The order of targets may differ between runs. For example, only in some runs a load target precedes an area target.
     """
     longest = max(entries, key=lambda entry: entry.extent)
     known = dict.fromkeys(itertools.chain(longest.snapshots, *(entry.snapshots for entry in entries)))

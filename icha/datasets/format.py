@@ -143,7 +143,7 @@ def _problems_with_surface(surface: xr.Dataset) -> Iterator[str]:
 
 
 def _problems_with_variables(data: xr.Dataset, table: Table, *further: Table) -> Iterator[str]:
-    """Yield variables that differ from `table`, or from a `further` table with at least one variable in the file."""
+    """Yield problems with variables of `table`, and of each `further` table of which the file has a variable."""
     for each in further:
         if each.keys() & data.variables.keys():
             table = table | each

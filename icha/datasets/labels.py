@@ -119,7 +119,7 @@ def number_label(value: float) -> str:
 
 
 def arrange_slopes(pairs: Iterable[tuple[str, float]]) -> np.ndarray:
-    """Arrange rms slopes in ascending order: in one row for all surfaces or, if shorter, in one row for each surface.
+    """Arrange rms slopes in ascending order: in one row if one surface has all slopes, else in one row per surface.
 
     Parameters
     ----------

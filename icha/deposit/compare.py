@@ -85,7 +85,7 @@ class File(NamedTuple):
 
     @property
     def is_remark(self) -> bool:
-        """True if the file (such as a figure) only presents other results, and differs from the file of the rerun."""
+        """True if the file only shows results of other files, like a figure, and differs from the file of the rerun."""
         return self.verdict == DIFFERENT and self.path.endswith(_DERIVED)
 
 

@@ -229,7 +229,7 @@ def _add(crate: ROCrate, key: str, kind: str | list[str], **properties: Any) -> 
 
 
 def _set(entity: Entity, kind: list[str] | None = None, **properties: Any) -> None:
-    """Set all properties of an entity that are not empty; if `kind` is given, also set the types of the entity."""
+    """Set the properties of an entity, except empty properties; if `kind` is given, also set the types."""
     if kind:
         entity.properties()["@type"] = kind
     for name, value in properties.items():

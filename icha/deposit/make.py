@@ -167,7 +167,7 @@ def _write(path: Path, text: str) -> None:
 
 
 def _write_zip(path: Path, folder: Path, name: str) -> None:
-    """Write a folder to a zip as `name`; without compression, because compressed bytes depend on the zlib version."""
+    """Write a folder to a zip as folder `name`, uncompressed, because compressed bytes depend on the zlib version."""
     with zipfile.ZipFile(path, "w", zipfile.ZIP_STORED) as archive:
         for file in files_of(folder):
             status = (folder / file).stat()

@@ -26,7 +26,7 @@ from icha.support.program import INSTALLED, is_installed, own_workflow, package_
 
 # Files and folders of the program that computes results. Every file in these folders must be committed.
 PROGRAM = ("Snakefile", "icha/", "workflow/", "profiles/default/")
-# Folder of configurations. They need not be committed, because a deposit contains the configuration that was used.
+# Folder of configurations, which need no commit, because a deposit contains the configuration that was used.
 _CONFIGURATIONS = "config/"
 # File in the folder of results. It lists all package versions that were installed when results were computed.
 MADE_WITH = "made_with.txt"

@@ -24,7 +24,7 @@ CHECKSUMS = "SHA256SUMS"
 README, CRATE, ZENODO = "README.md", "ro-crate-metadata.json", ".zenodo.json"
 # Folder of the program's source in a deposit.
 SOURCE = "source"
-# Results of a campaign, which `icha reproduce` computes again.
+# Folders and files of results that `icha reproduce` computes again.
 COMPUTED = (
     *("dataset", "runs", "surfaces", "references", "aggregated", "figures"),
     *("report.html", "checks.json", "verdict.txt"),
@@ -33,8 +33,8 @@ COMPUTED = (
 LARGEST_TEXT = 64_000_000
 # Largest lengths in bytes of a name and of a path that common file systems accept.
 _LONGEST_NAME, _LONGEST_PATH = 255, 1000
-# Limits without the option `LARGE`: at most MOST_FILES files; an extracted size of at most MOST_GROWTH times the zip
-# size plus ALLOWANCE bytes. ICHA does not compress zips. Compression would reduce zips to about a third.
+# Limits without the option `LARGE`: a zip has at most MOST_FILES files, and its extracted size is at most ALLOWANCE
+# bytes plus MOST_GROWTH times the zip size. ICHA does not compress zips; compression would save two thirds.
 MOST_FILES, MOST_GROWTH, ALLOWANCE = 200_000, 50, 100_000_000
 LARGE = "--large"
 _LINE = re.compile(r"([0-9a-f]{64})  (.+)")

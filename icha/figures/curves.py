@@ -218,7 +218,7 @@ def _draw_crosses(axes, line, points):
 
 
 def _draw_unloading(panels, line):
-    """Draw the unloading of every run of a line at compressive loads; the limits of the axes do not change."""
+    """For every run of a line, draw the unloading at compressive loads; the limits of the axes do not change."""
     for leg in [leg for run in line.runs.by_seed.values() for leg in select.unloading_legs(run)]:
         for axes, points in panels.items():
             load, values = points(leg)

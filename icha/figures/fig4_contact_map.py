@@ -27,7 +27,7 @@ class MapFigure(SnapshotFigure, RunFigure):
 
 
 def inputs(campaign: Campaign, options: MapFigure, files: results.ResultFiles) -> Inputs:
-    """Return the paths of the campaign dataset, the surface file, and the same run with boundary elements if any."""
+    """Return the paths of the campaign dataset, the surface file and, if any, the same run with boundary elements."""
     run = options.run(campaign)
     found = {"campaign": files.path(results.DATASET), "surface": files.path(results.SURFACE, run)}
     if run.model == DEFAULT_MODEL and REFERENCE_MODEL in campaign.studies[options.study].models:
@@ -39,8 +39,8 @@ DECLARATION = Declaration(
     description="Contact spots over the topography.", options=MapFigure, inputs=inputs, holds_topography=True
 )
 
-# The surface is _ZOOM times as wide as the enlarged window. If the window is wider than _WIDEST_IN_RADII mean radii of
-# the spots, the window is halved repeatedly, but not to fewer than _LEAST_CELLS cells along a side.
+# The surface is _ZOOM times as wide as the enlarged window. A window that is wider than _WIDEST_IN_RADII times the mean
+# radius of the spots is halved repeatedly, but not to fewer than _LEAST_CELLS cells along a side.
 _ZOOM = 4
 _WIDEST_IN_RADII = 40
 _LEAST_CELLS = 64
@@ -67,7 +67,7 @@ def figure(
     ----------
     campaign : the campaign dataset.
     surface : dataset of the surface file, with the topography of the run.
-    truth : the same run with boundary elements and contact maps, if there is such a run.
+    truth : dataset of the same run with boundary elements, including contact maps; None without such a run.
     run : labels of the run.
     kind, target : kind and target of the snapshot; None for the first snapshot.
     """
@@ -157,7 +157,7 @@ def _draw_boundary_elements(panels, topography, window, heights, beside, covered
 
 
 def _window(nodes, side, corner, width):
-    """Return the nodes of a periodic map in a window, and the coordinates of the four borders of these nodes' cells."""
+    """Return the nodes of a periodic map that cover a window, and the coordinates of the four sides of this region."""
     cell = side / len(nodes)
     columns, rows = (
         np.arange(start, start + int(np.ceil(width / cell)) + 2) for start in np.floor(corner / cell).astype(int)

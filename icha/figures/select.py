@@ -149,7 +149,7 @@ def path_steps(run: xr.Dataset) -> xr.Dataset:
 
 
 def branches(run: xr.Dataset) -> Iterator[tuple[str, xr.Dataset]]:
-    """Yield branch (loading or unloading) and steps of every leg of a run, from the end of the previous leg on."""
+    """Yield for every leg of a run: branch (loading or unloading), and steps from the end of the previous leg on."""
     legs = run["leg"].values
     for leg in np.unique(legs):
         steps = np.flatnonzero(legs == leg)
@@ -265,9 +265,9 @@ def select_unloaded_runs(campaign: xr.DataTree, study: str) -> list[tuple[RunLab
 
 
 def _select_runs_with(condition, campaign, study):
-    """Return the runs of the `shown_model` that fulfil a condition; or, if there are none, those of boundary elements.
+    """Return the runs of the `shown_model` that fulfil a condition; if none does, such runs of boundary elements.
 
-    Runs with boundary elements may unload from full contact, where runs with asperities end before their last stop.
+    Near full contact, runs with asperities end before unloading, but runs with boundary elements may unload.
     """
     for model in (None, REFERENCE_MODEL):
         runs = select_runs(campaign, study, ragged=False, model=model)

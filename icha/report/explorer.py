@@ -34,9 +34,9 @@ from icha.support.formatting import format_count, printable_lines
 
 # Labels that identify a contact, in the order of the lists on the page.
 CHOICES = ("study", "surface", "rms_slope", "material", "seed")
-# Largest numbers of cells along an edge of a topography, and along an edge of a contact map (it has finer details).
+# Largest numbers of cells along an edge of a topography and of a contact map. Contact maps have finer details.
 MOST_HEIGHTS, MOST_CELLS = 256, 512
-# The page omits pressure densities below this fraction of the highest density. With the JKR law, the tail is infinite.
+# The page omits densities of pressure below this fraction of the highest, because the JKR law has an infinite tail.
 LEAST_DENSITY = 1e-3
 LEVELS = 255  # largest grey level of a picture
 CONTACT_COLOUR = (230, 0, 13)  # red, green and blue of spots and patches

@@ -59,7 +59,7 @@ def format_mean(values: np.ndarray, form) -> Markup:
 def format_range(values: np.ndarray, form) -> Markup | str:
     """Format the 95 % interval of a mean, or the extremes of fewer than five values. Equal values give an empty text.
 
-    If the interval of positive values would reach below zero, the interval is computed from logarithms.
+    If all values are positive and the interval would reach zero, the interval is computed from their logarithms.
     """
     over = ensemble(values)
     # Runs reach target loads exactly, except for rounding errors.

@@ -38,8 +38,8 @@ def index_variable(dim: str, label: str) -> Variable:
 
 
 _TOPOGRAPHY = ("surface", "seed", "rms_slope")
-# Labels on which variables of the runs depend. Variables that are not listed depend on all five labels. Targets of
-# snapshots are the same for all runs of a study. Bins are fixed in units of h_rms (gap) and of E* h'_rms (pressure).
+# For each variable of the runs: the labels that change its value. Variables not listed here depend on all five labels.
+# Runs of a study have the same snapshot targets. Bins are fixed in units of h_rms (gap) and of E* h'_rms (pressure).
 VARIES_WITH = {
     **dict.fromkeys(("contact_modulus", "surface_energy", "interaction_range", "flaw_radius"), ("material",)),
     **dict.fromkeys(("theoretical_strength", "interface_strength"), ("material",)),
