@@ -63,7 +63,7 @@ _STICKINESS_PAPER = "L. Pastewka and M. O. Robbins, PNAS 111 (2014) 3298-3303, d
 class ConvergenceError(RuntimeError):
     """Error: the path could not be computed to its end, for example because it leaves the range of the model.
 
-    `dataset` contains the targets that were reached. The attribute `incomplete` or `beyond_model` states the reason.
+    `dataset` contains the targets that were reached; its attribute `incomplete` or `beyond_model` states the reason.
     """
 
     def __init__(self, message: str, dataset: xr.Dataset):
@@ -238,7 +238,7 @@ def asperity_applicability(
 def _check_arguments(surface, material, path, by_summits):
     """Raise `ValueError` for arguments of the wrong type, and for targets out of range on this surface.
 
-    by_summits : whether summits represent the surface in the model; such a model limits loads and areas.
+    by_summits : True if summits represent the surface in the model, so that loads and areas are limited.
     """
     for name, value, kind in (("surface", surface, Surface), ("material", material, Material), ("path", path, Path)):
         if not isinstance(value, kind):
@@ -291,7 +291,7 @@ class _PathRecord:
 
 
 def _count_uphill_jumps_in(record: _PathRecord) -> int:
-    """Return the number of jumps into contact that cost energy according to the law of a spot or the energy balance."""
+    """Count the jumps into contact that cost energy, by the law of a spot or by the energy balance."""
     gained = np.diff([step["dissipated_by_jump_in"] for step in record.steps], prepend=0.0) < 0
     return sum(
         int(np.count_nonzero((events.kind == JUMP_IN) & ((events.energy < 0) | uphill)))
@@ -302,7 +302,7 @@ def _count_uphill_jumps_in(record: _PathRecord) -> int:
 def _record_path(contact, observables, path, reachable, progress) -> _PathRecord:
     """Follow a path and return the record of its steps, snapshots and events.
 
-    reachable : path without the targets outside the range of the model; the record ends before the first of these.
+    reachable : path without targets outside the range of the model; the record ends before the first such target.
     """
     left_out = [target for target in path.targets if target not in reachable.targets]
     remaining = len(reachable.targets)
@@ -329,7 +329,7 @@ def _record_path(contact, observables, path, reachable, progress) -> _PathRecord
                 record.pressed, largest = state, step["contact_area_fraction"]
             if waypoint.target.snapshot:
                 record_snapshot(waypoint.target, state, index)
-            # Keep the state with the largest tension in the last leg (loading or unloading up to a turning point).
+            # Keep the state with the largest tension in the last leg, that is, in the last loading or unloading.
             tension = waypoint.leg, -step["nominal_pressure"]
             if weakest is None or tension > weakest[0]:
                 weakest = tension, state, index
@@ -411,7 +411,7 @@ def _describe_targets(table: Table, path: Path) -> Table:
 
 
 def _target_unit(kinds: set[str], named_by: str) -> dict:
-    """Return the unit of targets of some kinds; if the units differ, also a comment that lists the kinds in metres."""
+    """Return the unit of targets of these kinds; if units differ, add a comment that lists the kinds given in m."""
     metres = kinds.intersection(IN_METRES)
     if not metres or metres == kinds:
         return {"units": "m" if metres else "1"}

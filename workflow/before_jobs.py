@@ -52,7 +52,7 @@ def refuse_superseded() -> None:
 
 
 def plan_without_collecting() -> None:
-    """Disable garbage collection until the first job starts, and again when the process ends.
+    """Disable garbage collection until the first job starts, and avoid a collection when the process ends.
 
     Snakemake's plan contains almost no garbage. For ten thousand runs, collection would take a third of planning time.
     """
@@ -61,7 +61,7 @@ def plan_without_collecting() -> None:
 
 
 def start_jobs_freely(workflow) -> None:
-    """Enable garbage collection, except for the plan; remove Snakemake's limit of job starts per second.
+    """Enable garbage collection of objects younger than the plan; remove Snakemake's limit of job starts per second.
 
     With Snakemake's limit, each finished local job wakes the scheduler once a second until all jobs are done. After a
     thousand short jobs, the scheduler uses most of a core. Snakemake has no option to disable the limit.
@@ -114,14 +114,14 @@ class CampaignResults:
         if not METADATA.is_dir() or not os.access(".snakemake", os.W_OK):
             self._refuse_unwritable()  # nothing was computed yet, or Snakemake could not write its records
         elif os.path.isdir(results) and not os.access(results, os.W_OK):
-            # In such a folder, Snakemake reports missing files only as protected.
+            # If a folder cannot be written to, Snakemake only reports that missing files are protected.
             _warn(f"cannot write to {results}: missing results cannot be computed")
 
     def have_stale_made_again(self, paths: Iterable[str], rules: Iterable) -> None:
-        """Mark results of other settings or inputs as incomplete, unless Snakemake itself detects these results.
+        """Mark results as incomplete if their settings or inputs have changed, unless Snakemake detects these changes.
 
-        Snakemake compares the settings with its own records. After a result was restored from a backup, the records may
-        be missing or may describe another file. For inputs, Snakemake compares time stamps, not contents.
+        Snakemake compares the settings with its own records. If a result was restored from a backup, its record may be
+        missing or may describe another file. For inputs, Snakemake compares time stamps, not contents.
 
         Parameters
         ----------
@@ -236,7 +236,7 @@ class _Wildcards(dict):
 
 
 def _present_settings(rules, path: str) -> str:
-    """Return the checksum of the parameters that the job of a result has in the present configuration."""
+    """Return the checksum of the parameters with which the job would make a result now."""
     rule = next(rule for rule in rules if any(output.match(path) for output in rule.output))
     wildcards = _Wildcards(rule.get_wildcards(path))
     values = (value(wildcards) if callable(value) else value for value in rule.params)
@@ -289,8 +289,8 @@ locks = []
 def hold_lock(path: str) -> str | None:
     """Lock a file until this process ends; if another process has locked the file, return its process number.
 
-    Snakemake's own lock is the existence of a file. A killed program leaves this file behind, and later calls then
-    require `--unlock`.
+    Snakemake itself creates a file as a lock. A killed program leaves this file behind, and later calls then require
+    `--unlock`.
     """
     try:
         Path(path).parent.mkdir(parents=True, exist_ok=True)

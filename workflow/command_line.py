@@ -12,7 +12,7 @@ DEFAULT = "config/config.yaml"
 
 
 def campaign_configuration(workflow, root: str) -> Configuration:
-    """Read the file of `--configfile`, or the default file in the folder `root`, with the values of `--config`.
+    """Read the file of `--configfile`, or the default file in `root`, and replace values by those of `--config`.
 
     Snakemake's own `config` is not used, because Snakemake would merge two files and accept duplicate keys.
 

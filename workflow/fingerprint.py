@@ -137,7 +137,7 @@ class _Syntax(NamedTuple):
 
 
 # Reading the syntax trees of all modules takes a second, so the results are cached in the folder of Python's bytecode.
-# The key is the checksum of the text of the module; the file name depends on the versions of Python and of this module.
+# Keys of the cache are checksums of modules. The name of its file depends on the version of Python and on this module.
 _READER = hashlib.sha256(Path(__file__).read_bytes() + sys.version.encode()).hexdigest()[:16]
 _CACHE = Path(importlib.util.cache_from_source(__file__)).with_suffix(f".{_READER}.json")
 _syntaxes: dict[str, list] = {}
@@ -159,7 +159,7 @@ def _syntax_of(file: Path) -> _Syntax:
 
 def save_cache() -> None:
     """Save the syntax of the modules for the next process, if the folder can be written to."""
-    # `whole_file` would check the owner of the results; this file is not a result.
+    # `whole_file` is not used, because it checks the owner of the results, and the cache is not a result.
     temporary = _CACHE.with_suffix(f".{os.getpid()}.tmp")
     with contextlib.suppress(OSError):
         temporary.write_text(json.dumps(_syntaxes), encoding="ascii")
@@ -186,7 +186,7 @@ _DOCUMENTED = ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef
 
 
 def _canonical(node):
-    """Return a syntax tree without positions, docstrings and empty fields (which differ between versions of Python)."""
+    """Return a syntax tree without positions, docstrings and empty fields; versions of Python differ in empty ones."""
     if isinstance(node, ast.AST):
         fields = ((name, value) for name, value in ast.iter_fields(node) if value not in (None, []))
         if isinstance(node, _DOCUMENTED) and ast.get_docstring(node, clean=False) is not None:

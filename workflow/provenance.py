@@ -23,7 +23,7 @@ def recorded_jobs(
     Parameters
     ----------
     records : Snakemake's records, `.snakemake/metadata`.
-    made : path in the deposit of each result, by the name of the result in Snakemake (`results/<campaign>/…`).
+    made : for the name of each result in Snakemake (`results/<campaign>/…`), the path of this result in the deposit.
     given : path in the deposit of each file that no job made: the configuration as used, topographies, measurements.
     scripts : folder of the scripts, whose docstrings describe the jobs.
 
@@ -89,8 +89,8 @@ def _record(records: Path, name: str) -> dict[str, Any]:
 def _settings(params: list[str]) -> tuple[tuple[str, str], ...]:
     """Return names and values of the settings of a job, from its recorded parameters.
 
-    Snakemake records parameters without their names. Therefore only parameters that are mappings are included, because
-    the keys of mappings are names. The attributes of datasets, and paths of this machine, are omitted.
+    Snakemake records parameters without their names. Therefore the function returns only parameters that are mappings,
+    because the keys of a mapping are names. It omits the attributes of datasets, and paths of this machine.
     """
     settings: dict[str, str] = {}
     for text in params:

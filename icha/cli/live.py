@@ -20,7 +20,7 @@ from icha.support.formatting import printable
 
 # When finished jobs have taken this number of core-seconds, measured and expected times have the same weight.
 PRIOR_SECONDS = 5.0
-# Expected core-seconds of a job that the plan does not list. Such a job writes a few lines.
+# Expected core-seconds of a job that the plan does not list. Jobs outside the plan only write a few lines.
 DEFAULT_SECONDS = 0.1
 MOST_JOBS = 8  # largest number of running jobs that the view lists
 MOST_ERROR_LINES = 3  # largest number of lines that the view prints for the error of a failed job
@@ -33,7 +33,7 @@ class JobRecord:
     Attributes
     ----------
     rule : name of the Snakemake rule of the job.
-    title : message of the rule about the job.
+    title : description of the job, from the `message` of its rule.
     outputs : paths of the files that the job writes.
     log : path of the log file; empty for a job without a log.
     started : time of the start, s.
@@ -58,7 +58,7 @@ class Progress:
 
     Attributes
     ----------
-    expected : rule and expected core-seconds of the job that writes a file, by the path of the file.
+    expected : for the path of each file, the rule of the job that writes the file, and the job's expected core-seconds.
     clock : function that returns the present time, s.
     total : number of jobs of each rule.
     running : running jobs, by their number in Snakemake.
@@ -127,7 +127,7 @@ class Progress:
             return None
         ended, running = [*self.done, *self.failed], [*self.running.values()]
         measured = sum(job.seconds * job.threads for job in ended)
-        # Ratio of measured to expected times on this machine.
+        # Factor by which jobs take longer than expected on this machine.
         slowness = (measured + PRIOR_SECONDS) / (sum(map(self._expected_work, ended)) + PRIOR_SECONDS)
         work = self._waiting_work([*ended, *running]) * slowness
         for job in running:
@@ -141,7 +141,7 @@ class Progress:
     def _waiting_work(self, begun: list[JobRecord]) -> float:
         """Return the expected core-seconds of the jobs that have not begun.
 
-        Snakemake reports only the number of waiting jobs of each rule, so each job counts as the mean job of its rule.
+        Each job counts with the mean of its rule, because Snakemake reports only how many jobs of a rule are waiting.
         """
         outputs = {output for job in begun for output in job.outputs}
         expected: dict[str, list[float]] = {}
@@ -205,7 +205,7 @@ class View:
             self.live = Live(get_renderable=self._draw, console=console, refresh_per_second=4, transient=True)
 
     def print(self, text: str, style: str = "") -> None:
-        """Print a line, above the table if there is one."""
+        """Print a line of text; if the view shows a table, the line appears above the table."""
         self._console.print(Text(printable(text), style=style), soft_wrap=True)
 
     def print_job(self, job: JobRecord, failed: bool) -> None:

@@ -55,7 +55,7 @@ class UserError(Exception):
 
 
 def reports_errors(command: Callable) -> Callable:
-    """Decorate a command so that an expected error prints its message and sets the exit status, without traceback."""
+    """Decorate a command so that an expected error prints a message without traceback, and sets the exit status."""
 
     def fail(message: object, status: int):
         echo(f"Error: {message}", err=True, fg="red")
@@ -87,19 +87,19 @@ def find_project() -> Path | None:
 
 
 def project() -> Path:
-    """Return the folder of campaigns and results: the clone, or the working directory outside a clone."""
+    """Return the folder of campaigns and results: inside a clone of ICHA the clone, else the working directory."""
     return find_project() or Path.cwd()
 
 
 def find_workflow() -> Path:
-    """Return the folder of the Snakefile and its profiles: the clone, or the installed workflow outside a clone."""
+    """Return the folder with Snakefile and profiles: inside a clone of ICHA the clone, else the installed workflow."""
     return find_project() or own_workflow()
 
 
 def list_campaigns() -> dict[str, Path]:
     """Return the configuration files of the project and of ICHA, by the name of the campaign.
 
-    This name is the file name without .yaml. For config/config.yaml, the default file, the key `name` gives this name.
+    The name of a campaign is the file name without .yaml, or the value of the key `name` in config/config.yaml.
     """
     files: dict[str, Path] = {}
     for folder in (find_workflow(), project()):  # files of the project replace files of ICHA with the same name

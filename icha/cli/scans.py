@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 # A warning recommends another measurement if more than this fraction of the points is filled.
 MOST_FILLED = 0.05
-# For keys that the file lacks: values in m with which ICHA can read the file, and examples for the user.
+# A file may lack these keys. ICHA then reads the file with the guesses, in m, and shows the examples to the user.
 GUESSES = {"height_unit": 1e-9, "size": (1e-4, 1e-4)}
 EXAMPLES = {"height_unit": "nm", "lateral_unit": "um", "size": "[90 um, 90 um]"}
 
@@ -184,7 +184,7 @@ def _load(path: Path, data: str | None):
         rows, columns = scan.heights.shape  # most scans have square pixels
         guessed["size"] = columns * 1e-6, rows * 1e-6
     elif "height_unit" in missing:
-        # Coordinates without a unit have the unit of the heights. Here the unit of the heights is unknown, too.
+        # Coordinates without a unit have the unit of the heights, but the file does not contain this unit either.
         if load_scan(path, Preparation("auto", "free", data, **guessed, lateral_unit=1.0)).size != scan.size:
             missing["lateral_unit"] = "is missing, and the file does not contain it; default: unit of the heights"
     return scan, guessed, missing

@@ -21,12 +21,12 @@ from icha.contact.models import MODELS
 from icha.support.input_files import read_columns
 from icha.support.values import ROUNDING, Name, Problem, Section, Text, distinct
 
-# Sections in which boundary elements solve contacts of a study.
+# In these sections, boundary elements solve contacts of a study.
 BESIDE_STUDIES = ("finite_range", "boundary_element_loops")
 # Largest number of entries in a section. The number is small, because the check of an entry goes through all runs of
 # its study.
 _FEW = Field(max_length=100)
-# Grid cells per shortest wavelength: ICHA warns below the first number for asperities, below the second otherwise.
+# Least numbers of grid cells per shortest wavelength without a warning: for asperities alone, and for other models.
 _LEAST_CELLS, _ADVISABLE_CELLS = 4, 8
 
 
@@ -206,7 +206,7 @@ class Campaign(Section):
             if not (unknown_slopes and any(str(key).startswith("rms_slope") for key in location)):
                 yield location, value, reason
         if not unknown_slopes:
-            # The names of runs, which this check compares, contain slopes.
+            # This check compares names of runs, and these names contain slopes.
             yield from _within(("publication",), self.publication.problems(self))
 
     def _problems(self):

@@ -28,7 +28,7 @@ def surface_cases(campaign: Campaign) -> list[tuple[str, int]]:
 
 
 def solution_cases(campaign: Campaign) -> list[SolutionLabels]:
-    """Return the labels of all solutions in the section `finite_range`, entry by entry."""
+    """Return the labels of all solutions of the section `finite_range`, in the order of its entries."""
     return [
         SolutionLabels(label, entry.study, *contact, pressure)
         for label, entry in campaign.finite_range.items()
@@ -37,7 +37,7 @@ def solution_cases(campaign: Campaign) -> list[SolutionLabels]:
 
 
 def loop_cases(campaign: Campaign) -> list[ContactLabels]:
-    """Return the labels of all loops in the section `boundary_element_loops`, entry by entry."""
+    """Return the labels of all loops of the section `boundary_element_loops`, in the order of its entries."""
     return [
         ContactLabels(label, *contact)
         for label, entry in campaign.boundary_element_loops.items()

@@ -1,8 +1,8 @@
 """Expand each study of a campaign into runs: combinations of surfaces, seeds, slopes and materials.
 
-A study runs all combinations of the entries of its lists. Lists in a group of `zip` are combined entry by entry. A
-value in `cases` replaces the list of the same parameter. Each combination of varied parameters defines a new surface or
-material, called a variant, with a name such as `rough-hurst0.6`.
+A study runs all combinations of the entries of its lists. But the lists of one group in the key `zip` are combined
+entry by entry. A value in `cases` replaces the list of the same parameter. Each combination of varied parameters
+defines a new surface or material, called a variant, with a name such as `rough-hurst0.6`.
 """
 
 import hashlib
@@ -101,7 +101,7 @@ def _cases(study: Study) -> list[dict[str, Any]]:
 
 
 def _axes(study: Study, lists: Mapping, fixed: Mapping) -> Iterator[list[str]]:
-    """Yield groups of lists. Lists in a group are combined entry by entry; the groups form all combinations."""
+    """Yield groups of lists. The lists of one group are combined entry by entry, and different groups in all ways."""
     groups = [[_LISTS.get(name, name) for name in group] for group in study.zip]
     done = set(fixed)
     for name in lists:
@@ -136,7 +136,7 @@ def _excess(section: str, count: int, what: str, most: int) -> Iterator[Problem]
 
 
 def _run_count(label: str, study: Study) -> int:
-    """Count the runs of a study for all its models. Equal runs are counted each time."""
+    """Count the runs of a study with all its models. A run that occurs twice counts twice."""
     lists = _lists(label, study)
     counts = (math.prod(len(lists[group[0]]) for group in _axes(study, lists, given)) for given in _cases(study))
     return len(study.models) * sum(counts)
@@ -147,7 +147,7 @@ def _study_problems(campaign: Campaign, label: str, study: Study) -> Iterator[Pr
     lists, cases = _lists(label, study), study.cases or []
 
     def values(one):
-        """Return all values of the parameter `one`, from its list and from `cases`, with their locations."""
+        """Return all values of the parameter `one` with their locations: values in its list, and values in `cases`."""
         located = (((*prefix, "cases", index, one), getattr(case, one)) for index, case in enumerate(cases))
         return [*lists[one], *((location, value) for location, value in located if value is not None)]
 
@@ -221,7 +221,7 @@ class _Variants:
         )
 
     def _variant(self, section: str, base: str, changes: Mapping[str, _Located]) -> str:
-        """Return the name of the variant of a surface or material with changed values; create new variants first."""
+        """Return the name of a variant: a surface or material with changed values. Create the variant if it is new."""
         key = (section, base, *((name, repr(value)) for name, (_, value) in changes.items()))
         if changes and key not in self._names:
             self._names[key] = self._make(section, base, changes)
@@ -257,7 +257,7 @@ def value_label(section, name: str) -> str:
     value = getattr(section, name)
     if not isinstance(value, float):
         text = str(value)
-        # The checksum of a text replaces a text that cannot be part of a file name, such as the name of a channel.
+        # If a text cannot be part of a file name, such as the name of a channel, its checksum is used instead.
         return text if re.fullmatch(r"[A-Za-z0-9_.+-]{1,40}", text) else hashlib.sha256(text.encode()).hexdigest()[:8]
     unit = next((each.unit for each in type(section).model_fields[name].metadata if isinstance(each, FloatRange)), None)
     if unit is None:

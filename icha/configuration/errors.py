@@ -23,7 +23,7 @@ _FORMER_KEYS = {
     ("Study", "united_until"): "was removed, because coalesced spots now split when their parts would no longer "
     "overlap. Remove the key",
 }
-# Messages by pydantic's type of error. They replace messages of pydantic that only programmers would understand.
+# Messages for users, by pydantic's type of error. The messages of pydantic itself are for programmers.
 _NOT_A_SECTION = "is not a section; expected a mapping of keys to values"
 _REASONS = {
     "model_type": _NOT_A_SECTION,

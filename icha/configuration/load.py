@@ -159,6 +159,6 @@ def collect_inputs(configuration: Configuration) -> tuple[str, dict[str, str]]:
         content[section][name] = (content[section][name] or {}) | {"path": stored}
         if section == "measurements" or (section, name) in used:
             files[stored] = path
-    # Every surface now has a path, so the defaults must not contain a path.
+    # Every surface from a file now has its own path, so the path is removed from the defaults.
     (content.get("defaults") or {}).get("surfaces", {}).pop("path", None)
     return dump_yaml(content, configuration.origin), files

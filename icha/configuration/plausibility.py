@@ -71,7 +71,7 @@ class Unusual(NamedTuple):
     Attributes
     ----------
     location : keys that lead to the value in the configuration.
-    source : for a value that is not in the configuration, text about its origin; the text begins with a blank.
+    source : origin of a value that is not in the configuration, as text with a blank in front; otherwise empty.
     """
 
     location: tuple
@@ -81,7 +81,7 @@ class Unusual(NamedTuple):
 
     @property
     def key(self) -> str:
-        """Key of the value for the list `confirmed`; entries of a list have the key of the list."""
+        """Key that stands for the value in the list `confirmed`; for an entry of a list, the key of this list."""
         return ".".join(entry for entry in self.location if isinstance(entry, str))
 
 
@@ -102,7 +102,7 @@ def _unusual(location: tuple, value: Any) -> Iterator[Unusual]:
 
 
 def unusual_topography(location: tuple, section: Any, period: float, rms_slope: float | None) -> Iterator[Unusual]:
-    """Yield the size and the rms slope of a topography from a file, each only if unusual.
+    """For a topography from a file, yield the size if it is unusual, and the rms slope if it is unusual.
 
     Parameters
     ----------

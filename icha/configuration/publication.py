@@ -81,7 +81,7 @@ def _date(value: str) -> str | None:
 
 
 def _matching(pattern: str) -> Callable[[str], str | None]:
-    """Return a function that returns a text if the text matches a pattern, else None."""
+    """Return a function of a text. This function returns the text if it matches `pattern`, otherwise None."""
     return lambda value: value if re.fullmatch(pattern, value) else None
 
 

@@ -153,7 +153,7 @@ class TurningPoint(Snapshot):
     """Relative load p/E* = F/(E* A0) of the turning point."""
 
 
-# Names and descriptions of the parameters that a study may vary: all keys except kinds, files and sections.
+# Names and descriptions of the parameters that a study may vary: all keys except `kind`, `path` and `crop`.
 SCALARS: dict[str, str] = {}
 for _section in (*SURFACE_KINDS.values(), MaterialSection):
     for _name, _field in _section.model_fields.items():
@@ -255,8 +255,8 @@ class Study(Section):
         slope = min((slope for slope in self.rms_slopes if slope != MEASURED), default=math.inf)
         most = (MAX_REDUCED_PRESSURE if DEFAULT_MODEL in self.models else LARGEST_REDUCED_PRESSURE) * slope
         for location, kind, value in self._states():
-            # If a study has both models, asperity runs end early at the limit of the asperity model. The first target
-            # must be below this limit.
+            # If a study has both models, asperity runs may end early at the limit of the asperity model. Therefore only
+            # the first target and the turning points must be within this limit.
             needed = alone or (DEFAULT_MODEL in self.models and (location[-1] == 0 or location[0] == "turning_points"))
             if needed and kind in ASPERITY_RANGES and value > ASPERITY_RANGES[kind].most:
                 reason = f"is out of range; expected {ASPERITY_RANGES[kind].expected}, or models: [boundary_elements]"

@@ -214,7 +214,7 @@ class SelfAffineSurface(Section):
     @field_validator("rolloff_wavelength", "short_wavelength", "grid")
     @classmethod
     def _check_wavelengths(cls, value, info):
-        """Refuse wavelengths unless period >= roll-off > shortest wavelength, and the grid resolves the shortest."""
+        """Check that period >= roll-off > shortest wavelength, and that the grid resolves the shortest wavelength."""
         period, rolloff, short = map(info.data.get, ("period", "rolloff_wavelength", "short_wavelength"))
         if info.field_name == "rolloff_wavelength":
             if period is not None and value > period * (1 + ROUNDING):

@@ -1,4 +1,4 @@
-"""Read surfaces from files: properties for the checks of a campaign, and `icha.read_scan` for scripts."""
+"""Read surfaces from files, for campaigns and their checks, and for scripts (function `icha.read_scan`)."""
 
 from __future__ import annotations
 

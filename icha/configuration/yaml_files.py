@@ -14,7 +14,7 @@ from icha.configuration.surfaces import SURFACE_KINDS
 from icha.support import formatting
 from icha.support.input_files import problem_with_path
 
-# Limits of a file: bytes; number of values after expansion of aliases; nested sections; characters of a number.
+# Limits of a file: number of bytes, of values after expansion of aliases, of nested sections, of characters per number.
 _MOST_BYTES, _MOST_VALUES, _DEEPEST, _LONGEST_NUMBER = 10**6, 10**6, 50, 100
 
 
@@ -84,7 +84,7 @@ class _Loader(yaml.SafeLoader):
     """A YAML loader that refuses repeated keys, and does not read numbers such as 064 as octal numbers."""
 
     def construct_unless_text(self, node, construct):
-        """Convert a scalar to a Python value. If this fails, return the text; the section refuses the text later.
+        """Convert a scalar to a Python value. If conversion fails, return the text, and a later check refuses it.
 
         Conversion fails for `0b_` (similar to a number), for 30 February (similar to a date), and for integers with
         thousands of digits.

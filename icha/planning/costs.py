@@ -2,7 +2,7 @@
 
 The time of each kind of job is a power law. Powers and scales are a least-squares fit to the logarithms of measured
 times, mostly on one core of an AMD EPYC. Of the times in `tests/planning/measured_times.csv`, 90 % differ from the
-power law by less than a factor of two. `correction` adapts expected times to the present machine, from the measured
+power law by less than a factor of two. `correction` adapts expected times to the present machine. It uses the measured
 times of completed jobs of the campaign.
 """
 
@@ -26,8 +26,8 @@ class Workflow:
 
     Attributes
     ----------
-    start : time from the call to the first job, for the start of `icha run`, Snakemake and the parent process of jobs.
-    planned : additional start time for each file of the campaign.
+    start : time for starting `icha run`, Snakemake and the parent process of jobs, before the first job.
+    planned : time for planning each file of the campaign, in addition to `start`.
     job : time of a job in addition to its computation: scheduling, fork, log, checksums.
     memory : memory of `icha run`, Snakemake and the parent process of jobs.
     forked : memory of a job that is a fork of the parent process, before its computation.
@@ -67,7 +67,7 @@ class PowerLaw:
 
 # Power laws by name. The law of a contact has the name of the solver, followed by `adhesion` and `cycle` if they apply.
 # The law of another job has the name of the Snakemake rule. Quantities: `nodes`, `spots` (at the largest load), `stops`
-# (targets of the path) and `runs` are numbers; `load` is p/(E* h'rms); `step` is a step of the mean gap in h_rms.
+# (targets of the path) and `runs` are counts; `load` is p/(E* h'rms); `step` is a step of the mean gap in h_rms.
 LAWS = {
     "surface": PowerLaw(0.015, 2.4e-7, {"nodes": 1}),
     "asperities": PowerLaw(0.14, 1.6e-3, {"spots": 1.06}),
@@ -148,7 +148,7 @@ class RunSize:
     summit : memory for each summit, bytes.
     maps : bytes of the compressed maps in the file, for each grid cell and snapshot.
     sticky : if U_full/dgamma is below this value, the time of a run is proportional to dgamma/U_full.
-    minutes : time limits in minutes for loading only, for a cycle, and for a run on several cores.
+    minutes : three time limits, min: for loading only, for a cycle, and for a run on several cores.
     """
 
     arrays: int
@@ -200,7 +200,7 @@ def run_cost(
     seconds *= max(1.0, size.sticky / energy_ratio)
     steps: float = stops
     if legs:
-        # Every contact spot forms and detaches; with adhesion, the path resolves jump-in and jump-off.
+        # Each contact spot forms and detaches. With adhesion, each jump-in and each jump-off needs several steps.
         further = DEFAULT_STEP / max_step
         steps = (1 + legs) / 2 * (120 * further + (40 if adhesive else 0.75) * most)
         seconds *= (1 + legs) / 2 * further
@@ -215,20 +215,20 @@ def run_cost(
 def finite_range_cost(nodes: int, *, adhesive: bool, **quantity: float) -> Cost:
     """Return the expected cost of boundary elements at a finite range, on a grid of `nodes` x `nodes` nodes.
 
-    The keyword is `load` (reduced pressure) for a solution, or `step` (step of the mean gap in h_rms) for a loop.
+    One keyword is needed: `load` (reduced pressure) for a solution, or `step` (of the mean gap, h_rms) for a loop.
     """
     seconds = _law("finite range", adhesive=adhesive, cycle="step" in quantity).seconds(nodes=nodes**2, **quantity)
     return Cost(seconds, WORKFLOW.forked + 20 * _DOUBLE * nodes**2, 40e3 + 0.04 * nodes**2)
 
 
-# Memory of a job for the values of runs: bytes for each byte in `values`, and largest memory in bytes. The memory is
-# limited because arrays above `icha.datasets.results.LEFT_IN_FILE` are not read as a whole.
+# Memory that a job needs for the values of runs: bytes for each byte in `values`, up to a limit in bytes. The limit
+# exists because arrays above `icha.datasets.results.LEFT_IN_FILE` are not read as a whole.
 _COPIES, _MOST_READ = 3.9, 1.9e9
 # Largest memory for values of runs in the job that writes the campaign dataset block by block, bytes.
 _BLOCKS = 35 * MiB
-# A contact map needs this number of arrays of the size of the topography, by the number of models in the map.
+# Number of arrays of the size of the topography that a contact map needs, for one model and for two models.
 MAP_ARRAYS = {1: 2, 2: 7}
-# Memory for libraries and pages, by the rule of the job, bytes.
+# Memory for the libraries of a figure, and for the page of the report, by the rule of the job, bytes.
 _LIBRARIES = {"figure": 85 * MiB, "report_page": 18 * MiB}
 
 
@@ -253,7 +253,7 @@ def derived_cost(rule: str, runs: int, disk: float, values: float = 0.0, *, node
 def correction(pairs: Sequence[tuple[float, float]]) -> float:
     """Return the factor that corrects expected times; `pairs` are expected and measured times of similar jobs, s.
 
-    The factor is the median of measured/expected time. With few pairs the factor is closer to 1; without pairs it is 1.
+    For n pairs, the factor is m^(n/(n + 1)), where m is the median of measured/expected time; without pairs it is 1.
     """
     if not pairs:
         return 1.0

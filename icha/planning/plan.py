@@ -88,7 +88,7 @@ def plan(campaign: Campaign, results: Path) -> list[Item]:
 
 
 def _correction(items: list[Item], results: Path) -> float:
-    """Return the factor that corrects the expected times of one kind of job, from measured times of completed jobs."""
+    """From the measured times of completed jobs of one kind, compute the factor that corrects expected times."""
     done = [item for item in items if item.state in (DONE, FAILED)]
     measured = [(item.cost.seconds, _benchmark(results, item)) for item in done[:: max(1, len(done) // _SAMPLE)]]
     return costs.correction([(expected, seconds) for expected, seconds in measured if seconds])
@@ -163,7 +163,7 @@ def _finite_range(campaign, results, path, entry, case, quantity) -> Item:
 
 
 def _derived_files(campaign, files: CampaignFiles, computed: list[Item]) -> Iterator[tuple]:
-    """Yield part, rule, path, stage, inputs and cost of each file that is computed from runs."""
+    """For each file that is computed from runs, yield part of the campaign, rule, path, stage, inputs and cost."""
     runs, cost = len(files.runs), costs.derived_cost
     disk = sum(item.cost.disk for item in computed if item.is_run)
     values = sum(item.cost.values for item in computed)
@@ -197,7 +197,7 @@ def _derived_files(campaign, files: CampaignFiles, computed: list[Item]) -> Iter
 def _cost_parameters(settings, rms_slope) -> dict:
     """Convert the settings of a run to arguments of `run_cost`."""
     path, snapshots = settings["path"], settings["path"]["snapshots"]
-    # Reduced pressure divided by the value of a target; about 1/2 for area fractions. 0 means that it is unknown.
+    # Reduced pressure divided by the value of a target; about 1/2 for area fractions, and 0 if the pressure is unknown.
     factors = {"reduced_pressure": 1, "relative_load": 1 / rms_slope, "area_fraction": 1 / 2, "mean_separation": 0}
     stops = {(kind, value) for kind in factors for value in path.get(f"{kind}s") or ()}
     stops |= {tuple(snapshot) for snapshot in snapshots or ()}
@@ -266,7 +266,7 @@ def time_on(items: Iterable[Item], cores: int) -> float:
 
 
 def start_up(items: Collection[Item]) -> float:
-    """Return the time in s from the call to the first job. In this time Snakemake starts and plans the jobs."""
+    """Return the time in s that `icha run` and Snakemake need before the first job: to start, and to plan the jobs."""
     if not any(item.to_do for item in items):
         return 0.0
     return WORKFLOW.start + WORKFLOW.planned * len(items)

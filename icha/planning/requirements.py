@@ -16,7 +16,7 @@ from icha.support import formatting
 from icha.support.formatting import format_count
 
 TAMAAS = "tamaas"
-# Sections of a configuration. Tamaas solves the entries of these sections.
+# ICHA uses the library Tamaas for the entries of these sections of a configuration.
 BY_TAMAAS = ("finite_range", "boundary_element_loops")
 
 
@@ -45,7 +45,7 @@ def surface_threads(campaign: Campaign, surface: str) -> int:
 
 
 def _megabytes(program: float, arrays: float, nodes: int) -> int:
-    """Return the memory of a job, MB: `program` (MB) plus `arrays` arrays of nodes x nodes numbers."""
+    """Return the memory of a job in MB: `program`, plus `arrays` arrays that have nodes x nodes numbers each."""
     return int(program + arrays * 8e-6 * nodes**2)
 
 
@@ -66,7 +66,7 @@ def solver_memory(campaign: Campaign, surface: str, entry: BesideStudy) -> int:
 
 
 def figure_memory(campaign: Campaign, *, holds_topography: bool) -> int:
-    """Return the memory that Snakemake reserves for a figure with or without a topography, MB."""
+    """Return the memory that Snakemake reserves for a figure, MB; drawing a topography needs more memory."""
     largest = max(campaign.grid(surface) for study in campaign.studies.values() for surface in study.surfaces)
     return _megabytes(1000, max(MAP_ARRAYS.values()) * holds_topography, largest)
 

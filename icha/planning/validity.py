@@ -41,7 +41,7 @@ from icha.surfaces.moments import (
 # icha.references.summit_theories also contains this number, but takes long to import.
 _SUMMIT_RADIUS = 3 * math.sqrt(math.pi) / 8
 
-# About 5 % of the first contact spots have a Tabor parameter below this value times that of the mean summit.
+# Tabor parameter divided by that of the mean summit; about 5 % of the first contact spots are below this ratio.
 _SMALLEST_TABOR = 0.84
 
 
@@ -58,14 +58,14 @@ def self_affine_moments(
 
 
 def surface_facts(campaign: Campaign, name: str) -> dict[str, float]:
-    """Return, by name, the properties of a surface at rms slope 1. These decide the validity of the contact models.
+    """Return, by name, those properties of a surface at rms slope 1 that decide whether the contact models are valid.
 
     Random surfaces are assumed to be Gaussian and isotropic. Properties of surfaces from files are computed from
     heights.
 
     Returns
     -------
-    Properties of `icha.analysis.validity.VALIDATED`, and four more. `summits` is the number of summits that the
+    The properties in `icha.analysis.validity.VALIDATED`, and four others. `summits` is the number of summits that the
     asperity model uses. `rms_curvature` is the rms curvature of profiles, 1/m. `rms_height` is the rms height, m.
     `complete_contact_pressure` is the pressure of complete contact, divided by E*; it is estimated for random surfaces.
     """
@@ -107,7 +107,7 @@ def expected_validity(campaign: Campaign) -> list[Statement]:
     for case in run_cases(campaign):
         facts, by_summits = facts_of(case.surface), MODELS[case.model].by_summits
         material = Material(**campaign.materials[case.material].model_dump(exclude_none=True))
-        # The similarity to the surfaces of the validation matters only for the asperity model.
+        # Only the asperity model needs surfaces that are similar to the surfaces of its validation.
         known = (facts if by_summits else {}) | {
             "full_contact_energy_ratio": energy_ratio(campaign, case),
             COMPLETE: facts[COMPLETE] * case.rms_slope * material.contact_modulus,
@@ -136,7 +136,7 @@ def expected_validity(campaign: Campaign) -> list[Statement]:
 
 
 def _describe_outside(tabor):
-    """Describe the contacts with spots outside the range of Wu's formula, from the Tabor parameters in `tabor`."""
+    """Describe the contacts that have spots outside the range of Wu's formula; `tabor` contains Tabor parameters."""
     cases = []
     for (material, surface), values in tabor.items():
         if _SMALLEST_TABOR * min(values) < WU_HOLDS_FROM:

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from pathlib import Path
 
-# Number of bytes in a test of free disk space; libraries write about as many bytes at once.
+# A test of free disk space writes this number of bytes, because libraries write about as many bytes at once.
 _PROBE = 2**20
 _ENDING = ".part"
 # Environment variable with content and path of the file that records the owner. Started programs inherit the variable.
@@ -63,13 +63,13 @@ def whole_file(path: str | os.PathLike, *, lasting: bool = True) -> Iterator[Pat
 
 
 def move_only_while_owned() -> None:
-    """Make this process a job, which may move results only while the call that started the job owns the results."""
+    """Mark this process as a job: it may move results only while the call that started the job owns the results."""
     global _moving
     _moving = while_owned
 
 
 def moving() -> AbstractContextManager:
-    """Return the context in which a file may be moved to its final path."""
+    """Return the context manager for moving a file to its final path; in a job, it checks the owner of the results."""
     return _moving()
 
 
@@ -114,7 +114,7 @@ class Superseded(ValueError):
 
 
 def take_over(file: str | os.PathLike) -> None:
-    """Make this process, and all processes that it starts, owner of results; `file` records the owner."""
+    """Let this process, and all processes that it starts, own the results; write the record of the owner to `file`."""
     os.environ.pop(_OWNER_VARIABLE, None)
     word = secrets.token_hex(8)
     Path(file).parent.mkdir(parents=True, exist_ok=True)

@@ -110,7 +110,7 @@ def stale(
     Parameters
     ----------
     results, paths : folder of results of the campaign, and paths in this folder.
-    asked : function from a path to the present checksum of the job's parameters; by default only inputs are checked.
+    asked : function that returns the present checksum of the job's parameters for a path; None: check only inputs.
     """
     known = cache(lambda path: _known(results, path))
 

@@ -111,7 +111,7 @@ def text(attribute: bytes | str | Iterable[bytes | str]) -> str:
 
 
 def refuse_traps(path: str | os.PathLike) -> None:
-    """Raise RefusedFile for an HDF5 file with links or data in other files, cyclic groups, or too many names.
+    """Raise RefusedFile for an HDF5 file with external links or data, cyclic groups, or too many names.
 
     Links to other files could reach any file of this machine. A group with two names may contain itself, which crashes
     the netCDF library. Links to data in the same file are accepted. Files of other formats are not checked.
@@ -131,7 +131,7 @@ def refuse_traps(path: str | os.PathLike) -> None:
         groups, count = {h5py.h5o.get_info(file.id).addr}, 0
 
         def trap(name, link):
-            """Return a reason to refuse the file, or None; h5py stops at the first reason."""
+            """Return the reason why the file is refused, or None; h5py stops after the first reason."""
             nonlocal count
             count, shown = count + 1, name.decode("utf-8", "replace")
             if count > _MOST_NAMES or name.count(b"/") >= _DEEPEST:
@@ -164,7 +164,7 @@ def read_columns(path: str | Path, columns: dict[str, float]) -> list:
     Parameters
     ----------
     path : path of the file.
-    columns : headings of the columns, and for each heading the factor by which the numbers are multiplied.
+    columns : heading of each column to read, with the factor by which the numbers of this column are multiplied.
 
     Raises
     ------

@@ -32,7 +32,7 @@ def on_cores(function: Callable, items: Iterable) -> list:
     results, waiting = [None] * len(items), enumerate(items)
 
     def work():
-        # Each thread takes the next item itself, because it would be slow to assign many short items one by one.
+        # Each thread takes its next item itself, because assigning many short items to threads one by one is slow.
         for number, item in waiting:
             results[number] = function(item)
 

@@ -1,7 +1,7 @@
 """Units and bounds for the values of arguments and configuration keys.
 
-Functions and classes check arguments with `validate`. `icha.support.values` checks configuration keys with the same
-bounds. `icha.path.targets` contains the bounds for targets of a path.
+Functions and classes call `validate` to check their arguments. `icha.support.values` checks configuration keys with the
+same bounds. `icha.path.targets` contains the bounds for targets of a path.
 """
 
 import numbers

@@ -55,7 +55,7 @@ PATTERN = rf"^\s*{_NUMBER}\s*[A-Za-zµμÅ].*$"
 NAME_PATTERN = r"^[a-z0-9_][a-z0-9_-]*$"
 # Largest number of characters of a name, and of a name with varied values. A file name may have 255 characters.
 _LONGEST_NAME, LONGEST_LABEL = 80, 200
-# Relative tolerance of a quotient of two lengths, such as the number of cells per wave.
+# A quotient of two lengths, such as the number of cells per wave, may have this relative rounding error.
 ROUNDING = 1e-9
 # Largest number of names in a message.
 _MOST_LISTED = 30

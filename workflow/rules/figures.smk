@@ -8,7 +8,7 @@ from icha.support.checksums import sha256_of
 
 RESULT_FILES = ResultFiles(CAMPAIGN.name, RESULTS)
 FIGURES = CAMPAIGN.figures.by_name()
-# Input files of each figure, by the arguments of the function that draws it.
+# Input files of each figure. The keys are the arguments of the function that draws the figure.
 FIGURE_INPUTS = {name: DECLARATIONS[name].inputs(CAMPAIGN, options, RESULT_FILES) for name, options in FIGURES.items()}
 
 

@@ -13,7 +13,7 @@ wildcard_constraints:
 # Snakemake needs the settings of each run several times, for up to ten thousand runs.
 SETTINGS_OF_RUN = cache(lambda case: run_settings(CAMPAIGN, case))
 
-# Fingerprint by model: the script imports the module of its model.
+# Each model has its own fingerprint, because the script imports the module of the model.
 CODE_OF_RUN = {name: code_of("run_sweep.py", model.module) for name, model in MODELS.items()}
 
 

@@ -54,7 +54,7 @@ def job_context(snakemake):
         for path in outputs:
             checksums.begin(results, path)
         inputs = _checksums_of(results, snakemake.input)
-        # Computed first, because the script may change its parameters.
+        # This checksum is computed before the script runs, because the script may change its parameters.
         asked = checksums.hash_parameters(map(repr, snakemake.params))
         yield asked, inputs
         for path in outputs:
@@ -90,7 +90,7 @@ def refuse_changed(file, sha256, name=None):
 
 
 def attributes(snakemake):
-    """Return the attributes of a job's dataset: the attributes in its rule, and an `id` that all machines share."""
+    """Return the attributes of a job's dataset: those in its rule, and an `id` that is the same on all machines."""
     attributes = snakemake.params.attributes
     path = Path(snakemake.output[0]).relative_to(_results(snakemake)).with_suffix("")
     return {"id": f"{attributes['campaign']}/{path.as_posix()}"} | attributes
@@ -102,7 +102,7 @@ def _results(snakemake):
 
 
 def _result(results, path):
-    """Return the name of a result in the records of checksums: its path, or the folder of a file SHA256SUMS."""
+    """Return the name of a result in the checksums: its path, or for a file SHA256SUMS, the path of the folder."""
     file = Path(path).relative_to(results)
     return str(file.parent if file.name == "SHA256SUMS" else file)
 

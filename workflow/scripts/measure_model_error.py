@@ -8,7 +8,7 @@ from icha.datasets.labels import RunLabels, SolutionLabels
 
 
 def measure_model_error(campaign, runs, solutions, output, *, run_labels, labels, attributes):
-    """Write the errors of the asperity model; `run_labels` are the labels of `runs`, `labels` those of `solutions`."""
+    """Write the errors of the asperity model; `run_labels` belong to the files `runs`, `labels` to `solutions`."""
     others = zip((RunLabels(*label) for label in run_labels), map(read_run, runs), strict=True)
     pairs = zip((SolutionLabels(*label) for label in labels), map(read_dataset, solutions), strict=True)
     write_dataset(model_error(read_campaign(campaign), pairs, runs=others, attrs=attributes), output)

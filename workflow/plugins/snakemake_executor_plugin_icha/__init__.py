@@ -42,7 +42,7 @@ class Executor(LocalExecutor):
         super().__post_init__()
         self._processes = multiprocessing.get_context("forkserver")
         self._processes.set_forkserver_preload([f"{__name__}.preload"])
-        # Libraries read these variables when they are loaded. Snakemake sets them only for jobs in a new process.
+        # Libraries read these variables when they are loaded. Snakemake sets the variables only for new processes.
         os.environ.update(dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1"))
         # Without a spec, forks would import the main program: the whole command line of Snakemake.
         program = sys.modules["__main__"]
@@ -116,6 +116,6 @@ def run_script(script: str, context: Snakemake, benchmark: str | None) -> None:
 
 
 def _shared_megabytes() -> float:
-    """Return the memory that this process shares with others, MiB. After the fork, this is nearly all its memory."""
+    """Return the memory that this process shares with others, MiB. Just after a fork, nearly all memory is shared."""
     memory = psutil.Process().memory_full_info()
     return (memory.rss - memory.uss) / 2**20
