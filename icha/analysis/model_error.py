@@ -313,7 +313,7 @@ def distribution_distance(quantity: str, one: xr.Dataset, other: xr.Dataset) -> 
 
 
 def _values_and_weights(quantity, state):
-    """Return the value and the fraction of the nominal area of each bin; the rest of the area has the value zero."""
+    """For each bin, return the value and the fraction of the nominal area; the rest of the area has the value zero."""
     edges = state[f"{quantity}_bin_edges"].values
     content = state[f"{quantity}_density"].values * np.diff(edges)
     values = np.sqrt(edges[1:] * edges[:-1]) if quantity == "gap" else state["pressure_bin_mean"].values

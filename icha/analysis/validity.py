@@ -138,8 +138,8 @@ def statements(
     ----------
     models : names of the models of each study.
     cases : the runs.
-    outside : text that lists surfaces and materials with jumps into contact outside the verified range; "" if there are
-        none, None without adhesion.
+    outside : text with the surfaces and materials whose jumps into contact are outside the verified range; "" if there
+        are none; None without adhesion.
     sticky : surfaces and materials whose attraction outweighs repulsion, from `describe_sticky`.
     """
     cases = list(cases)

@@ -21,8 +21,8 @@ LARGEST_UNKNOWN_WORK = 1e-2
 CELL_LOSS_LIMIT = 1e-3
 # Largest loss of a loop of boundary elements without adhesion, divided by the largest work. The exact loss is zero.
 CELL_CLOSURE_LIMIT = 1e-4
-# Largest gain of energy by unions of spots and splits of unions, divided by the largest work. The rule of unions does
-# not conserve energy: without adhesion, loops close within a few hundredths of a per cent (docs/hysteresis.md).
+# Largest gain of energy by unions of spots and splits of unions, divided by the largest work. The rule of unions
+# nearly conserves energy: without adhesion, loops close within a few hundredths of a per cent (docs/hysteresis.md).
 UNION_LIMIT = 1e-3
 
 # Meanings of the checks by name.

@@ -21,7 +21,7 @@ FRONT_LIMIT = 1e-3
 # Largest decrease of the contact area of boundary elements, divided by the largest area. The position of a front within
 # a cell has an error, so the computed area may decrease a little when a front enters another cell.
 CELL_LIMIT = 1e-3
-# Largest rise of the mean separation in a step in which spots unite, in h_rms. After a union, the same load may need a
+# Largest rise of the mean separation, in h_rms, in a step in which spots unite. After a union, the same load may need a
 # larger separation.
 SEPARATION_RISE_LIMIT = 1e-2
 _MAY_BE_INFINITE = {name for name, description in RUN.items() if INFINITE in description.further}
@@ -96,7 +96,7 @@ def _check_loading(run) -> Iterator[tuple]:
     names = ("contact_area_fraction", "nominal_pressure", "mean_separation", "step_kind", "coalescence_count")
     loading = {name: run[name][first] for name in names}
     adhesive, height = float(run["surface_energy"]) > 0, float(run["rms_height"])
-    # Two targets of different kinds may lead to the same state, except for the error of the solver.
+    # Two targets of different kinds may lead to states that differ only by the error of the solver.
     limit = CELL_LIMIT if model_of(run.attrs).by_cells else TARGET_LIMIT
     yield "area rises", _largest_fall_in_loading(loading, "contact_area_fraction"), limit
     if not adhesive:
@@ -135,7 +135,7 @@ def _largest_rises_of_separation(loading):
 
 
 def _target_error(run):
-    """Return the largest relative error of a target; areas counted in cells may differ by their tolerance."""
+    """Return the largest relative error of a target; areas counted in cells may differ by the area tolerance."""
     scale = float(run["contact_modulus"])
     reached = {
         "reduced_pressure": run["reduced_pressure"],

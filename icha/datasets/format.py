@@ -43,7 +43,7 @@ class UnknownFile(ValueError):
     """A file that ICHA does not write, or that is not a readable netCDF file."""
 
 
-# Variables of a study: first those that list the runs, then those along the steps of every run.
+# Variables of a study: first the variables that list the runs, then the variables along the steps of every run.
 _STUDY = {name: CAMPAIGN_TABLE[name] for name in ("status", "step_count", "failure")} | {
     name: each._replace(dims=(*LABELS, "step"))
     for name, each in of_run.RUN.items()

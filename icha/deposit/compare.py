@@ -39,7 +39,7 @@ TOLERANCE = 1e-6
 FLOOR = 1e-6
 # Largest absolute differences that are within tolerance, by the name of the variable.
 NOISE = {"residual": RESIDUAL_LIMIT, "gap_residual": RESIDUAL_LIMIT, "front_residual": FRONT_LIMIT}
-# Endings of the names of files that are made from the data. Differences between these files are only remarks.
+# Endings of the names of files that are made from the data. Differences between these files count only as remarks.
 _DERIVED = (".png", ".pdf", ".html", "checks.json")
 # Largest number of variables that the text of a comparison lists.
 _MOST_LINES = 20

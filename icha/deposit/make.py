@@ -32,7 +32,7 @@ from icha.support.checksums import is_whole, recorded_hash, sha256_of, stale
 _BLOCK = 2**20
 # All files in the zip have the earliest time that the format allows, so that the same files give the same zip.
 _NO_TIME = (1980, 1, 1, 0, 0, 0)
-# Number for Unix in an entry of a zip; file permissions then have the meaning of Unix.
+# With this number in an entry of a zip, file permissions have the meaning of Unix.
 _UNIX = 3
 
 
@@ -103,8 +103,8 @@ def refuse_mixed(results: Path, campaign: Campaign, recorded: Mapping[str, str])
     ----------
     results : folder of results of the campaign.
     campaign : configuration of the campaign.
-    recorded : checksum of the job's parameters (`icha.support.checksums.hash_parameters`) that the workflow has
-        recorded for each result, by path in `results`.
+    recorded : for each path in `results`, the checksum of the job's parameters
+        (`icha.support.checksums.hash_parameters`). The workflow has recorded these checksums.
 
     Raises
     ------

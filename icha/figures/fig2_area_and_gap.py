@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 
 def inputs(campaign: Campaign, options: StudyFigure, files: results.ResultFiles) -> Inputs:
-    """Return the paths of dataset and theories; add the model error if the study has solutions at a finite range."""
+    """Return the paths of dataset, theories and, if the study has solutions at a finite range, model error."""
     found = dataset_and_theories(campaign, options, files)
     if is_solved_at_finite_range(campaign, options.study):
         found["model_error"] = files.path(results.MODEL_ERROR)
@@ -69,7 +69,7 @@ def figure(
     if solved := _finite_range_curves(model_error, study, shown.looks):
         shown.crosses.extend(solved)
         shown.handles[FINITE_RANGE] = model_handle(FINITE_RANGE, ms=8)
-    # Solutions in the limit of a short range are preferred, because solutions at a finite range are only bounds.
+    # Solutions in the limit of a short range are preferred: solutions at a finite range are only bounds of this limit.
     truths = {truth.runs.contact: truth for truth in reversed(shown.crosses)}
     compared = [(line, truths[line.runs.contact]) for line in shown.lines if line.runs.contact in truths]
     fig, axes = new_panels(4.5, 2, sharex=True, height_ratios=(1, _LOWER)) if compared else new_panels(3.3)

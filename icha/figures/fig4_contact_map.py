@@ -47,7 +47,7 @@ _LEAST_CELLS = 64
 # Largest number of spots that are drawn as vector graphics. More spots become an image, so that PDF files stay small.
 _MANY_SPOTS = 2000
 _RED = (0.9, 0.0, 0.05)
-# Names and colours of nodes in contact: in no model, only with asperities, only with boundary elements, in both models.
+# Names and colours of nodes: in contact in no model, only with asperities, only with boundary elements, in both models.
 _STATES = (("", "white"), ("asperities only", _RED), ("boundary elements only", "black"), ("both", "0.72"))
 
 

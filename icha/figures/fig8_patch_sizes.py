@@ -101,7 +101,7 @@ def patches_above(areas: Sequence[np.ndarray], nominal_area: float) -> tuple[np.
     The parameter `areas` has the same meaning as in `patch_density`.
     """
     pooled = np.sort(np.concatenate(areas))
-    # The numbers of patches are evenly spaced on a logarithmic axis, so that the few largest patches are all shown.
+    # The chosen numbers of patches are evenly spaced on a logarithmic axis, so that the largest patches are all shown.
     ranks = np.unique(np.rint(np.geomspace(1, len(pooled), _CURVE_POINTS)).astype(int)) if len(pooled) else []
     at = pooled[len(pooled) - np.asarray(ranks, int)[::-1]]
     return at, np.array([len(area) - np.searchsorted(area, at) for area in areas]) / nominal_area

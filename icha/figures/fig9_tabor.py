@@ -80,7 +80,7 @@ def figure(campaign: xr.DataTree, *, study: str, kind: str | None = None, target
 
 
 def _finish(ax, smallest):
-    """Shade the Tabor parameters for which the jump into contact is not verified, and set the limits of the axes."""
+    """Shade the range of Tabor parameters without verified jump into contact, and set the limits of the axes."""
     from icha.asperity.material import WU_HOLDS_FROM
 
     low, high = ax.get_xlim()

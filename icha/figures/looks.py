@@ -3,7 +3,7 @@
 The colour of a marker shows the material. Crosses are results of boundary elements. Closed markers are results of the
 asperity model with adhesion, open markers those without adhesion. The shape of closed and open markers distinguishes
 surfaces and slopes. If there are many materials, or many surfaces and slopes, colours change gradually from dark to
-bright. The legend then names only some of these lines.
+bright, and the legend names only some of the lines.
 """
 
 from __future__ import annotations

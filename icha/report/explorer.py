@@ -70,7 +70,7 @@ def write_explorer(
     ----------
     folder : folder of the results of the campaign.
     page : HTML file to write.
-    only : values to include, by a name in `CHOICES` such as "study"; for other names, all values are included.
+    only : values to include, by a name in `CHOICES` such as "study"; a missing name stands for all its values.
     largest : largest size of the page, MB.
 
     Raises
