@@ -27,7 +27,7 @@ ANOTHER_FOLDER = "use another folder: `icha run --directory FOLDER`, `snakemake 
 def prepare_process() -> None:
     """Set the environment variables that jobs inherit from this process."""
     if sys.platform == "linux":
-        # Jobs end with this process: see workflow/scripts/job.py.
+        # Jobs end when this process ends; see workflow/scripts/job.py.
         os.environ["ICHA_SNAKEMAKE"] = f"{os.getpid()} {beginning_of(os.getpid())}"
     # A file in the working directory must not replace a module of the same name.
     os.environ["PYTHONSAFEPATH"] = "1"
@@ -37,7 +37,7 @@ def prepare_process() -> None:
 
 
 def end_with_caller() -> None:
-    """End this process when the `icha run` that started it ends, even if `icha run` is killed."""
+    """End this process when `icha run`, which started this process, ends or is killed."""
     if caller := os.environ.get("ICHA_CALLER"):
         end_with_parent(int(caller))
 

@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 PACKAGE = "icha"
-# Module that starts and ends every job, in the folder of the scripts. The module has no effect on results.
+# This module starts and ends every job. It is in the folder of the scripts, and has no effect on results.
 JOB_MODULE = "job.py"
 
 
@@ -126,7 +126,7 @@ class _Syntax(NamedTuple):
 
     Attributes
     ----------
-    digest : checksum of the syntax tree of the module, without parts that change no result.
+    digest : checksum of the syntax tree of the module, without the parts that have no effect on results.
     imports : for each import, its level (0 if absolute), its module, and the imported name (None for `import module`).
     names : texts in the module that may be names of files.
     """

@@ -24,7 +24,7 @@ def recorded_jobs(
     ----------
     records : Snakemake's records, `.snakemake/metadata`.
     made : for the name of each result in Snakemake (`results/<campaign>/…`), the path of this result in the deposit.
-    given : path in the deposit of each file that no job made: the configuration as used, topographies, measurements.
+    given : for each file that no job made (configuration as used, topographies, measurements), its path in the deposit.
     scripts : folder of the scripts, whose docstrings describe the jobs.
 
     Raises

@@ -18,7 +18,7 @@ from icha.cli.project import TARGETS
 from icha.support import formatting
 from icha.support.formatting import printable
 
-# When finished jobs have taken this number of core-seconds, measured and expected times have the same weight.
+# Measured and expected times have the same weight when finished jobs were expected to take this many core-seconds.
 PRIOR_SECONDS = 5.0
 # Expected core-seconds of a job that the plan does not list. Jobs outside the plan only write a few lines.
 DEFAULT_SECONDS = 0.1

@@ -312,7 +312,7 @@ def _print_outcome(status: int, stopped: bool, progress, campaign, folder: Path,
 
 
 def _print_failures(status: int, stopped: bool, progress, campaign, folder: Path, log: Path) -> None:
-    """Print the runs without a result and the failed jobs, each with its reason."""
+    """Print the failed jobs, and the runs without a result, with the reason for each failure."""
     from icha.cli.live import read_error
     from icha.planning.plan import failed_runs
 
@@ -326,7 +326,7 @@ def _print_failures(status: int, stopped: bool, progress, campaign, folder: Path
     if failed:
         echo(f"{format_count(len(failed), 'job')} failed:", fg="red")
         for job in failed:
-            # The message of the job "Verdict on the checks" repeats the runs without a result.
+            # The message of the job "Verdict on the checks" repeats the runs without a result, which are printed above.
             reason = [line for line in read_error(job, folder) if not any(line.startswith(path) for path in incomplete)]
             unknown = f"the job ended without a message, perhaps for lack of memory; see {job.log or log}"
             _print_failure(f"  {job.title}", reason or [unknown], bold=True)

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 def inspect_topographies(campaign: Campaign) -> tuple[dict[str, Topography], list[Problem]]:
-    """Return the properties of all surfaces from files that studies use, and the problems of these files."""
+    """Return the properties of those surfaces of studies that come from files, and the problems of these files."""
     contacts = [each for study in campaign.studies for each in campaign.contacts(study)]
     of_measured_slope = {each.surface for each in contacts if each.rms_slope == MEASURED}
     facts, problems = {}, []

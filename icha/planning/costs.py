@@ -160,7 +160,7 @@ class RunSize:
 
 RUN_SIZES = {
     "asperities": RunSize(arrays=1, summit=9 * 1024),
-    # Measured times at U_full/dgamma = 1.8, 0.72 and 0.14 were 1.5, 4.3 and up to 21 times the time at 7.
+    # Measured time, divided by the time at U_full/dgamma = 7: 1.5 at 1.8, 4.3 at 0.72, and up to 21 at 0.14.
     "boundary_elements": RunSize(arrays=20, maps=1.5, sticky=3.0, minutes=(240, 960, 1440)),
 }
 

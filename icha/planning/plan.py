@@ -25,7 +25,7 @@ from icha.support.input_files import text
 DONE, TO_DO, CHANGED, FAILED, DAMAGED = "done", "to do", "changed", "failed", "damaged"
 # Largest number of measured times from which the correction for one kind of job is computed.
 _SAMPLE = 200
-# Reduced pressure that is assumed for targets that are mean separations.
+# Assumed reduced pressure of a target that is given as a mean separation.
 _UNKNOWN_LOAD = 0.03
 
 

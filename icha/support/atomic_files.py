@@ -15,7 +15,7 @@ from pathlib import Path
 # A test of free disk space writes this number of bytes, because libraries write about as many bytes at once.
 _PROBE = 2**20
 _ENDING = ".part"
-# Environment variable with content and path of the file that records the owner. Started programs inherit the variable.
+# Environment variable: content and path of the file that records the owner. Child processes inherit the variable.
 _OWNER_VARIABLE = "ICHA_OWNER"
 _moving: Callable[[], AbstractContextManager] = nullcontext
 _SUPERSEDED = "a later call of this campaign owns this result; this job wrote nothing"

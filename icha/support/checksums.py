@@ -6,8 +6,8 @@ unchanged; otherwise ICHA computes its SHA-256. A damaged disk can change the co
 and time. A `thorough` check computes the SHA-256 of every file, and so finds errors of the disk.
 
 A sidecar also contains a checksum of the parameters of the job, and the checksums of the job's inputs. An unchanged
-result may still belong to other settings, another program version, or other inputs. If a sidecar exists but its result
-does not, the result must be computed again.
+result may still come from other settings, another version of the program, or other inputs. If a sidecar exists but its
+result does not, the result must be computed again.
 """
 
 import contextlib
@@ -69,7 +69,7 @@ def distrust(results: str | os.PathLike, path: str) -> None:
 
 
 def is_whole(results: str | os.PathLike, path: str, *, thorough: bool = False) -> bool:
-    """Return whether a result agrees with the checksum in its sidecar; True without a sidecar.
+    """Return whether a result agrees with the checksum in its sidecar; True if it has no sidecar.
 
     Unless `thorough` is true, a result with the recorded size and time counts as whole. If only the time differs, the
     sidecar receives the new time. An existing result whose sidecar cannot be read is not whole.

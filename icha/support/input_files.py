@@ -78,7 +78,7 @@ def require_room(needed: float, most: int | None = None) -> None:
 
 @contextmanager
 def bounded_memory(most: int | None = None) -> Iterator[None]:
-    """Limit the memory of a block of code, with its libraries, to `most` bytes; the default is `most_memory`.
+    """Limit the memory of a block of code and of the libraries that it calls to `most` bytes (default: `most_memory`).
 
     A block that needs more memory raises `TooLarge`; libraries in C may raise their own errors instead. Only Linux
     supports the limit. On other systems, `require_room` is the only check.

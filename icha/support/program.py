@@ -35,7 +35,7 @@ if __name__ == "__main__":
 
 
 def beginning_of(process: int) -> str:
-    """Return the start time of a process, in clock ticks. The number and the start time together identify a process.
+    """Return the start time of a process, in clock ticks. A process is identified by its number and its start time.
 
     Raises FileNotFoundError or ProcessLookupError if the process does not exist.
     """

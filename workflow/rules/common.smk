@@ -30,7 +30,7 @@ CONFIG_TEXT, NAMED_FILES = collect_inputs(CONFIGURATION)
 INPUTS = {f"{RESULTS}/{place}": file for place, file in NAMED_FILES.items()}
 COPIED = {copy: file for copy, file in INPUTS.items() if Path(copy).resolve() != Path(file).resolve()}
 
-# Checksum of the settings of a run, by its labels.
+# Function that returns the checksum of the settings of a run with given labels.
 SHA256_OF_RUN = cache(lambda case: run_sha256(CAMPAIGN, case))
 
 # Attributes of every dataset; workflow/scripts/job.py adds the attribute `id`, the path of the dataset.

@@ -72,7 +72,7 @@ def job_context(snakemake):
 
 
 def refuse_changed(file, sha256, name=None):
-    """Raise an error if a file has changed, because results would be attributed to the old content.
+    """Raise an error if a file has changed; otherwise the results would be attributed to the old content.
 
     Parameters
     ----------

@@ -11,7 +11,7 @@ from icha.support.program import end_with_parent
 SERVER = os.getpid()
 # Subpackages that are not imported: the command line, and modules that only a deposit needs.
 _EXCLUDED = ("cli", "deposit")
-# Modules that libraries import at their first use.
+# Libraries import these modules only when a function needs them.
 _LATE = ("pint", "PIL.PngImagePlugin", "matplotlib.style", "matplotlib.backends.backend_pdf", "fontTools.subset")
 
 
