@@ -80,7 +80,7 @@ class BoundaryElements(FullContactProblem):
         With `control`, `separation` is the first guess. The result may be full contact, at separation 0: under a large
         load, or at a separation below `smallest_gap`. Without `control`, the first call from full contact only lowers
         the pressure to the opening pressure, at separation 0; the next call opens the contact. Unstable patches detach
-        without force, so `let_go` must be 0. Raise `NotConverged` otherwise, or if there is no equilibrium.
+        without force: raise `NotConverged` if `let_go` is not 0, or if there is no equilibrium.
         """
         if let_go:
             raise NotConverged("boundary elements cannot detach single patches by force")
@@ -176,7 +176,7 @@ class BoundaryElements(FullContactProblem):
         return False
 
     def _predict(self, state, separation):
-        """Predict the contact at a separation (m) by the rates of a state; without valid rates return its contact."""
+        """Predict the contact at a separation (m) by the rates of a state; without valid rates, do not change it."""
         contact = Contact(state.cells, state.fraction, state.pressure / self.contact_modulus)
         if state.rates is None:
             return contact

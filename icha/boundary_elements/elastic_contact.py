@@ -280,8 +280,8 @@ def solve_nonadhesive_contact(
 ) -> ElasticContact:
     """Solve the contact without adhesion at a separation (in cell sizes) or under a nominal pressure (in E*).
 
-    contact : start of the iteration, with pressures if a load is given. At a separation it may be empty: the start is
-        then the cells that are higher than the separation.
+    contact : start of the iteration, with pressures if a load is given. Without a load it may be empty; then the
+        iteration starts from the cells that are higher than the separation.
     """
     if not len(contact.cells):
         cells = np.flatnonzero(topography.double > separation)

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
 # Compliance of the last row of cells of a straight contact (kernel 2/q, cell size h), in h/E*. The compliance of a bond
-# is larger by a factor: above 1, no cell snaps; with 3.5 patches follow JKR at any position (docs/short_range.md).
+# is larger by a factor. Above 1 no cell snaps; with 3.5, patches follow JKR at any position (docs/short_range.md).
 _ROW_COMPLIANCE, _BOND_FACTOR = 1.7316, 3.5
 COMPLIANCE = _BOND_FACTOR * _ROW_COMPLIANCE
 # Compliance of a cell at the front in preconditioners: about that of its bond minus that of the half-space.

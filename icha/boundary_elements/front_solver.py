@@ -113,7 +113,7 @@ class ActiveCells(Contact):
         return float(np.max(self.residuals, initial=0.0))
 
     def cells_to_relax(self) -> tuple[np.ndarray, bool]:
-        """Return cells above `fine` if these are few, otherwise those above `coarse`, (k,) bool, and whether few."""
+        """Return cells with residuals above `fine` if few, otherwise above `coarse`, (k,) bool, and whether few."""
         few = TOLERANCES.few * np.count_nonzero(self.at_front)
         unconverged = self.residuals > TOLERANCES.fine
         if np.count_nonzero(unconverged) <= few:
@@ -281,7 +281,7 @@ class FrontRelaxation:
     def relax_locally(self, active: ActiveCells, relax_around: Callable) -> bool:
         """Relax the front around cells far from equilibrium; keep the result and return True if the energy is lower.
 
-        Between two successful steps do this five times at most, once if the cells are many, and not after a failure.
+        Do this at most five times between two successful steps, only once if cells are many, not again after a failure.
         """
         far, few = active.cells_to_relax()
         if not far.any() or self.local_relaxations >= (_MAX_LOCAL_RELAXATIONS if few else 1):
@@ -393,7 +393,7 @@ class LinearisedFront:
         """Solve for the changes of fraction and pressure, (k,) each, with a right-hand side, by GMRES.
 
         The residual is reduced to the relative `accuracy`. If tiles are too inaccurate for this, residuals of the full
-        grid correct the solution, as long as each correction halves them. So the accuracy may not be reached.
+        grid correct the solution, as long as each correction halves them. The result may be less accurate.
 
         Raises
         ------

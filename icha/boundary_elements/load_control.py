@@ -56,7 +56,7 @@ class ControlProblem:
         return of(state)
 
     def scale(self, state: CellState) -> float:
-        """Return the unit of relative errors: |target|; for zero load |p| of a state, with a limit by `_ZERO_LOAD`."""
+        """Return the unit of relative errors: |target|; for zero load |p| of a state, bounded below by `_ZERO_LOAD`."""
         if self.control.target:
             return abs(self.control.target)
         unit = abs(self.contact.stiffness(state)) * self.contact.rms_height

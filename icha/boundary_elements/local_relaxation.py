@@ -150,7 +150,7 @@ def _boxes(labels):
 
 
 def _cut(labels, boxes):
-    """Cut boxes wider than half the largest window; number pieces in `labels`; return all boxes, then the pieces."""
+    """Cut boxes wider than half the largest window; number pieces in `labels`; return old boxes and then pieces."""
     widest, step = _SIDES[-1] // 2 // BLOCK, _PIECE // BLOCK
     pieces = []
     for number, box in enumerate(boxes, 1):

@@ -142,7 +142,7 @@ class _Cycle:
         A target inside a jump is kept in `progress.skipped` in leg 0, and raises an error at once in later legs. With
         `until_apart`, such a target is left out without an error. Without `until_apart`, raise `NotConverged` if the
         surfaces separate before the last target. At the end of a loading leg, the visited separations become stations
-        if they are far enough apart (`_is_new_station`), after a reloading only those below all earlier stations.
+        if they are far enough apart (`_is_new_station`). After a reloading, only those below all old stations do so.
         """
         self.leg, self.event_at, self.longest_part = leg, np.inf, 0.0
         self.ahead.clear()

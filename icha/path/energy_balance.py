@@ -162,7 +162,7 @@ class EnergyBalance:
         1. Jumps cause the whole loss if the step has no coalescence and no split, if the sum of the reference losses is
            not zero, and if the loss is within a factor of two of this sum or more than a tenth of the work. Jumps in
            and jumps off share the loss in proportion to their reference losses, which must not have different signs.
-        2. In all other cases, jumps in and jumps off have their reference losses. The rest of the loss is attributed to
+        2. In all other cases, each jump causes its reference loss. The rest of the loss is attributed to
            coalescence if the step has a coalescence or split; otherwise it is unattributed.
         """
         energy, kinds, united = step.events.energy, step.events.kind, step.unites_or_splits

@@ -15,7 +15,7 @@ def follow(contact: ContactModel, path: Path, report: Callable[[str], None] | No
     """Follow a path with a contact, and yield the waypoints in the order of the path.
 
     For a path that ends with the first loading, the waypoints are the equilibria at the targets. For a cyclic path they
-    are all equilibria, under load control only the equilibria that load control visits. Targets are met exactly.
+    are all equilibria or, under load control, all equilibria that load control visits. Targets are met exactly.
 
     Parameters
     ----------

@@ -53,8 +53,8 @@ class TargetFunction:
     def predict_separation(self, state: State) -> float:
         """Return the expected separation of the target, m.
 
-        A mean separation is the target itself. A load or area is extrapolated exponentially; the result is -inf if the
-        load or area in the state is not positive, or does not grow on loading.
+        For a mean separation, it is the target value. For a load or area, it is extrapolated exponentially, and is -inf
+        if the load or area in the state is not positive, or does not grow on loading.
         """
         control = self.control
         if control is None:
@@ -106,7 +106,7 @@ def find_target_state(target: TargetFunction, before: State, after: State) -> St
     The state at a mean separation is computed directly. For a load or area, the interval between the two states is
     halved until the solver finds the state at the target inside the interval. If the load or area jumps past the
     target, the interval becomes very narrow. Then the solver looks for the target on the branch after the jump, where
-    load control would continue; the separation of the found state may be outside the interval, before `before`. Raise
+    load control would continue; the found state may lie outside the interval, on the other side of `before`. Raise
     `InsideJump` if there is no such equilibrium, or if the middle of an interval below `CLOSE_TO_A_JUMP` has no
     equilibrium. Raise `NotConverged` if the middle of a wider interval has none, or after `_MAX_HALVINGS`.
     """

@@ -41,7 +41,7 @@ def reference_dataset(
     Parameters
     ----------
     spectrum : spectrum of the surface, or None. Without a spectrum, Persson's theory gives only the area.
-    moments : spectral moments of the surface at any rms slope. None leaves out theories of separate summits.
+    moments : spectral moments of the surface at any rms slope; if None, theories of separate summits are left out.
     adhesive : materials with adhesion, by rms slope and name; each material has a curve of Fuller & Tabor.
     reduced_pressures : values of p/(E* h'_rms), increasing and positive.
     attrs : additional global attributes.
