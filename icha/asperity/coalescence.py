@@ -20,7 +20,7 @@ def overlapping_pairs(position, a, first, second, r):
     ----------
     position : (n, 2) float, centres of the spots, m.
     a : (n,) float, contact radii of the spots, m.
-    first, second : (p,) int, indices of the two spots of p pairs; pairs with the smaller spot first are ignored.
+    first, second : (p,) int, indices of the two spots of p pairs; pairs are ignored if `first` is the smaller spot.
     r : (p,) float, distances between the two spots of the pairs, m.
     """
     depth = a[first] + a[second] - r
@@ -62,7 +62,7 @@ def covering_spot(points, position, a, period, larger_than=None):
     points : (k, 2) float, positions of the points, m.
     position, a : (m, 2) and (m,) float, centres and contact radii of the spots, m.
     larger_than : (k,) float, contact radii of the points, m; given only if the points are the centres of the spots.
-        Then only a larger spot covers a point. If two spots are equal, the first spot covers the second.
+        In this case only larger spots can cover a point. If two spots are equal, the first spot covers the second.
     """
     covering = np.full(len(points), -1)
     if not len(points) or not len(position):

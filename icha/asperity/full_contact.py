@@ -16,7 +16,7 @@ MEANING = (
 
 
 def full_contact_energy_ratio(full_contact_energy: float, contact_modulus: float, surface_energy: float) -> float:
-    """Return the ratio U_full/dgamma of elastic energy of full contact to work of adhesion; infinite without adhesion.
+    """Return U_full/dgamma: elastic energy of full contact, divided by work of adhesion; infinite without adhesion.
 
     full_contact_energy : U_full/E* of the surface (`icha.surfaces.surface.Surface.full_contact_energy`), m.
     contact_modulus, surface_energy : E* (Pa) and dgamma (J/m^2).

@@ -103,7 +103,7 @@ class JKR:
         """Return the approach at which contact forms, (1 - 2.641 mu^(3/7)) epsilon, eq. (3), m; negative for a gap.
 
         For Tabor parameters mu below about 1.06, the formula gives less than the jump-off approach, where no JKR state
-        exists. For very small mu, the formula gives more than zero. The result is limited to the interval from the
+        exists. For very small mu, the formula gives a positive approach. The result is limited to the interval from the
         jump-off approach to zero. Without adhesion the result is zero.
         """
         if self.material.surface_energy == 0:
@@ -139,7 +139,7 @@ class JKR:
         """Return the derivative of `displacement` with respect to a, for a > 0.
 
         The adhesive part, sqrt(a)/sqrt(r^2 - a^2), is singular at the edge. If r exceeds a by less than 2.5 %, the
-        square root is kept constant. In equilibrium no centre of another spot is so close to the edge.
+        square root is kept constant. In equilibrium, the centre of another spot is never so close to the edge.
         """
         outside = r > a
         arc = np.arcsin(np.where(outside, a / np.maximum(r, a), 1.0))
@@ -208,8 +208,8 @@ class JKR:
     def union(self, a_i, R_i, a_j, R_j):
         """Return the union of two spots: contact radius (m), radius of curvature (m), and position of the centre.
 
-        a^2 = a_i^2 + a_j^2 and R^2 = R_i^2 + R_j^2. The centre is the centroid of the cap volumes pi a^4/(4R). Its
-        position is given as a fraction of the distance from the first spot to the second.
+        a^2 = a_i^2 + a_j^2 and R^2 = R_i^2 + R_j^2. The centre is the centroid of the cap volumes pi a^4/(4R),
+        given as a fraction of the distance from the first spot to the second.
         """
         volume_i, volume_j = a_i**4 / R_i, a_j**4 / R_j
         return np.hypot(a_i, a_j), np.hypot(R_i, R_j), volume_j / (volume_i + volume_j)

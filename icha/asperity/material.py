@@ -19,8 +19,8 @@ class Material:
     Parameters
     ----------
     contact_modulus : E*, composite elastic modulus, Pa, in [1e-9, 1e15].
-    surface_energy : work of adhesion dgamma (gamma in the paper), J/m^2, at most 1e24. It is zero without adhesion;
-        otherwise surface_energy/contact_modulus is in [1e-40, 1e9] m.
+    surface_energy : work of adhesion dgamma (gamma in the paper), J/m^2, at most 1e24; zero without adhesion.
+        With adhesion, surface_energy/contact_modulus must be in [1e-40, 1e9] m.
     interaction_range : range of the attractive forces (epsilon in eq. 3 of Violano & Afferrante), m, in [1e-24, 1e9].
     flaw_radius : radius of the largest flaw of the interface, m, in [1e-24, 1e9]; 0 for an interface without flaws.
 
@@ -58,9 +58,9 @@ class Material:
     def interface_strength(self) -> float:
         """Tension at which closed contact opens, Pa: the smaller of theoretical strength and strength with the flaw.
 
-        The flaw, a penny-shaped crack of radius a, grows at the tension sigma = sqrt(pi E* dgamma/(2 a)). Its stress
-        intensity K = 2 sigma sqrt(a/pi) then gives the energy release rate K^2/(2 E*) = dgamma, because one of the two
-        bodies is rigid (I. N. Sneddon, Proc. R. Soc. A 187 (1946) 229-260).
+        The flaw, a penny-shaped crack of radius a, grows at the tension sigma = sqrt(pi E* dgamma/(2 a)). At this
+        tension, the stress intensity is K = 2 sigma sqrt(a/pi), and the energy release rate is K^2/(2 E*) = dgamma. The
+        rate has the factor 1/2 because one body is rigid (I. N. Sneddon, Proc. R. Soc. A 187 (1946) 229-260).
         """
         if not self.flaw_radius:
             return self.theoretical_strength

@@ -5,7 +5,7 @@ import numpy as np
 from icha.asperity.material import Material
 from icha.surfaces.moments import SpectralMoments
 
-# Reduced contact area divided by load, A E* h'_rms/F, for small areas in the theory of Pastewka & Robbins.
+# A E* h'_rms/F for small contact areas A at the load F, in the theory of Pastewka & Robbins.
 REPULSIVE_AREA_SLOPE = 2.0
 
 
@@ -18,7 +18,7 @@ def stickiness(moments: SpectralMoments, material: Material) -> float:
 
         A_att/A = pi [3 h'' r/(16 h'^2)]^(2/3).
 
-    Here h' is the rms slope and h'' the rms Laplacian. The paper calls the ratio kappa/kappa_att. This ratio exceeds 1
+    Here h' is the rms slope and h'' the rms Laplacian. The paper calls the force ratio kappa/kappa_att. It exceeds 1
     if the paper's criterion for sticking is met, (h' r E*/(kappa dgamma)) [h' d/(4 r)]^(2/3) < pi (3/16)^(2/3) = 1.03.
     The criterion is valid if the range is so short that A_att is small compared with A: J. M. Monti, A. Sanner and
     L. Pastewka, Tribol. Lett. 69 (2021), doi:10.1007/s11249-021-01454-6. Without adhesion the ratio is 0.
@@ -34,9 +34,9 @@ def sticky_rms_height(longest_wavelength: float, material: Material) -> float:
     r"""Return the largest rms height, m, of a random surface that is sticky according to the bearing area model (BAM).
 
     M. Ciavarella, Meccanica 53 (2018) 241-250, doi:10.1007/s11012-017-0701-6. Here u is the mean separation, h the rms
-    height, beta = 1/2 and q_L = 2 pi/lambda_L. Attraction acts where the gap is less than the range. Its nominal
-    pressure is p_a = dgamma/(sqrt(2 pi) h) exp(-u^2/(2 h^2)). The nominal pressure of repulsion, by Persson, is p_r =
-    (3/(8 beta)) q_L h E* exp(-u/(beta h)). The ratio p_a/p_r is largest at u = h/beta, where p_a exceeds p_r if
+    height, beta = 1/2 and q_L = 2 pi/lambda_L. Attraction acts where the gap is less than the range. The nominal
+    tension of attraction is p_a = dgamma/(sqrt(2 pi) h) exp(-u^2/(2 h^2)). Persson's nominal pressure of repulsion is
+    p_r = (3/(8 beta)) q_L h E* exp(-u/(beta h)). The maximum of p_a/p_r, at u = h/beta, exceeds 1 if
 
         h^2 < e^2/(sqrt(2 pi) 3 pi/2) lambda_L dgamma/E* = 0.63 lambda_L dgamma/E*.
 

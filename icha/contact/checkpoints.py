@@ -34,8 +34,8 @@ class CheckpointedContact:
     contact : `icha.contact.model.ContactModel`.
     of : text that identifies the contact.
     folder : folder of the checkpoints, one file each.
-    packed : function that converts a new state to named arrays; its second argument is the state before.
-    unpacked : function that converts these arrays to the state; its second argument is the state before.
+    packed : function that converts a new state to named arrays; its second argument is the previous state.
+    unpacked : function that converts these arrays to the state; its second argument is the previous state.
     """
 
     contact: Any
@@ -64,7 +64,7 @@ class CheckpointedContact:
         return new
 
     def __getattr__(self, name: str) -> Any:
-        """Return any other attribute of the contact."""
+        """Return an attribute of the contact that this class does not define."""
         return getattr(self.contact, name)
 
 

@@ -36,7 +36,7 @@ class NotConverged(Exception):
 
 
 class BeyondModel(NotConverged):
-    """Error: the next target is outside the range of the model. The path up to this target is a valid result."""
+    """Error: the next target is outside the range of the model. The path before the target is a valid result."""
 
 
 class FullContact(NotConverged):
@@ -80,7 +80,7 @@ class Events:
 
     @classmethod
     def concatenate(cls, parts) -> Events:
-        """Return one `Events` with the events of several `Events`, in the same order."""
+        """Join several `Events` into one, in the given order."""
         parts = [cls(np.empty(0, np.int8), np.empty((0, 2)), np.empty(0, int), np.empty(0)), *parts]
         return cls(*(np.concatenate([getattr(part, name) for part in parts]) for name in cls.__match_args__))
 
@@ -104,7 +104,7 @@ def events_between(before: State, after: State) -> Events:
 
 
 class ContactModel(Protocol):
-    """Contact of one surface and one material. A path computes each equilibrium from the equilibrium before.
+    """Contact of one surface and one material. A path computes each equilibrium from the previous one.
 
     Attributes
     ----------

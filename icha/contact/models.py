@@ -11,11 +11,11 @@ from typing import NamedTuple
 
 # Largest error of an equilibrium of asperities, in h_rms.
 RESIDUAL_TOLERANCE = 1e-9
-# With adhesion a load is the difference of repulsion and attraction. If the load is less than this fraction of the
-# repulsion, the error of the load is relative to this fraction of the repulsion.
+# With adhesion a load is the difference of repulsion and attraction. The error of a load is divided by the load or, if
+# larger, by this fraction of the repulsion.
 SMALLEST_LOAD = 1e-4
-# Error of a prescribed area, without adhesion, if contact is counted in whole cells. The error must be below both
-# values: the first is in cells, the second is a fraction of the area.
+# Largest error of a prescribed area, without adhesion, if contact is counted in whole cells. The smaller of both values
+# applies: the first is in cells, the second is a fraction of the prescribed area.
 AREA_TOLERANCE_CELLS, AREA_TOLERANCE_PART = 2.0, 0.1
 
 
@@ -56,11 +56,11 @@ class PathAccuracy:
     ----------
     event : an event counts as located if the step that contains it is not longer than this value, in h_rms.
     loss : largest error of the work of one step with events, relative to `StepAccuracy.energy_scale`.
-    balance : largest difference of work and energy change in a long step without events, relative to the same scale.
+    balance : largest difference of work and energy change in a long step without events, relative to `energy_scale`.
     tension : largest relative error of the largest tension in a step without events.
     least_work : lower limit of the energy to which `loss` is relative, J/m^2.
     error_controlled_steps : if True, the error of the work of each step decides the length of the next step, because
-        the pressure may jump without an event. If False, each step may be twice as long as the last one.
+        the pressure may jump without an event. If False, each step may be twice as long as the previous step.
     """
 
     event: float = 1e-12
@@ -78,8 +78,8 @@ class Model:
     Attributes
     ----------
     words : name of the model in sentences and legends, in the plural.
-    title : title of a run, before the names of surface and material.
-    method : method in the summary of a run.
+    title : name of the model in the title of a run; the names of surface and material follow.
+    method : name of the method in the summary of a run.
     references : publications on the method, separated by "; ".
     module : module whose `contact_of(surface, material)` returns an `icha.contact.model.ContactModel`.
     folder : folder for the runs of this model, with a slash at the end; empty for the default model.
@@ -111,7 +111,7 @@ class Model:
 
 _WU = "J.-J. Wu, J. Phys. D: Appl. Phys. 43 (2010) 415303"
 _MAP = ("snapshot", "row", "column")
-# The first model applies to runs without a model name. Other models are compared with the second model.
+# The first model applies to runs without a model name. The second model is the reference in comparisons of models.
 DEFAULT_MODEL, REFERENCE_MODEL = "asperities", "boundary_elements"
 # Models by their names in configurations, in files and in `icha.simulate`.
 MODELS = {

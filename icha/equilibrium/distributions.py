@@ -49,7 +49,7 @@ def gap_distribution(law: JKR, surface: Surface, state: ContactState) -> dict:
     field = DisplacementField(law, period, grid, spots.position, a, spots.radius_of_curvature, free_square)
 
     def count_cells(rows, w):
-        """Return areas, in cells: uncovered area in each bin of the gap, covered area, area covered more than once."""
+        """Return three areas, in cells: uncovered area in each gap bin, covered area, area covered more than once."""
         u = w + (state.separation - surface.heights[rows])
         cover, inside = _cover_rows(period, grid, spots.position, a, rows, free_square)
         u[inside] = 0.0
@@ -99,7 +99,7 @@ def pressure_distribution(law: JKR, surface: Surface, spots: Spots) -> dict:
     if len(a):
         largest = np.max(law.pressure(0.0, a, R))
         for k, p in enumerate([*edges[:-1], max(edges[-1], largest)]):
-            # Area of every spot where the pressure is below p, and the force on this area.
+            # For every spot, the area where the pressure is below p, and the force on this area.
             areas, forces = law.pressure_distribution(p, a, R)
             area[k], force[k] = np.sum(areas), np.sum(forces)
         area[0] = force[0] = 0.0  # the first bin includes all lower pressures

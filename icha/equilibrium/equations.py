@@ -73,7 +73,7 @@ class Evaluation:
     error : (n,) float, left side minus right side of each equation, m.
     control_error : nominal pressure (Pa) or area fraction minus the prescribed value; 0 for a given separation.
     repulsion : sum of the repulsive parts of all forces, divided by the nominal area, Pa; 0 if no load is prescribed.
-        `Equations.error_size` compares the error of a small load with this value.
+        `Equations.error_size` compares the error of a small load with a fraction of this value.
     interaction : elastic interaction of the spots.
     """
 
@@ -105,8 +105,8 @@ class Equations:
     def evaluate(self, approach, separation: float, interaction: Interaction | None = None) -> Evaluation:
         """Compute contact radii, displacements and errors at given approaches (n,) and mean separation, m.
 
-        interaction : interaction of an earlier evaluation, used again if it belongs to the same half-space and was set
-            up for contact radii at least as large. Otherwise a new interaction is set up.
+        interaction : interaction of an earlier evaluation. It is used again if it belongs to the same half-space, and
+            if no contact radius exceeds the radii for which it was set up. Otherwise a new interaction is set up.
         """
         contact, sites, law = self.contact, self.sites, self.contact.law
         present, R = sites.present, sites.radius_of_curvature

@@ -84,7 +84,7 @@ class InteractingAsperities(AsperityContact):
         return 0.0 - self.slope(PRESSURE, state)  # not -0.0 without contact
 
     def slope(self, quantity: str, state: ContactState) -> float:
-        """Return the derivative of PRESSURE or AREA_FRACTION with respect to the mean separation, without events."""
+        """Return d(quantity)/d(mean separation) while no event occurs; `quantity` is PRESSURE or AREA_FRACTION."""
         sites, c = state.sites, state.contact_index
         a, R = state.contact_radius[c], sites.radius_of_curvature[c]
         growth = radius_slope(self.law, a, R, sites.approach[c], sites.jump_off_approach[c]) * sites.response[c]
@@ -96,7 +96,7 @@ class InteractingAsperities(AsperityContact):
         The energy of a spot is that of a single JKR contact, plus F w/2. Here F is the force of the spot, and w the
         displacement at its centre by the other spots, as in eq. (4). Because w is taken at the centre, two spots of
         different size do not act equally on each other. So along a path without events, the change of the energy is not
-        exactly the work done: they differ by about (a/r)^2 times the interaction energy, with the distance r of spots.
+        exactly the work done. At a distance r of two spots, the difference is about (a/r)^2 of the interaction energy.
         """
         spots, law = state.spots, self.law
         a, R = spots.contact_radius, spots.radius_of_curvature
@@ -126,7 +126,7 @@ class AsperityObservables:
     def of_step(self, state: ContactState) -> dict:
         """Return residual, number of barred asperities (`pending_count`), and share of spots outside Wu's range.
 
-        Wu's formula, eq. (3), is verified for Tabor parameters from 1. Unions do not count. Without adhesion it is 0.
+        Wu's formula, eq. (3), is verified for Tabor parameters >= 1. The share omits unions; 0 without adhesion.
         """
         law, spots = self.contact.law, state.spots
         verified = law.is_jump_in_verified(spots.radius_of_curvature[spots.members == 1])
@@ -134,7 +134,7 @@ class AsperityObservables:
         return {"residual": state.residual, "pending_count": state.barred_count, "outside_wu_fraction": outside}
 
     def of_snapshot(self, state: ContactState) -> dict:
-        """Return the distributions of gap and pressure, and for each spot the properties `spot_…` below in SI units."""
+        """Return the distributions of gap and pressure, and for each spot the properties named `spot_…`, SI units."""
         law, spots = self.contact.law, state.spots
         return {
             **gap_distribution(law, self.surface, state),
@@ -152,8 +152,8 @@ class AsperityObservables:
     def reasons_against(self, separations: Iterable[float], pressed: ContactState | None) -> list[str]:
         """Return reasons why summits do not represent the surface, as sentences for the user; an empty list if they do.
 
-        The reasons are peaks without summits and unsupported summits (see `SummitCoverage`), at the mean separations of
-        the first loading, m, and tops that are not parabolic under the spots of single asperities in `pressed`.
+        Reasons at the mean separations of the first loading (m): peaks without summits, and unsupported summits (see
+        `SummitCoverage`). Reason in `pressed`: tops are not parabolic under the spots of single asperities.
         pressed : state with the largest contact area; None if there is no state.
         """
         reasons = SummitCoverage.of(self.surface, self.contact.asperities).reasons_against(separations)

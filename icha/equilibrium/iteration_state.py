@@ -18,14 +18,14 @@ class IterationState:
     ----------
     contact : contact of the asperities.
     start : equilibrium from which the search starts.
-    unloading : whether the separation, given or as first guess, is larger than the separation of `start`.
+    unloading : whether the given separation, or the first guess of it, exceeds the separation of `start`.
     sites : table of sites.
     site_of_asperity, last_approach, last_separation, barred_count : as in `ContactState`.
     released_from : (asperities,) int, site of the union that has released the asperity since the last call of
         `apply_jump_in`; -1 for other asperities.
     was_released : (asperities,) bool, whether a union has released an asperity during this search.
     barred : (asperities,) bool, whether an asperity may not make contact again because it broke contact in this search.
-    new_unions : indices of the sites of unions whose heights are not known yet.
+    new_unions : indices of the sites of unions that have no heights yet.
     log : events of this search so far, each a row of kind, position, members, energy and asperity.
     """
 

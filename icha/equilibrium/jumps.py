@@ -21,12 +21,12 @@ from icha.equilibrium.iteration_state import IterationState
 from icha.equilibrium.sites import CANDIDATE, CONTACT
 from icha.half_space.interaction import displacement_at
 
-# Largest increase of the approach of an asperity out of contact, divided by the size of the change of the separation.
+# Largest increase of the approach of an asperity out of contact, divided by the increase or decrease of the separation.
 _LARGEST_APPROACH_RATE = 3.0
-# Usual increase of this approach, divided by the decrease of the separation.
+# Usual increase of the approach of such an asperity, divided by the decrease of the separation.
 _USUAL_APPROACH_RATE = 1.2
 # Jumps of other spots may increase an approach by up to x h_rms + y |delta_off|, where delta_off is the jump-off
-# approach of the bluntest asperity. Each pair contains x and y: the guess during the search, the bound at its end.
+# approach of the bluntest asperity. Pairs of x and y: a guess during the search, and a bound at the end of the search.
 _SUDDEN_GUESS = 0.02, 2.0
 _SUDDEN_BOUND = 1.0, 10.0
 # Spots break contact together if the increases of the separation up to their jump-offs differ by at most this fraction.
@@ -51,9 +51,9 @@ def apply_jump_in(state: IterationState, evaluation: Evaluation, margin: float) 
 
     1. A ready asperity that was barred before stays out of contact and is counted in `barred_count`.
     2. A ready asperity under a spot becomes part of this spot. It does not count as an added site.
-    3. A ready asperity under the larger spot of another one gets no site; in the next call it must reach jump-in.
+    3. A ready asperity under the larger spot of another ready one gets no site; in the next call it must reach jump-in.
     4. Any other ready asperity gets a site: a contact with adhesion, a candidate without adhesion. If a union has
-       released it, a split of the union is logged. Otherwise a jump-in is logged, but not for a candidate.
+       released the asperity, a split of the union is logged. For other contacts, a jump-in is logged.
     """
     contact, law, asperities = state.contact, state.contact.law, state.contact.asperities
     spots = np.flatnonzero((evaluation.a > 0) & state.sites.present)
@@ -79,7 +79,7 @@ def apply_jump_in(state: IterationState, evaluation: Evaluation, margin: float) 
     splits, jumping = np.unique(source[source >= 0]), ready[source < 0]
     state = state.with_events(SPLIT, state.sites.position[splits], state.sites.members[splits])
     if contact.adhesive:
-        # The jump releases the energy at the jump-in approach. Any further approach is due to work from outside.
+        # The jump releases the energy at the jump-in approach. External work causes any further approach.
         R = asperities.radius_of_curvature[jumping]
         energy = -law.energy(law.contact_radius(contact.jump_in_approach[jumping], R), R)
         state = state.with_events(JUMP_IN, asperities.position[jumping], 1, energy, jumping)
@@ -94,8 +94,8 @@ def _sudden_growth(contact, x, y):
 def _evaluate_approaches(state, evaluation, spots, margin):
     """Compute the approaches of the asperities without site that may have reached jump-in, and store them in the state.
 
-    They are selected by an upper bound of their approaches if `margin` is 0, otherwise by a guess that may miss some.
-    Return the new state and their indices. `spots` : indices of the present sites with a positive contact radius.
+    If `margin` is 0, an upper bound of the approaches selects the asperities, otherwise a guess that may miss some.
+    Return the new state and these indices. `spots` : indices of the present sites with a positive contact radius.
     """
     contact, asperities, sites = state.contact, state.contact.asperities, state.sites
     largest = state.last_approach + _LARGEST_APPROACH_RATE * np.abs(state.last_separation - evaluation.separation)
@@ -111,7 +111,7 @@ def _evaluate_approaches(state, evaluation, spots, margin):
 
 
 def _select_uncovered(state, jumping):
-    """Return the jumping asperities (indices) whose centres will not lie under the larger spot of another one."""
+    """Return the jumping asperities (indices) that will not lie under the larger spot of another jumping one."""
     asperities = state.contact.asperities
     position = asperities.position[jumping]
     a = state.contact.law.contact_radius(state.last_approach[jumping], asperities.radius_of_curvature[jumping])
@@ -183,7 +183,7 @@ def _break_contact(state, breaking):
     """Break the contact of the spots where the mask `breaking` (n,) is True, and log their jump-offs.
 
     A union releases its asperities, also those that it only covers, except asperities that were already released in
-    this search. All other asperities in broken spots are barred. If an asperity has jumped in during this search, its
+    this search. All other asperities of broken spots are barred. If an asperity has jumped in during this search, its
     jump-in is deleted from the log, and no jump-off is logged.
     """
     sites, law = state.sites, state.contact.law

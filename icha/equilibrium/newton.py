@@ -37,11 +37,11 @@ _PAST_JUMP_OFF = 0.2
 
 
 def newton_step(equations: Equations, evaluation: Evaluation, size: float) -> tuple[Evaluation, bool, bool]:
-    """Take one Newton step; halve it until the `error_size` is enough below `size`, its value before the step.
+    """Take one Newton step; halve the step until the `error_size` is enough below `size`, the value before the step.
 
     The error must fall by at least 10 % after the full step, 5 % after half the step, and so on. If eight trials with
     the approximate matrix fail, eight with the exact matrix follow. Return the evaluation after the step (the old one
-    if all fail), whether a trial succeeded, and whether the exact matrix was needed. Errors are those of `_solve_step`.
+    if all fail), whether a trial succeeded, and whether the exact matrix was needed. Exceptions: see `_solve_step`.
     """
     for exact in (False, True):
         step, separation_step = _solve_step(equations, evaluation, exact)
@@ -61,7 +61,7 @@ def solve_response(equations: Equations, evaluation: Evaluation) -> np.ndarray:
     """Return the response x = d(delta)/du of the approach of every site to the mean separation, (n,).
 
     The response solves (1 + W' da/d(delta)) x = -1, with the derivative W' = dw/da of the displacements; removed sites
-    get -1. Repeated solves correct x, first with the approximate matrix. Raise `NotConverged` if they all fail.
+    get -1. Repeated solves correct x, first with the approximate matrix. Raise `NotConverged` if all solves fail.
     """
     sites = equations.sites
     response = np.full(len(sites), -1.0)
@@ -108,9 +108,9 @@ def _linearise(equations, evaluation):
 def _solve_step(equations, evaluation, exact):
     """Return the Newton step by the exact or approximate matrix: changes of approaches (n,) and separation, m.
 
-    If the separation is given, its change is 0. If load or area is given, its change is at most _LARGEST_CHANGE h_rms,
-    and limits the predicted changes of the approaches. Raise `NotConverged` if no contact radius changes with the
-    separation, or if the linear equations have no finite solution.
+    If the separation is given, it does not change. If load or area is given, the separation changes by at most
+    _LARGEST_CHANGE h_rms, which also limits the predicted changes of the approaches. Raise `NotConverged` if no contact
+    radius changes with the separation, or if the linear equations have no finite solution.
     """
     contact, sites, control = equations.contact, equations.sites, equations.control
     present, slope, exact_product, approximate_product = _linearise(equations, evaluation)
@@ -120,8 +120,8 @@ def _solve_step(equations, evaluation, exact):
     if control is None:
         step[present] = _solve_linear(lambda x: x + product(x), -evaluation.error[present], tolerance)
         return step, 0.0
-    # The separation is one more unknown. The last response predicts a change of each approach for the change of the
-    # separation. The unknowns are the differences from this prediction, so that the matrix is close to the identity.
+    # Now the separation is one more unknown. The last response and the change of the separation predict the change of
+    # each approach. The other unknowns are the differences from these predictions, so the matrix is near the identity.
     last = sites.response[present]
     R = sites.radius_of_curvature[present]
     gradient = slope * derivative_by_radius(contact, control.quantity, evaluation.a[present], R)
@@ -130,7 +130,7 @@ def _solve_step(equations, evaluation, exact):
         raise NotConverged("no contact radius changes with the separation, so the load or area cannot be reached")
 
     def bordered(x):
-        """Multiply the matrix by x (m + 1,): differences from the predicted changes, then change of separation."""
+        """Multiply the matrix by x: m differences from the predicted changes, and the change of the separation."""
         y = x[:count] + x[count] * last
         return np.append(y + product(y) + x[count], np.sum(gradient * y) / rate)
 
@@ -147,12 +147,12 @@ def _take_step(equations, evaluation, step):
     The modifications apply only with adhesion. The equations are smooth functions of the contact radius, but near
     jump-off the radius changes as s, the square root of delta - delta_off.
 
-    1. A spot in contact with a radius below 1.5 jump-off radii and a step towards jump-off: the step is taken in the
-       radius. If the radius reaches its lowest value, the jump-off radius, the approach falls by the rest of the step.
-    2. A spot a little past jump-off that returns to contact (`_returns_to_contact`): its new s solves s^2 + c s = L,
-       because its return changes the displacement by c s. L would be the new delta - delta_off at a constant
-       displacement. The Newton step neglects s^2 and gives s_N, so that c = L/s_N.
-    3. Any other spot past jump-off: the approach rises at most to jump-off.
+    1. A spot in contact that moves towards jump-off, with a radius below 1.5 jump-off radii: the step changes the
+       radius. If the radius reaches the jump-off radius, the approach falls by the rest of the step.
+    2. A spot a little past jump-off that returns to contact (`_returns_to_contact`): this changes the displacement by
+       c s. Therefore the new s solves s^2 + c s = L, and L is the new delta - delta_off for an unchanged displacement.
+       The Newton step neglects s^2 and gives s_N, so that c = L/s_N.
+    3. Any other spot past jump-off: the approach rises at most to the jump-off approach.
     """
     approach = evaluation.approach + step
     if not equations.contact.adhesive:
@@ -169,7 +169,7 @@ def _take_step(equations, evaluation, step):
     R, a = sites.radius_of_curvature[close], evaluation.a[close]
     stable = np.maximum(evaluation.approach, jump_off_approach)[close]
     change = radius_slope(law, a, R, stable, jump_off_approach[close]) * step[close]
-    # The rest is a fraction of the step or, if minus the error is lower than the step, a fraction of minus the error.
+    # At the jump-off radius, the approach also changes by `rest_fraction` times the lower of `step` and -`error`.
     rest_fraction = 1 - np.minimum((lowest - a) / np.where(change < 0, change, -1.0), 1.0)
     reached = law.approach(np.maximum(a + change, lowest), R)
     approach[close] = reached + np.where(change < 0, rest_fraction * np.minimum(step, -evaluation.error)[close], 0.0)

@@ -43,7 +43,7 @@ class AsperityContact(MaterialUnits):
 
 # Status of a site: in contact, candidate for contact (only without adhesion), or removed.
 CONTACT, CANDIDATE, REMOVED = 1, 2, 3
-# The half-space is set up again if the number of sites has grown by this factor, or if this fraction is removed.
+# Limits for a new half-space: number of sites, divided by `sites_at_setup`, and fraction of removed sites.
 _GROWTH = 1.5
 _REMOVED_FRACTION = 0.25
 
@@ -66,7 +66,7 @@ class MergeRecord:
     columns: dict[str, np.ndarray]
 
     def asperities(self) -> list[list[int]]:
-        """Return two lists: the asperities (indices) that united to the first spot, and those of the second spot."""
+        """Return two lists: indices of the asperities in the first spot, and of the asperities in the second spot."""
         return [
             [index] if union is None else [each for spot in union.asperities() for each in spot]
             for index, union in zip(self.columns["asperity"].tolist(), self.columns["union"], strict=True)
@@ -83,15 +83,15 @@ class Sites:
     height, radius_of_curvature : (n,) float, heights and radii of curvature of asperities and unions, m.
     jump_off_approach : (n,) float, lowest approaches with a stable state of contact, m; below them spots break contact.
     asperity : (n,) int, index of the asperity; -1 for a union.
-    members : (n,) int, number of asperities that united to this spot; asperities that it only covers do not count.
+    members : (n,) int, number of asperities united in the spot; asperities that the spot only covers do not count.
     union : (n,) object, `MergeRecord` of a union; None for other sites.
     split_number : (n,) int, the same number for the two spots from one split of a union; -1 for other sites.
     status : (n,) int, CONTACT, CANDIDATE or REMOVED.
     approach : (n,) float, last known approach of each site, m.
     response : (n,) float, derivative of the approach with respect to the mean separation.
     counts_as_old : (n,) bool, True for spots that were in contact when the present search began, for unions, and for
-        spots from a split: they absorb every new site under them. False for candidates, and for single asperities
-        added to the table in this search.
+        spots from a split. These spots absorb every new site under them. False for candidates, and for single
+        asperities added to the table in this search.
     half_space : elastic half-space with a point at every site.
     sites_at_setup : number of sites when the half-space was set up for the last time.
     """
@@ -154,7 +154,7 @@ class Sites:
         return Sites(**arrays, half_space=half_space, sites_at_setup=self.sites_at_setup)
 
     def remove(self, which) -> Sites:
-        """Return a table of the same length in which some sites are REMOVED; `which` is a mask (n,) or indices."""
+        """Return a table of the same length in which the sites `which`, a mask (n,) or indices, are REMOVED."""
         status = self.status.copy()
         status[which] = REMOVED
         return replace(self, status=status)
@@ -163,7 +163,7 @@ class Sites:
         """Delete removed sites and set up the half-space again, if over a quarter are removed or over a third are new.
 
         Sites are new if they were added after the last set-up. Return the table, and the new index of every site,
-        (n + 1,) int: -1 for removed sites, and -1 as last value. If nothing is done, return this table and None.
+        (n + 1,) int: -1 for removed sites, and -1 as last value. If neither is true, return this table and None.
         """
         removed = self.status == REMOVED
         if len(self) <= _GROWTH * self.sites_at_setup and np.count_nonzero(removed) <= _REMOVED_FRACTION * len(self):
@@ -213,14 +213,14 @@ class ContactState:
     Attributes
     ----------
     separation : mean separation u, m.
-    sites : table of sites, n of them.
+    sites : table of n sites.
     contact_radius : (n,) float, contact radius of each site, zero out of contact, m.
     site_of_asperity : (asperities,) int, site in contact to which an asperity belongs: its own spot, a union that
         contains it, or a spot that covered it when it made contact; -1 for asperities out of contact and candidates.
-    last_approach : (asperities,) float, approach of an asperity out of contact at its last evaluation, m.
-    last_separation : (asperities,) float, mean separation at this evaluation, m; inf if the approach is not known.
+    last_approach : (asperities,) float, last computed approach of each asperity out of contact, m.
+    last_separation : (asperities,) float, mean separation for `last_approach`, m; inf if the approach is not known.
     residual : largest error of the equations of equilibrium, in h_rms.
-    barred_count : number of asperities above jump-in that stay out of contact: they broke contact in the last search.
+    barred_count : number of asperities above jump-in that are barred because they broke contact in the last search.
     history : events of the path up to this state, one `Events` for each equilibrium with events.
     """
 

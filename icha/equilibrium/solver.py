@@ -24,7 +24,7 @@ from icha.equilibrium.unions import absorb_new_asperities, merge_overlapping, se
 _EVENT_TOLERANCE = 3e-4
 _EVENT_MARGIN = 10.0
 # Largest number of Newton steps between two rounds of events. Largest number of steps with the exact matrix in the
-# whole search. If more are needed, the step of the path is too long.
+# whole search. If a search needs more steps, the step of the path is too long.
 _MAX_NEWTON_STEPS = 60
 _MAX_EXACT_STEPS = 4
 # Largest number of rounds of events; a surface with many equal summits may need many. Largest number of rounds that
@@ -41,8 +41,8 @@ def find_equilibrium(
 ) -> ContactState:
     """Find the equilibrium at another mean separation, load or contact area, starting from an equilibrium.
 
-    Parameters and errors are those of `icha.contact.model.ContactModel.equilibrium`. With a `control`, `separation` is
-    only the first guess. `let_go` is the number of spots that are made to break contact before the first Newton step.
+    Parameters and exceptions are those of `icha.contact.model.ContactModel.equilibrium`. With a `control`, `separation`
+    is only the first guess. `let_go` is the number of spots that break contact before the first Newton step.
     When the equations are nearly solved, all events that are due are applied. If no Newton step reduces the error,
     overlapping spots merge. The search ends when the equations are solved and no event is due.
 
@@ -94,9 +94,9 @@ def find_equilibrium(
 def apply_events(state: IterationState, evaluation: Evaluation, margin: float) -> tuple[IterationState, bool]:
     """Apply a round of events: jump-offs, jump-ins, coalescences and, on unloading, splits.
 
-    An event occurs if its condition is exceeded by more than a margin, m. Splits need no margin. Without adhesion, new
-    sites need the margin 0. Return the new state, with the approaches of the evaluation, and whether a site was added,
-    removed or replaced. Raise `FullContact` if more than half the nominal area is in contact.
+    An event occurs if its condition is exceeded by more than a margin, m. Splits need no margin. Without adhesion,
+    jump-ins occur only if the margin is 0. Return the new state, with the approaches of the evaluation, and whether a
+    site was added, removed or replaced. Raise `FullContact` if more than half the nominal area is in contact.
     """
     contact = state.contact
     area = pressure_or_area_fraction(contact, AREA_FRACTION, evaluation.a, state.sites.radius_of_curvature)
@@ -104,12 +104,12 @@ def apply_events(state: IterationState, evaluation: Evaluation, margin: float) -
         raise FullContact(f"the contact area reached {area:.2f} of the nominal area, above the limit {_FULL_CONTACT}")
     state = state.with_approach(evaluation.approach)
     if not contact.adhesive:
-        # A candidate that has covered asperities may be out of contact now.
+        # If a candidate is out of contact now, the asperities that it covered belong to no site.
         state = _free_asperities(state, (state.sites.status == CANDIDATE) & (evaluation.approach <= 0))
     before = state
     state = apply_jump_off(state, evaluation, margin)
     changed = state is not before
-    # Without adhesion, probable contacts are already candidates. Others are added when the equations are solved.
+    # Without adhesion, probable contacts are already candidates. Other candidates follow when the margin is 0.
     if contact.adhesive or margin == 0:
         state, jumped = apply_jump_in(state, evaluation, margin)
         changed |= jumped
@@ -121,7 +121,7 @@ def apply_events(state: IterationState, evaluation: Evaluation, margin: float) -
 
 
 def _check_events_end(state, visited):
-    """Count this round in `visited`; raise `NotConverged` after too many rounds, or too many with the same spots."""
+    """Count this round in `visited`; raise `NotConverged` if rounds are too many, in all or with the same spots."""
     sites = state.sites
     places = np.rint(sites.position[sites.status == CONTACT] / (_SAME_PLACE * state.contact.asperities.period))
     checksum = hashlib.sha256(np.sort(places @ (1.0, 2 / _SAME_PLACE)).tobytes()).digest()
@@ -134,8 +134,8 @@ def _check_events_end(state, visited):
 def _merge_after_failed_step(state, evaluation, margin, size):
     """Merge overlapping spots because no Newton step succeeds, and return the new state.
 
-    Merge the pairs that overlap even if the approaches are wrong by the margin, m. If there are none,
-    merge the pairs in which one spot covers the centre of the other. If there are none, raise `NotConverged`.
+    Merge the pairs that overlap even if the approaches are wrong by the margin, m. If there are no such pairs,
+    merge the pairs in which one spot covers the centre of the other. If both kinds are missing, raise `NotConverged`.
     size : error of the equilibrium, in h_rms, for the message.
     """
     before = state.with_approach(evaluation.approach)
@@ -151,7 +151,7 @@ def _merge_after_failed_step(state, evaluation, margin, size):
 def _build_contact_state(state, evaluation, control):
     """Build the `ContactState` at the end of a search, with the responses of the sites.
 
-    Without adhesion, `_update_candidates` then decides which sites are in contact, and logs the changes.
+    Without adhesion, `_update_candidates` first decides which sites are in contact, and logs the changes.
     """
     contact, history = state.contact, state.start.history
     response = solve_response(Equations(contact, state.sites, control), evaluation)
@@ -175,7 +175,7 @@ def _build_contact_state(state, evaluation, control):
 def _update_candidates(state, evaluation):
     """Turn candidates with an approach > 0 into contacts, and contacts with an approach <= 0 into candidates.
 
-    Used only without adhesion. Log both as events. Other asperities under a lost contact have no site afterwards.
+    Used only without adhesion. Log both changes as events. Asperities that a lost contact covered then have no site.
     """
     sites, status, site_of_asperity = state.sites, state.sites.status.copy(), state.site_of_asperity.copy()
     made = np.flatnonzero((status == CANDIDATE) & (evaluation.approach > 0))
@@ -190,7 +190,7 @@ def _update_candidates(state, evaluation):
 
 
 def _free_asperities(state, sites):
-    """Return the state in which asperities under the given sites, (n,) bool, have no site."""
+    """Return the state in which no asperity belongs to the given sites, a mask (n,)."""
     freed = np.isin(state.site_of_asperity, np.flatnonzero(sites))
     site_of_asperity = np.where(freed, -1, state.site_of_asperity)
     last_separation = np.where(freed, np.inf, state.last_separation)  # the present approach is not known

@@ -1,8 +1,8 @@
 """Coalescence of spots, the splitting of unions on unloading, and new contacts that lie inside other spots.
 
-Two overlapping spots become one spot, a union (`icha.asperity.jkr.JKR.union`). At the moment of coalescence, the union
-has the contact area of both spots together. Its force differs from the sum of both forces. `set_union_heights` then
-chooses its height so that the union is in equilibrium. New contacts inside other spots are removed, because the
+Two overlapping spots become one spot, a union (`icha.asperity.jkr.JKR.union`). At the moment of coalescence, the
+contact area of the union is the sum of both areas. But its force is not the sum of both forces. `set_union_heights`
+then chooses a height for which the union is in equilibrium. New contacts inside other spots are removed, because the
 equations are singular when the edge of one spot passes through the centre of another spot.
 """
 
@@ -22,7 +22,7 @@ def merge_overlapping(state: IterationState, evaluation: Evaluation, margin=0.0,
     """Replace pairs of overlapping spots by unions; each spot merges with at most one other. Return the new state.
 
     The unions have no heights before `set_union_heights` is called. If no spots merge, return `state` itself.
-    margin : error of the approaches, m; two spots merge only if they overlap even if the approaches have this error.
+    margin : error of the approaches, m; two spots merge only if they would overlap in spite of such an error.
     deep : whether only those pairs merge in which one spot covers the centre of the other. On unloading, two spots
         from the split of one union merge again only if `deep` is True.
     """
@@ -62,7 +62,7 @@ def merge_overlapping(state: IterationState, evaluation: Evaluation, margin=0.0,
 
 
 def set_union_heights(state: IterationState, evaluation: Evaluation) -> tuple[IterationState, Evaluation]:
-    """Set the heights of new unions so that their errors are zero; return the new state and evaluation."""
+    """Set the heights of new unions so that their equations have no error; return the new state and evaluation."""
     if not len(state.new_unions):
         return state, evaluation
     height = state.sites.height.copy()
@@ -95,7 +95,7 @@ def _select_merging_pairs(state, evaluation, margin, deep):
 
 
 def _record_unions(state, pairs, a, radius):
-    """Return a `MergeRecord` for each of k pairs; `a` and `radius`: contact radii of sites (n,) and unions (k,), m."""
+    """Return a `MergeRecord` for each of k pairs; `a` (n,) and `radius` (k,): contact radii of sites and unions, m."""
     unions = np.full(len(pairs), None)
     sites, (i, j) = state.sites, pairs.T
     offset = periodic_difference(sites.position[j], sites.position[i], state.contact.asperities.cell)
@@ -119,8 +119,8 @@ def split_unions(state: IterationState, evaluation: Evaluation) -> IterationStat
 def _split_union(state, site, a):
     """Replace a union by its two spots, log the split, and return the new state; `a` is the radius of the union, m.
 
-    Each spot gets its radius at coalescence, reduced by the same factor as the radius of the union since then. Both
-    spots get the same `split_number`. Asperities that the union only covered are out of contact afterwards.
+    The radius of each spot is its radius at coalescence, times the present radius of the union divided by the
+    `union_radius`. Both spots get the same `split_number`. Asperities that the union only covered lose contact.
     """
     sites, law, union = state.sites, state.contact.law, state.sites.union[site]
     contact_radius = union.contact_radius * (a / union.union_radius)
@@ -146,8 +146,8 @@ def absorb_new_asperities(state: IterationState, evaluation: Evaluation) -> Iter
     """Remove new sites whose centre lies under a spot that counts as old, or under a larger new spot.
 
     Sites are new if `Sites.counts_as_old` is False: they are single asperities or candidates. Sites of contact radius
-    zero stay. The covering spots get the asperities, and the jump-ins of these asperities are deleted from the log. If
-    a site is removed, the new state also has the approaches of the evaluation; otherwise the same state is returned.
+    zero stay. The covering spots get the asperities, and the jump-ins of these asperities are deleted from the log.
+    Return the new state, with the approaches of the evaluation, or `state` itself if no site is removed.
     """
     sites, a, interaction, old = state.sites, evaluation.a, evaluation.interaction, state.sites.counts_as_old
     site, cover, r = interaction.target, interaction.source, interaction.r

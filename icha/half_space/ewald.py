@@ -7,9 +7,9 @@ erf(alpha r)/r, is summed as a Fourier series with non-uniform FFTs. Each Fourie
 summed over pairs of close points. A point may also have moments of a pressure. The displacement by the k-th moment is
 proportional to the k-th power of the plane Laplacian, applied to 1/r (`icha.half_space.grid_displacement`).
 
-A single square on a free half-space has no images. The square is placed in a periodic cell of twice its side. There,
-two points of the square are closer to each other than to any image. Then `icha.half_space.free_square` subtracts the
-displacement by images and counter-pressure. The sum of F/(pi E* r) over the square remains.
+A single square on a free half-space has no images. The square is placed in a periodic cell of twice its side. In
+this cell, two points of the square are closer to each other than to any image. `icha.half_space.free_square` subtracts
+the displacement by images and counter-pressure. What remains is the sum of F/(pi E* r) over the points of the square.
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ def short_mean(alpha, contact_modulus, period):
 class _SmoothSum:
     """Function that sums the smooth half of the displacement with non-uniform FFTs.
 
-    FFT plans take long to make, but depend only on the number of modes. Points are set when they change.
+    FFT plans take long to make, but depend only on the number of modes. Points are set again only when they change.
     """
 
     def __init__(self, period, alpha, contact_modulus, cut, tolerance, dtype=np.complex128):
@@ -156,7 +156,7 @@ class Ewald:
         return (basis(points[:, 1], self.period), basis(points[:, 0], self.period)) if self.free else None
 
     def image_displacement(self, sources, targets, moments):
-        """Return the displacement (m) at targets by images of sources; both are given by their `bases`."""
+        """Return the displacement (m) at targets by images of sources; both arguments are `bases` of points."""
         field = image_field(*sources, moments, self.period, self.contact_modulus)
         by, bx = targets
         return np.einsum("ia,ia->i", by @ field, bx)
@@ -190,7 +190,7 @@ class Ewald:
 
     @cached_property
     def self_displacement(self):
-        """Displacement of a point by its own unit force, m/N, and unit second moment, 1/(N m): smooth half only."""
+        """Smooth half of the displacement of a point by its unit force, m/N, and by its unit second moment, 1/(N m)."""
         value, laplacian = _smooth_kernel(np.zeros(1), self.alpha)
         scale = 1 / (np.pi * self.contact_modulus)
         return scale * value[0], scale * laplacian[0]
@@ -235,10 +235,10 @@ class PointHalfSpace:
     ----------
     ewald : split of the sum.
     points : (n, 2) float, positions, m.
-    pairs : near pairs of points, each pair once: arrays of the later point, the earlier point, and their distance, m.
+    pairs : three arrays for all pairs of near points: index of the later point, of the earlier point, and distance, m.
     near : matrices of the short-ranged displacement by unit moments k = 0, 1, 2: for each k an (n, n) lower triangular
         matrix and its transpose.
-    near_loose : the same two matrices for unit forces (k = 0), with a relative error of 1e-3.
+    near_loose : as `near`, but only the two matrices for unit forces (k = 0), with a relative error of 1e-3.
     bases : `Ewald.bases` of the points; None on a periodic surface.
     """
 

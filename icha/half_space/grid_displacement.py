@@ -1,8 +1,8 @@
 """Displacement of the half-space at all nodes of a grid, and the nodes around every spot.
 
-The sum over spots and images is split as in `icha.half_space.ewald`: a smooth half by its Fourier series, and a
-short-ranged half in a window around every spot. The computing time depends on the total area of the windows. Farther
-than five radii from a spot, four moments of the pressure represent the spot, so that small spots have small windows.
+The sum over spots and images is split as in `icha.half_space.ewald`. A Fourier series gives the smooth half. The
+short-ranged half is computed in a window around every spot. The computing time depends on the area of all windows.
+At more than five radii from a spot, four moments of the pressure represent the spot. So small spots have small windows.
 The smooth half of a large spot must be smooth on the scale of this spot. Therefore spots of similar size form groups,
 and every group has a Fourier series with a different number of modes.
 
@@ -156,7 +156,7 @@ class DisplacementField:
             half[np.arange(-k, k + 1) % len(half), : k + 1] += each
 
         def transform_along_y(columns):
-            """Transform some columns of Fourier coefficients along y; then they contain values at the rows."""
+            """Transform some columns along y: each row of `half` becomes the Fourier series along x of a grid row."""
             half[:, columns] = scipy.fft.ifft(half[:, columns], axis=0, norm="forward", workers=1)
 
         on_cores(transform_along_y, blocks(half.shape[1], 64))
@@ -282,7 +282,7 @@ _SMOOTH_HALF = _smooth_half_table()
 
 
 def windows(centres, reach: float, grid: int, period: float, rows: slice):
-    """Yield the nodes that lie in some rows and in squares around `centres`, an (m, 2) array in m.
+    """Yield those nodes of some rows that lie in squares around the positions `centres`, an (m, 2) array in metres.
 
     The half width of a square is `reach`, m; some nodes lie a little outside. No node occurs twice for the same centre.
 

@@ -24,7 +24,7 @@ _WINDOW_OF_MOMENTS = 16.0
 
 
 def _find_distant_pairs(tree, position, radius, ewald):
-    """Return targets, sources and distances of the pairs outside the near field that need an exact displacement.
+    """Return targets, sources and distances of those pairs outside the near field that need an exact displacement.
 
     tree : search tree of the targets; position, radius : (m, 2) and (m,), centres and contact radii of the sources, m.
     """
@@ -58,7 +58,7 @@ class Interaction:
     radius_of_curvature : (n,) float, radii of curvature of the spots, m.
     largest_radius : (n,) float, m: the list of exact pairs is complete for contact radii up to these values.
     target, source : (k,) int, exact pairs: at the spot `target`, the displacement by the spot `source` is exact.
-    r : (k,) float, distances between the two spots of these pairs, m.
+    r : (k,) float, distances between the two spots of the exact pairs, m.
     by_moments : three (k,) arrays, displacements by unit moments of the source; the exact displacements replace them.
     """
 
@@ -88,7 +88,7 @@ class Interaction:
         return cls(law, half_space, radius_of_curvature, largest_radius, target, source, r, by_moments)
 
     def displacement(self, a):
-        """Return the displacement w at each spot by all other spots and images for radii a, in m."""
+        """Return the displacement w (m) at each spot by all other spots and images; `a` contains the radii (m)."""
         law, R, j = self.law, self.radius_of_curvature, self.source
         moments = law.force(a, R), law.second_moment(a, R), law.fourth_moment(a, R)
         exact = law.displacement(self.r, a[j], R[j])
@@ -112,7 +112,7 @@ class Interaction:
         counts = np.flatnonzero(present[self.source])
         j, r, target = self.source[counts], self.r[counts], self.target[counts]
         fields = [moment[j] * field[counts] for moment, field in zip(moments, self.by_moments, strict=True)]
-        # Exact derivatives at the pairs, minus the contribution of the forces. The second array subtracts all moments.
+        # Exact derivatives at the pairs, minus the fields of the forces (first array) or of all moments (second array).
         beyond_forces = law.displacement_derivative(r, a[j], R[j]) - fields[0]
         beyond_moments = beyond_forces - fields[1] - fields[2]
 

@@ -24,7 +24,7 @@ RESOLVED_CELLS = 8
 LEAST_CELLS_OF_SUMMIT = 80
 # Boundary elements represent a surface only if its shortest wave has at least this number of cells.
 LEAST_CELLS_PER_WAVE = 1.5
-# The smaller of two mean square slopes is a rounding error if it is at most this fraction of the larger slope.
+# The smaller of two mean square slopes is a rounding error if it is at most this fraction of the larger one.
 _NO_SLOPE = 1e-12
 # Waves up to this wave number, in units of 2 pi/L, are summed. An integral replaces the sum over shorter waves.
 _DENSE = 64
@@ -153,7 +153,7 @@ def radial_power_spectrum(surface: Surface) -> tuple[np.ndarray, np.ndarray, np.
     """Compute the radial power spectrum: the mean power C of the wave vectors in each ring around the origin.
 
     The integral of C over the plane of wave vectors is the mean square height. The first ten rings are 2 pi/L wide; the
-    width of each other ring is a tenth of its wave number. The last ring ends at the largest circle in the grid of wave
+    width of each later ring is a tenth of its wave number. The last ring ends at the largest circle in the grid of wave
     vectors. The heights of a free square are first multiplied by Hann's window, because a step between opposite edges
     would add waves. C is then divided by the mean square of the window.
 

@@ -99,7 +99,7 @@ class SelfAffineSpectrum:
 
     @cached_property
     def plateau(self) -> float:
-        """Plateau C0 of the spectrum in m^4; the modes of the periodic cell then have exactly the given rms slope."""
+        """Plateau C0 of the spectrum in m^4, for which the modes of the cell have exactly the given rms slope."""
         _, _, k, _ = self._band
         q = 2 * np.pi / self.period
         slope2 = 2 * float(np.sum(self._shape(k) * k**2)) * q**4

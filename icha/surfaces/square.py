@@ -9,7 +9,7 @@ def cell_of(period, free):
 
 
 def periodic_difference(first, second, period):
-    """Return the coordinate differences first - second (m) for the periodic image nearest to `first`."""
+    """Return the coordinate differences first - second (m) for the image of `second` that is nearest to `first`."""
     difference = first - second
     return difference - period * np.rint(difference / period)
 

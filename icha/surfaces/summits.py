@@ -55,7 +55,7 @@ _ROUNDING = 1e-9
 _FLAT = 1e-6
 # Nodes added beyond each edge of a free square. Nodes farther away would have an influence of 0.43^32 = 2e-12.
 _MARGIN = 32
-# Number of rows or columns of the grid, and number of start nodes or summits, that are processed at a time.
+# Number of rows or columns of the grid in one block. Number of start nodes or summits in one block.
 _LINES = 16
 _POINTS = 4096
 # Asperities represent a surface if two shares are at most this value: the share of the load that acts on peaks without
@@ -307,8 +307,8 @@ def paraboloid_departure(
     -------
     float, the mean of abs(ln(d / (a^2 / 2R))) over the spots, weighted by their areas. Here d is the mean depth of the
     surface below the summit on the circle of radius a. Near the top of an elongated summit, d follows the arithmetic
-    mean of the principal curvatures, not 1/R. The function compares d with both curvatures and returns the smaller
-    result. The result is 0 if no spot is wider than half a cell.
+    mean of the principal curvatures, not 1/R. The function computes the result with 1/R and with the
+    arithmetic mean, and returns the smaller result. The result is 0 if no spot is wider than half a cell.
     """
     mode = "mirror" if surface.free else "grid-wrap"
     spline = scipy.ndimage.spline_filter(surface.heights, order=3, mode=mode)

@@ -130,7 +130,7 @@ class Surface:
         def along_y(columns):
             modes = scipy.fft.fft(half[:, columns], axis=0, norm="forward", workers=1)
             power = modes.real**2 + modes.imag**2
-            # Only the first column and, on even grids, the last column contain both of two opposite wave vectors.
+            # Only the first column and, on even grids, the last column contain both q and -q of a wave.
             kx = np.arange(columns.start, columns.stop)
             count = np.where((kx > 0) & (2 * kx < n), 2.0, 1.0)
             power *= count
@@ -170,7 +170,7 @@ class Surface:
     def rms_curvature(self) -> float:
         """Root mean square curvature of profiles in 1/m: sqrt(3/8 sum q^4 |h_q|^2) for an isotropic surface.
 
-        The Contact Mechanics Challenge uses the inverse, R_c = 60.1 nm, as the radius in the Tabor parameter.
+        The Contact Mechanics Challenge uses the inverse curvature, R_c = 60.1 nm, as the radius in the Tabor parameter.
         """
         return (3 / 8 * self.spectral_moments[2]) ** 0.5
 

@@ -19,7 +19,7 @@ from icha.surfaces.surface import FREE, PERIODIC, Surface, edges_fit
 _FLOOR_FALLS, _FLOOR_SPANS = -1.0, 1.3
 # A noise floor counts as a rounding error if its power, divided by the largest power, is below this value.
 _ROUNDING = 1e-20
-# A coarser grid is recommended if it has at most this fraction of the nodes along a side.
+# A coarser grid is recommended if its number of nodes along a side is at most this fraction of the present number.
 _WORTH = 0.75
 
 
@@ -75,7 +75,7 @@ class ScanResolution(PreparedTopography):
 
     @property
     def cells_per_summit(self) -> float:
-        """Number of nodes of the prepared surface per summit."""
+        """Number of nodes per summit of the prepared surface."""
         return self.surface.grid**2 / max(self.summits, 1)
 
     @property
@@ -114,7 +114,7 @@ def filtered_slope_share(surface: Surface, cutoff: float) -> float:
 
 
 def examine_scan(path: str | os.PathLike, preparation: Mapping) -> ScanResolution:
-    """Prepare a scan with and without its filter; arguments and errors are those of `prepared_topography`."""
+    """Prepare a scan with and without its filter; arguments and exceptions are those of `prepared_topography`."""
     raw = {key: preparation[key] for key in preparation if key not in ("cutoff", "taper")}
     if preparation["boundary"] != PERIODIC:
         raw |= {"boundary": FREE, "grid": None}

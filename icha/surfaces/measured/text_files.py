@@ -43,7 +43,7 @@ _NUMBER = r"([-+]?\d+(?:[.,]\d+)?(?:[eE][-+]?\d+)?)"
 _LENGTHS = re.compile(rf"{_NUMBER}\s*(\S+?)?(?:\s*[x×*]\s*{_NUMBER}\s*(\S+)?)?$")
 # A line of the heading: a name, then a colon, an equals sign, a delimiter or blanks, then a value.
 _ENTRY = re.compile(r"^[#%/\s\"']*([A-Za-z][A-Za-z _./()-]*?)\s*(?:[:=,;\t]\s*|\s+(?=[-+]?\d))(.+?)[\s\"']*$")
-# Names in small letters, without punctuation.
+# Names of entries in a heading, in small letters and without punctuation.
 _SIZES = ("size", "scan size", "scan range", "scan area", "field of view")
 _PIXELS = ("pixel", "pixel size", "pixel spacing", "spacing", "point spacing", "cellsize", "cell size")
 _UNITS = ("unit", "units", "z unit", "z units", "value unit", "value units", "height unit", "height units", "data unit")
@@ -76,7 +76,7 @@ class _Heading:
 
 
 def format_of_text(file: SourceFile) -> str:
-    """Find the format of a text file from its columns; "instrument" for texts of instruments or without numbers."""
+    """Find the format of a text file from its columns; "instrument" if an instrument wrote it, or without numbers."""
     layout = file.layout
     if layout is not None and _titles(layout):
         return "xyz"
@@ -331,7 +331,7 @@ def _wave_numbers(q, settings):
         k = q
     else:
         unit = np.min(np.abs(q)[np.abs(q) > 1e-9 * largest])
-        # The longest wave has few digits in the file. Therefore the unit is computed from the shortest wave.
+        # The smallest wave number has few digits in the file. Therefore the unit is computed from the largest one.
         k = np.rint(q * (np.max(np.abs(np.rint(q / unit))) / largest))
         if np.max(np.abs(q * (np.max(np.abs(k)) / largest) - k)) > 0.01:
             raise _not_waves("expected wave vectors that are multiples of the smallest one")

@@ -44,7 +44,7 @@ def _guess_encoding(start: bytes) -> str:
     if start.startswith((b"\xff\xfe", b"\xfe\xff")):
         return "utf-16"
     try:
-        # The last line may end within a character.
+        # The last line is left out, because `start` may end within a character.
         start[: start.rfind(b"\n") + 1].decode("utf-8-sig")
     except UnicodeDecodeError:
         return "cp1252"
@@ -112,18 +112,18 @@ def has_decimal_commas(fields: Iterable[str]) -> bool:
 
 
 def are_decimal_between_blanks(text: str) -> bool:
-    """Return whether a line has several numbers with decimal commas, with blanks (and perhaps commas) between them."""
+    """Return whether a line has several numbers with decimal commas, separated by blanks and perhaps commas."""
     fields = re.split(r",?\s+", text.strip())
     return len(fields) > 1 and all(map(_DECIMAL_COMMA.match, fields))
 
 
 def are_halves_of_decimals(rows: list[list[str]]) -> bool:
-    """Return whether columns alternate between digits before and digits after decimal commas.
+    """Return whether odd columns are the digits before decimal commas, and even columns the digits after them.
 
     Digits after a comma have no sign, and their number is the same in all rows. Columns of integers may look the same.
     So the function needs evidence: a leading zero after a comma, or another number of digits before the comma.
     """
-    # A row is shorter if its last field is empty.
+    # A row with an empty last field is shorter; such rows do not count.
     width = max(map(len, rows))
     rows = [row for row in rows if len(row) == width]
     if width < 6 or width % 2:

@@ -28,8 +28,8 @@ _EQUAL_STEPS = 1e-2
 # Smallest range of coordinates, in units of the last digit.
 _FEWEST_UNITS = 4
 # Limits in `_resembles` for the first three lines of a table. Lines 1 and 2 differ by at most `_DIFFERENCE` times the
-# difference of lines 2 and 3. In addition, the fraction `_SAME_SIGN` of the steps has the same sign in lines 1 and 2,
-# or lines 2 and 3 differ by at most `_SMOOTH` times their heights.
+# difference of lines 2 and 3. In addition, at least the fraction `_SAME_SIGN` of the steps has the same sign in lines 1
+# and 2, or lines 2 and 3 differ by at most `_SMOOTH` times their heights.
 _DIFFERENCE, _SAME_SIGN, _SMOOTH = 3, 0.8, 0.2
 # Fewest numbers in a row or column of coordinates.
 _FEWEST_COORDINATES = 8
@@ -226,10 +226,10 @@ def drop_coordinates(values: np.ndarray) -> tuple[np.ndarray, tuple[float, float
 
     Returns
     -------
-    heights, steps of the coordinates along x and y (None unless the table has both), and a remark on removed parts.
+    Heights; steps of the coordinates along x and y, or None without both coordinates; and a remark on removed parts.
 
-    Raises UnfitTopography if a row or column seems to contain coordinates that cannot be removed. These are coordinates
-    with unequal steps in the first row or column, or with equal steps in the last row or column.
+    Raises UnfitTopography if the first row or column seems to contain coordinates with unequal steps, or if the last
+    row or column contains numbers with equal steps.
     """
     heights, steps = values, {}
     for name in ("row", "column"):
@@ -251,7 +251,7 @@ def drop_coordinates(values: np.ndarray) -> tuple[np.ndarray, tuple[float, float
 
 
 def _coordinate_step(table):
-    """Return the step of coordinates in the first line of a table; nan if steps differ, None for heights."""
+    """Return the step of the coordinates in the first line of a table: nan if steps differ, None if it has heights."""
     line, others = table[0], table[1:3]
     if len(table) < 3 or len(line) < _FEWEST_COORDINATES or any(_equal_step(each) is not None for each in others):
         return None
@@ -277,7 +277,7 @@ def _resembles(line, others):
 
 
 def _equal_step(line: np.ndarray, *, rounded: bool = True) -> float | None:
-    """Return the step from number to number in a line; None if the steps differ, even without the first number.
+    """Return the step from number to number in a line; None if the steps differ, also without the first number.
 
     rounded : True if steps may differ because numbers are rounded to few digits.
     """

@@ -53,7 +53,7 @@ class PreparedTopography:
     data : name of the array or channel that was read; empty if the file has only one.
     reading : points, pixels, units and omitted parts of the file, as text for users.
     filled : number of missing points that were filled.
-    points : number of points of the square, before resampling.
+    points : number of points in the whole square, not along a side, before resampling.
     """
 
     surface: Surface
@@ -73,7 +73,7 @@ def prepared_topography(path: str | os.PathLike, preparation: Mapping) -> Prepar
     Parameters
     ----------
     path : path of the file.
-    preparation : arguments of `Preparation`, which `MeasuredSurface.preparation` returns.
+    preparation : arguments of `Preparation`, as `MeasuredSurface.preparation` returns them.
 
     Raises
     ------
@@ -210,7 +210,7 @@ def _harmonic(heights, missing, *, periodic):
 
 
 def resample_to_square_pixels(scan: Scan, settings: Preparation) -> Scan:
-    """Resample a scan to square pixels. Their side is the shorter side of the original pixels.
+    """Resample a scan to square pixels. The new pixels have the shorter side of the original pixels.
 
     A cosine series interpolates the heights along the longer side of the pixels. The series keeps all measured waves
     and their rms slope, and adds no wave shorter than two pixels. `treat_edges` resamples periodic scans.
