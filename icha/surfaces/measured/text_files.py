@@ -209,7 +209,7 @@ def _read_heading(lines: Sequence[str], shape: tuple[int, int], decimal_comma: b
     if commas and not decimal_comma and settings.size is None:
         raise UnfitTopography(
             "size",
-            f"is {commas[0]!r} in the file: the comma may be decimal or separate thousands; expected the size in this key",
+            f"is {commas[0]!r} in the file; the comma may be decimal or separate thousands. Give the size in this key",
         )
     size, coordinates = _size([*([" x ".join(sides)] if sides else []), *sizes], pixels, shape)
     return _Heading(
