@@ -78,8 +78,8 @@ class Model:
     Attributes
     ----------
     words : name of the model in sentences and legends, in the plural.
-    title : name of the model in the title of a run; the names of surface and material follow.
-    method : name of the method in the summary of a run.
+    title : name of the model at the end of the title of a run.
+    method : name of the method at the end of the summary of a run.
     references : publications on the method, separated by "; ".
     module : module whose `contact_of(surface, material)` returns an `icha.contact.model.ContactModel`.
     folder : folder for the runs of this model, with a slash at the end; empty for the default model.

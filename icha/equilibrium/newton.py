@@ -149,9 +149,9 @@ def _take_step(equations, evaluation, step):
 
     1. A spot in contact that moves towards jump-off, with a radius below 1.5 jump-off radii: the step changes the
        radius. If the radius reaches the jump-off radius, the approach falls by the rest of the step.
-    2. A spot a little past jump-off that returns to contact (`_returns_to_contact`): this changes the displacement by
-       c s. Therefore the new s solves s^2 + c s = L, and L is the new delta - delta_off for an unchanged displacement.
-       The Newton step neglects s^2 and gives s_N, so that c = L/s_N.
+    2. A spot a little past jump-off that returns to contact (`_returns_to_contact`): the return changes the
+       displacement by c s. Therefore the new s solves s^2 + c s = L. L is the new delta - delta_off for an unchanged
+       displacement. The Newton step neglects s^2 and gives s_N, so that c = L/s_N.
     3. Any other spot past jump-off: the approach rises at most to the jump-off approach.
     """
     approach = evaluation.approach + step

@@ -70,7 +70,7 @@ def self_affine_integral(order: int, start: float, end: float, roll: float, hurs
 def self_affine_full_contact_energy(
     period: float, rolloff_wavelength: float, short_wavelength: float, hurst: float
 ) -> float:
-    """Compute the elastic energy of full contact per area and E*, m, for a self-affine surface with rms slope 1.
+    """Compute the energy of full contact, divided by area and E*, m, for a self-affine surface with rms slope 1.
 
     Lengths are in m. The result equals `Surface.full_contact_energy` of surfaces with the same `SelfAffineSpectrum`,
     but needs no heights. The function sums over the long waves and integrates the spectrum of the short waves.

@@ -75,7 +75,7 @@ class Asperities:
     radius_of_curvature : (n,) array, 1/sqrt(kappa1 kappa2), the geometric mean of the principal radii of curvature, m.
     period : side of the square, m.
     free : True for a single square on a half-space, False for one cell of a periodic surface.
-    unsupported_height : (k,) array, heights (m) of maxima of the spline that the nodes do not support; no asperities.
+    unsupported_height : (k,) array, heights (m) of spline maxima without support by the nodes; not used as asperities.
     """
 
     position: np.ndarray

@@ -76,7 +76,7 @@ class _Heading:
 
 
 def format_of_text(file: SourceFile) -> str:
-    """Find the format of a text file from its columns; "instrument" if an instrument wrote it, or without numbers."""
+    """Find the format of a text file from its columns; "instrument" if it has no numbers or is from an instrument."""
     layout = file.layout
     if layout is not None and _titles(layout):
         return "xyz"

@@ -187,9 +187,9 @@ def _find_damage(text, number, notation):
 
 
 def _decide_on_commas(notation, lines, count):
-    """Decide from all lines with `count` fields whether commas are decimal; return the completed notation.
+    """Decide from all lines with `count` fields whether commas are decimal signs; return the completed notation.
 
-    Raises UnfitTopography if it is not clear whether the commas are decimal.
+    Raises UnfitTopography if it is not clear whether the commas are decimal signs.
     """
     rows = [notation.fields(text) for line in lines if (text := strip_remark(line))]
     rows = [row[: _count_columns(row)] for row in rows if len(row) == count]
