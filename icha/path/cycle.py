@@ -96,8 +96,7 @@ class _Cycle:
     step_length : length of the next trial step, m, if `ahead` is empty and no station follows in this direction.
     accuracy : sums over all steps so far, and the accuracy that further steps need.
     leg : number of the leg, even on loading and odd on unloading.
-    event_at : direction times separation, m, at the end of the shortest trial step that contained the next event. The
-        event happens earlier. The value is inf if no event is known, or with error-controlled steps.
+    event_at : `direction` times separation, m, where the shortest trial step with the next event ended; or inf.
     ahead : with error-controlled steps, equilibria found at the ends of too long trial steps; the nearest is last.
     longest_part : length (m) of the longest part accepted so far of a trial step that was too long and was divided.
     stations : separations of a loading that all later legs, in both directions, visit again, ascending, m.
@@ -139,10 +138,9 @@ class _Cycle:
     ) -> Generator[Waypoint, TargetFunction | None, None]:
         """Follow one leg to all its targets or, with `until_apart`, to complete separation; yield all waypoints.
 
-        A target inside a jump is kept in `progress.skipped` in leg 0, and raises an error at once in later legs. With
-        `until_apart`, such a target is left out without an error. Without `until_apart`, raise `NotConverged` if the
-        surfaces separate before the last target. At the end of a loading leg, the visited separations become stations
-        if they are far enough apart (`_is_new_station`). After a reloading, only those below all old stations do so.
+        A target inside a jump is kept in `progress.skipped` in leg 0, raises an error in later legs, and is left out
+        with `until_apart`. Raise `NotConverged` if the surfaces separate before the last target. At the end of loading,
+        separations that are far apart (`_is_new_station`) become stations; on reloading, only those below all others.
         """
         self.leg, self.event_at, self.longest_part = leg, np.inf, 0.0
         self.ahead.clear()
@@ -197,7 +195,7 @@ class _Cycle:
             self.stations = sorted({*self.stations, *(at for at in [*visited, self.state.separation] if at < lowest)})
 
     def _advance(self, step, state):
-        """Move to the end of a step, update `accuracy`, `progress` and `ahead`, and return the waypoint (BETWEEN)."""
+        """Move to the end of a step, update `accuracy`, `progress` and `ahead`, and return the waypoint."""
         self.accuracy.add(step, state)
         self.progress.record_equilibrium(state, self.loading)
         self.state = state
