@@ -263,7 +263,7 @@ def _warn(text: str) -> None:
 
 
 def _damaged_records(results: str) -> Iterator[tuple[str, Path]]:
-    """Yield each result with a damaged record in Snakemake, and the record. A full disk can damage a record.
+    """Yield pairs: a result whose record in Snakemake is damaged (as by a full disk), and the path of this record.
 
     If a record is damaged, Snakemake stops or considers the result up to date. Snakemake has no public interface that
     lists damaged records.

@@ -102,7 +102,7 @@ def model_error(
 
 
 def _short_range_entries(select, runs, origins):
-    """Compare asperity runs of studies with `runs` in the limit of a short range; collect attributes in `origins`."""
+    """Compare the boundary elements in `runs` with the asperity runs of their studies; add attributes to `origins`."""
     entries: dict[str, dict[SolutionLabels, dict | None]] = {}
     for labels, truth in runs:
         labels = RunLabels(*labels)

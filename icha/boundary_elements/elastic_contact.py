@@ -141,7 +141,7 @@ def solve_active_set(
     tolerance : largest allowed error of displacements in contact, in cell sizes. With a tolerance above the rounding
         error of single precision, all fields are computed in single precision.
     separation : mean separation, in cell sizes; ignored if `load` is given.
-    load : nominal pressure, in E*, or None. The pressures of `contact` are scaled to a load, so they must not be zero.
+    load : nominal pressure, in E*, or None. One factor scales all pressures to a load; their sum must not be 0.
     sticky : whether the cells of the initial contact stay in contact under tension.
 
     Raise `FullContact` if all cells close at a given separation: no equilibrium exists, because the mean gap would be

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 # A warning recommends another measurement if more than this fraction of the points is filled.
 MOST_FILLED = 0.05
-# A file may lack these keys. ICHA then reads the file with the guesses, in m, and shows the examples to the user.
+# A file may lack these keys. ICHA then assumes the values of GUESSES (in m), and shows those of EXAMPLES to the user.
 GUESSES = {"height_unit": 1e-9, "size": (1e-4, 1e-4)}
 EXAMPLES = {"height_unit": "nm", "lateral_unit": "um", "size": "[90 um, 90 um]"}
 

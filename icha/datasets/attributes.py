@@ -1,4 +1,4 @@
-"""Global attributes that describe every file, and the reasons why a run is not a result.
+"""Global attributes that describe every file, and the reasons why a run does not count as a result.
 
 The attributes follow the CF conventions (section 2.6.2) and partly the Attribute Convention for Data Discovery (ACDD
 1.3). The files do not claim to follow ACDD, because the ACDD attributes for places and times on earth do not apply.

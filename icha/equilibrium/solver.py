@@ -95,8 +95,9 @@ def apply_events(state: IterationState, evaluation: Evaluation, margin: float) -
     """Apply a round of events: jump-offs, jump-ins, coalescences and, on unloading, splits.
 
     An event occurs if its condition is exceeded by more than a margin, m. Splits need no margin. Without adhesion,
-    jump-ins occur only if the margin is 0. Return the new state, with the approaches of the evaluation, and whether a
-    site was added, removed or replaced. Raise `FullContact` if more than half the nominal area is in contact.
+    jump-ins occur only if the margin is 0. Return two values: the new state, which contains the approaches of
+    `evaluation`; and whether a site was added, removed or replaced. Raise `FullContact` if more than half the nominal
+    area is in contact.
     """
     contact = state.contact
     area = pressure_or_area_fraction(contact, AREA_FRACTION, evaluation.a, state.sites.radius_of_curvature)

@@ -205,7 +205,7 @@ class ComparedFigure(StudyFigure):
     """A comparison with boundary elements. The study needs both models, or an entry of `finite_range`."""
 
     def study_problems(self, campaign: Campaign, study: Any) -> Iterator[Problem]:
-        """Also yield a problem if the study has no solutions with boundary elements at the same loads."""
+        """Also yield a problem if the study has no boundary elements at the loads of its asperity runs."""
         yield from super().study_problems(campaign, study)
         if campaign.compares_models(self.study) or is_solved_at_finite_range(campaign, self.study):
             return

@@ -87,7 +87,7 @@ class PathProgress:
         range of targets is already limited.
 
         target : target that the state after the step meets; None if there is no such target.
-        before, pending, loading : only for the message; start of the step, targets not met yet (sorted), and direction.
+        before, loading : start and direction of the step. pending : targets not met yet. They serve only the message.
         """
         contact = self.contact
         ahead = target or (pending[0] if pending else None)

@@ -99,8 +99,8 @@ class StepAccuracy:
         """Return False if the tension inside a step may be larger than in any state of the path so far.
 
         A larger tension is only possible on unloading with events that may change the pressure: the tension just before
-        the event may be as large as the tangent at the start. An excess of `_MISSED_TENSION` over the tension in both
-        states of the step is accepted. With adhesion also return False if the last contact breaks in the step.
+        the event may be as large as the tangent at the start. It may exceed the larger tension of both states by a
+        fraction of _MISSED_TENSION. With adhesion also return False if the last contact breaks in the step.
         """
         contact = self.contact
         if step.separation_change < 0 or not step.may_change_pressure:

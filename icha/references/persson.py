@@ -15,7 +15,7 @@ PERSSON = "B. N. J. Persson, J. Chem. Phys. 115 (2001) 3840, doi:10.1063/1.13886
 XU = "Y. Xu, L. Zhu, F. Xiao and Y. Zhou, Tribol. Lett. 72 (2024), doi:10.1007/s11249-024-01838-4, gamma = 0.45"
 YANG_PERSSON = "C. Yang and B. N. J. Persson, J. Phys.: Condens. Matter 20 (2008) 215214, gamma = 0.45"
 # The gamma of Yang & Persson is the elastic energy of a small contact divided by the energy of full contact on the same
-# area. The gamma of Xu et al. is the same ratio of the variances of the pressure.
+# area. For the gamma of Xu et al., the variance of the pressure replaces the energy.
 YANG_PERSSON_GAMMA, XU_GAMMA = 0.45, 0.45
 # Number of iterations for the area of Xu et al. Each iteration reduces the error of the area to less than a quarter.
 _AREA_ITERATIONS = 40
