@@ -173,8 +173,8 @@ def _full_contact(cases):
         if lowest.facts[STRENGTH] < lowest.facts[THEORETICAL]:
             strength += f" with its flaw, {format_quantity(lowest.facts[THEORETICAL], 'Pa')} without the flaw"
         text += (
-            f"; contact is complete at about {complete} without adhesion; full contact opens at {opening} (strength of "
-            f"the interface: {strength}){_unresolved_strength(lowest.facts)}"
+            f"; contact is complete at about {complete} without adhesion; full contact opens at the pressure {opening} "
+            f"(strength of the interface: {strength}){_unresolved_strength(lowest.facts)}"
         )
     if STICKY_HEIGHT in lowest.facts:
         heights = (format_quantity(lowest.facts[name], "m") for name in (STICKY_HEIGHT, RMS_HEIGHT))
