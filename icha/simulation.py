@@ -1,6 +1,7 @@
 """Simulate the contact of one surface and one material along a path; the result is an xarray dataset."""
 
 import importlib
+import math
 import pathlib
 import warnings
 from collections.abc import Callable, Sequence
@@ -176,7 +177,7 @@ def empty_run(
     """
     record, summits = _PathRecord(reason), locate_summits(surface)
     coverage = SummitCoverage.of(surface, summits)
-    reasons = coverage.reasons_against([surface.rms_height]) if MODELS[model].by_summits else []
+    reasons = coverage.reasons_against([surface.unit_height]) if MODELS[model].by_summits else []
     return _dataset(surface, material, path, model, seed, record, summits, reasons, {})
 
 
@@ -196,14 +197,15 @@ def _dataset(surface, material, path, name, seed, record, summits, reasons, of_c
         "asperity_count": len(summits),
         "unsupported_summit_count": len(summits.unsupported_height),
         **bin_values("gap", gap_bins(surface)),
-        **bin_values("pressure", PRESSURE_BINS * (material.contact_modulus * surface.rms_slope)),
+        **bin_values("pressure", PRESSURE_BINS * (material.contact_modulus * surface.unit_slope)),
     }
     dataset = build_dataset(
         table | CYCLE | _describe_targets(table, path), values, _attributes(surface, material, path, name)
     )
     if MODELS[name].by_summits:
         largest = max((step["contact_area_fraction"] for step in record.steps), default=0.0)
-        applicability = asperity_applicability(values["full_contact_energy_ratio"], reasons, largest)
+        ratio = math.inf if surface.smooth else values["full_contact_energy_ratio"]
+        applicability = asperity_applicability(ratio, reasons, largest)
     else:
         applicability = f"{MODELS[name].words} not applicable: {'; '.join(reasons)}" if reasons else ""
     dataset.attrs["applicability"] = applicability
@@ -249,21 +251,22 @@ def _check_arguments(surface, material, path, by_summits):
         if target in limited and target.kind in ASPERITY_RANGES and target.value > 0:
             ASPERITY_RANGES[target.kind].validate(f"path: {target.kind}", target.value)
         if target.kind == RELATIVE_LOAD:
-            load = f"path: {RELATIVE_LOAD} = {target.value!r} on a surface of rms slope {surface.rms_slope:.4g}"
-            if 0 < abs(target.value) < LEAST_PRESSURE * surface.rms_slope:
+            load = f"path: {RELATIVE_LOAD} = {target.value!r} on a surface of rms slope {surface.unit_slope:.4g}"
+            if 0 < abs(target.value) < LEAST_PRESSURE * surface.unit_slope:
                 raise ValueError(
                     f"{load} is too small; expected a reduced pressure of at least {LEAST_PRESSURE} in "
                     "absolute value, or 0 at a turning point that ends unloading"
                 )
-            if by_summits and target.value > MAX_REDUCED_PRESSURE * surface.rms_slope:
+            if by_summits and target.value > MAX_REDUCED_PRESSURE * surface.unit_slope:
                 raise ValueError(
                     f"{load} is beyond the range of the asperity model; expected a reduced pressure of at most "
                     f"{MAX_REDUCED_PRESSURE}"
                 )
-        if target.snapshot and target.kind == MEAN_SEPARATION and target.value > _HIGHEST_SNAPSHOT * surface.rms_height:
+        highest = _HIGHEST_SNAPSHOT * surface.unit_height
+        if target.snapshot and target.kind == MEAN_SEPARATION and target.value > highest:
             raise ValueError(
                 f"path: a snapshot at a mean separation of {target.value!r} m is far above any contact; expected at "
-                f"most {_HIGHEST_SNAPSHOT:g} rms heights ({_HIGHEST_SNAPSHOT * surface.rms_height:.4g} m)"
+                f"most {_HIGHEST_SNAPSHOT:g} rms heights ({highest:.4g} m)"
             )
 
 
@@ -424,13 +427,13 @@ def _surface_values(surface: Surface, material: Material, seed: int) -> dict:
     complete = surface.complete_contact_pressure * material.contact_modulus
     return {
         **get_values(material, *MATERIAL, "flaw_radius"),
-        **get_values(surface, *ROUGHNESS, "period", "boundary", "grid"),
+        **get_values(surface, *ROUGHNESS, "unit_height", "unit_slope", "period", "boundary", "grid"),
         "seed": seed,
         "spectral_moment_0": moments.m0,
         "spectral_moment_2": moments.m2,
         "spectral_moment_4": moments.m4,
         "nayak_parameter": moments.nayak_parameter,
-        "tabor_parameter": material.tabor_parameter(1 / surface.rms_curvature),
+        "tabor_parameter": material.tabor_parameter(surface.summit_radius),
         "stickiness": stickiness(moments, material),
         "full_contact_energy_ratio": full_contact_energy_ratio(
             surface.full_contact_energy, material.contact_modulus, material.surface_energy

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from icha.support.rules import ADHESION_LENGTH, CONTACT_MODULUS, LENGTH, SURFACE_ENERGY
+from icha.support.rules import ADHESION_LENGTH, CONTACT_MODULUS, LENGTH, POISSON_RATIO, SURFACE_ENERGY
 
 # Smallest Tabor parameter for which Wu's distance of the jump into contact is within 0.5 % of the exact distance
 # (`validation/jump_in.py`).
@@ -23,6 +23,8 @@ class Material:
         With adhesion, surface_energy/contact_modulus must be in [1e-40, 1e9] m.
     interaction_range : range of the attractive forces (epsilon in eq. 3 of Violano & Afferrante), m, in [1e-24, 1e9].
     flaw_radius : radius of the largest flaw of the interface, m, in [1e-24, 1e9]; 0 for an interface without flaws.
+    thickness : thickness of an elastic layer on a rigid base, m, in [1e-24, 1e9]; infinite for a half-space.
+    poisson_ratio : Poisson ratio of the layer, in [0, 0.5]; a half-space does not depend on it at a given E*.
 
     Raises
     ------
@@ -34,15 +36,24 @@ class Material:
     surface_energy: float
     interaction_range: float
     flaw_radius: float = 0.0
+    thickness: float = math.inf
+    poisson_ratio: float = 0.5
 
     def __post_init__(self):
         """Check the values."""
         rules = {"contact_modulus": CONTACT_MODULUS, "surface_energy": SURFACE_ENERGY, "interaction_range": LENGTH}
         rules |= {"flaw_radius": LENGTH} if self.flaw_radius != 0 else {}
+        rules |= {"thickness": LENGTH} if self.layered else {}
+        rules |= {"poisson_ratio": POISSON_RATIO}
         for name, rule in rules.items():
             object.__setattr__(self, name, rule.validate(name, getattr(self, name)))
         if self.surface_energy:
             ADHESION_LENGTH.validate("surface_energy over contact_modulus", self.adhesion_length)
+
+    @property
+    def layered(self) -> bool:
+        """True for a layer of finite thickness."""
+        return self.thickness != math.inf
 
     @property
     def adhesion_length(self) -> float:

@@ -26,6 +26,8 @@ def stickiness(moments: SpectralMoments, material: Material) -> float:
     moments : spectral moments of the surface at its actual rms slope.
     """
     slope, reach = moments.rms_slope, material.interaction_range
+    if not slope:
+        return 0.0  # a smooth shape
     attractive_area = np.pi * np.cbrt(3 * moments.rms_laplacian * reach / (16 * slope**2)) ** 2
     return float(REPULSIVE_AREA_SLOPE * material.adhesion_length / (slope * reach) * attractive_area)
 

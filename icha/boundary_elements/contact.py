@@ -17,7 +17,7 @@ from icha.boundary_elements.elastic_contact import Contact, Topography, solve_no
 from icha.boundary_elements.front import Front, adhesive_areas, reported_area_gradient, reported_areas
 from icha.boundary_elements.front_solver import TOLERANCES, FrontProblem, find_active_cells, rates_with_separation
 from icha.boundary_elements.full_contact import ROUNDING, FullContactProblem
-from icha.boundary_elements.half_space import HalfSpace
+from icha.boundary_elements.half_space import MARGIN, HalfSpace, Layer
 from icha.boundary_elements.load_control import ControlProblem, solve_at_control
 from icha.boundary_elements.observables import PatchObservables
 from icha.boundary_elements.patches import (
@@ -45,12 +45,17 @@ _SMALLEST_WORK = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class BoundaryElements(FullContactProblem):
-    """Contact model of a periodic rough surface against a half-space, by boundary elements on grid cells."""
+    """Contact model of a rough surface against a half-space or layer, by boundary elements on grid cells."""
+
+    @property
+    def count(self) -> int:
+        """Number of cells of the surface, without the margin of a free square."""
+        return self.grid**2
 
     @property
     def area(self) -> float:
-        """Nominal area A0, m^2."""
-        return self.heights.size * self.spacing**2
+        """Nominal area A0, m^2: that of the periodic cell or of the free square."""
+        return self.count * self.spacing**2
 
     @property
     def largest_area_fraction(self) -> float:
@@ -100,7 +105,9 @@ class BoundaryElements(FullContactProblem):
         if not self.adhesive and control.quantity == PRESSURE and control.target > 0 and len(state.cells):
             if control.target >= self.opening_pressure:
                 return self.full_contact(control.target)
-            return self._solve_nonadhesive(state, load=control.target / self.contact_modulus)
+            return self._solve_nonadhesive(
+                state, load=control.target / self.contact_modulus * self.count / self.space.size
+            )
         return solve_at_control(ControlProblem(self, control, self._solve, self._events), state, separation)
 
     def _from_full_contact(self, state, separation, control):
@@ -127,11 +134,11 @@ class BoundaryElements(FullContactProblem):
 
     def pressure(self, state: CellState) -> float:
         """Return the nominal pressure of a state: force divided by nominal area, Pa; negative in tension."""
-        return float(np.sum(state.pressure)) / self.heights.size
+        return float(np.sum(state.pressure)) / self.count
 
     def area_fraction(self, state: CellState) -> float:
         """Return the contact area of a state divided by the nominal area."""
-        return float(np.sum(self.area_of_cells(state))) / self.heights.size
+        return float(np.sum(self.area_of_cells(state))) / self.count
 
     def area_of_cells(self, state: CellState) -> np.ndarray:
         """Return the contact area of each cell, (k,), divided by the cell area.
@@ -145,15 +152,22 @@ class BoundaryElements(FullContactProblem):
     def gap(self, state: CellState) -> np.ndarray:
         """Return the gap at the grid nodes, (n, n), m; in partial cells it is the extension of the bond."""
         displaced = self.space.displacement(state.cells, state.pressure / self.contact_modulus)
-        return displaced * self.spacing + state.separation - self.heights
+        return self.crop(displaced * self.spacing + state.separation - self.heights)
+
+    def crop(self, field: np.ndarray) -> np.ndarray:
+        """Return a field of the grid without the margin of a free square."""
+        return field[: self.grid, : self.grid]
 
     def fractions(self, state: CellState) -> np.ndarray:
-        """Return the fraction of contact of all cells of the grid, (n, n)."""
-        return self.space.field(state.cells, state.fraction)
+        """Return the fraction of contact of all cells of the surface, (n, n)."""
+        return self.crop(self.space.field(state.cells, state.fraction))
 
     def mean_gap(self, state: CellState) -> float:
-        """Return the mean gap, m; it equals the mean separation because the mean displacement is zero."""
-        return state.separation
+        """Return the mean gap where the surface has a height, m; it is the mean separation if that is fixed."""
+        if self.space.mean_is_fixed:
+            return state.separation
+        gap = self.gap(state)
+        return float(np.mean(gap[np.isfinite(gap)]))
 
     def spot_count(self, state: CellState) -> int:
         """Return the number of contact patches of a state."""
@@ -169,7 +183,7 @@ class BoundaryElements(FullContactProblem):
 
     def stored_energy(self, state: CellState) -> float:
         """Return the elastic energy minus the work of adhesion, divided by the nominal area, J/m^2."""
-        return float(np.sum(self._energy_of_cells(state))) / self.heights.size
+        return float(np.sum(self._energy_of_cells(state))) / self.count
 
     def is_unstable(self, state: CellState) -> bool:
         """Return False: every equilibrium is a minimum of energy."""
@@ -228,7 +242,7 @@ class BoundaryElements(FullContactProblem):
             return state
         contact = Contact(state.cells, state.fraction, state.pressure / self.contact_modulus)
         fraction, pressure = rates_with_separation(self.space, self.front, contact, state.mean_fraction, accuracy)
-        scale = self.heights.size * self.spacing
+        scale = self.count * self.spacing
         pressure_slope = float(np.sum(pressure)) * self.contact_modulus / scale
         if self.adhesive:
             gradient = reported_area_gradient(state.fraction, state.mean_fraction)
@@ -250,28 +264,28 @@ def contact_of(surface: Surface, material: Material) -> BoundaryElements:
     Raises
     ------
     ValueError
-        If the surface is not periodic, or if adhesion is so weak that rounding of the heights would hide it.
+        If adhesion is so weak that rounding of the heights would hide it.
     """
-    surface.require_periodic("a model of boundary elements")
     law, asperities, h = JKR(material), locate_summits(surface), surface.spacing
+    heights = np.pad(surface.profile, (0, MARGIN if surface.free else 0), constant_values=-np.inf)
     column, row = (np.rint(asperities.position / h).astype(int) % surface.grid).T
-    cell = row * surface.grid + column
+    cell = row * len(heights) + column
     R = asperities.radius_of_curvature
     jump_in = law.jump_in_approach(R)
-    above, radius = asperities.height - surface.heights.ravel()[cell], law.contact_radius(jump_in, R)
+    above, radius = asperities.height - heights.ravel()[cell], law.contact_radius(jump_in, R)
     summits = Summits(cell, above / h, -jump_in / h, radius / h)
     strength = material.interface_strength / material.contact_modulus
     front = Front(material.surface_energy / (material.contact_modulus * h), strength)
-    if 0 < front.critical_opening < _SMALLEST_OPENING * np.abs(surface.heights).max() / h:
+    topography = Topography.of(heights / h)
+    if 0 < front.critical_opening < _SMALLEST_OPENING * topography.largest:
         raise ValueError(
             f"surface_energy: {material.surface_energy:g} J/m^2 is too small: rounding of heights up to "
-            f"{np.abs(surface.heights).max():g} m hides the adhesion. Use zero or a larger value"
+            f"{topography.largest * h:g} m hides the adhesion. Use zero or a larger value"
         )
-    space = HalfSpace.of(surface.grid)
-    topography = Topography.of(surface.heights / h)
-    return BoundaryElements(
-        surface.heights, h, law, surface.rms_height, surface.rms_slope, asperities, space, topography, front, summits
-    )
+    layer = Layer(material.thickness / h, material.poisson_ratio) if material.layered else None
+    space = HalfSpace.of(len(heights), layer, free=surface.free)
+    units = surface.unit_height, surface.unit_slope
+    return BoundaryElements(heights, surface.grid, h, law, *units, asperities, space, topography, front, summits)
 
 
 def resumable(contact: BoundaryElements, folder: pathlib.Path) -> CheckpointedContact:

@@ -72,7 +72,10 @@ class Contact:
 
 @dataclass(frozen=True, eq=False)
 class Topography:
-    """Heights of a surface in cell sizes, (n, n) or (t, n, n), in two precisions; `largest` is the largest |height|."""
+    """Heights of a surface in cell sizes, (n, n) or (t, n, n), in two precisions; -inf where there is no surface.
+
+    `largest` is the largest finite absolute value.
+    """
 
     double: np.ndarray
     single: np.ndarray
@@ -81,7 +84,8 @@ class Topography:
     @classmethod
     def of(cls, heights: np.ndarray) -> Topography:
         """Return the topography of given heights (in double precision, in cell sizes)."""
-        return cls(heights, heights.astype(np.float32), float(max(heights.max(), -heights.min())))
+        lowest = np.min(heights, where=heights > -np.inf, initial=np.inf)
+        return cls(heights, heights.astype(np.float32), float(max(heights.max(), -lowest)))
 
     @property
     def rounding(self) -> float:
@@ -150,7 +154,8 @@ def solve_active_set(
     dtype = np.float32 if tolerance > topography.rounding else float
     keep, gap, before, changing = np.full(len(contact.cells), sticky), None, np.inf, not sticky
     for _ in range(_MAX_CHANGES):
-        if load is None and len(contact.cells) == space.size and (contact.fraction >= 1).all():
+        full = len(contact.cells) == space.size and (contact.fraction >= 1).all()
+        if load is None and full and space.mean_is_fixed:
             raise FullContact("the contact covers the whole surface")
         contact = _scale_to_load(space, contact, load)
         if gap is None:

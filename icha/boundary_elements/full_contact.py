@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+import scipy.fft
 
 from icha.asperity.jkr import JKR, MaterialUnits
 from icha.boundary_elements.adhesive import Summits
@@ -24,20 +25,25 @@ ROUNDING = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class FullContactProblem(MaterialUnits):
-    """A periodic rough surface against a half-space: the contact problem, and its states of full contact.
+    """A rough surface against a half-space or layer: the contact problem, and its states of full contact.
+
+    Full contact has a closed form if the mean displacement is fixed (`HalfSpace.mean_is_fixed`). Otherwise it is found
+    like any other contact.
 
     Parameters
     ----------
-    heights : (n, n), heights of the surface, m.
+    heights : (n, n), heights of all cells of the grid, m; -inf in the margin of a free square.
+    grid : number of cells along a side of the surface, without the margin of a free square.
     spacing : size of a cell, m.
     law : contact law of a single summit; it gives the gap at which a summit jumps into contact.
-    rms_height, rms_slope : root-mean-square height (m) and slope of the surface.
+    rms_height, rms_slope : units of length (m) and slope; those of the roughness, or of a surface with a shape.
     asperities : summits of the surface.
     space, topography, front, summits : half-space, heights, law of the front and summits for the solver, in units of
         the cell size and of E*.
     """
 
     heights: np.ndarray
+    grid: int
     spacing: float
     law: JKR
     rms_height: float
@@ -50,7 +56,14 @@ class FullContactProblem(MaterialUnits):
 
     @cached_property
     def full_contact_pressure(self) -> np.ndarray:
-        """Pressure in full contact minus its mean value, (n, n), Pa."""
+        """Pressure in full contact minus its mean value, (n, n), Pa; without closed form zero."""
+        if not self.space.mean_is_fixed:
+            return np.zeros_like(self.heights)
+        if self.space.layer:
+            compliance = self.space.compliance[np.dtype(float)].copy()
+            compliance[0, 0] = np.inf
+            modes = scipy.fft.rfft2(self.topography.double, workers=1) / compliance
+            return self.contact_modulus * scipy.fft.irfft2(modes, s=self.heights.shape, workers=1)
         return self.contact_modulus * full_contact_pressure(self.heights, len(self.heights) * self.spacing)
 
     @property
@@ -60,12 +73,14 @@ class FullContactProblem(MaterialUnits):
 
     @property
     def smallest_gap(self) -> float:
-        """Mean gap below which the contact counts as full contact, m."""
-        return _SMALLEST_GAP * self.rms_height
+        """Mean separation below which contact counts as full contact, m; -inf if it does not determine the gap."""
+        return _SMALLEST_GAP * self.rms_height if self.space.mean_is_fixed else -np.inf
 
     @property
     def opening_pressure(self) -> float:
         """Nominal pressure at which full contact opens on unloading, Pa; negative if this is a tension."""
+        if not self.space.mean_is_fixed:
+            return np.inf
         return -float(self.full_contact_pressure.min()) - self.interface_strength
 
     def full_contact(self, pressure: float) -> CellState:
@@ -76,7 +91,7 @@ class FullContactProblem(MaterialUnits):
 
     def is_full(self, state: CellState) -> bool:
         """Return whether a state is full contact: all cells in contact at zero separation."""
-        return state.separation == 0 and len(state.cells) == self.heights.size
+        return self.space.mean_is_fixed and state.separation == 0 and len(state.cells) == self.heights.size
 
     @property
     def undetermined_pressure(self) -> float:

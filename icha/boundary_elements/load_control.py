@@ -62,6 +62,11 @@ class ControlProblem:
         unit = abs(self.contact.stiffness(state)) * self.contact.rms_height
         return max(abs(self.contact.pressure(state)), _ZERO_LOAD * unit if np.isfinite(unit) else 0.0)
 
+    def closer(self, separation: float) -> float:
+        """Return a smaller separation for the next trial towards a larger load, m."""
+        longest = _LONGEST * self.contact.rms_height
+        return separation - (min(_CLOSING * separation, longest) if self.contact.space.mean_is_fixed else longest)
+
     def tolerance(self, scale: float) -> float:
         """Return the largest error of a met target: a part of `scale`; for areas without adhesion, some cell areas."""
         if self.control.quantity == AREA_FRACTION and not self.contact.adhesive:
@@ -133,8 +138,10 @@ def solve_at_control(problem: ControlProblem, state: CellState, separation: floa
     scale = problem.scale(state)
     smallest_difference = _SAME_SEPARATION * contact.rms_height
     initial = bracket = Bracket(np.sign(-problem.error(state)) or 1.0, smallest_difference, state)
-    if separation <= 0:
+    if contact.space.mean_is_fixed and separation <= 0:
         separation = 0.5 * state.separation
+    elif separation == -np.inf:
+        separation = problem.closer(state.separation)
     reason = ""
     try:
         for _ in range(_MAX_ATTEMPTS):
@@ -178,7 +185,7 @@ def find_nearby_state(problem: ControlProblem, bracket: Bracket, separation: flo
         separation = problem.newton_separation(trial)
         if control_is_load and bracket.sign > 0 and bracket.beyond is None and not separation < trial.separation:
             # The load falls as the surfaces approach, so search past the minimum of the load.
-            separation = trial.separation - min(_CLOSING * trial.separation, _LONGEST * contact.rms_height)
+            separation = problem.closer(trial.separation)
         separation = bracket.limit(separation)
         if separation < contact.smallest_gap:
             separation = (1 - _CLOSING) * trial.separation

@@ -9,18 +9,16 @@ interaction between the parts.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from functools import cache
 from typing import NamedTuple
 
 import numpy as np
-import scipy.fft
 from scipy.ndimage import find_objects
 
 from icha.boundary_elements.cells import BLOCK, blocks_around, find_among, merge_cells
 from icha.boundary_elements.elastic_contact import Contact, Topography
 from icha.boundary_elements.front import Front, average_fractions
 from icha.boundary_elements.front_solver import FrontProblem, relax_front
-from icha.boundary_elements.half_space import HalfSpace, by_precision
+from icha.boundary_elements.half_space import HalfSpace
 from icha.boundary_elements.patches import label_patches
 from icha.contact.model import FullContact, NotConverged
 from icha.support.parallel import blocks, on_cores
@@ -60,7 +58,7 @@ def relax_in_windows(
         return None
     windows = list(regions.windows(space.grid))
     mean_fraction = average_fractions(space.field(contact.cells, contact.fraction, np.float32)).ravel()
-    kernels = {side: window_kernel(space.grid, side) for side in {cells.shape[-1] for cells, _ in windows}}
+    kernels = {side: space.window_kernel(side) for side in {cells.shape[-1] for cells, _ in windows}}
 
     def relax(batch):
         cells, free = batch
@@ -164,15 +162,3 @@ def _cut(labels, boxes):
                     pieces.append((slice(row, row + step), slice(column, column + step)))
                     labels[rows[inside[:, 0]], columns[inside[:, 1]]] = len(boxes) + len(pieces)
     return boxes + pieces
-
-
-@cache
-def window_kernel(grid: int, side: int) -> tuple[dict[np.dtype, np.ndarray], np.ndarray]:
-    """Return compliance (in two precisions) and stiffness of a window, exact for cells closer than half its side."""
-    qx, qy = 2 * np.pi * scipy.fft.rfftfreq(grid), 2 * np.pi * scipy.fft.fftfreq(grid)
-    q = np.hypot(qy[:, None], qx)
-    q[0, 0] = np.inf
-    offset = np.rint(scipy.fft.fftfreq(side) * side).astype(int)
-    rows = np.cos(np.outer(offset, qy)) @ (2 / q) / grid
-    table = scipy.fft.irfft(rows, n=grid, axis=1)[:, offset % grid]
-    return by_precision(scipy.fft.rfft2(table).real), HalfSpace.of(side).stiffness

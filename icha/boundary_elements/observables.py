@@ -48,7 +48,10 @@ class PatchObservables:
         areas = self.contact.area_of_cells(state)
         gap = self._gap_density(state, areas)
         pressure, mean = self._pressure_density(state, areas)
-        field = self.contact.space.field
+
+        def field(*values):
+            return self.contact.crop(self.contact.space.field(*values))
+
         return {
             "overlap_fraction": 0.0,
             "area_beyond_edges": 0.0,
@@ -72,7 +75,7 @@ class PatchObservables:
         """Return the probability density of the gap outside contact; its integral plus the area fraction is one."""
         edges_of_bins = gap_bins(self.surface)
         gap = np.clip(self.contact.gap(state), 0.0, edges_of_bins[-1])
-        outside = 1 - self.contact.space.field(state.cells, areas)
+        outside = 1 - self.contact.crop(self.contact.space.field(state.cells, areas))
         content, _ = np.histogram(gap, edges_of_bins, weights=outside)
         return content / gap.size / np.diff(edges_of_bins)
 
@@ -86,7 +89,7 @@ class PatchObservables:
         content, _ = np.histogram(counted, edges_of_bins, weights=weight)
         force, _ = np.histogram(counted, edges_of_bins, weights=weight * pressure)
         mean = np.divide(force, content, out=np.zeros(len(content)), where=content > 0)
-        return content / self.contact.heights.size / np.diff(edges_of_bins), mean
+        return content / self.contact.count / np.diff(edges_of_bins), mean
 
     def _patches(self, state, areas):
         """Return position, area, perimeter, force, number of summits and radius of the highest summit of each patch."""
@@ -101,7 +104,7 @@ class PatchObservables:
         of_summit = labels_at(contact.summits.cell, state.cells, labels)
         order = np.argsort(contact.asperities.height, kind="stable")
         # A patch without a summit gets the radius of the rms curvature of the surface.
-        radius = np.full(count + 1, 1 / self.surface.rms_curvature)
+        radius = np.full(count + 1, self.surface.summit_radius)
         radius[of_summit[order]] = contact.asperities.radius_of_curvature[order]
         centre = patch_centres(state.cells, grid, labels, count, state.fraction) * h
         return {

@@ -105,7 +105,7 @@ def count_unshared_separations(run) -> int:
     error of the work.
     """
     first, later = (np.unique(run["mean_separation"][run["leg"] == 0]), run["mean_separation"][run["leg"] > 0])
-    same = 10 * RESIDUAL_TOLERANCE * float(run["rms_height"])
+    same = 10 * RESIDUAL_TOLERANCE * float(run["unit_height"])
     after = np.searchsorted(first, later)
     nearest = [np.abs(later - first[np.clip(k, 0, len(first) - 1)]) for k in (after - 1, after)]
     return int(np.count_nonzero(np.minimum(*nearest) > same))
@@ -124,7 +124,7 @@ def work_error(run) -> float:
     """
     width, stiffness = np.abs(np.diff(run["mean_separation"])), finite_stiffness(run)
     ends = np.abs(stiffness[1:]) + np.abs(stiffness[:-1])
-    separation = RESIDUAL_TOLERANCE * float(run["rms_height"])
+    separation = RESIDUAL_TOLERANCE * float(run["unit_height"])
     relative = model_of(run.attrs).stiffness_error
     return float(np.sum(width * ends * (0.5 * separation + relative * width / 12)))
 

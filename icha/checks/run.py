@@ -95,7 +95,7 @@ def _check_loading(run) -> Iterator[tuple]:
     first = run["leg"] == 0  # unloading may follow other curves
     names = ("contact_area_fraction", "nominal_pressure", "mean_separation", "step_kind", "coalescence_count")
     loading = {name: run[name][first] for name in names}
-    adhesive, height = float(run["surface_energy"]) > 0, float(run["rms_height"])
+    adhesive, height = float(run["surface_energy"]) > 0, float(run["unit_height"])
     # Two targets of different kinds may lead to states that differ only by the error of the solver.
     limit = CELL_LIMIT if model_of(run.attrs).by_cells else TARGET_LIMIT
     yield "area rises", _largest_fall_in_loading(loading, "contact_area_fraction"), limit
@@ -156,8 +156,8 @@ def _target_error(run):
     largest = np.array([np.max(np.abs(reached[kind])) for kind in kinds])
     # With adhesion a load may be a small difference of attraction and repulsion. Each of them is about as large as the
     # stiffness times h_rms. Therefore the error of a very small load is relative to SMALLEST_LOAD times this product.
-    gross = np.abs(finite_stiffness(run)) * float(run["rms_height"]) * adhesive
-    unit = {"reduced_pressure": scale * float(run["rms_slope"]), "relative_load": scale}
+    gross = np.abs(finite_stiffness(run)) * float(run["unit_height"]) * adhesive
+    unit = {"reduced_pressure": scale * float(run["unit_slope"]), "relative_load": scale}
     least = np.array([SMALLEST_LOAD * gross[k] / unit.get(kind, math.inf) for k, kind in enumerate(kinds)])
     return np.max(error / np.where(target != 0, np.maximum(np.abs(target), least), largest))
 

@@ -111,7 +111,7 @@ class ContactModel(Protocol):
     adhesive : whether there is adhesion, so that contact forms and breaks in jumps.
     contact_modulus : E*, the unit of relative loads, Pa.
     pressure_unit : E* h'_rms, the unit of reduced pressures, Pa.
-    rms_height : rms height h_rms of the surface, the unit of separations, m.
+    rms_height : unit of separations, m: rms height of the surface, with a shape `Surface.unit_height`.
     asperities : summits of the surface; there may be none if the model does not need them.
     area : nominal contact area A0, m^2.
     largest_area_fraction : the model is not valid if contact area divided by nominal area exceeds this value.
@@ -214,6 +214,6 @@ def gap_bins(surface: Surface) -> np.ndarray:
     more than 31.6 h_rms, the last bin ends at this gap. At separations up to 9 h_rms, the last bin contains less than
     0.2 % of the undeformed surface (Chebyshev's inequality).
     """
-    edges = GAP_BINS * surface.rms_height
-    edges[-1] = max(edges[-1], np.ptp(surface.heights))
+    edges, profile = GAP_BINS * surface.unit_height, surface.profile
+    edges[-1] = max(edges[-1], np.ptp(profile[np.isfinite(profile)]))
     return edges

@@ -50,7 +50,7 @@ def gap_distribution(law: JKR, surface: Surface, state: ContactState) -> dict:
 
     def count_cells(rows, w):
         """Return three areas, in cells: uncovered area in each gap bin, covered area, area covered more than once."""
-        u = w + (state.separation - surface.heights[rows])
+        u = w + (state.separation - surface.profile[rows])
         cover, inside = _cover_rows(period, grid, spots.position, a, rows, free_square)
         u[inside] = 0.0
         # Bin 0 contains the negative gaps.
@@ -93,7 +93,7 @@ def pressure_distribution(law: JKR, surface: Surface, spots: Spots) -> dict:
     pressure_density : (bins,) float, P(p) in the bins of `icha.contact.model.PRESSURE_BINS`, 1/Pa.
     pressure_bin_mean : (bins,) float, area-weighted mean pressure of each bin, Pa; 0 for an empty bin.
     """
-    edges = PRESSURE_BINS * (law.material.contact_modulus * surface.rms_slope)
+    edges = PRESSURE_BINS * (law.material.contact_modulus * surface.unit_slope)
     a, R = spots.contact_radius, spots.radius_of_curvature
     area, force = np.zeros(len(edges)), np.zeros(len(edges))
     if len(a):

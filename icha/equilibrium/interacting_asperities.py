@@ -175,4 +175,4 @@ class AsperityObservables:
 
 def contact_of(surface: Surface, material: Material) -> InteractingAsperities:
     """Return the contact of a surface and a material; raise `ValueError` if the surface has no summits."""
-    return InteractingAsperities(JKR(material), find_summits(surface), surface.rms_height, surface.rms_slope)
+    return InteractingAsperities(JKR(material), find_summits(surface), surface.unit_height, surface.unit_slope)

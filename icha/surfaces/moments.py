@@ -99,7 +99,7 @@ class SpectralMoments(NamedTuple):
     @property
     def nayak_parameter(self) -> float:
         """Nayak's parameter m0 m4/m2^2, the width of the spectrum; isotropic surfaces have at least 3/2."""
-        return self.m0 * self.m4 / self.m2**2
+        return self.m0 * self.m4 / (self.m2**2 or 1.0)
 
     @property
     def rms_height(self) -> float:
@@ -131,7 +131,7 @@ def spectral_moments(surface: Surface) -> SpectralMoments:
 def height_statistics(surface: Surface) -> tuple[float, float]:
     """Compute skewness and kurtosis of the heights; a Gaussian surface has 0 and 3."""
     z = surface.heights
-    variance = np.mean(z**2)
+    variance = np.mean(z**2) or 1.0
     return float(np.mean(z**3) / variance**1.5), float(np.mean(z**4) / variance**2)
 
 
@@ -146,6 +146,8 @@ def slope_anisotropy(surface: Surface) -> float:
     one, other = z[1:, 1:] - z[:-1, :-1], z[1:, :-1] - z[:-1, 1:]
     tensor = [[np.mean(one**2), np.mean(one * other)], [np.mean(one * other), np.mean(other**2)]]
     least, most = np.linalg.eigvalsh(tensor)
+    if not most:
+        return 1.0
     return math.sqrt(most / least) if least > _NO_SLOPE * most else math.inf
 
 
@@ -167,7 +169,7 @@ def radial_power_spectrum(surface: Surface) -> tuple[np.ndarray, np.ndarray, np.
     periodic, scale = surface, 1.0
     if surface.free:
         hann = np.sin(np.pi * (np.arange(surface.grid) + 0.5) / surface.grid) ** 2
-        periodic = replace(surface, heights=surface.heights * (hann[:, None] * hann), boundary="periodic")
+        periodic = replace(surface, heights=surface.heights * (hann[:, None] * hann), boundary="periodic", shape=None)
         scale = 1 / np.mean(hann**2) ** 2
 
     def rings(k2, count, power):

@@ -134,7 +134,7 @@ def locate_summits(surface: Surface) -> Asperities:
     Asperities in the order of their start nodes; there may be none.
     """
     spacing, margin = surface.spacing, _MARGIN if surface.free else 0
-    heights = surface.heights
+    heights = _finite_profile(surface)
     if surface.free:
         heights = np.pad(heights, margin, mode="reflect", reflect_type="odd")
     grid = len(heights)
@@ -160,6 +160,12 @@ def locate_summits(surface: Surface) -> Asperities:
         free=surface.free,
         unsupported_height=height[~supported],
     )
+
+
+def _finite_profile(surface):
+    """Return the heights with the shape, m; where a shape has no surface, its lowest height."""
+    lowest = np.min(surface.profile, where=np.isfinite(surface.profile), initial=np.inf)
+    return np.maximum(surface.profile, lowest)
 
 
 def _is_supported(heights, summit, height):
@@ -311,7 +317,7 @@ def paraboloid_departure(
     arithmetic mean, and returns the smaller result. The result is 0 if no spot is wider than half a cell.
     """
     mode = "mirror" if surface.free else "grid-wrap"
-    spline = scipy.ndimage.spline_filter(surface.heights, order=3, mode=mode)
+    spline = scipy.ndimage.spline_filter(_finite_profile(surface), order=3, mode=mode)
     large = contact_radius >= _SMALLEST_SPOT * surface.spacing
     if not large.any():
         return 0.0
@@ -357,7 +363,7 @@ class SummitCoverage:
     @classmethod
     def of(cls, surface: Surface, asperities: Asperities) -> SummitCoverage:
         """Find the peaks of a surface and the summits near the peaks; edge nodes of a free square do not count."""
-        heights, grid = surface.heights, surface.grid
+        heights, grid = surface.profile, surface.grid
 
         def examine(rows):
             block = heights[np.arange(rows.start - 1, rows.stop + 1) % grid]

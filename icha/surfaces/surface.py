@@ -11,6 +11,7 @@ import sys
 import warnings
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.fft
@@ -18,6 +19,9 @@ import scipy.fft
 from icha.support.parallel import blocks, on_cores
 from icha.support.rules import LENGTH, SLOPE, FloatRange, IntegerRange
 from icha.surfaces.square import problem_with_heights
+
+if TYPE_CHECKING:
+    from icha.surfaces.shapes import Shape
 
 # Values of `boundary`: one cell of a periodic surface, or a single square on a half-space.
 PERIODIC, FREE = "periodic", "free"
@@ -41,30 +45,42 @@ MISFIT_OF_EDGES = (
 )
 
 
+# Distance of the apex of a shape from the middle of a square of n x n cells, along x and y, in cells.
+_OFF_THE_NODES = 0.29
+# Least unit of length of a surface with a shape, divided by the side of the shape: the unit of a flat punch.
+_LEAST_UNIT = 1e-3
+
+
 class EdgeWarning(UserWarning):
     """Warning: the heights at opposite edges of a periodic surface differ by a step."""
 
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """A rough surface of zero mean height: one cell of a periodic surface, or a single square.
+    """A rough surface of zero mean height: one cell of a periodic surface, or a single square, which may have a shape.
+
+    Statistics, spectrum and energy of full contact are those of the roughness, without the shape.
 
     Parameters
     ----------
-    heights : (n, n) array, metres. The mean height is removed; the array is copied and made read-only.
+    heights : (n, n) array, metres: the roughness. The mean height is removed; the array is copied and made read-only.
     period : side of the square, metres, in [1e-24, 1e9]; a periodic surface repeats after this length.
     boundary : "periodic" (in both directions), or "free" (a single square; the half-space is larger than the square).
+    shape : smooth shape that carries the roughness, such as `icha.Sphere`, with its apex in the middle of the square;
+        only with the boundary "free". The roughness may then be zero.
 
     Raises
     ------
     ValueError
-        If the heights are not a square array of at least 8 x 8 finite numbers, or are all the same. Also if the range
-        of heights divided by the period is not in [1e-24, 1e9], or if the period or the boundary is invalid.
+        If the heights are not a square array of at least 8 x 8 finite numbers, or are all the same although there is no
+        shape. Also if the range of heights divided by the period is not in [1e-24, 1e9], or if the period, the boundary
+        or the shape is invalid.
     """
 
     heights: np.ndarray
     period: float
     boundary: str = PERIODIC
+    shape: Shape | None = None
 
     def __post_init__(self):
         """Check the arguments, remove the mean height, and make the heights read-only."""
@@ -77,16 +93,21 @@ class Surface:
             heights = np.array(given, dtype=np.float64, order="C")
         except (TypeError, ValueError) as error:
             raise ValueError(f"heights: must be an array of real numbers in metres ({error})") from None
-        if problem := problem_with_heights(heights):
+        if problem := problem_with_heights(heights, smooth=self.shape is not None):
             raise ValueError(f"heights: {problem}")
         object.__setattr__(self, "period", LENGTH.validate("period", self.period))
-        with np.errstate(over="ignore"):
-            _STEEPNESS.validate("heights: their range over the period", np.ptp(heights) / self.period)
+        if not self.smooth:
+            with np.errstate(over="ignore"):
+                _STEEPNESS.validate("heights: their range over the period", np.ptp(heights) / self.period)
         heights -= heights.mean()
         heights.flags.writeable = False
         object.__setattr__(self, "heights", heights)
         if self.boundary not in (PERIODIC, FREE):
             raise ValueError(f"boundary: {self.boundary!r} must be one of {PERIODIC}, {FREE}")
+        if self.shape and not self.free:
+            raise ValueError(f"boundary: {self.boundary!r}; a surface with a shape needs {FREE!r}")
+        if self.shape and (not np.isfinite(self.profile).any() or np.isnan(self.profile).any()):
+            raise ValueError(f"shape: {self.shape} does not fit a square of side {self.period:g} m")
         # Only surfaces that users make cause the warning. `icha describe` reports the step for other surfaces.
         caller = sys._getframe(2).f_globals.get("__name__", "")
         if not self.free and not caller.startswith(("icha.", "dataclasses")) and not edges_fit(heights):
@@ -106,6 +127,59 @@ class Surface:
     def free(self) -> bool:
         """True if the surface is a single square."""
         return self.boundary == FREE
+
+    @property
+    def smooth(self) -> bool:
+        """True if there is no roughness, but only a shape."""
+        return self.shape is not None and not self.heights.any()
+
+    @cached_property
+    def profile(self) -> np.ndarray:
+        """Heights of shape and roughness together, (n, n), m; -inf where a shape has no surface.
+
+        Without roughness, the apex of the shape has the height 0.
+        """
+        if self.shape is None:
+            return self.heights
+        x = (np.arange(self.grid) + 0.5) * self.spacing - self.apex
+        profile = self.heights + self.shape.heights(x, x[:, None])
+        profile.flags.writeable = False
+        return profile
+
+    @property
+    def summit_radius(self) -> float:
+        """Typical radius of curvature of a summit, m: 1/`rms_curvature`; without roughness, that of the shape."""
+        if self.smooth:
+            return getattr(self.shape, "radius", self.period)
+        return 1 / self.rms_curvature
+
+    @property
+    def apex(self) -> float:
+        """Coordinate x = y of the apex of the shape, m, from the edge of the square.
+
+        It lies a little beside the middle, so that the rows of cells at the edge of contact close one after another.
+        """
+        return 0.5 * self.period + _OFF_THE_NODES * self.spacing
+
+    @cached_property
+    def _units(self) -> tuple[float, float]:
+        """Units of length (m) and of slope: rms height and slope, with a shape those of the profile near its apex."""
+        if self.shape is None:
+            return self.rms_height, self.rms_slope
+        finite = self.profile[np.isfinite(self.profile)]
+        side = self.spacing * math.sqrt(finite.size)
+        height = max(float(np.std(finite)), self.rms_height, _LEAST_UNIT * side)
+        return height, height / side
+
+    @property
+    def unit_height(self) -> float:
+        """Unit of separations and gaps, m: the rms height; with a shape, the rms height of the whole profile."""
+        return self._units[0]
+
+    @property
+    def unit_slope(self) -> float:
+        """Unit of slopes: the rms slope; with a shape, `unit_height` divided by the side of the square."""
+        return self._units[1]
 
     def require_periodic(self, purpose: str) -> None:
         """Raise ValueError if the surface is a free square; the message names the computation `purpose`."""

@@ -23,7 +23,7 @@ def test_displacements_in_a_window_are_those_of_the_whole_surface(around):
     whole = HalfSpace.of(320)
     count = 0
     for cells, free in module.Regions.around(np.flatnonzero(restless), 320, around).windows(320):
-        small = HalfSpace(cells.shape, *module.window_kernel(320, cells.shape[-1]))
+        small = HalfSpace(cells.shape, *whole.window_kernel(cells.shape[-1]))
         pressure = rng.normal(size=np.count_nonzero(free))
         own = np.flatnonzero(free)
         found = small.field(own, small.displacement(own, pressure, own))
