@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 _HOME = {
     "SelfAffineSpectrum": "surfaces.spectrum",
     "Surface": "surfaces.surface",
+    **dict.fromkeys(("Sphere", "Paraboloid", "CylinderPunch", "FlatPunch", "Cone", "Wave"), "surfaces.shapes"),
     "Material": "asperity.material",
     "Path": "path.targets",
     "read_scan": "configuration.topographies",
@@ -20,6 +21,12 @@ if TYPE_CHECKING:  # for editors and type checkers only
     from icha.path.targets import Path as Path
     from icha.simulation import ConvergenceError as ConvergenceError
     from icha.simulation import simulate as simulate
+    from icha.surfaces.shapes import Cone as Cone
+    from icha.surfaces.shapes import CylinderPunch as CylinderPunch
+    from icha.surfaces.shapes import FlatPunch as FlatPunch
+    from icha.surfaces.shapes import Paraboloid as Paraboloid
+    from icha.surfaces.shapes import Sphere as Sphere
+    from icha.surfaces.shapes import Wave as Wave
     from icha.surfaces.spectrum import SelfAffineSpectrum as SelfAffineSpectrum
     from icha.surfaces.surface import Surface as Surface
 

@@ -123,6 +123,21 @@ class BoundaryElements(FullContactProblem):
         separation = max(separation, self.smallest_gap)
         return self._next_equilibrium(self.open_most_tensile(separation), separation, control)
 
+    def at_edge(self, state: CellState) -> np.ndarray:
+        """Return whether each cell in contact, (k,), is in an outermost row or column of a free square."""
+        row, column = np.divmod(state.cells, len(self.heights))
+        outermost = (np.minimum(row, column) == 0) | (np.maximum(row, column) == self.grid - 1)
+        return outermost & bool(self.space.transformed)
+
+    def reason_beyond(self, state: CellState) -> str:
+        """Return a reason if the contact of a shape has reached the edge of its square; otherwise an empty text."""
+        if self.shape is None or not self.at_edge(state).any():
+            return ""
+        return (
+            f"the contact reaches the edge of the square of side {self.grid * self.spacing:g} m, although the shape "
+            "continues; use a larger square, or smaller loads"
+        )
+
     def observables(self, surface: Surface) -> PatchObservables:
         """Return the object that computes recorded values of states from this contact and its surface."""
         return PatchObservables(self, surface)
@@ -285,7 +300,8 @@ def contact_of(surface: Surface, material: Material) -> BoundaryElements:
     layer = Layer(material.thickness / h, material.poisson_ratio) if material.layered else None
     space = HalfSpace.of(len(heights), layer, free=surface.free)
     units = surface.unit_height, surface.unit_slope
-    return BoundaryElements(heights, surface.grid, h, law, *units, asperities, space, topography, front, summits)
+    solver = asperities, space, topography, front, summits
+    return BoundaryElements(heights, surface.grid, h, law, *units, *solver, surface.shape)
 
 
 def resumable(contact: BoundaryElements, folder: pathlib.Path) -> CheckpointedContact:

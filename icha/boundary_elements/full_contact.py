@@ -14,6 +14,7 @@ from icha.boundary_elements.elastic_contact import Topography
 from icha.boundary_elements.front import Front
 from icha.boundary_elements.half_space import HalfSpace
 from icha.boundary_elements.patches import CellState
+from icha.surfaces.shapes import Shape
 from icha.surfaces.summits import Asperities
 from icha.surfaces.surface import full_contact_pressure
 
@@ -40,6 +41,7 @@ class FullContactProblem(MaterialUnits):
     asperities : summits of the surface.
     space, topography, front, summits : half-space, heights, law of the front and summits for the solver, in units of
         the cell size and of E*.
+    shape : shape that carries the roughness; None without a shape.
     """
 
     heights: np.ndarray
@@ -53,6 +55,7 @@ class FullContactProblem(MaterialUnits):
     topography: Topography
     front: Front
     summits: Summits
+    shape: Shape | None = None
 
     @cached_property
     def full_contact_pressure(self) -> np.ndarray:

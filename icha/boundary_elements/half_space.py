@@ -5,10 +5,11 @@ Lengths are in units of the cell size, pressures in E*. There are three kinds:
 - Periodic half-space: a unit pressure wave with wave number q displaces the surface by 2/q (K. L. Johnson, Contact
   Mechanics, 1985, sec. 13.2). The mean pressure causes no displacement, because separations are measured between the
   mean planes.
-- Periodic layer on a rigid base: `layer_compliance` instead of 2/q.
+- Periodic layer on a rigid base: `layer_compliance` instead of 2/q. The displacement by the mean pressure is left out
+  here too (`Layer.uniform_compliance`).
 - Free half-space under a square: the displacement by a uniform pressure on a cell (`cell_displacement`) is summed
-  over all loaded cells by a transform of twice the side. It vanishes far from the contact. A free layer is a periodic
-  layer of this larger side.
+  over all loaded cells by a transform of twice the side. It vanishes far from the contact. For a free layer, the
+  difference between layer and half-space (`layer_correction`) is added.
 
 The cells of a free square are surrounded by a margin that is never in contact. So edges of contact at the edges of
 the square are like all others, although the other modules take the grid as periodic.
@@ -24,6 +25,8 @@ from typing import Protocol
 import numpy as np
 import scipy.fft
 from numpy.typing import DTypeLike
+from scipy.interpolate import make_interp_spline
+from scipy.special import j0
 
 from icha.boundary_elements import transforms
 from icha.boundary_elements.tiles import TiledGrid
@@ -32,6 +35,8 @@ from icha.boundary_elements.tiles import TiledGrid
 _MEAN_STIFFNESS = 0.3
 # Width of the margin on two sides of a free square, in cells: more than the radius of every stencil.
 MARGIN = 8
+# A layer is not displaced farther than _FAR thicknesses from a load. Largest a = q t in `layer_correction`.
+_FAR, _LARGEST_A = 20.0, 20.0
 # Sides of smaller squares around the contact on a free square are multiples of this number of cells.
 _SQUARE = 16
 
@@ -43,22 +48,50 @@ class Layer:
     thickness: float
     poisson_ratio: float
 
+    @property
+    def uniform_compliance(self) -> float:
+        """Displacement by a uniform unit pressure, E* t/M, in cell sizes; M is the modulus of uniaxial strain."""
+        return self.thickness * (1 - 2 * self.poisson_ratio) / (1 - self.poisson_ratio) ** 2
+
 
 def layer_compliance(q: np.ndarray, layer: Layer) -> np.ndarray:
     """Return the displacement by a unit pressure wave of wave number q on a layer without friction, times E*.
 
-    (2/q) ((3 - 4 nu) sinh 2a - 2a) / ((3 - 4 nu) cosh 2a + 2a^2 + 5 - 12 nu + 8 nu^2) with a = q t (K. L. Johnson,
-    Contact Mechanics, 1985, sec. 13.5). For q = 0 it is t E*/M, with the modulus M of uniaxial strain.
+    The compliance is (2/q) phi(a) with a = q t and phi from `_layer_factor`; for q = 0 it is `uniform_compliance`.
     """
-    t, nu = layer.thickness, layer.poisson_ratio
+    safe = np.where(q > 0, q, 1.0)
+    return np.where(q > 0, 2 / safe * _layer_factor(safe * layer.thickness, layer), layer.uniform_compliance)
+
+
+def _layer_factor(a, layer):
+    """Return the compliance of a layer divided by that of a half-space, for a = q t > 0.
+
+    ((3 - 4 nu) sinh 2a - 2a) / ((3 - 4 nu) cosh 2a + 2a^2 + 5 - 12 nu + 8 nu^2): K. L. Johnson, Contact Mechanics,
+    1985, sec. 13.5.
+    """
+    nu = layer.poisson_ratio
     # Multiplied by 2 exp(-2a) above and below, so that nothing overflows.
-    a = q * t
     decay = np.exp(-2 * a)
     above = (3 - 4 * nu) * -np.expm1(-4 * a) - 4 * a * decay
     below = (3 - 4 * nu) * (1 + decay**2) + 2 * decay * (2 * a**2 + 5 - 12 * nu + 8 * nu**2)
-    # E*/M = (1 - 2 nu)/(1 - nu)^2 for a rigid indenter.
-    uniform = t * (1 - 2 * nu) / (1 - nu) ** 2
-    return np.where(q > 0, 2 / np.where(q > 0, q, 1.0) * above / below, uniform)
+    return above / below
+
+
+def layer_correction(r: np.ndarray, layer: Layer) -> np.ndarray:
+    """Return the displacement at distances r from the middle of a cell on a layer, minus that on a half-space.
+
+    It is the Hankel transform (1/pi t) int (phi(a) - 1) J0(a r/t) exp(-a^2/(24 t^2)) da. The factor exp averages over a
+    cell. Farther than `_FAR` thicknesses, a layer is not displaced.
+    """
+    t = layer.thickness
+    far = min(_FAR * t, float(np.max(r)))
+    # phi - 1 vanishes as exp(-2a). The nodes resolve the oscillations of J0 up to `far`.
+    node, weight = np.polynomial.legendre.leggauss(200 + int(_LARGEST_A * far / t))
+    a = _LARGEST_A * (node + 1) / 2
+    factor = _LARGEST_A / 2 * weight * (_layer_factor(a, layer) - 1) * np.exp(-((a / t) ** 2) / 24) / (np.pi * t)
+    table = np.linspace(0, far, 64 + int(16 * far / t))
+    spline = make_interp_spline(table, np.array([np.dot(factor, j0(a * each / t)) for each in table]), k=5)
+    return np.where(r <= far, spline(np.minimum(r, far)), -1 / (np.pi * np.maximum(r, 1.0)))
 
 
 def cell_displacement(y: np.ndarray, x: np.ndarray) -> np.ndarray:
@@ -241,15 +274,17 @@ def _stiffness(grid):
 @lru_cache(maxsize=4)
 def _compliance(grid, layer, free):
     """Return the displacement by unit pressure for each mode of the transforms, in double and single precision."""
-    if free and layer is None:
+    if free:
         along = np.abs(scipy.fft.fftfreq(grid)) * grid
-        modes = scipy.fft.rfft2(cell_displacement(along[:, None], along)).real
+        displaced = cell_displacement(along[:, None], along)
+        if layer:
+            displaced += layer_correction(np.hypot(along[:, None], along), layer)
+        modes = scipy.fft.rfft2(displaced).real
     else:
         q = wave_numbers(grid)
         with np.errstate(divide="ignore"):
             modes = 2 / q if layer is None else layer_compliance(q, layer)
-        if layer is None:
-            modes[0, 0] = 0.0
+        modes[0, 0] = 0.0
     return by_precision(modes)
 
 

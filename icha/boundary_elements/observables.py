@@ -40,8 +40,17 @@ class PatchObservables:
             "front_residual": state.front_residual,
             "gap_residual": state.gap_residual / contact.rms_height,
             "pending_count": state.pending,
+            "layer_compression": self._layer_compression(state),
             "outside_wu_fraction": outside if contact.adhesive else 0.0,
         }
+
+    def _layer_compression(self, state):
+        """Return the mean displacement of a periodic layer by the nominal pressure, m; 0 otherwise."""
+        contact = self.contact
+        if not contact.space.layer or self.surface.free:
+            return 0.0
+        reduced = contact.pressure(state) / contact.contact_modulus
+        return reduced * contact.space.layer.uniform_compliance * contact.spacing
 
     def of_snapshot(self, state: CellState) -> dict:
         """Return the distributions of gap and pressure, properties of each patch, and maps of contact and pressure."""

@@ -172,6 +172,9 @@ class ContactModel(Protocol):
     def is_unstable(self, state: State) -> bool:
         """Return whether a spot is unstable: the approach of the spot grows while the surfaces move apart."""
 
+    def reason_beyond(self, state: State) -> str:
+        """Return the reason why a state is outside the range of the model, for the user; empty inside the range."""
+
     def observables(self, surface: Surface) -> Observables:
         """Return the object that computes the values that a run records of its states."""
 

@@ -148,6 +148,13 @@ MODELS = {
                 "largest gap in contact, or overlap out of contact, over h_rms",
                 "float64",
             ),
+            "layer_compression": (
+                ("step",),
+                "m",
+                "mean displacement of the surface of a periodic layer by the nominal pressure, not part of "
+                "mean_separation; 0 for a half-space and for a free square",
+                "float64",
+            ),
             "resolved_tension": (
                 (),
                 "Pa",

@@ -103,6 +103,10 @@ class InteractingAsperities(AsperityContact):
         displacement = spots.height - state.separation - spots.approach
         return float(np.sum(law.energy(a, R) + 0.5 * law.force(a, R) * displacement)) / self.area
 
+    def reason_beyond(self, state: ContactState) -> str:
+        """Return an empty text: the areas and gaps of the path limit this model."""
+        return ""
+
     def is_unstable(self, state: ContactState) -> bool:
         """Return whether any spot is unstable: its approach grows fast with the separation, d(delta)/du > 10."""
         return bool(np.max(state.sites.response[state.contact_index], initial=0.0) > _UNSTABLE_RESPONSE)

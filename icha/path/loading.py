@@ -8,7 +8,7 @@ from operator import itemgetter
 
 import numpy as np
 
-from icha.contact.model import ContactModel, NotConverged, State
+from icha.contact.model import BeyondModel, ContactModel, NotConverged, State
 from icha.path.energy_balance import Waypoint
 from icha.path.stops import (
     SAME_EXCESS,
@@ -82,6 +82,7 @@ class PathProgress:
     ) -> None:
         """Raise `NotConverged` if the model is not valid in the state `after`, at the end of a step.
 
+        It is a `BeyondModel` if the contact gives a reason (`ContactModel.reason_beyond`).
         The contact area must not be larger than `contact.largest_area_fraction`. Between targets the mean gap must be
         positive, unless the model is valid up to full contact. At a target the mean gap may be negative, because the
         range of targets is already limited.
@@ -90,6 +91,8 @@ class PathProgress:
         before, loading : start and direction of the step. pending : targets not met yet. They serve only the message.
         """
         contact = self.contact
+        if reason := contact.reason_beyond(after):
+            raise BeyondModel(str(self.make_path_error(before, loading, NotConverged(reason))))
         ahead = target or (pending[0] if pending else None)
         name = ahead.target.describe() if ahead else "separation"
         area = contact.area_fraction(after)

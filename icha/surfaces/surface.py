@@ -150,7 +150,7 @@ class Surface:
     def summit_radius(self) -> float:
         """Typical radius of curvature of a summit, m: 1/`rms_curvature`; without roughness, that of the shape."""
         if self.smooth:
-            return getattr(self.shape, "radius", self.period)
+            return self.shape.sphere_radius or self.period
         return 1 / self.rms_curvature
 
     @property
