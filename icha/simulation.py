@@ -38,12 +38,15 @@ from icha.path.follow import follow
 from icha.path.targets import (
     ASPERITY_RANGES,
     BETWEEN,
-    IN_METRES,
+    CONTACT_RADIUS,
+    FORCE,
+    INDENTATION,
     LEAST_PRESSURE,
     MAX_AREA_FRACTION,
     MAX_REDUCED_PRESSURE,
     MEAN_SEPARATION,
     RELATIVE_LOAD,
+    UNITS,
     Path,
     Target,
 )
@@ -250,24 +253,36 @@ def _check_arguments(surface, material, path, by_summits):
     for target in (*path.targets, *path.turning_points):
         if target in limited and target.kind in ASPERITY_RANGES and target.value > 0:
             ASPERITY_RANGES[target.kind].validate(f"path: {target.kind}", target.value)
-        if target.kind == RELATIVE_LOAD:
-            load = f"path: {RELATIVE_LOAD} = {target.value!r} on a surface of rms slope {surface.unit_slope:.4g}"
-            if 0 < abs(target.value) < LEAST_PRESSURE * surface.unit_slope:
-                raise ValueError(
-                    f"{load} is too small; expected a reduced pressure of at least {LEAST_PRESSURE} in "
-                    "absolute value, or 0 at a turning point that ends unloading"
-                )
-            if by_summits and target.value > MAX_REDUCED_PRESSURE * surface.unit_slope:
-                raise ValueError(
-                    f"{load} is beyond the range of the asperity model; expected a reduced pressure of at most "
-                    f"{MAX_REDUCED_PRESSURE}"
-                )
-        highest = _HIGHEST_SNAPSHOT * surface.unit_height
-        if target.snapshot and target.kind == MEAN_SEPARATION and target.value > highest:
+        _check_target(surface, material, target, by_summits)
+
+
+def _check_target(surface, material, target, by_summits):
+    """Raise `ValueError` for a load that is too small or too large, a large radius, or a snapshot far above contact."""
+    place = f"path: {target.kind} = {target.value!r} {UNITS.get(target.kind, '')}".rstrip()
+    if target.kind in (RELATIVE_LOAD, FORCE):
+        unit = material.contact_modulus * surface.period**2 if target.kind == FORCE else 1.0
+        pressure, load = target.value / (unit * surface.rms_slope), f"{place} on a surface of rms slope"
+        if 0 < abs(pressure) < LEAST_PRESSURE:
             raise ValueError(
-                f"path: a snapshot at a mean separation of {target.value!r} m is far above any contact; expected at "
-                f"most {_HIGHEST_SNAPSHOT:g} rms heights ({highest:.4g} m)"
+                f"{load} {surface.rms_slope:.4g} is too small; expected a reduced pressure of at least "
+                f"{LEAST_PRESSURE} in absolute value, or 0 at a turning point that ends unloading"
             )
+        if by_summits and pressure > MAX_REDUCED_PRESSURE:
+            raise ValueError(
+                f"{load} {surface.rms_slope:.4g} is beyond the range of the asperity model; expected a reduced "
+                f"pressure of at most {MAX_REDUCED_PRESSURE}"
+            )
+    largest = (MAX_AREA_FRACTION if by_summits else 1.0) * surface.period**2
+    if target.kind == CONTACT_RADIUS and np.pi * target.value**2 > largest:
+        expected = f"expected at most {np.sqrt(largest / np.pi):.4g} m"
+        model = ", the limit of the asperity model" if by_summits else ""
+        raise ValueError(f"{place} is too large on a square of side {surface.period:.4g} m; {expected}{model}")
+    separation = {MEAN_SEPARATION: target.value, INDENTATION: -target.value}.get(target.kind, 0.0)
+    if target.snapshot and separation > _HIGHEST_SNAPSHOT * surface.rms_height:
+        raise ValueError(
+            f"path: a snapshot at a mean separation of {separation!r} m is far above any contact; expected at "
+            f"most {_HIGHEST_SNAPSHOT:g} rms heights ({_HIGHEST_SNAPSHOT * surface.rms_height:.4g} m)"
+        )
 
 
 @dataclass
@@ -414,11 +429,15 @@ def _describe_targets(table: Table, path: Path) -> Table:
 
 
 def _target_unit(kinds: set[str], named_by: str) -> dict:
-    """Return the unit of targets of these kinds; if units differ, add a comment that lists the kinds given in m."""
-    metres = kinds.intersection(IN_METRES)
-    if not metres or metres == kinds:
-        return {"units": "m" if metres else "1"}
-    return {"units": "1", "further": {"comment": f"in m where {named_by} is {' or '.join(sorted(metres))}, else 1"}}
+    """Return the unit of targets of these kinds; if units differ, add a comment that lists the kinds with a unit."""
+    units = {UNITS.get(kind, "1") for kind in kinds}
+    if len(units) <= 1:
+        return {"units": units.pop() if units else "1"}
+    parts = [
+        f"in {unit} where {named_by} is {' or '.join(sorted(kind for kind in kinds if UNITS.get(kind) == unit))}"
+        for unit in sorted(units - {"1"}, reverse=True)
+    ]
+    return {"units": "1", "further": {"comment": f"{', '.join(parts)}, else 1"}}
 
 
 def _surface_values(surface: Surface, material: Material, seed: int) -> dict:

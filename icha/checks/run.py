@@ -11,7 +11,7 @@ from icha.checks.loops import LOOP_CHECKS, check_events, check_loop, finite_stif
 from icha.contact.models import AREA_TOLERANCE_CELLS, AREA_TOLERANCE_PART, SMALLEST_LOAD, model_of
 from icha.datasets.variables.run import OF_MODELS, RUN
 from icha.datasets.variables.terms import INFINITE
-from icha.path.targets import AREA_FRACTION, BETWEEN
+from icha.path.targets import AREAS, BETWEEN, CONTACT_RADIUS
 
 # Largest error of an equilibrium, in h_rms, and largest relative error of a target.
 RESIDUAL_LIMIT = 1e-8
@@ -129,35 +129,41 @@ def _largest_rises_of_separation(loading):
     the area jumps past a target, the path meets the target on the branch after the jump.
     """
     rise = np.diff(loading["mean_separation"])
-    given_area = (loading["step_kind"][1:] == AREA_FRACTION) & (np.diff(loading["contact_area_fraction"]) > 0)
+    given_area = np.isin(loading["step_kind"][1:], AREAS) & (np.diff(loading["contact_area_fraction"]) > 0)
     united = np.diff(loading["coalescence_count"]) != 0
     return tuple(float(np.max(rise[where & ~given_area], initial=0.0)) for where in (~united, united))
 
 
 def _target_error(run):
     """Return the largest relative error of a target; areas counted in cells may differ by the area tolerance."""
-    scale = float(run["contact_modulus"])
+    scale, nominal_area = float(run["contact_modulus"]), float(run["period"]) ** 2
     reached = {
         "reduced_pressure": run["reduced_pressure"],
         "relative_load": run["nominal_pressure"] / scale,
         "area_fraction": run["contact_area_fraction"],
         "mean_separation": run["mean_separation"],
+        "force": run["nominal_pressure"] * nominal_area,
+        "indentation": -run["mean_separation"],
+        "contact_radius": run["contact_area_fraction"],
         BETWEEN: run["mean_separation"],
     }
     target, kinds = run["step_target"], [str(kind) for kind in run["step_kind"]]
+    # For a contact radius, areas are compared.
+    radius = np.array([kind == CONTACT_RADIUS for kind in kinds])
+    target = np.where(radius, np.pi * target**2 / nominal_area, target)
     value = np.array([reached[kind][k] for k, kind in enumerate(kinds)])
     error = np.abs(value - target)
     adhesive = float(run["surface_energy"]) > 0
     if model_of(run.attrs).by_cells and not adhesive:
-        of_area = np.array([kind == AREA_FRACTION for kind in kinds])
+        of_area = np.array([kind in AREAS for kind in kinds])
         cells = np.minimum(AREA_TOLERANCE_CELLS / float(run["grid"]) ** 2, AREA_TOLERANCE_PART * np.abs(target))
         error = np.where(of_area, np.maximum(error - cells, 0.0), error)
     # If the target is zero load, the error is relative to the largest load of the run.
     largest = np.array([np.max(np.abs(reached[kind])) for kind in kinds])
     # With adhesion a load may be a small difference of attraction and repulsion. Each of them is about as large as the
     # stiffness times h_rms. Therefore the error of a very small load is relative to SMALLEST_LOAD times this product.
-    gross = np.abs(finite_stiffness(run)) * float(run["unit_height"]) * adhesive
-    unit = {"reduced_pressure": scale * float(run["unit_slope"]), "relative_load": scale}
+    gross = np.abs(finite_stiffness(run)) * float(run["rms_height"]) * adhesive
+    unit = {"reduced_pressure": scale * float(run["rms_slope"]), "relative_load": scale, "force": 1 / nominal_area}
     least = np.array([SMALLEST_LOAD * gross[k] / unit.get(kind, math.inf) for k, kind in enumerate(kinds)])
     return np.max(error / np.where(target != 0, np.maximum(np.abs(target), least), largest))
 

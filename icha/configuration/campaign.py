@@ -7,6 +7,7 @@ Values are in SI units. `icha.configuration.load` reads a campaign from a config
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path as FilePath
 from typing import Annotated, Any, NamedTuple
@@ -163,11 +164,15 @@ class Campaign(Section):
 
     def grid(self, surface: str) -> int | None:
         """Return the number of nodes along a side of a surface; None if its file has not been read."""
-        return getattr(self.topography(surface) or self.surfaces[surface], "grid", None)
+        return getattr(self._grid_and_period(surface), "grid", None)
 
     def period(self, surface: str) -> float:
         """Return the side of a surface, m; the surface must be random, or its file must have been read."""
-        return (self.topography(surface) or self.surfaces[surface]).period
+        return self._grid_and_period(surface).period
+
+    def _grid_and_period(self, surface):
+        """Return the object with the grid and the period of a surface; both are missing if its file is not read."""
+        return self.topography(surface) or self.surfaces[surface]
 
     def snapshots_of(self, study: str) -> list[tuple[str, float]] | None:
         """Return kind and value of all states that the runs of a study save; None if runs save only the last target.
@@ -211,7 +216,7 @@ class Campaign(Section):
 
     def _problems(self):
         for label, study in self.studies.items():
-            yield from _within(("studies", label), study.problems(self.snapshots_of(label)))
+            yield from _within(("studies", label), study.problems(self.snapshots_of(label), *self._units(label)))
             yield from _within(("studies", label), self._model_problems(study))
         sections = {section: getattr(self, section) for section in (*BESIDE_STUDIES, "measurements")}
         for section, entries in (sections | {"figures": self.figures.by_name()}).items():
@@ -229,6 +234,17 @@ class Campaign(Section):
                 read_columns(entry.path, entry.columns)
             except ValueError as error:
                 yield ("measurements", label, "path"), entry.path, str(error)
+
+    def _units(self, study: str) -> tuple[float, float]:
+        """Return the smallest E* A0 h'rms (N) and the smallest side (m) of a study; infinite if they are unknown."""
+        known = [each for each in self.contacts(study) if hasattr(self._grid_and_period(each.surface), "period")]
+        sides = {each.surface: self.period(each.surface) for each in known}
+        units = [
+            self.materials[each.material].contact_modulus * sides[each.surface] ** 2 * each.rms_slope
+            for each in known
+            if each.rms_slope != MEASURED
+        ]
+        return min(units, default=math.inf), min(sides.values(), default=math.inf)
 
     def _model_problems(self, study: Study) -> Iterator[Problem]:
         """Yield a problem for each surface that a model of the study does not support."""

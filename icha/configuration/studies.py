@@ -19,19 +19,23 @@ from icha.asperity.cohesive_zone import resolution_problem
 from icha.asperity.material import Material
 from icha.configuration.surfaces import SURFACE_KINDS, MaterialSection
 from icha.contact.models import DEFAULT_MODEL, MODELS
-from icha.path.snapshots import AreaFraction, ReducedPressure, Snapshot
+from icha.path.snapshots import AreaFraction, Indentation, ReducedPressure, Snapshot
 from icha.path.targets import (
     ASPERITY_RANGES,
+    CONTACT_RADIUS,
     DEFAULT_STEP,
+    FORCE,
     LARGEST_REDUCED_PRESSURE,
     MAX_AREA_FRACTION,
     MAX_REDUCED_PRESSURE,
+    QUANTITIES,
     RELATIVE_LOAD,
     STEP,
     Path,
 )
-from icha.support.rules import NUMBER, REFINEMENT, SLOPE, TOLERANCE, FloatRange
+from icha.support.rules import FORCES, NUMBER, REFINEMENT, SLOPE, TOLERANCE, FloatRange
 from icha.support.values import (
+    Force,
     Label,
     Length,
     Name,
@@ -49,6 +53,7 @@ from icha.support.values import (
     list_names,
     list_of_names,
     number,
+    quantity,
     stops,
     to_number,
     unknown,
@@ -99,7 +104,7 @@ Values = Annotated[
 
 
 class Targets(Section):
-    """The targets of the loading path. Exactly one of the three lists must be given."""
+    """The targets of the loading path. Exactly one of the lists must be given."""
 
     reduced_pressures: stops(ReducedPressure, increasing) | None = Field(
         default=None,
@@ -111,14 +116,22 @@ class Targets(Section):
     )
     mean_separations: stops(Length, decreasing) | None = None
     """Mean separations with unit, decreasing."""
+    forces: stops(Force, increasing) | None = None
+    """Normal forces with unit, such as `[1 mN, 2 mN]`, increasing."""
+    indentations: stops(Indentation, increasing) | None = None
+    """Indentations with unit, such as `[-50 nm, 1 um]`, increasing. The indentation is the negative separation. On a
+    surface with a shape, it is zero where the apex of the smooth shape meets the undeformed half-space."""
+    contact_radii: stops(Length, increasing) | None = None
+    """Contact radii √(A/π) with unit, increasing. A is the contact area."""
 
     _check = model_validator(mode="after")(exactly_one)
 
     @property
     def states(self) -> list[tuple[str, float]]:
         """Kind (such as reduced_pressure) and value (SI units) of every target."""
-        ((kinds, values),) = self.model_dump(exclude_none=True).items()
-        return [(kinds.removesuffix("s"), value) for value in values]
+        ((plural, values),) = self.model_dump(exclude_none=True).items()
+        (kind,) = (name for name, quantity in QUANTITIES.items() if quantity.plural == plural)
+        return [(kind, value) for value in values]
 
     @property
     def last(self) -> tuple[str, float]:
@@ -144,6 +157,9 @@ class _OrEveryStop:
         return {"anyOf": [handler(core_schema), {"const": EVERY_STOP}]}
 
 
+_ANY_FORCE = FloatRange("N", least=-FORCES.most, most=FORCES.most)
+
+
 class TurningPoint(Snapshot):
     """A state at which the loading direction changes. Exactly one key must be given. Tensile loads are negative."""
 
@@ -151,6 +167,8 @@ class TurningPoint(Snapshot):
     """Reduced pressure p/(E* h'rms) of the turning point."""
     relative_load: number(NUMBER) | None = None
     """Relative load p/E* = F/(E* A0) of the turning point."""
+    force: quantity(_ANY_FORCE, "-1 mN") | None = None
+    """Normal force of the turning point, with its unit."""
 
 
 # Names and descriptions of the parameters that a study may vary: all keys except `kind`, `path` and `crop`.
@@ -248,12 +266,23 @@ class Study(Section):
             settings["control"] = self.control
         return settings
 
-    def problems(self, snapshots: list[tuple[str, float]] | None) -> Iterator[Problem]:
-        """Yield the problems that prevent the study from running; `snapshots` come from `Campaign.snapshots_of`."""
-        alone = self.models == [DEFAULT_MODEL]
-        # At a given relative load, the smallest slope has the largest reduced pressure.
-        slope = min((slope for slope in self.rms_slopes if slope != MEASURED), default=math.inf)
-        most = (MAX_REDUCED_PRESSURE if DEFAULT_MODEL in self.models else LARGEST_REDUCED_PRESSURE) * slope
+    def problems(
+        self, snapshots: list[tuple[str, float]] | None, force_unit: float = math.inf, side: float = math.inf
+    ) -> Iterator[Problem]:
+        """Yield the problems that prevent the study from running.
+
+        Parameters
+        ----------
+        snapshots : states from `Campaign.snapshots_of`.
+        force_unit : smallest E* A0 h'rms of all contacts, N; infinite if it is unknown.
+        side : side of the smallest surface, m; infinite if it is unknown.
+        """
+        alone, by_summits = self.models == [DEFAULT_MODEL], DEFAULT_MODEL in self.models
+        # At a given load, the smallest slope has the largest reduced pressure. Smooth surfaces have the slope 0.
+        slope = min((slope for slope in self.rms_slopes if slope != MEASURED and slope > 0), default=math.inf)
+        most = MAX_REDUCED_PRESSURE if by_summits else LARGEST_REDUCED_PRESSURE
+        units = {RELATIVE_LOAD: (slope, ""), FORCE: (force_unit, " N")}
+        largest_radius = side * math.sqrt((MAX_AREA_FRACTION if by_summits else 1.0) / math.pi)
         for location, kind, value in self._states():
             # If a study has both models, asperity runs may end early at the limit of the asperity model. Therefore only
             # the first target and the turning points must be within this limit.
@@ -261,16 +290,22 @@ class Study(Section):
             if needed and kind in ASPERITY_RANGES and value > ASPERITY_RANGES[kind].most:
                 reason = f"is out of range; expected {ASPERITY_RANGES[kind].expected}, or models: [boundary_elements]"
                 yield location, value, reason
-            if kind == RELATIVE_LOAD and value > most:
-                reason = f"is a reduced pressure of {value / slope:g} at rms slope {slope:g}"
-                yield location, value, f"{reason}; expected relative loads up to {most:g}"
+            if kind in units and value > most * units[kind][0]:
+                unit, symbol = units[kind]
+                reason = f"is a reduced pressure of {value / unit:g} at rms slope {slope:g}"
+                expected = f"{QUANTITIES[kind].plural.replace('_', ' ')} up to {most * unit:g}{symbol}"
+                yield location, value, f"{reason}; expected {expected}"
+            if kind == CONTACT_RADIUS and value > largest_radius:
+                limit = f"A/A0 = {MAX_AREA_FRACTION:g}, the limit of the asperity model" if by_summits else "the square"
+                reason = f"is too large on a square of side {side:g} m"
+                yield location, value, f"{reason}; expected at most {largest_radius:g} m ({limit})"
         if self.unload or self.turning_points or self.control != "separation":
             yield from self._path_problems(snapshots)
 
     def _states(self) -> Iterator[tuple[tuple, str, float]]:
         """Yield location (keys), kind and value of each target, snapshot and turning point."""
         for k, (kind, value) in enumerate(self.targets.states):
-            yield ("targets", f"{kind}s", k), kind, value
+            yield ("targets", QUANTITIES[kind].plural, k), kind, value
         snapshots = [] if self.snapshots == EVERY_STOP else self.snapshots or []
         for key, states in (("snapshots", snapshots), ("turning_points", self.turning_points)):
             for k, state in enumerate(states):

@@ -30,7 +30,7 @@ from icha.path.stops import (
     next_of_each_kind,
     sort_targets,
 )
-from icha.path.targets import LOADS, MEAN_SEPARATION, Path
+from icha.path.targets import LOADS, Path
 
 # Distance of the last station above first contact, in h_rms, without adhesion. Exactly at first contact, a spot may
 # remain in contact because of the error of the equilibrium.
@@ -52,9 +52,9 @@ def follow_cycle(
     """
     start, targets = contact.untouched(), [TargetFunction(target, contact) for target in path.targets]
     # Targets at separations above first contact, where nothing touches.
-    above = [t for t in targets if t.target.kind == MEAN_SEPARATION and t.target.value > start.separation]
+    above = [t for t in targets if t.control is None and t.separation > start.separation]
     for each in sort_targets(above, -1):
-        state = contact.equilibrium(start, each.target.value)
+        state = contact.equilibrium(start, each.separation)
         targets.remove(each)
         progress.record_target(each.target, state)
         yield Waypoint(each.target, state, 0)

@@ -3,14 +3,16 @@
 from pydantic import Field, model_validator
 
 from icha.path.targets import QUANTITIES
-from icha.support.values import Length, Positive, Section, exactly_one, number
+from icha.support.rules import INDENTATIONS
+from icha.support.values import Force, Length, Positive, Section, exactly_one, number, quantity
 
 ReducedPressure = number(QUANTITIES["reduced_pressure"].rule)
 AreaFraction = number(QUANTITIES["area_fraction"].rule)
+Indentation = quantity(INDENTATIONS, "1 um")
 
 
 class Snapshot(Section):
-    """A state whose spots and distributions of gap and pressure are saved. Give exactly one of the four keys."""
+    """A state whose spots and distributions of gap and pressure are saved. Give exactly one key."""
 
     reduced_pressure: ReducedPressure | None = Field(  # type: ignore[valid-type]
         default=None, description="Reduced pressure p/(E* h'rms) of the state."
@@ -22,6 +24,15 @@ class Snapshot(Section):
         default=None, description="Contact area fraction A/A0 of the state."
     )
     mean_separation: Length | None = Field(default=None, description="Mean separation of the state, with its unit.")
+    force: Force | None = Field(default=None, description="Normal force of the state, such as `1 mN`.")
+    indentation: Indentation | None = Field(  # type: ignore[valid-type]
+        default=None,
+        description="Indentation of the state, such as `1 um`: the negative separation. A negative indentation means "
+        "that the undeformed surfaces do not touch.",
+    )
+    contact_radius: Length | None = Field(
+        default=None, description="Contact radius √(A/π) of the state, with its unit; A is the contact area."
+    )
 
     _check = model_validator(mode="after")(exactly_one)
 

@@ -35,15 +35,21 @@ class TargetFunction:
     def excess(self, state: State) -> float:
         """Return the excess of a state over the target, relative to the absolute value of the target.
 
-        The excess rises on loading. For a mean separation it is relative to h_rms, for zero load to LEAST_PRESSURE.
+        The excess rises on loading. For a separation it is relative to h_rms, for zero load to LEAST_PRESSURE, and for a
+        contact radius it is the excess of the area.
         """
         quantity, value = self.target.quantity, self.target.value
         if quantity.controlled is None:
-            return (value - state.separation) / self.contact.rms_height
-        found = quantity.evaluate(self.contact, state)
+            return (self.separation - state.separation) / self.contact.rms_height
         if quantity.controlled == PRESSURE:
-            return (found - value) / (abs(value) or LEAST_PRESSURE)
-        return found / value - 1
+            least = LEAST_PRESSURE * self.contact.pressure_unit / quantity.scale(self.contact)
+            return (quantity.evaluate(self.contact, state) - value) / (abs(value) or least)
+        return self.contact.area_fraction(state) / quantity.prescribed(self.contact, value) - 1
+
+    @property
+    def separation(self) -> float:
+        """Separation of a target that is a separation or an indentation, m."""
+        return self.target.quantity.prescribed(self.contact, self.target.value)
 
     @property
     def control(self) -> Control | None:
@@ -53,12 +59,12 @@ class TargetFunction:
     def predict_separation(self, state: State) -> float:
         """Return the expected separation of the target, m.
 
-        For a mean separation, it is the target value. For a load or area, it is extrapolated exponentially, and is -inf
+        For a separation or an indentation, it is that of the target. For a load or area, it is extrapolated exponentially, and is -inf
         if the load or area in the state is not positive, or does not grow on loading.
         """
         control = self.control
         if control is None:
-            return self.target.value
+            return self.separation
         ratio, slope = 1 + self.excess(state), self.contact.slope(control.quantity, state) / control.target
         return state.separation - np.log(ratio) / (slope / ratio) if ratio > 0 and slope < 0 else -np.inf
 
@@ -72,7 +78,7 @@ def sort_targets(targets: Iterable[TargetFunction], direction: int) -> list[Targ
 
     direction : sign of the change of the separation: -1 on loading, 1 on unloading.
     """
-    signs = {MEAN_SEPARATION: direction}  # loads and areas change in the opposite direction
+    signs = {MEAN_SEPARATION: direction}  # all other quantities change in the opposite direction
     return sorted(targets, key=lambda each: signs.get(each.target.kind, -direction) * each.target.value)
 
 
@@ -103,7 +109,7 @@ class InsideJump(NotConverged):
 def find_target_state(target: TargetFunction, before: State, after: State) -> State:
     """Find the state at a target that lies between two states of the path, on loading or unloading.
 
-    The state at a mean separation is computed directly. For a load or area, the interval between the two states is
+    The state at a separation is computed directly. For a load or area, the interval between the two states is
     halved until the solver finds the state at the target inside the interval. If the load or area jumps past the
     target, the interval becomes very narrow. Then the solver looks for the target on the branch after the jump, where
     load control would continue; the found state may lie outside the interval, on the other side of `before`. Raise
@@ -112,7 +118,7 @@ def find_target_state(target: TargetFunction, before: State, after: State) -> St
     """
     contact = target.contact
     if target.control is None:
-        return target.solve(before, target.target.value)
+        return target.solve(before, target.separation)
     sign = 1.0 if after.separation < before.separation else -1.0
     for halvings in range(_MAX_HALVINGS):
         width = sign * (before.separation - after.separation)

@@ -1,15 +1,16 @@
-"""Targets of a path: mean separations, loads or areas with their ranges, and turning points."""
+"""Targets of a path: separations, loads or areas with their ranges, and turning points."""
 
 from __future__ import annotations
 
 import copy
 import itertools
-from collections.abc import Iterable, Sequence
+import math
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 from icha.contact.model import AREA_FRACTION as CONTROLLED_AREA
 from icha.contact.model import PRESSURE, ContactModel, Control, State
-from icha.support.rules import LENGTH, NUMBER, POSITIVE, FloatRange
+from icha.support.rules import FORCES, INDENTATIONS, LENGTH, NUMBER, POSITIVE, FloatRange
 
 # Largest reduced pressure and area fraction of a target with the asperity model. At larger values the spots are not
 # separate, and without adhesion the mean gap soon becomes zero.
@@ -35,34 +36,46 @@ class TargetQuantity:
 
     Attributes
     ----------
-    name : name in targets and in files. Except for relative loads, this name plus an s is an argument of `Path`.
-    rule : range of values that a target may have.
-    controlled : PRESSURE or CONTROLLED_AREA if the solver prescribes this quantity; None for the mean separation.
-    unit_attribute : name of the attribute of the contact that is the unit of a pressure; empty for other quantities.
+    name : name in targets and in files.
+    rule : range and unit of the values that a target may have.
+    controlled : PRESSURE or CONTROLLED_AREA if the solver prescribes this quantity; None for a separation.
+    scale : function of the contact: the factor that converts a target, or the power of a target, to the unit of the
+        solver. The result is a pressure (Pa), an area fraction or a separation (m).
+    power : power of the target that the solver prescribes: 2 for a contact radius, otherwise 1.
+    plural : name of a list of targets; except for relative loads, `Path` has an argument of this name.
     """
 
     name: str
     rule: FloatRange
-    controlled: str | None = None
-    unit_attribute: str = ""
+    controlled: str | None
+    scale: Callable[[ContactModel], float]
+    power: int = 1
+    plural: str = ""
 
-    def scale(self, contact: ContactModel) -> float:
-        """Return the factor that converts the value of a target to SI units: in Pa for a load, and 1 otherwise."""
-        return getattr(contact, self.unit_attribute) if self.unit_attribute else 1.0
+    def __post_init__(self):
+        """Set the default plural."""
+        object.__setattr__(self, "plural", self.plural or f"{self.name}s")
 
     def evaluate(self, contact: ContactModel, state: State) -> float:
         """Return the value of the quantity in a state, in the same unit as the value of a target."""
-        if self.controlled == PRESSURE:
-            return contact.pressure(state) / self.scale(contact)
-        return state.separation if self.controlled is None else contact.area_fraction(state)
+        if self.controlled is None:
+            found = state.separation
+        else:
+            found = contact.pressure(state) if self.controlled == PRESSURE else contact.area_fraction(state)
+        return (found / self.scale(contact)) ** (1 / self.power)
+
+    def prescribed(self, contact: ContactModel, value: float) -> float:
+        """Return the pressure (Pa), area fraction or separation (m) of a target value."""
+        return value**self.power * self.scale(contact)
 
     def control(self, contact: ContactModel, value: float) -> Control | None:
         """Return the load or area that the solver must prescribe for a target value; None for a separation."""
-        return None if self.controlled is None else Control(self.controlled, value * self.scale(contact))
+        return None if self.controlled is None else Control(self.controlled, self.prescribed(contact, value))
 
 
-REDUCED_PRESSURE, RELATIVE_LOAD = "reduced_pressure", "relative_load"
-AREA_FRACTION, MEAN_SEPARATION = "area_fraction", "mean_separation"
+REDUCED_PRESSURE, RELATIVE_LOAD, FORCE = "reduced_pressure", "relative_load", "force"
+AREA_FRACTION, CONTACT_RADIUS = "area_fraction", "contact_radius"
+MEAN_SEPARATION, INDENTATION = "mean_separation", "indentation"
 _PRESSURES = FloatRange(least=LEAST_PRESSURE, most=LARGEST_REDUCED_PRESSURE)
 _AREAS = FloatRange(least=LEAST_AREA, most=1.0)
 # Ranges of targets with the asperity model.
@@ -73,17 +86,23 @@ ASPERITY_RANGES = {
 QUANTITIES = {
     quantity.name: quantity
     for quantity in (
-        TargetQuantity(REDUCED_PRESSURE, _PRESSURES, PRESSURE, "pressure_unit"),
-        TargetQuantity(RELATIVE_LOAD, POSITIVE, PRESSURE, "contact_modulus"),
-        TargetQuantity(AREA_FRACTION, _AREAS, CONTROLLED_AREA),
-        TargetQuantity(MEAN_SEPARATION, LENGTH),
+        TargetQuantity(REDUCED_PRESSURE, _PRESSURES, PRESSURE, lambda contact: contact.pressure_unit),
+        TargetQuantity(RELATIVE_LOAD, POSITIVE, PRESSURE, lambda contact: contact.contact_modulus),
+        TargetQuantity(AREA_FRACTION, _AREAS, CONTROLLED_AREA, lambda contact: 1.0),
+        TargetQuantity(MEAN_SEPARATION, LENGTH, None, lambda contact: 1.0),
+        TargetQuantity(FORCE, FORCES, PRESSURE, lambda contact: 1 / contact.area),
+        TargetQuantity(INDENTATION, INDENTATIONS, None, lambda contact: -1.0),
+        TargetQuantity(
+            CONTACT_RADIUS, LENGTH, CONTROLLED_AREA, lambda contact: math.pi / contact.area, 2, "contact_radii"
+        ),
     )
 }
-LOADS = (REDUCED_PRESSURE, RELATIVE_LOAD)
+LOADS = (REDUCED_PRESSURE, RELATIVE_LOAD, FORCE)
+AREAS = (AREA_FRACTION, CONTACT_RADIUS)
 # Kind of the target of an equilibrium between the targets of a path. The value of this target is the mean separation.
 BETWEEN = "path"
-# Kinds whose values are in m; all others have no unit.
-IN_METRES = (MEAN_SEPARATION, BETWEEN)
+# Units of the values of targets with a unit, by kind; the values of all other kinds have no unit.
+UNITS = {name: each.rule.unit for name, each in QUANTITIES.items() if each.rule.unit != "1"} | {BETWEEN: "m"}
 
 SEPARATION_CONTROL, LOAD_CONTROL = "separation", "load"
 
@@ -95,7 +114,7 @@ class Target:
     Attributes
     ----------
     kind : name of the prescribed quantity, a key of `QUANTITIES`; or BETWEEN.
-    value : prescribed value, in m for a mean separation; all other kinds have no unit.
+    value : prescribed value, in the unit of `UNITS`.
     snapshot : whether the distributions and spots of the state are saved.
     """
 
@@ -121,11 +140,15 @@ class Path:
     ----------
     reduced_pressures : values of p/(E* h'_rms), increasing, in [1e-12, 100]; with the asperity model at most 0.15.
     area_fractions : values of A/A0, increasing, in [1e-9, 1]; with the asperity model at most 0.25.
-    mean_separations : values of u in m, decreasing, in [1e-24, 1e9]. Give exactly one of these three lists.
+    mean_separations : values of u in m, decreasing, in [1e-24, 1e9].
+    forces : values of the normal force in N, increasing, in [1e-30, 1e30].
+    indentations : values of -u in m, increasing, in [-1e9, 1e9]; negative before the undeformed surfaces meet.
+    contact_radii : values of sqrt(A/pi) in m, increasing, in [1e-24, 1e9]. Give exactly one of these six lists.
     snapshots : pairs (kind, value), in any order, of states of the first loading whose distributions and spots are
-        saved. The kind is "reduced_pressure", "relative_load" (F/(E* A0)), "area_fraction" or "mean_separation" (m). A
-        snapshot is an additional target unless the list contains the same kind and value. Snapshots are in the dataset
-        in the order in which the path reaches them. Default: the last target of the list.
+        saved. The kind is "reduced_pressure", "relative_load" (F/(E* A0)), "area_fraction", "mean_separation" (m),
+        "force" (N), "indentation" (m) or "contact_radius" (m). A snapshot is an additional target unless the list
+        contains the same kind and value. Snapshots are in the dataset in the order in which the path reaches them.
+        Default: the last target of the list.
     turning_points : pairs (kind, value) at which the path turns after its last target: the first one ends unloading,
         the second one ends loading, and so on. The kinds are those of snapshots. Loads that end unloading may be
         tensile (negative) or zero.
@@ -155,6 +178,9 @@ class Path:
         area_fractions: Iterable[float] | None = None,
         mean_separations: Iterable[float] | None = None,
         *,
+        forces: Iterable[float] | None = None,
+        indentations: Iterable[float] | None = None,
+        contact_radii: Iterable[float] | None = None,
         snapshots: Sequence[tuple[str, float]] | None = None,
         turning_points: Sequence[tuple[str, float]] = (),
         unload: bool = False,
@@ -163,9 +189,10 @@ class Path:
     ) -> None:
         """Validate the values and build the list of targets."""
         lists = {REDUCED_PRESSURE: reduced_pressures, AREA_FRACTION: area_fractions, MEAN_SEPARATION: mean_separations}
+        lists |= {FORCE: forces, INDENTATION: indentations, CONTACT_RADIUS: contact_radii}
         given = [kind for kind, values in lists.items() if values is not None]
         if len(given) != 1:
-            names, found = (", ".join(f"{kind}s" for kind in kinds) for kinds in (lists, given))
+            names, found = (", ".join(QUANTITIES[kind].plural for kind in kinds) for kinds in (lists, given))
             raise ValueError(f"{names}: expected exactly one of them, got {found or 'none'}")
         (kind,) = given
         if not isinstance(unload, bool):
@@ -201,7 +228,7 @@ class Path:
 
 def _validate_list(kind, values):
     """Return the values of a list of targets as floats; raise `ValueError` if a value is out of range or order."""
-    name, rule, falls = f"{kind}s", QUANTITIES[kind].rule, kind == MEAN_SEPARATION
+    name, rule, falls = QUANTITIES[kind].plural, QUANTITIES[kind].rule, kind == MEAN_SEPARATION
     if isinstance(values, str | bytes) or not isinstance(values, Iterable):
         raise ValueError(f"{name}: expected a list of numbers, got {values!r}")
     values = [rule.validate(f"{name}[{k}]", value) for k, value in enumerate(values)]

@@ -15,6 +15,7 @@ from icha.datasets import results as results_files
 from icha.datasets.attributes import why_no_result
 from icha.datasets.results import ResultFiles, job_file
 from icha.figures.registry import DECLARATIONS
+from icha.path.targets import QUANTITIES
 from icha.planning import costs
 from icha.planning.costs import WORKFLOW
 from icha.planning.results import CampaignFiles, campaign_files
@@ -136,7 +137,7 @@ def _computed_files(campaign, results, files, sha256_of_run) -> Iterator[Item]:
         if not is_whole(results, path):
             state, reason = DAMAGED, ""
         grid = campaign.grid(case.surface)
-        sweep = _cost_parameters(run_settings(campaign, case), case.rms_slope)
+        sweep = _cost_parameters(run_settings(campaign, case), campaign.period(case.surface))
         ratio = energy_ratio(campaign, case) if sweep["adhesive"] else math.inf
         cost = run_cost(case.model, grid, summits(case.surface), energy_ratio=ratio, **sweep)
         part = f"study {case.study}" + (f", {MODELS[case.model].words}" if case.model != DEFAULT_MODEL else "")
@@ -194,15 +195,22 @@ def _derived_files(campaign, files: CampaignFiles, computed: list[Item]) -> Iter
     yield "report", "report_page", files.report, 4, files.computed, cost_of_report
 
 
-def _cost_parameters(settings, rms_slope) -> dict:
-    """Convert the settings of a run to arguments of `run_cost`."""
+def _cost_parameters(settings, side) -> dict:
+    """Convert the settings of a run to arguments of `run_cost`; `side` is the side of the surface, m."""
     path, snapshots = settings["path"], settings["path"]["snapshots"]
-    # Reduced pressure divided by the value of a target; about 1/2 for area fractions, and 0 if the pressure is unknown.
-    factors = {"reduced_pressure": 1, "relative_load": 1 / rms_slope, "area_fraction": 1 / 2, "mean_separation": 0}
-    stops = {(kind, value) for kind in factors for value in path.get(f"{kind}s") or ()}
+    modulus, slope = settings["material"]["contact_modulus"], settings["rms_slope"]
+    # Reduced pressure of a target; about half of an area fraction, and `_UNKNOWN_LOAD` if the pressure is unknown.
+    loads = {
+        "reduced_pressure": lambda value: value,
+        "relative_load": lambda value: value / slope,
+        "force": lambda value: value / (modulus * side**2 * slope),
+        "area_fraction": lambda value: value / 2,
+        "contact_radius": lambda value: math.pi * value**2 / side**2 / 2,
+    }
+    stops = {(kind, value) for kind, each in QUANTITIES.items() for value in path.get(each.plural) or ()}
     stops |= {tuple(snapshot) for snapshot in snapshots or ()}
     return {
-        "load": max(value * factors[kind] or _UNKNOWN_LOAD for kind, value in stops),
+        "load": max(loads[kind](value) if kind in loads else _UNKNOWN_LOAD for kind, value in stops),
         "stops": len(stops),
         "snapshots": 1 if snapshots is None else len(snapshots),
         "adhesive": settings["material"]["surface_energy"] > 0,

@@ -28,6 +28,9 @@ SHOWN_AT = {
     "relative_load": ("area", "gap"),
     "area_fraction": ("pressure", "gap"),
     "mean_separation": ("pressure", "area"),
+    "force": ("area", "gap"),
+    "indentation": ("pressure", "area"),
+    "contact_radius": ("pressure", "gap"),
 }
 MOST_STOPS = 12  # largest number of targets (columns) in a table; if there are more, 12 are chosen evenly
 FORMATS = {"pressure": format_scientific, "area": format_scientific, "gap": "{:.3f}".format}

@@ -94,6 +94,8 @@ NUMBER = FloatRange()
 POSITIVE = FloatRange(above=0)
 # Bounds far beyond physical lengths; within the bounds, products of powers of lengths neither overflow nor underflow.
 LENGTH = FloatRange("m", least=1e-24, most=1e9)
+INDENTATIONS = FloatRange("m", least=-1e9, most=1e9)
+FORCES = FloatRange("N", least=1e-30, most=1e30)
 
 # Surfaces.
 HURST = FloatRange(above=0, most=1)

@@ -13,7 +13,7 @@ from typing import Annotated, Any
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, WithJsonSchema
 
-from icha.support.rules import CONTACT_MODULUS, LENGTH, POSITIVE, SEED, SURFACE_ENERGY, FloatRange, IntegerRange
+from icha.support.rules import CONTACT_MODULUS, FORCES, LENGTH, POSITIVE, SEED, SURFACE_ENERGY, FloatRange, IntegerRange
 
 # A number as text. PyYAML reads `1.0e6` and `1e-3` as text, so text must be accepted as a number.
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
@@ -24,9 +24,9 @@ _UNIT = re.compile(r"[A-Za-zµμÅ°%²³⁻·][\w\s*/^().µμÅ°%²³⁻·-]*"
 _LONGEST = 100
 
 # Names of quantities, by SI unit.
-PHYSICAL_NAMES = {"m": "length", "Pa": "pressure", "J/m^2": "energy per area", "1": "ratio"}
+PHYSICAL_NAMES = {"m": "length", "Pa": "pressure", "J/m^2": "energy per area", "N": "force", "rad": "angle", "1": "ratio"}
 
-# The commonest units of pressure and energy per area. These units do not need pint, which takes long to load.
+# The commonest units of pressure, energy per area and force. These units do not need pint, which takes long to load.
 # tests/support/test_units.py compares the factors with the factors of pint.
 USUAL = {
     ("Pa", "Pa"): "1",
@@ -35,6 +35,10 @@ USUAL = {
     ("GPa", "Pa"): "1e9",
     ("J/m^2", "J/m^2"): "1",
     ("mJ/m^2", "J/m^2"): "1e-3",
+    ("N", "N"): "1",
+    ("mN", "N"): "1e-3",
+    ("uN", "N"): "1e-6",
+    ("nN", "N"): "1e-9",
 }
 
 # Units of length. Pint is not used, because pint also accepts px, pt, au and hand, which have other meanings in files
@@ -264,6 +268,7 @@ def _file(value: str) -> str:
 
 File = Annotated[Text, AfterValidator(_file)]
 Length = quantity(LENGTH, "100 um")
+Force = quantity(FORCES, "1 mN")
 Modulus = quantity(CONTACT_MODULUS, "25 MPa")
 SurfaceEnergy = quantity(SURFACE_ENERGY, "50 mJ/m^2")
 Positive = number(POSITIVE)

@@ -35,18 +35,25 @@ BOTH = pytest.mark.parametrize("material", [ADHESIVE, BARE], ids=["adhesive", "b
 def test_targets_of_every_kind_are_met_exactly_and_in_the_order_of_the_path(surface, material):
     height = surface.rms_height
     snapshots = [("relative_load", 7e-3), ("mean_separation", 1.7 * height), ("area_fraction", 0.013)]
+    snapshots += [("force", 6e-4), ("indentation", -1.6 * height), ("contact_radius", 7e-6)]
     for stops in (
         {"reduced_pressures": [1e-4, 2e-3, 1.1e-2, 3e-2]},
         {"area_fractions": [1e-3, 9e-3, 5e-2]},
         {"mean_separations": [2.2 * height, 1.1 * height]},
+        {"forces": [1e-5, 2e-4, 2e-3]},
+        {"indentations": [-2.2 * height, -1.1 * height]},
+        {"contact_radii": [2e-6, 1.2e-5]},
     ):
         run = simulate(surface, material, Path(**stops, snapshots=snapshots))
-        assert run.sizes["step"] == len(next(iter(stops.values()))) + 3
+        assert run.sizes["step"] == len(next(iter(stops.values()))) + 6
         reached = {
             "reduced_pressure": run.nominal_pressure / (MODULUS * surface.rms_slope),
             "relative_load": run.nominal_pressure / MODULUS,
             "area_fraction": run.contact_area_fraction,
             "mean_separation": run.mean_separation,
+            "force": run.nominal_pressure * PERIOD**2,
+            "indentation": -run.mean_separation,
+            "contact_radius": PERIOD * np.sqrt(run.contact_area_fraction / np.pi),
         }
         for step in run.step.values:
             kind, target = str(run.step_kind[step].item()), float(run.step_target[step])
@@ -54,7 +61,8 @@ def test_targets_of_every_kind_are_met_exactly_and_in_the_order_of_the_path(surf
         assert np.all(np.diff(run.mean_separation) < 0) and np.all(np.diff(run.contact_area_fraction) > 0)
         assert material is ADHESIVE or np.all(np.diff(run.nominal_pressure) > 0)
         assert np.all(run.residual <= RESIDUAL_TOLERANCE)
-        assert sorted(run.snapshot_kind.values) == ["area_fraction", "mean_separation", "relative_load"]
+        assert sorted(run.snapshot_kind.values) == sorted(kind for kind, _ in snapshots)
+        assert ", in N where snapshot_kind is force, else 1" in run.snapshot_target.attrs["comment"]
         at = run.snapshot_step.values
         assert np.all(np.diff(at) > 0)
         np.testing.assert_array_equal(run.step_kind.values[at], run.snapshot_kind.values)
