@@ -67,7 +67,7 @@ def other_versions(deposit: Path) -> list[str]:
 
 
 def find_runs(only: Iterable[str], deposit: Path) -> list[str]:
-    """Return the paths of the runs in a deposit that a user selects by name.
+    """Return the paths of the selected runs in a deposit; the user selects runs by name.
 
     Parameters
     ----------

@@ -263,7 +263,7 @@ class PointHalfSpace:
         return cls._assemble(ewald, points, None, found.max(axis=1), found.min(axis=1))
 
     def extended(self, points) -> PointHalfSpace:
-        """Return the half-space with additional points, a (k, 2) array in m, after the present points."""
+        """Return a half-space with the present points, followed by additional `points`, a (k, 2) array in m."""
         known, period = len(self.points), self.ewald.period
         points = np.mod(points, period)
         tree = cKDTree(points, boxsize=period)

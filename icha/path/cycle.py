@@ -257,7 +257,8 @@ class _Cycle:
         If the state `ahead` is given, this state is the equilibrium, and only its events are found. On unloading with
         adhesion, the spots together may lose their equilibrium before any single spot has reached its own jump-off. If
         this happens in a step shorter than `CLOSE_TO_A_JUMP` * h_rms, the spot closest to jump-off is made to break
-        contact. If there is still no equilibrium, two, four, … spots are made to break contact, at most all spots.
+        contact. If there is still no equilibrium, more spots are made to break
+        contact: first two, then four, and so on, up to all spots.
         On unloading, an unstable equilibrium counts as no equilibrium, unless spots were made to break contact. Raise
         the first `NotConverged` if there is no equilibrium.
         """

@@ -32,7 +32,7 @@ def event_error(du, pressure_jump):
 
 
 def integration_error(du, slope, end_slope):
-    """Return the estimated error of the work of a step without events, J/m^2: half the slope term of `Step.between`."""
+    """Return the estimated error of the work of a step without events, J/m^2: half the slope term in `Step.between`."""
     return du**2 * abs(end_slope - slope) / 24
 
 

@@ -75,7 +75,7 @@ def plan(campaign: Campaign, results: Path) -> list[Item]:
     """List all files of a campaign, except files of negligible cost, in the order of their computation.
 
     A run is done if its file exists and has the present settings (`config_sha256`). Only Snakemake detects changes of
-    the program. A file that is not a run is done if the file and its inputs exist. A file is damaged if it differs from
+    the program. Any other file is done if the file and its inputs exist. A file is damaged if it differs from
     its checksum (`icha.support.checksums`). Measured times in the folder `results` correct the expected times for this
     machine.
     """

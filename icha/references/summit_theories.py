@@ -113,7 +113,7 @@ def fuller_tabor_area(reduced_separation, moments: SpectralMoments, material: Ma
 
 
 def fuller_tabor_pressure(reduced_separation, moments: SpectralMoments, material: Material):
-    """Return p* on loading of Gaussian summits with the JKR law, negative in tension; see `fuller_tabor_area`."""
+    """Return p* during loading if the summit heights are Gaussian; negative in tension. See `fuller_tabor_area`."""
     law = JKR(material)
     pressure = _sum_over_summits(law.force, law, reduced_separation, moments)
     return pressure / (material.contact_modulus * moments.rms_slope)

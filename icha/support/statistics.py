@@ -30,9 +30,9 @@ class Ensemble(NamedTuple):
     def band(self, *, positive: bool = False) -> tuple[np.ndarray, np.ndarray]:
         """Return the bounds of the confidence interval: m ± c, or m exp(± c/m) for a `positive` quantity of mean m.
 
-        The bounds m exp(± c/m) are positive, and tend to m ± c for small c/m. They come from the interval ln(m) ± c/m:
-        the standard error of ln(m) is, to first order, that of m divided by m (delta method). If m is not positive, the
-        function returns m ± c.
+        The bounds m exp(± c/m) are positive, and tend to m ± c for small c/m. They come from the interval ln(m) ± c/m,
+        because the standard error of ln(m) is that of m, divided by m, to first order (delta method). If m is not
+        positive, the function returns m ± c.
         """
         above = (self.mean > 0) & positive
         factor = np.exp(np.divide(self.confidence, self.mean, out=np.zeros_like(self.mean), where=above))

@@ -138,8 +138,8 @@ def height_statistics(surface: Surface) -> tuple[float, float]:
 def slope_anisotropy(surface: Surface) -> float:
     """Compute the ratio of the largest to the smallest rms slope of profiles, among all directions.
 
-    The ratio is 1 for isotropic surfaces and infinite for straight grooves. Both slopes come from the principal values
-    of the slope tensor; each cell between four nodes contributes one slope.
+    The ratio is 1 for isotropic surfaces and infinite for straight grooves. Both rms slopes come from the principal
+    values of the slope tensor. This tensor is a mean over the cells between four nodes, with one gradient per cell.
     """
     z = surface.heights if surface.free else np.pad(surface.heights, ((0, 1), (0, 1)), mode="wrap")
     # Slopes between opposite corners are along axes at 45 degrees; the principal values are the same.

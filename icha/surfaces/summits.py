@@ -309,12 +309,11 @@ def paraboloid_departure(
     contact_radius : (k,) float, radius a of each spot, m.
     radius_of_curvature : (k,) float, radius of curvature R of each summit, m.
 
-    Returns
-    -------
-    float, the mean of abs(ln(d / (a^2 / 2R))) over the spots, weighted by their areas. Here d is the mean depth of the
-    surface below the summit on the circle of radius a. Near the top of an elongated summit, d follows the arithmetic
-    mean of the principal curvatures, not 1/R. The function computes the result with 1/R and with the
-    arithmetic mean, and returns the smaller result. The result is 0 if no spot is wider than half a cell.
+    Returns ------- float, the mean of abs(ln(d / (a^2 / 2R))) over the spots, weighted by their areas. Here d is the
+    mean depth of the surface below the summit on the circle of radius a. Near the top of an elongated summit, d is
+    a^2/2 times the arithmetic mean of the principal curvatures, while 1/R is their geometric mean. The function
+    computes the result with 1/R and with the arithmetic mean, and returns the smaller result. The result is 0 if no
+    spot is wider than half a cell.
     """
     mode = "mirror" if surface.free else "grid-wrap"
     spline = scipy.ndimage.spline_filter(_finite_profile(surface), order=3, mode=mode)

@@ -59,7 +59,7 @@ class ScanResolution(PreparedTopography):
 
     @cached_property
     def asperities(self) -> Asperities:
-        """Summits of the prepared surface; `Asperities` explains which summits are unsupported."""
+        """Summits of the prepared surface, and its unsupported maxima; see `Asperities`."""
         return locate_summits(self.surface)
 
     @property
