@@ -10,7 +10,7 @@ import pytest
 import xarray as xr
 from digests import digest
 
-from icha import ConvergenceError, Material, Path, SelfAffineSpectrum, Surface, simulate
+from icha import ConvergenceError, Material, Paraboloid, Path, SelfAffineSpectrum, Sphere, Surface, simulate
 from icha.asperity.stickiness import stickiness
 from icha.datasets.format import RUN, problems_with_file
 from icha.surfaces.moments import spectral_moments
@@ -216,3 +216,24 @@ def test_bad_arguments_are_refused_by_name(argument, value):
     good = {"surface": rough(), "material": BARE, "path": Path(reduced_pressures=[1e-3]), "seed": 1}
     with pytest.raises(ValueError, match=argument):
         simulate(**(good | {argument: value}))
+
+
+def test_a_smooth_sphere_pulls_off_as_jkr_says_also_if_an_area_lies_inside_its_jump():
+    modulus, radius, cell, grid = 1e6, 1e-3, 1e-6, 64
+    # The unit of radii, (dgamma R^2/E*)^(1/3), is five cells.
+    energy = (5 * cell) ** 3 * modulus / radius**2
+    surface = Surface(np.zeros((grid, grid)), grid * cell, "free", Paraboloid((radius, radius)))
+    path = Path(area_fractions=[0.03, 0.08], unload=True)
+    run = simulate(surface, Material(modulus, energy, 1e-12), path, model="boundary_elements")
+    assert "failed_checks" not in run.attrs
+    assert run.branch.values[1] == "loading" and float(run.contact_area_fraction[1]) > 0.03
+    force = run.nominal_pressure * surface.period**2
+    assert -float(force.min()) == pytest.approx(1.5 * np.pi * energy * radius, rel=5e-3)
+
+
+def test_a_run_ends_where_the_contact_of_a_shape_reaches_the_edge_of_its_square():
+    surface = Surface(np.zeros((32, 32)), 32e-6, "free", Sphere(1e-3))
+    path = Path(indentations=[2e-8, 3e-7])
+    with pytest.raises(ConvergenceError, match="reaches the edge of the square") as error:
+        simulate(surface, Material(1e6, 0.0, 1e-9), path, model="boundary_elements")
+    assert error.value.dataset.attrs["beyond_model"] and error.value.dataset.sizes["step"] == 1

@@ -93,7 +93,14 @@ def _check(run: RunArrays) -> Iterator[tuple]:
 def _check_loading(run) -> Iterator[tuple]:
     """Yield name, value and limit of the checks of the first loading, and of the stiffness check in all steps."""
     first = run["leg"] == 0  # unloading may follow other curves
-    names = ("contact_area_fraction", "nominal_pressure", "mean_separation", "step_kind", "coalescence_count")
+    names = (
+        "contact_area_fraction",
+        "nominal_pressure",
+        "mean_separation",
+        "step_kind",
+        "coalescence_count",
+        "jump_in_count",
+    )
     loading = {name: run[name][first] for name in names}
     adhesive, height = float(run["surface_energy"]) > 0, float(run["unit_height"])
     # Two targets of different kinds may lead to states that differ only by the error of the solver.
@@ -113,10 +120,10 @@ def _largest_fall_in_loading(loading, name):
     """Return the largest decrease of a variable between targets or steps, divided by the largest magnitude.
 
     At the same separation, two spots may carry less load after their union than before. Therefore the variable may
-    decrease in a step in which spots unite, but not from one target to the next.
+    decrease in a step in which spots unite, but not from one target to the next. It may also decrease in `_retreats`.
     """
     values, at_targets = loading[name], loading["step_kind"] != BETWEEN
-    united = np.cumsum(np.diff(loading["coalescence_count"], prepend=0) != 0)
+    united = np.cumsum((np.diff(loading["coalescence_count"], prepend=0) != 0) | _retreats(loading))
     parts = [values[at_targets], *(values[united == count] for count in np.unique(united))]
     fall = max(float(np.max(-np.diff(part), initial=0.0)) for part in parts)
     return fall / (float(np.max(np.abs(values))) or 1.0)
@@ -126,12 +133,20 @@ def _largest_rises_of_separation(loading):
     """Return the largest rise of the mean separation, m, in steps without unions, and in steps with unions.
 
     Steps in which the area increases to an area target are ignored, because the separation may rise in such a step. If
-    the area jumps past a target, the path meets the target on the branch after the jump.
+    the area jumps past a target, the path meets the target on the branch after the jump; see also `_retreats`.
     """
     rise = np.diff(loading["mean_separation"])
     given_area = np.isin(loading["step_kind"][1:], AREAS) & (np.diff(loading["contact_area_fraction"]) > 0)
+    given_area |= _retreats(loading)[1:]
     united = np.diff(loading["coalescence_count"]) != 0
     return tuple(float(np.max(rise[where & ~given_area], initial=0.0)) for where in (~united, united))
+
+
+def _retreats(loading):
+    """Return whether each step leads back from a jump into contact to an area target inside the jump."""
+    rises = np.diff(loading["mean_separation"], prepend=np.inf) > 0
+    jumped = (np.diff(loading["jump_in_count"], prepend=0) > 0) & (loading["step_kind"] == BETWEEN)
+    return rises & np.roll(jumped, 1) & np.isin(loading["step_kind"], AREAS)
 
 
 def _target_error(run):

@@ -202,7 +202,7 @@ def test_next_to_no_load_is_met_as_well_as_what_it_is_made_up_of():
 
 def bare_run(separations, legs, stiffness=0.0, model="asperities"):
     """What the errors of the work are made of, with an h_rms of 1 m."""
-    values = {"mean_separation": np.array(separations), "leg": np.array(legs), "rms_height": np.array(1.0)}
+    values = {"mean_separation": np.array(separations), "leg": np.array(legs), "unit_height": np.array(1.0)}
     return RunArrays(values | {"contact_stiffness": np.full(len(legs), stiffness)}, {}, {"contact_model": model})
 
 
