@@ -299,9 +299,20 @@ def contact_of(surface: Surface, material: Material) -> BoundaryElements:
         )
     layer = Layer(material.thickness / h, material.poisson_ratio) if material.layered else None
     space = HalfSpace.of(len(heights), layer, free=surface.free)
-    units = surface.unit_height, surface.unit_slope
-    solver = asperities, space, topography, front, summits
-    return BoundaryElements(heights, surface.grid, h, law, *units, *solver, surface.shape)
+    return BoundaryElements(
+        heights=heights,
+        grid=surface.grid,
+        spacing=h,
+        law=law,
+        rms_height=surface.unit_height,
+        rms_slope=surface.unit_slope,
+        asperities=asperities,
+        space=space,
+        topography=topography,
+        front=front,
+        summits=summits,
+        shape=surface.shape,
+    )
 
 
 def resumable(contact: BoundaryElements, folder: pathlib.Path) -> CheckpointedContact:

@@ -149,7 +149,7 @@ class Surface:
     @property
     def summit_radius(self) -> float:
         """Typical radius of curvature of a summit, m: 1/`rms_curvature`; without roughness, that of the shape."""
-        if self.smooth:
+        if self.shape and self.smooth:
             return self.shape.sphere_radius or self.period
         return 1 / self.rms_curvature
 
