@@ -144,7 +144,8 @@ class BoundaryElements(FullContactProblem):
 
     def relax_region(self, region: np.ndarray, separation: float) -> CellState:
         """Find the equilibrium at a separation (m), starting from contact in a given region, (n, n) bool."""
-        cells, nothing = np.flatnonzero(region), np.zeros(np.count_nonzero(region))
+        cells = np.flatnonzero(np.pad(region, (0, self.space.grid - self.grid)))
+        nothing = np.zeros(len(cells))
         return self.equilibrium(CellState(separation, cells, nothing + 1, nothing, nothing), separation)
 
     def pressure(self, state: CellState) -> float:
@@ -297,6 +298,8 @@ def contact_of(surface: Surface, material: Material) -> BoundaryElements:
             f"surface_energy: {material.surface_energy:g} J/m^2 is too small: rounding of heights up to "
             f"{topography.largest * h:g} m hides the adhesion. Use zero or a larger value"
         )
+    if not topography.largest:  # a flat punch, whose indentations are rounded like heights of the unit
+        topography = replace(topography, largest=surface.unit_height / h)
     layer = Layer(material.thickness / h, material.poisson_ratio) if material.layered else None
     space = HalfSpace.of(len(heights), layer, free=surface.free)
     return BoundaryElements(
