@@ -16,8 +16,8 @@ from icha.contact.models import AREA_TOLERANCE_CELLS, AREA_TOLERANCE_PART
 if TYPE_CHECKING:
     from icha.boundary_elements.contact import BoundaryElements
 
-# A load or area is met if its relative error is at most this. Paths allow a larger error, 1e-9 (`icha.path.stops`).
-_MET = 5e-10
+# A load or area is met if its relative error is at most this part of the error that paths allow.
+_MET = 0.5
 # Smallest difference of two separations, divided by h_rms.
 _SAME_SEPARATION = 1e-13
 # Least load to which errors at zero load are relative, in units of stiffness times h_rms: about the size of attraction
@@ -69,10 +69,11 @@ class ControlProblem:
 
     def tolerance(self, scale: float) -> float:
         """Return the largest error of a met target: a part of `scale`; for areas without adhesion, some cell areas."""
+        met = _MET * self.contact.path_accuracy.target * scale
         if self.control.quantity == AREA_FRACTION and not self.contact.adhesive:
             cells = AREA_TOLERANCE_CELLS * self.contact.spacing**2 / self.contact.area
-            return max(_MET * scale, min(cells, AREA_TOLERANCE_PART * scale))
-        return _MET * scale
+            return max(met, min(cells, AREA_TOLERANCE_PART * scale))
+        return met
 
     def newton_separation(self, state: CellState, before: CellState | None = None) -> float:
         """Predict the target's separation (m) from the slope at a state or the secant through `before`; NaN if flat."""

@@ -54,6 +54,7 @@ class PathAccuracy:
 
     Attributes
     ----------
+    target : largest relative error of a load or area that the solver meets.
     event : an event counts as located if the step that contains it is not longer than this value, in h_rms.
     loss : largest error of the work of one step with events, relative to `StepAccuracy.energy_scale`.
     balance : largest difference of work and energy change in a long step without events, relative to `energy_scale`.
@@ -63,6 +64,7 @@ class PathAccuracy:
         the pressure may jump without an event. If False, each step may be twice as long as the previous step.
     """
 
+    target: float = 1e-9
     event: float = 1e-12
     loss: float = 1e-10
     balance: float = 3e-6
@@ -169,7 +171,7 @@ MODELS = {
         periodic_only=True,
         least_cells=4,
         # Fronts that hop from cell to cell lose energy that only a finer grid would resolve.
-        accuracy=PathAccuracy(event=1e-5, loss=1e-4, tension=1e-5, error_controlled_steps=True),
+        accuracy=PathAccuracy(target=1e-6, event=1e-5, loss=1e-4, tension=1e-5, error_controlled_steps=True),
         resumable=True,
     ),
 }

@@ -78,7 +78,7 @@ def follow_cycle(
     if path.unload:
         leg = len(path.turning_points) + (len(path.turning_points) % 2 == 0)
         targets = [TargetFunction(replace(target, snapshot=False), contact) for target in path.targets]
-        pending = [target for target in targets if target.excess(cycle.state) > SAME_EXCESS]
+        pending = [target for target in targets if target.excess(cycle.state) > target.tolerance]
         yield from cycle.follow_leg(leg, pending, until_apart=True)
         progress.report_position("apart", cycle.state)
 

@@ -7,7 +7,7 @@ from icha.contact.model import ContactModel, State
 from icha.path.cycle import follow_cycle
 from icha.path.energy_balance import EnergyBalance, Waypoint, waypoint_between_targets
 from icha.path.loading import PathProgress, first_loading
-from icha.path.stops import SAME_EXCESS, TargetFunction
+from icha.path.stops import TargetFunction
 from icha.path.targets import BETWEEN, LOAD_CONTROL, REDUCED_PRESSURE, Path, Target
 
 
@@ -81,8 +81,8 @@ def select_load_control(
         state = waypoint.state
         pressure = contact.pressure(state)
         advances = pressure >= load if waypoint.loading else pressure <= load
-        # If two targets have the same load, rounding may make the load of the second target slightly smaller.
-        advances |= waypoint.target.kind != BETWEEN and abs(pressure - load) <= SAME_EXCESS * abs(load)
+        # If two targets have the same load, their errors may make the load of the second target slightly smaller.
+        advances |= waypoint.target.kind != BETWEEN and abs(pressure - load) <= contact.path_accuracy.target * abs(load)
         landed = load_target is not None and waypoint.target is load_target.target
         # The first state is always visited, because a jump can only start from a visited state.
         if last_visited is not None and not advances and not landed:

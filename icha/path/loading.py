@@ -11,7 +11,6 @@ import numpy as np
 from icha.contact.model import BeyondModel, ContactModel, NotConverged, State
 from icha.path.energy_balance import Waypoint
 from icha.path.stops import (
-    SAME_EXCESS,
     SAME_SEPARATION,
     InsideJump,
     TargetFunction,
@@ -203,5 +202,5 @@ def _solve_within_step(target, expected, following, state, step) -> State | None
         return None
     same = SAME_SEPARATION * target.contact.rms_height
     outside = target.control and not state.separation - step <= found.separation <= state.separation + same
-    passed = any(other.excess(found) > SAME_EXCESS for other in following if other is not target)
+    passed = any(other.excess(found) > other.tolerance for other in following if other is not target)
     return None if outside or passed else found

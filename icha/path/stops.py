@@ -52,6 +52,11 @@ class TargetFunction:
         return self.target.quantity.prescribed(self.contact, self.target.value)
 
     @property
+    def tolerance(self) -> float:
+        """Largest absolute value of `excess` in a state that meets the target."""
+        return SAME_EXCESS if self.target.quantity.controlled is None else self.contact.path_accuracy.target
+
+    @property
     def control(self) -> Control | None:
         """Load or area that the solver prescribes to meet the target; None for a separation."""
         return self.target.quantity.control(self.contact, self.target.value)
@@ -187,7 +192,7 @@ def find_first_target(
     """
     first: tuple[TargetFunction | None, State] = None, after
     for target in targets:
-        if abs(target.excess(after)) <= SAME_EXCESS and first[0] is None:
+        if abs(target.excess(after)) <= target.tolerance and first[0] is None:
             first = target, after
         elif direction * target.excess(after) <= 0:
             found = find_target_state(target, before, after)
