@@ -97,8 +97,8 @@ def simulate(
     surface : rough surface, scaled to its final rms slope.
     material : contact modulus, work of adhesion, range of attraction and largest flaw of the interface.
     path : loads, areas or separations to reach; at some of these targets, spots and distributions are stored.
-    model : "asperities" or "boundary_elements". Boundary elements are slower, use the limit of a short range of
-        attraction, and need a periodic surface.
+    model : "asperities" or "boundary_elements". Boundary elements are slower, and use the limit of a short range
+        of attraction.
     seed : seed of the surface, for the record in the dataset; -1 for a surface without a seed.
     progress : function that is called with a line of text at every target.
     kept : folder of checkpoints (`icha.contact.checkpoints`), only with boundary elements. If a call was interrupted, a
