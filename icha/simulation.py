@@ -33,6 +33,7 @@ from icha.datasets.attributes import COMPUTED, file_attributes
 from icha.datasets.build import bin_values, build_dataset, concatenate_rows, describe_variables, get_values, stack_rows
 from icha.datasets.variables.run import CYCLE, FURTHER, LOOP, RUN
 from icha.datasets.variables.terms import MATERIAL, ROUGHNESS, Table
+from icha.half_space.layer import softness_of
 from icha.path.energy_balance import Waypoint, summarise_loop
 from icha.path.follow import follow
 from icha.path.targets import (
@@ -53,7 +54,7 @@ from icha.path.targets import (
 from icha.support.rules import IntegerRange
 from icha.surfaces.moments import height_statistics, slope_anisotropy, spectral_moments
 from icha.surfaces.summits import SummitCoverage, locate_summits
-from icha.surfaces.surface import Surface
+from icha.surfaces.surface import Surface, full_contact_pressure
 
 # A contact area may exceed its limit by this fraction, because equilibria have small errors.
 _AREA_TOLERANCE = 1e-6
@@ -443,7 +444,10 @@ def _target_unit(kinds: set[str], named_by: str) -> dict:
 def _surface_values(surface: Surface, material: Material, seed: int) -> dict:
     """Return the values of the surface and the material, by variable name."""
     moments, (skewness, kurtosis) = spectral_moments(surface), height_statistics(surface)
-    complete = surface.complete_contact_pressure * material.contact_modulus
+    # Pressure in full contact at zero load, for E* = 1. Half its work on the heights is the elastic energy.
+    pressure = full_contact_pressure(surface.heights, surface.period, free=surface.free, softness=softness_of(material))
+    complete = -float(pressure.min()) * material.contact_modulus
+    energy = float(np.vdot(surface.heights, pressure)) / (2 * pressure.size)
     return {
         **get_values(material, *MATERIAL, "flaw_radius"),
         **get_values(surface, *ROUGHNESS, "unit_height", "unit_slope", "period", "boundary", "grid"),
@@ -455,7 +459,7 @@ def _surface_values(surface: Surface, material: Material, seed: int) -> dict:
         "tabor_parameter": material.tabor_parameter(surface.summit_radius),
         "stickiness": stickiness(moments, material),
         "full_contact_energy_ratio": full_contact_energy_ratio(
-            surface.full_contact_energy, material.contact_modulus, material.surface_energy
+            energy, material.contact_modulus, material.surface_energy
         ),
         "complete_contact_pressure": complete,
         "theoretical_strength": material.theoretical_strength,

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import scipy.fft
 
 from icha.asperity.jkr import JKR, MaterialUnits
 from icha.boundary_elements.adhesive import Summits
@@ -14,6 +13,7 @@ from icha.boundary_elements.elastic_contact import Topography
 from icha.boundary_elements.front import Front
 from icha.boundary_elements.half_space import HalfSpace
 from icha.boundary_elements.patches import CellState
+from icha.half_space.layer import softness_of
 from icha.surfaces.shapes import Shape
 from icha.surfaces.summits import Asperities
 from icha.surfaces.surface import full_contact_pressure
@@ -62,12 +62,8 @@ class FullContactProblem(MaterialUnits):
         """Pressure in full contact minus its mean value, (n, n), Pa; without closed form zero."""
         if not self.space.mean_is_fixed:
             return np.zeros_like(self.heights)
-        if self.space.layer:
-            compliance = self.space.compliance[np.dtype(float)].copy()
-            compliance[0, 0] = np.inf
-            modes = scipy.fft.rfft2(self.topography.double, workers=1) / compliance
-            return self.contact_modulus * scipy.fft.irfft2(modes, s=self.heights.shape, workers=1)
-        return self.contact_modulus * full_contact_pressure(self.heights, len(self.heights) * self.spacing)
+        side, softness = len(self.heights) * self.spacing, softness_of(self.law.material)
+        return self.contact_modulus * full_contact_pressure(self.heights, side, softness=softness)
 
     @property
     def interface_strength(self) -> float:

@@ -25,73 +25,17 @@ from typing import Protocol
 import numpy as np
 import scipy.fft
 from numpy.typing import DTypeLike
-from scipy.interpolate import make_interp_spline
-from scipy.special import j0
 
 from icha.boundary_elements import transforms
 from icha.boundary_elements.tiles import TiledGrid
+from icha.half_space.layer import Layer, layer_compliance, layer_correction
 
 # Stiffness of the approximate inverse for the mean displacement, divided by its stiffness for the longest wave.
 _MEAN_STIFFNESS = 0.3
 # Width of the margin on two sides of a free square, in cells: more than the radius of every stencil.
 MARGIN = 8
-# A layer is not displaced farther than _FAR thicknesses from a load. Largest a = q t in `layer_correction`.
-_FAR, _LARGEST_A = 20.0, 20.0
 # Sides of smaller squares around the contact on a free square are multiples of this number of cells.
 _SQUARE = 16
-
-
-@dataclass(frozen=True)
-class Layer:
-    """Elastic layer bonded to a rigid base: thickness in cell sizes, and Poisson ratio."""
-
-    thickness: float
-    poisson_ratio: float
-
-    @property
-    def uniform_compliance(self) -> float:
-        """Displacement by a uniform unit pressure, E* t/M, in cell sizes; M is the modulus of uniaxial strain."""
-        return self.thickness * (1 - 2 * self.poisson_ratio) / (1 - self.poisson_ratio) ** 2
-
-
-def layer_compliance(q: np.ndarray, layer: Layer) -> np.ndarray:
-    """Return the displacement by a unit pressure wave of wave number q on a layer without friction, times E*.
-
-    The compliance is (2/q) phi(a) with a = q t and phi from `_layer_factor`; for q = 0 it is `uniform_compliance`.
-    """
-    safe = np.where(q > 0, q, 1.0)
-    return np.where(q > 0, 2 / safe * _layer_factor(safe * layer.thickness, layer), layer.uniform_compliance)
-
-
-def _layer_factor(a, layer):
-    """Return the compliance of a layer divided by that of a half-space, for a = q t > 0.
-
-    ((3 - 4 nu) sinh 2a - 2a) / ((3 - 4 nu) cosh 2a + 2a^2 + 5 - 12 nu + 8 nu^2): K. L. Johnson, Contact Mechanics,
-    1985, sec. 13.5.
-    """
-    nu = layer.poisson_ratio
-    # Multiplied by 2 exp(-2a) above and below, so that nothing overflows.
-    decay = np.exp(-2 * a)
-    above = (3 - 4 * nu) * -np.expm1(-4 * a) - 4 * a * decay
-    below = (3 - 4 * nu) * (1 + decay**2) + 2 * decay * (2 * a**2 + 5 - 12 * nu + 8 * nu**2)
-    return above / below
-
-
-def layer_correction(r: np.ndarray, layer: Layer) -> np.ndarray:
-    """Return the displacement at distances r from the middle of a cell on a layer, minus that on a half-space.
-
-    It is the Hankel transform (1/pi t) int (phi(a) - 1) J0(a r/t) exp(-a^2/(24 t^2)) da. The factor exp averages over a
-    cell. Farther than `_FAR` thicknesses, a layer is not displaced.
-    """
-    t = layer.thickness
-    far = min(_FAR * t, float(np.max(r)))
-    # phi - 1 vanishes as exp(-2a). The nodes resolve the oscillations of J0 up to `far`.
-    node, weight = np.polynomial.legendre.leggauss(200 + int(_LARGEST_A * far / t))
-    a = _LARGEST_A * (node + 1) / 2
-    factor = _LARGEST_A / 2 * weight * (_layer_factor(a, layer) - 1) * np.exp(-((a / t) ** 2) / 24) / (np.pi * t)
-    table = np.linspace(0, far, 64 + int(16 * far / t))
-    spline = make_interp_spline(table, np.array([np.dot(factor, j0(a * each / t)) for each in table]), k=5)
-    return np.where(r <= far, spline(np.minimum(r, far)), -1 / (np.pi * np.maximum(r, 1.0)))
 
 
 def cell_displacement(y: np.ndarray, x: np.ndarray) -> np.ndarray:

@@ -178,5 +178,9 @@ class AsperityObservables:
 
 
 def contact_of(surface: Surface, material: Material) -> InteractingAsperities:
-    """Return the contact of a surface and a material; raise `ValueError` if the surface has no summits."""
+    """Return the contact of a surface and a material; raise `ValueError` for a layer or a surface without summits."""
+    if material.layered:
+        raise ValueError(
+            f"thickness: {material.thickness:g} m; the asperity model is only for a half-space. Use boundary elements"
+        )
     return InteractingAsperities(JKR(material), find_summits(surface), surface.unit_height, surface.unit_slope)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import sys
 import warnings
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -299,7 +300,13 @@ class Surface:
         return Surface(heights, self.period)
 
 
-def full_contact_pressure(heights: np.ndarray, period: float, *, free: bool = False) -> np.ndarray:
+def full_contact_pressure(
+    heights: np.ndarray,
+    period: float,
+    *,
+    free: bool = False,
+    softness: Callable[[np.ndarray], np.ndarray] | None = None,
+) -> np.ndarray:
     """Return the pressure in full contact at zero load, divided by E*: (n, n) array with p(q) = q h(q)/2 for waves q.
 
     Parameters
@@ -307,14 +314,27 @@ def full_contact_pressure(heights: np.ndarray, period: float, *, free: bool = Fa
     heights : (n, n), m.
     period : side of the square, m.
     free : True if mirror images continue the heights at the edges; False for a periodic surface.
+    softness : function of q (1/m) that returns the compliance divided by that of a half-space, such as `Layer.factor`;
+        None for a half-space.
     """
     n = len(heights)
+
+    def stiffness(ky, kx, unit):
+        q = np.hypot(ky[:, None], kx)
+        q *= unit
+        if softness:
+            q[0, 0] = unit
+            q /= softness(q)
+        q[0, 0] = 0.0
+        q /= 2
+        return q
+
     if free:
         modes, k = scipy.fft.dctn(heights, workers=1), np.arange(n)
-        modes *= np.pi / (2 * period) * np.hypot(k[:, None], k)
+        modes *= stiffness(k, k, np.pi / period)
         return scipy.fft.idctn(modes, workers=1, overwrite_x=True)
     modes, each = scipy.fft.rfft2(heights, workers=1), np.fft.fftfreq(n, 1 / n)
-    modes *= np.pi / period * np.hypot(each[:, None], each[: modes.shape[1]])
+    modes *= stiffness(each, each[: modes.shape[1]], 2 * np.pi / period)
     return scipy.fft.irfft2(modes, s=heights.shape, workers=1, overwrite_x=True)
 
 

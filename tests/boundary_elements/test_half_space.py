@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 
 from icha.boundary_elements import transforms
-from icha.boundary_elements.half_space import HalfSpace, Layer, layer_compliance
+from icha.boundary_elements.half_space import HalfSpace
+from icha.half_space.layer import Layer, layer_compliance
 from icha.support import parallel
+from icha.surfaces.surface import full_contact_pressure
 
 
 @pytest.mark.parametrize("kind", [np.float32, np.float64])
@@ -69,3 +71,16 @@ def test_a_smaller_square_around_the_contact_has_the_displacements_of_the_whole_
     operator = space.restrict_to(cells)
     assert operator.space.grid < 60
     np.testing.assert_allclose(operator.displacement(pressure), space.displacement(cells, pressure, cells), atol=1e-5)
+
+
+@pytest.mark.parametrize("free", [False, True])
+def test_the_pressure_in_full_contact_with_a_layer_displaces_it_by_the_heights(free):
+    layer, grid = Layer(5.0, 0.4), 32
+    heights = smooth_patch(grid, 4.0, 10) + 0.5 * smooth_patch(grid, 3.0, 20)
+    heights -= heights.mean()
+    pressure = full_contact_pressure(heights, grid, free=free, softness=layer.factor)
+    # A free square counts as a quarter of a periodic cell that consists of the square and its mirror images.
+    if free:
+        pressure = np.block([[pressure, pressure[:, ::-1]], [pressure[::-1], pressure[::-1, ::-1]]])
+    displaced = HalfSpace.of(len(pressure), layer).displacement(np.arange(pressure.size), pressure.ravel())
+    np.testing.assert_allclose(displaced[:grid, :grid], heights, atol=1e-10)
