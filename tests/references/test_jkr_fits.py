@@ -1,0 +1,88 @@
+"""Evaluation of JKR tests: exact curves return their parameters; misfits, orders and refused arguments."""
+
+import math
+
+import numpy as np
+import pytest
+
+from icha.references import indentation as closed
+from icha.references.jkr_fits import evaluate_jkr_test, fit_work_of_adhesion, pull_off_ratio
+
+MODULUS, RADIUS = 1e6, 1e-3
+
+
+def stable_states(work, smallest=1.0, largest=6.0):
+    """Return states of a JKR sphere between multiples of the contact radius at pull-off."""
+    unit = float(closed.sphere_pull_off(RADIUS, MODULUS, max(work, 1e-3)).contact_radius)
+    return closed.sphere_contact(unit * np.linspace(smallest, largest, 30), RADIUS, MODULUS, work)
+
+
+@pytest.mark.parametrize("quantity", ["contact_radius", "indentation"])
+@pytest.mark.parametrize("modulus", [None, MODULUS])
+@pytest.mark.parametrize("work", [0.05, 1e-4, 3.0])
+def test_fit_to_an_exact_curve_returns_its_parameters(quantity, modulus, work):
+    states = stable_states(work)
+    fit = fit_work_of_adhesion(states.force, RADIUS, contact_modulus=modulus, **{quantity: getattr(states, quantity)})
+    assert fit.work_of_adhesion == pytest.approx(work, rel=1e-5)
+    assert fit.contact_modulus == pytest.approx(MODULUS, rel=1e-5)
+    assert fit.misfit < 1e-8
+
+
+@pytest.mark.parametrize("quantity", ["contact_radius", "indentation"])
+def test_fit_to_hertz_finds_no_adhesion(quantity):
+    states = stable_states(0.0)
+    fit = fit_work_of_adhesion(states.force, RADIUS, **{quantity: getattr(states, quantity)})
+    assert 1.5 * math.pi * RADIUS * fit.work_of_adhesion < 1e-6 * states.force.max()
+    assert fit.contact_modulus == pytest.approx(MODULUS, rel=1e-4)
+
+
+def test_fit_is_a_minimum_of_the_squared_differences_of_cubed_radii():
+    rng, states = np.random.default_rng(2), stable_states(0.05, smallest=1.5)
+    a = np.asarray(states.contact_radius) * (1 + 0.02 * rng.standard_normal(30))
+    fit = fit_work_of_adhesion(states.force, RADIUS, contact_radius=a)
+
+    def misfit(work, modulus):
+        law = closed.sphere_radius_at_force(states.force, RADIUS, modulus, work)
+        return math.sqrt(np.mean((law**3 - a**3) ** 2)) / a.max() ** 3
+
+    least = misfit(fit.work_of_adhesion, fit.contact_modulus)
+    assert fit.misfit == pytest.approx(least, rel=1e-9)
+    for factor, other in ((1.01, 1), (0.99, 1), (1, 1.01), (1, 0.99)):
+        assert misfit(factor * fit.work_of_adhesion, other * fit.contact_modulus) > least
+
+
+@pytest.mark.parametrize("quantity", ["contact_radius", "indentation"])
+def test_loading_and_unloading_are_fitted_separately(quantity):
+    loading, unloading = stable_states(0.03, smallest=1.7, largest=9.0), stable_states(0.08)
+    # The last states of unloading lie beyond the pull-off force, and the surfaces are apart at both ends.
+    beyond = stable_states(0.08, smallest=0.7, largest=0.95)
+    force = np.concatenate([[0.0], loading.force, unloading.force[::-1], beyond.force[::-1], [0.0]])
+    first, second, third = (getattr(states, quantity) for states in (loading, unloading, beyond))
+    values = np.concatenate([[0.0], first, second[::-1], third[::-1], [0.0]])
+    assert loading.force.max() > unloading.force.max()
+    test = evaluate_jkr_test(force, RADIUS, contact_modulus=MODULUS, **{quantity: values})
+    assert test.unloading.work_of_adhesion == pytest.approx(0.08, rel=1e-5)
+    assert test.loading.work_of_adhesion == pytest.approx(0.03, rel=1e-5)
+    assert test.pull_off_work == pytest.approx(0.08, rel=1e-9)
+    assert pull_off_ratio(force, RADIUS, 0.05) == pytest.approx(1.6, rel=1e-9)
+
+
+def test_pull_off_ratio_is_zero_without_tension():
+    assert pull_off_ratio([0.0, 1e-3], RADIUS, 0.05) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"force": [1.0, 2.0]}, "contact_radius, indentation: give one of the two"),
+        ({"force": [1.0], "contact_radius": [1.0], "indentation": [1.0]}, "give one of the two"),
+        ({"force": [1.0, 2.0], "contact_radius": [1.0]}, "force, contact_radius: must be of the same length"),
+        ({"force": [1.0], "indentation": [1.0]}, "at least 2 values"),
+        ({"force": [1.0, math.nan], "indentation": [1.0, 2.0]}, "force: must be a list of finite numbers"),
+        ({"force": [0.0, 0.0], "indentation": [1.0, 2.0]}, "must not all be zero"),
+        ({"force": [1.0], "indentation": [1.0], "contact_modulus": 0.0}, "contact_modulus: 0.0 must be"),
+    ],
+)
+def test_invalid_arguments_are_refused(arguments, message):
+    with pytest.raises(ValueError, match=message):
+        fit_work_of_adhesion(radius=RADIUS, **arguments)
