@@ -249,7 +249,9 @@ class BoundaryElements(FullContactProblem):
 
     def _events(self, before, after):
         """Find jumps, coalescences and splits between two states; without adhesion they release no energy."""
-        energy = self._energy_of_cells if self.adhesive else lambda state: np.zeros(len(state.cells))
+        energy = (
+            self._energy_of_lone_cells if self.adhesive else lambda state, chosen: np.zeros(np.count_nonzero(chosen))
+        )
         return patch_events(before, after, energy, self.summits.cell, self.space.grid, self.spacing)
 
     def _with_slopes(self, state, accuracy):
@@ -267,6 +269,13 @@ class BoundaryElements(FullContactProblem):
             # The area changes by whole cells, but on average it is nearly proportional to the load.
             area_slope = self.area_fraction(state) * pressure_slope / self.pressure(state)
         return replace(state, pressure_slope=pressure_slope, area_slope=area_slope, rates=(fraction, pressure))
+
+    def _energy_of_lone_cells(self, state, chosen):
+        """Return the energy of chosen cells as in `_energy_of_cells`, J/m^2, without pressure on other cells."""
+        cells, pressure = state.cells[chosen], state.pressure[chosen]
+        displaced = self.space.displacement(cells, pressure / self.contact_modulus, cells) * self.spacing
+        areas = adhesive_areas(state.fraction[chosen], state.mean_fraction[chosen])
+        return 0.5 * pressure * displaced - self.law.material.surface_energy * areas
 
     def _energy_of_cells(self, state):
         """Return the elastic energy minus the work of adhesion of each cell in contact, (k,), J/m^2."""

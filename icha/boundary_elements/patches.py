@@ -122,7 +122,7 @@ def patch_centres(cells: np.ndarray, grid: int, labels: np.ndarray, count: int, 
 def patch_events(
     before: CellState,
     after: CellState,
-    energy_of_cells: Callable[[CellState], np.ndarray],
+    energy_of_cells: Callable[[CellState, np.ndarray], np.ndarray],
     summits: np.ndarray,
     grid: int,
     spacing: float,
@@ -131,8 +131,8 @@ def patch_events(
 
     Parameters
     ----------
-    energy_of_cells : function that returns the energy of each cell of a state, (k,), J/m^2. A patch that jumps off
-        releases its energy. A patch that jumps in releases the negative of its energy.
+    energy_of_cells : function that returns the energy, J/m^2, of chosen cells of a state, (k,) bool, as if no other
+        cells were in contact. A patch that jumps off releases its energy; one that jumps in, the negative of it.
     summits : (m,) int, cells of the summits.
     grid, spacing : number of cells along a side, and size of a cell in m.
     """
@@ -157,7 +157,10 @@ def _events_of_patches(kind, which, sign, state, labels, count, energy_of_cells,
     """Return an event that releases sign * energy, at least 0, for each patch in `which`, (e,), counted from 0."""
     if not len(which):
         return Events.concatenate(())
-    energy = np.bincount(labels, energy_of_cells(state), count + 1)[1:]
+    energy = np.zeros(count)
+    if sign:
+        chosen = np.isin(labels, which + 1)
+        energy = np.bincount(labels[chosen], energy_of_cells(state, chosen), count + 1)[1:]
     position = patch_centres(state.cells, grid, labels, count, state.fraction) * spacing
     return Events(
         np.full(len(which), kind, np.int8),
