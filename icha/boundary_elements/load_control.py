@@ -75,6 +75,17 @@ class ControlProblem:
             return max(met, min(cells, AREA_TOLERANCE_PART * scale))
         return met
 
+    def is_past_maximum(self, state: CellState, separation: float, bracket: Bracket) -> bool:
+        """Return whether a load below the target falls as the surfaces approach, by a predicted separation (m)."""
+        rising = self.control.quantity == PRESSURE and bracket.sign > 0 and bracket.beyond is None
+        return rising and self.error(state) < 0 and not separation < state.separation
+
+    def loose_tolerance(self, state: CellState, scale: float) -> float:
+        """Return the error of a nearby state that tight fronts may cause: a part of pressures, which may cancel."""
+        if self.control.quantity == PRESSURE:
+            scale = max(scale, float(np.sum(np.abs(state.pressure))) / self.contact.count)
+        return TOLERANCES.fine * scale
+
     def newton_separation(self, state: CellState, before: CellState | None = None) -> float:
         """Predict the target's separation (m) from the slope at a state or the secant through `before`; NaN if flat."""
         slope = self.contact.slope(self.control.quantity, state)
@@ -145,8 +156,9 @@ def solve_at_control(problem: ControlProblem, state: CellState, separation: floa
         separation = problem.closer(state.separation)
     reason = ""
     try:
-        for _ in range(_MAX_ATTEMPTS):
-            trial = find_nearby_state(problem, bracket, separation, scale)
+        # Near an extremum of the load, a loose front may seem to meet a target that no equilibrium meets.
+        for residual in (TOLERANCES.coarse, *(_MAX_ATTEMPTS - 1) * (TOLERANCES.fine,)):
+            trial = find_nearby_state(problem, bracket, separation, scale, residual)
             if abs(problem.error(trial)) <= problem.tolerance(scale) and not contact.adhesive:
                 return trial
             # States with loose fronts are not accurate bounds, so the secant steps begin with the initial bracket.
@@ -154,7 +166,10 @@ def solve_at_control(problem: ControlProblem, state: CellState, separation: floa
             if met:
                 return found
             bracket = initial.with_state(found, problem.error(found))
-            separation = bracket.limit(problem.newton_separation(found))
+            separation = problem.newton_separation(found)
+            if problem.is_past_maximum(found, separation, bracket):
+                separation = problem.closer(found.separation)
+            separation = bracket.limit(separation)
     except FullContact:
         if control.quantity == PRESSURE and initial.sign > 0:
             return contact.full_contact(control.target)
@@ -164,28 +179,28 @@ def solve_at_control(problem: ControlProblem, state: CellState, separation: floa
     raise NotConverged(f"found no equilibrium at a {control.quantity.replace('_', ' ')} of {control.target:g}{reason}")
 
 
-def find_nearby_state(problem: ControlProblem, bracket: Bracket, separation: float, scale: float) -> CellState:
-    """Find a state with an error of at most TOLERANCES.fine times `scale`, or without adhesion the final error.
+def find_nearby_state(
+    problem: ControlProblem, bracket: Bracket, separation: float, scale: float, residual: float
+) -> CellState:
+    """Find a state with an error of at most `loose_tolerance`, or without adhesion of at most the final error.
 
-    The first trial relaxes the fronts to TOLERANCES.coarse, and later trials to TOLERANCES.fine. After a trial that
+    The first trial relaxes the fronts to `residual`, and later trials to TOLERANCES.fine. After a trial that
     passes the target with an event, the next trial starts again from the state before the target. Raise `FullContact`
     if the mean gap vanishes, and `NotConverged` after too many trials.
     """
-    contact, start, residual = problem.contact, bracket.before, TOLERANCES.coarse
-    control_is_load = problem.control.quantity == PRESSURE
-    tolerance = TOLERANCES.fine * scale if contact.adhesive else problem.tolerance(scale)
+    contact, start = problem.contact, bracket.before
     trials = _MAX_TRIALS // 2 if contact.adhesive else 2 * _MAX_TRIALS
     for _ in range(trials):
         trial, residual = problem.solve(start, separation, residual), TOLERANCES.fine
         error = problem.error(trial)
-        if abs(error) <= tolerance:
+        if abs(error) <= (problem.loose_tolerance(trial, scale) if contact.adhesive else problem.tolerance(scale)):
             return trial
         bracket = bracket.with_state(trial, error)
         passed = trial is not bracket.before and len(problem.events(bracket.before, trial))
         start = bracket.before if passed else trial
         separation = problem.newton_separation(trial)
-        if control_is_load and bracket.sign > 0 and bracket.beyond is None and not separation < trial.separation:
-            # The load falls as the surfaces approach, so search past the minimum of the load.
+        if problem.is_past_maximum(trial, separation, bracket):
+            # Search past the minimum of the load.
             separation = problem.closer(trial.separation)
         separation = bracket.limit(separation)
         if separation < contact.smallest_gap:
@@ -198,12 +213,16 @@ def find_nearby_state(problem: ControlProblem, bracket: Bracket, separation: flo
 def iterate_secant(problem: ControlProblem, bracket: Bracket, trial: CellState, scale: float) -> tuple[CellState, bool]:
     """Approach the target by secant steps from a state near it; return the last state and whether the target is met.
 
-    The steps end without meeting the target when an error exceeds TOLERANCES.fine times `scale`, as after a jump. Raise
-    `FullContact` if the mean gap vanishes, and `NotConverged` after _MAX_TRIALS steps.
+    The steps end without meeting the target at a maximum of the load below it, and when an error exceeds
+    `loose_tolerance`, as after a jump. Raise `FullContact` if the mean gap vanishes, and `NotConverged` after
+    _MAX_TRIALS steps.
     """
     before, error = None, problem.error(trial)
     for _ in range(_MAX_TRIALS):
-        separation = bracket.limit(problem.newton_separation(trial, before))
+        separation = problem.newton_separation(trial, before)
+        if problem.is_past_maximum(trial, separation, bracket):
+            return trial, False
+        separation = bracket.limit(separation)
         if separation < problem.contact.smallest_gap:
             raise FullContact("the mean gap vanishes")
         # The first trial may have a loose front, too inaccurate for a secant.
@@ -213,7 +232,7 @@ def iterate_secant(problem: ControlProblem, bracket: Bracket, trial: CellState, 
         error = problem.error(trial)
         if abs(error) <= problem.tolerance(scale):
             return trial, True
-        if abs(error) > TOLERANCES.fine * scale:
+        if abs(error) > problem.loose_tolerance(trial, scale):
             return trial, False
         bracket = bracket.with_state(trial, error)
     raise NotConverged(f"{_MAX_TRIALS} secant steps did not meet the target")
