@@ -63,7 +63,7 @@ def _print_run(run, file: Path) -> None:
     echo(f"{steps} steps, {run.sizes.get('snapshot', 0)} snapshots, residual at most {residual:.1e} h_rms")
     curves = {label: run[name].values for name, label in CURVES.items()}
     if str(run["boundary"].values) == "free":
-        curves["gap/h_rms"] = (run["mean_gap"] / run["rms_height"]).values
+        curves["gap/h_rms"] = (run["mean_gap"] / run["unit_height"]).values
     for label, values in curves.items():
         echo(f"{label:>10} {values.min():.3g} to {values.max():.3g}")
     if "gap/h_rms" in curves:
@@ -82,7 +82,7 @@ def _print_surface(surface, file: Path) -> None:
     from icha.datasets.surface_file import measured_scale
 
     echo(f"{file}: {printable(surface.attrs.get('title', 'surface'))}")
-    for key in ("summary", "boundary", "source_file", "preparation"):
+    for key in ("summary", "boundary", "shape", "source_file", "preparation"):
         if key in surface.attrs:
             echo(f"{key.replace('_', ' ')}: {printable(surface.attrs[key])}")
     echo("")

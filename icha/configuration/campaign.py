@@ -89,7 +89,7 @@ class Campaign(Section):
     defaults: Defaults = Defaults()
     """Default values for all surfaces, materials or studies."""
     surfaces: Annotated[dict[Name, AnySurface], Field(min_length=1)]
-    """Surfaces by name. Each surface has `kind: self_affine`, `kind: measured` or `kind: file`."""
+    """Surfaces by name. Each surface has `kind: self_affine`, `kind: measured`, `kind: file` or `kind: smooth`."""
     materials: Annotated[dict[Name, MaterialSection], Field(min_length=1)]
     """Materials by name."""
     studies: Annotated[dict[Name, Study], Field(min_length=1)]
@@ -151,7 +151,7 @@ class Campaign(Section):
         return campaign
 
     def topography(self, surface: str) -> Topography | None:
-        """Return the properties of a surface from a file; None for a random surface."""
+        """Return the properties of a surface from a file; None for other surfaces."""
         return self._topographies.get(surface)
 
     def origin(self, section: str, name: str) -> str:
@@ -160,14 +160,14 @@ class Campaign(Section):
 
     def is_free(self, surface: str) -> bool:
         """Return whether a surface is a square with free edges; False for periodic surfaces."""
-        return getattr(self.surfaces[surface], "boundary", None) == "free"
+        return self.surfaces[surface].free
 
     def grid(self, surface: str) -> int | None:
         """Return the number of nodes along a side of a surface; None if its file has not been read."""
         return getattr(self._grid_and_period(surface), "grid", None)
 
     def period(self, surface: str) -> float:
-        """Return the side of a surface, m; the surface must be random, or its file must have been read."""
+        """Return the side of a surface, m; if the surface comes from a file, the file must have been read."""
         return self._grid_and_period(surface).period
 
     def _grid_and_period(self, surface):
@@ -192,10 +192,11 @@ class Campaign(Section):
         asked = [None if values is None else set(values) for values in lists]
 
         def is_asked_for(contact):
-            # Surfaces from files have no seeds.
-            any_seed = not self.surfaces[contact.surface].random
+            # Surfaces from files have no seeds, and smooth surfaces have no rms slopes.
+            surface = self.surfaces[contact.surface]
+            without = {"seed": not surface.random, "rms_slope": surface.smooth}
             return all(
-                values is None or value in values or (name == "seed" and any_seed)
+                values is None or value in values or without.get(name, False)
                 for name, value, values in zip(Contact._fields, contact, asked, strict=True)
             )
 
@@ -242,18 +243,20 @@ class Campaign(Section):
         units = [
             self.materials[each.material].contact_modulus * sides[each.surface] ** 2 * each.rms_slope
             for each in known
-            if each.rms_slope != MEASURED
+            # The reduced pressure of a surface with a shape does not depend on its roughness.
+            if each.rms_slope != MEASURED and self.surfaces[each.surface].shape is None
         ]
         return min(units, default=math.inf), min(sides.values(), default=math.inf)
 
     def _model_problems(self, study: Study) -> Iterator[Problem]:
-        """Yield a problem for each surface that a model of the study does not support."""
+        """Yield a problem for each surface or material that a model of the study does not support."""
+        for (index, label), name in itertools.product(enumerate(study.models), study.materials):
+            if MODELS[label].by_summits and self.materials[name].thickness is not None:
+                reason = f"need a half-space, because their law is that of a half-space, but {name!r} is a layer"
+                yield ("models", index), label, f"{reason}; expected [boundary_elements], or no `thickness` in {name!r}"
         for (index, label), name in itertools.product(enumerate(study.models), study.surfaces):
             surface, model = self.surfaces[name], MODELS[label]
             least = model.least_cells
-            if model.periodic_only and self.is_free(name):
-                reason = f"need a periodic surface, but {name!r} has free edges; expected asperities, or "
-                yield ("models", index), label, f"{reason}a `boundary` that makes the surface periodic"
             if surface.cells_per_short_wave < least * (1 - ROUNDING):
                 enough, better = surface.grid_of_cells(least), surface.grid_of_cells(_ADVISABLE_CELLS)
                 yield (
@@ -290,7 +293,7 @@ class Campaign(Section):
 
         return self.model_copy(
             update={
-                "surfaces": {n: s if s.random else in_folder(s) for n, s in self.surfaces.items()},
+                "surfaces": {n: in_folder(s) if s.from_file else s for n, s in self.surfaces.items()},
                 "measurements": {name: in_folder(m) for name, m in self.measurements.items()},
             }
         )

@@ -48,11 +48,13 @@ def loop_cases(campaign: Campaign) -> list[ContactLabels]:
 def surface_settings(campaign: Campaign, name: str) -> dict:
     """Return the settings of a surface in SI units, without seed and path."""
     surface = campaign.surfaces[name]
-    if surface.random:
-        return surface.model_dump(exclude_none=True)
-    if isinstance(surface, MeasuredSurface):
-        return {"kind": surface.kind} | surface.preparation
-    return {"kind": surface.kind, "period": surface.period, "metres_per_unit": surface.height_unit}
+    if not surface.from_file:
+        settings = surface.model_dump(exclude_none=True, exclude={"boundary", "shape"})
+    elif isinstance(surface, MeasuredSurface):
+        settings = {"kind": surface.kind} | surface.preparation
+    else:
+        settings = {"kind": surface.kind, "period": surface.period, "metres_per_unit": surface.height_unit}
+    return settings | surface.boundary_and_shape
 
 
 def run_settings(campaign: Campaign, case: RunLabels) -> dict:

@@ -78,6 +78,8 @@ def _lists(label: str, study: Study) -> dict[str, list[_Located]]:
 
     varied = study.vary.model_dump(exclude_none=True) if study.vary else {}
     lists = {one: located(getattr(study, many), many) for many, one in _LISTS.items()}
+    # Smooth surfaces have no slopes. One entry instead of none, so that there is one run for each seed and material.
+    lists["rms_slope"] = lists["rms_slope"] or [(("studies", label, "rms_slopes"), None)]
     lists |= {name: located(values, "vary", name) for name, values in varied.items()}
     return {name: lists[name] for name in _ORDER if name in lists}
 
@@ -152,7 +154,11 @@ def _study_problems(campaign: Campaign, label: str, study: Study) -> Iterator[Pr
         return [*lists[one], *((location, value) for location, value in located if value is not None)]
 
     for many, one in _LISTS.items():
-        if not lists[one] and (not cases or any(getattr(case, one) is None for case in cases)):
+        needed = not cases or any(getattr(case, one) is None for case in cases)
+        if one == "rms_slope":
+            names = (campaign.surfaces.get(name) for _, name in values("surface"))
+            needed = needed and not all(surface and surface.smooth for surface in names)
+        if needed and not getattr(study, many):
             description = " ".join(str(Study.model_fields[many].description).split())
             yield (*prefix, many), NOTHING, f"the key is missing; expected: {description}"
     for one, names in (("surface", campaign.surfaces), ("material", campaign.materials)):
@@ -213,10 +219,11 @@ class _Variants:
             kinds = ", ".join(k for k, section in SURFACE_KINDS.items() if name in section.model_fields)
             reason = f"is not a key of surface {surface!r}; expected only surfaces of kind {kinds}, or separate studies"
             self.problems[location[:4]] = (location[:4], value, reason)
+        section = self._campaign.surfaces[surface]
         return Contact(
             self._variant("surfaces", surface, of_surface),
-            point["seed"][1] if self._campaign.surfaces[surface].random else 0,
-            point["rms_slope"][1],
+            point["seed"][1] if section.random else 0,
+            0.0 if section.smooth else point["rms_slope"][1],
             self._variant("materials", material, of_material),
         )
 

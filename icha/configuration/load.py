@@ -116,7 +116,7 @@ def _check_text(path: Path, origin: str, written: Mapping) -> Campaign:
 
 def _named_files(campaign: Campaign) -> dict[tuple[str, str], str]:
     """Return the paths of the files of surfaces and measurements, by section and entry."""
-    files = {("surfaces", name): each.path for name, each in campaign.surfaces.items() if not each.random}
+    files = {("surfaces", name): each.path for name, each in campaign.surfaces.items() if each.from_file}
     return files | {("measurements", name): each.path for name, each in campaign.measurements.items()}
 
 

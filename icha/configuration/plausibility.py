@@ -4,6 +4,7 @@ ICHA refuses an unusual value, unless the campaign's list `confirmed` contains t
 that is confirmed causes a warning.
 """
 
+import math
 from collections.abc import Collection, Iterator, Mapping
 from typing import Any, NamedTuple
 
@@ -47,6 +48,7 @@ class Usual(NamedTuple):
 
 _SIDE = Usual("m", "1 nm", "1 m", "from a few atoms to a machine part")
 _WAVE = Usual("m", "0.1 nm", "1 m", "from an atom to a machine part")
+_RADIUS = Usual("m", "1 nm", "10 m", "from the tip of a microscope to a nearly flat lens")
 _SLOPE = Usual("1", "1e-4", "5", "superpolished mirrors have 1e-3, fracture surfaces about 1")
 _OF_ENERGY = "van der Waals forces give 10 to 200 mJ/m^2, clean metals 1 to 3 J/m^2"
 _OF_RANGE = "chemical bonds have less than 1 nm, van der Waals forces some nm; a coarse grid may need some 100 nm"
@@ -56,6 +58,10 @@ USUAL = {
     "surface_energy": Usual("J/m^2", "0.001 mJ/m^2", "3 J/m^2", _OF_ENERGY, or_zero=True),
     "interaction_range": Usual("m", "0.05 nm", "1 um", _OF_RANGE),
     "period": _SIDE,
+    "side": _SIDE,
+    "thickness": _SIDE,
+    "radius": _RADIUS,
+    "radii": _RADIUS,
     "size": _SIDE,
     "rolloff_wavelength": _WAVE,
     "short_wavelength": _WAVE,
@@ -137,8 +143,13 @@ _RATIO = Usual(
 
 
 def energy_ratio(campaign: Campaign, contact) -> float:
-    """Return U_full/dgamma of a contact: elastic energy of full contact per area, divided by the work of adhesion."""
+    """Return U_full/dgamma of a contact: elastic energy of full contact per area, divided by the work of adhesion.
+
+    The energy is that of the roughness. Without roughness, the ratio does not matter, and infinity is returned.
+    """
     surface, material = campaign.surfaces[contact.surface], campaign.materials[contact.material]
+    if surface.smooth:
+        return math.inf
     if isinstance(surface, SelfAffineSurface):
         energy = self_affine_full_contact_energy(*surface.lengths_and_hurst)
     else:

@@ -38,7 +38,7 @@ def key_tables() -> str:
     places: dict[str, list[str]] = {}
     for name, place in _sections(schema, schema, ""):
         places.setdefault(name, []).append(place)
-    tables = [_table(", ".join(places[name]), schema["$defs"][name]) for name in places]
+    tables = [_table(", ".join(dict.fromkeys(places[name])), schema["$defs"][name]) for name in places]
     return "\n".join([_table("Top level", schema), *tables])
 
 

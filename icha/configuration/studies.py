@@ -171,11 +171,11 @@ class TurningPoint(Snapshot):
     """Normal force of the turning point, with its unit."""
 
 
-# Names and descriptions of the parameters that a study may vary: all keys except `kind`, `path` and `crop`.
+# Names and descriptions of the parameters that a study may vary: all keys except `kind`, `path`, `crop` and `shape`.
 SCALARS: dict[str, str] = {}
 for _section in (*SURFACE_KINDS.values(), MaterialSection):
     for _name, _field in _section.model_fields.items():
-        if _name not in ("kind", "path", "crop"):
+        if _name not in ("kind", "path", "crop", "shape"):
             SCALARS.setdefault(_name, str(_field.description))
 
 
@@ -208,11 +208,11 @@ class Study(Section):
     surfaces: list_of_names() = []
     """Names of surfaces."""
     seeds: Seeds = [1]
-    """Seeds of the random phases: a list, or a range such as `1..50`. A surface from a file has no seeds and is used
-    once."""
+    """Seeds of the random phases: a list, or a range such as `1..50`. A surface from a file, or without
+    roughness, has no seeds and is used once."""
     rms_slopes: Slopes = []
     """Rms slopes h'rms. The heights of each topography are scaled to these slopes. With `measured`, a topography from a
-    file keeps its own slope."""
+    file keeps its own slope. A surface with `kind: smooth` has no slope: it is used once, with the rms slope 0."""
     materials: list_of_names() = []
     """Names of materials."""
     vary: Vary | None = None
@@ -225,7 +225,8 @@ class Study(Section):
     all values of the study."""
     models: Annotated[list[Literal[tuple(MODELS)]], Field(min_length=1), AfterValidator(distinct)] = [DEFAULT_MODEL]
     """Contact models of every run. `asperities` is fast. `boundary_elements` assumes a very short range of attraction,
-    and needs a periodic surface and a grid with at least 4 (better 8) cells per shortest wavelength."""
+    and needs a grid with at least 4 (better 8) cells per shortest wavelength. On a surface with free edges, boundary
+    elements take about four times as long as on a periodic surface."""
     targets: Targets
     """Targets of the loading path."""
     snapshots: (
@@ -370,6 +371,10 @@ class BesideStudy(Section):
             reason = "has no run with these surfaces, seeds, slopes and materials; expected combinations of the study"
             yield ("study",), self.study, reason
         pairs = list(dict.fromkeys((each.surface, each.material) for each in contacts))
+        for label in dict.fromkeys(label for _, label in pairs):
+            if campaign.materials[label].thickness is not None:
+                reason = f"contains the layer {label!r}; expected a study of materials without `thickness`"
+                yield ("study",), self.study, reason
         for name in dict.fromkeys(name for name, _ in pairs):
             if campaign.is_free(name):
                 reason = f"contains the surface {name!r} with free edges; expected a study of periodic surfaces"

@@ -1,11 +1,12 @@
-"""Sections `surfaces` and `materials`: rough surfaces and elastic half-spaces."""
+"""Sections `surfaces` and `materials`: rough surfaces, and elastic half-spaces or layers."""
 
 import math
 from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import BeforeValidator, ConfigDict, Field, WithJsonSchema, field_validator, model_validator
 
-from icha.support.rules import GRID, HURST, LENGTH, FloatRange, IntegerRange
+from icha.configuration.shapes import ShapeSection
+from icha.support.rules import GRID, HURST, LENGTH, POISSON_RATIO, FloatRange, IntegerRange
 from icha.support.values import (
     PATTERN,
     ROUNDING,
@@ -23,7 +24,7 @@ from icha.support.values import (
 
 
 class MaterialSection(Section):
-    """Material of the elastic half-space, and adhesion between the half-space and the rough surface."""
+    """Material of the elastic body, and adhesion between this body and the rough surface."""
 
     model_config = ConfigDict(title="Material")
 
@@ -37,6 +38,21 @@ class MaterialSection(Section):
     flaw_radius: Length | None = None
     """Radius a of the largest flaw of the interface. A flaw grows as a penny-shaped crack at the tension √(πE*Δγ/(2a)).
     Full contact opens at the smaller of this tension and the theoretical strength 1.03 Δγ/ε. Default: no flaw."""
+    thickness: Length | None = None
+    """Thickness of an elastic layer that is bonded to a rigid base. Only with `models: [boundary_elements]`. Default: a
+    half-space, which is infinitely thick."""
+    poisson_ratio: number(POISSON_RATIO) | None = None
+    """Poisson ratio of the layer, from 0 to 0.5; rubber has nearly 0.5. Required with `thickness`. A half-space does
+    not depend on this ratio, because E* is given."""
+
+    @model_validator(mode="after")
+    def _check_layer(self):
+        if self.thickness is not None and self.poisson_ratio is None:
+            raise ValueError(
+                f"poisson_ratio: the key is missing; a layer with thickness {self.thickness:g} m needs it; expected "
+                f"{POISSON_RATIO.expected}, such as 0.5 for rubber"
+            )
+        return self
 
 
 def _unit_of_length(value: Any) -> float:
@@ -87,8 +103,60 @@ class Crop(Section):
     """Side of the square."""
 
 
-class _SurfaceFromFile(Section):
+_SHAPE = Field(
+    default=None,
+    description="Smooth shape that carries the roughness, such as `{sphere: {radius: 1 mm}}`, with its apex in the "
+    "middle of the square. A shape needs `boundary: free`, which is then the default. Default: no shape.",
+)
+_BOUNDARY = Field(
+    default="periodic",
+    description="`periodic`: the surface repeats. `free`: a single square; the elastic body is larger than the square. "
+    "Default: `periodic`, or `free` with a shape.",
+)
+
+
+class _Surface(Section):
+    """Base class of surfaces.
+
+    Attributes
+    ----------
+    random : whether the surface has seeds.
+    from_file : whether the heights come from the file `path`.
+    smooth : whether the surface has no roughness, so that it has no rms slopes.
+    """
+
     random: ClassVar[bool] = False
+    from_file: ClassVar[bool] = False
+    smooth: ClassVar[bool] = False
+
+    @property
+    def free(self) -> bool:
+        """True for a single square, False for a periodic surface."""
+        return self.shape is not None or self.boundary == "free"
+
+    @property
+    def boundary_and_shape(self) -> dict:
+        """Boundary and shape in SI units, without defaults, so that old settings keep their checksums."""
+        if not self.free:
+            return {}
+        return {"boundary": "free"} | ({"shape": self.shape.model_dump(exclude_none=True)} if self.shape else {})
+
+    @model_validator(mode="after")
+    def _check_free(self):
+        if self.shape is not None and "boundary" in self.model_fields_set and self.boundary != "free":
+            raise ValueError(
+                f"boundary: {self.boundary!r} with a shape; expected free, because a shape does not repeat"
+            )
+        return self
+
+    def _check_shape(self, side, grid):
+        """Raise ValueError if the shape does not fit a square of this side (m) and number of nodes."""
+        if self.shape is not None and (problem := self.shape.problem(side, grid)):
+            raise ValueError(problem)
+
+
+class _SurfaceFromFile(_Surface):
+    from_file: ClassVar[bool] = True
     # The shortest wavelength of a surface from a file is unknown.
     cells_per_short_wave: ClassVar[float] = math.inf
 
@@ -150,6 +218,7 @@ class MeasuredSurface(_SurfaceFromFile):
     """Number of nodes along a side of the prepared surface. Fourier interpolation resamples the heights to this grid. A
     coarser grid loses the shortest waves. Default: the number of nodes of the scan (with `mirror`, twice this
     number)."""
+    shape: ShapeSection | None = _SHAPE
 
     @model_validator(mode="after")
     def _check_boundary(self):
@@ -163,8 +232,8 @@ class MeasuredSurface(_SurfaceFromFile):
 
     @property
     def preparation(self) -> dict:
-        """Arguments of `icha.surfaces.measured.settings.Preparation`, in SI units: all keys except kind and path."""
-        settings = self.model_dump(exclude={"kind", "path"})
+        """Arguments of `icha.surfaces.measured.settings.Preparation`, in SI units: all keys of the preparation."""
+        settings = self.model_dump(exclude={"kind", "path", "shape"})
         settings["detrend"] = self.detrend or ("none" if self.boundary == "periodic" else "tilt")
         settings["taper"] = (self.taper or 0.1) if self.boundary == "window" else None
         if self.cutoff is None:
@@ -175,7 +244,7 @@ class MeasuredSurface(_SurfaceFromFile):
         return settings
 
 
-class SelfAffineSurface(Section):
+class SelfAffineSurface(_Surface):
     """A random periodic surface with a self-affine spectrum with roll-off, generated by spectral synthesis."""
 
     random: ClassVar[bool] = True
@@ -196,6 +265,13 @@ class SelfAffineSurface(Section):
     amplitudes: Literal["fixed", "gaussian"] = "fixed"
     """Amplitudes of the waves. `fixed`: the spectrum gives the square of each amplitude, so all seeds have the same rms
     height and slope. `gaussian`: amplitudes are random, and the spectrum gives the mean square of each amplitude."""
+    boundary: Literal["periodic", "free"] = _BOUNDARY
+    shape: ShapeSection | None = _SHAPE
+
+    @model_validator(mode="after")
+    def _check_size_of_shape(self):
+        self._check_shape(self.period, self.grid)
+        return self
 
     @property
     def lengths_and_hurst(self) -> tuple[float, float, float, float]:
@@ -244,8 +320,42 @@ class FileSurface(_SurfaceFromFile):
     """Unit of the heights in the file, such as `um`. Each study scales the heights to the rms slopes of the study."""
     period: Length
     """Side L of the periodic cell."""
+    boundary: Literal["periodic", "free"] = _BOUNDARY
+    shape: ShapeSection | None = _SHAPE
+
+
+class SmoothSurface(_Surface):
+    """A shape alone, without roughness. A study uses it once, without seeds and rms slopes."""
+
+    smooth: ClassVar[bool] = True
+    cells_per_short_wave: ClassVar[float] = math.inf
+    boundary: ClassVar[str] = "free"
+
+    kind: Literal["smooth"]
+    """A shape without roughness."""
+    shape: ShapeSection
+    """The shape, such as `{sphere: {radius: 1 mm}}`, with its apex in the middle of the square."""
+    side: Length
+    """Side of the square. Contact must not reach its edges."""
+    grid: integer(GRID)
+    """Number of nodes along the side of the square. A contact radius of at least 8 cells is recommended."""
+
+    @property
+    def period(self) -> float:
+        """Side of the square, m."""
+        return self.side
+
+    @model_validator(mode="after")
+    def _check_size_of_shape(self):
+        self._check_shape(self.side, self.grid)
+        return self
 
 
 # Classes of the sections of surfaces, by the value of the key `kind`.
-SURFACE_KINDS = {"self_affine": SelfAffineSurface, "file": FileSurface, "measured": MeasuredSurface}
-AnySurface = Annotated[SelfAffineSurface | FileSurface | MeasuredSurface, Field(discriminator="kind")]
+SURFACE_KINDS = {
+    "self_affine": SelfAffineSurface,
+    "file": FileSurface,
+    "measured": MeasuredSurface,
+    "smooth": SmoothSurface,
+}
+AnySurface = Annotated[SelfAffineSurface | FileSurface | MeasuredSurface | SmoothSurface, Field(discriminator="kind")]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import warnings
 from collections.abc import Collection
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -26,7 +27,7 @@ def inspect_topographies(campaign: Campaign) -> tuple[dict[str, Topography], lis
     contacts = [each for study in campaign.studies for each in campaign.contacts(study)]
     of_measured_slope = {each.surface for each in contacts if each.rms_slope == MEASURED}
     facts, problems = {}, []
-    for name in dict.fromkeys(each.surface for each in contacts if not campaign.surfaces[each.surface].random):
+    for name in dict.fromkeys(each.surface for each in contacts if campaign.surfaces[each.surface].from_file):
         surface = campaign.surfaces[name]
         try:
             facts[name] = inspect_file(surface)
@@ -69,16 +70,34 @@ def inspect_file(section: MeasuredSurface | FileSurface) -> Topography:
 
 
 def read_surface(section: MeasuredSurface | FileSurface) -> Surface:
-    """Read a surface from a file, and prepare the surface with the keys of its section."""
+    """Read a surface from a file, and prepare the surface with the keys of its section.
+
+    A ValueError about the shape has the attribute `key`.
+    """
     # The modules below import SciPy, which takes time; campaigns without surfaces from files do not need SciPy.
     if isinstance(section, MeasuredSurface):
         from icha.surfaces.measured.topography import prepared_topography
 
-        return prepared_topography(section.path, section.preparation).surface
+        surface = prepared_topography(section.path, section.preparation).surface
+        return _with_shape(surface, section)
     from icha.surfaces.measured.scan import read_height_map
     from icha.surfaces.surface import Surface
 
-    return Surface(read_height_map(section.path, section.height_unit), section.period)
+    surface = Surface(
+        read_height_map(section.path, section.height_unit), section.period, "free" if section.free else "periodic"
+    )
+    return _with_shape(surface, section)
+
+
+def _with_shape(surface, section):
+    """Return a surface with the shape of its section; raise ValueError if the shape does not fit the square."""
+    if section.shape is None:
+        return surface
+    if problem := section.shape.problem(surface.period, surface.grid):
+        error = ValueError(problem.removeprefix("shape: "))
+        error.key = "shape"
+        raise error
+    return replace(surface, shape=section.shape.shape)
 
 
 def read_scan(path: str | os.PathLike, *, confirmed: Collection[str] = (), **keywords: Any) -> Surface:

@@ -146,7 +146,7 @@ def reduced_gap(data: xr.Dataset) -> xr.DataArray:
     On a periodic surface, mean gap and mean separation are equal. The mean separation of a free square is the
     distance to the half-space far from the square. Therefore only the mean gap is comparable among all surfaces.
     """
-    gap = (data["mean_gap"] / data["rms_height"]).transpose(*data["reduced_separation"].dims)
+    gap = (data["mean_gap"] / data["unit_height"]).transpose(*data["reduced_separation"].dims)
     return data["reduced_separation"].where(data["boundary"] != "free", gap)
 
 

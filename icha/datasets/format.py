@@ -125,10 +125,10 @@ def _problems_with_run(run: xr.Dataset) -> Iterator[str]:
         for name in ("gap_bin_edges", "pressure_bin_edges"):
             if not np.all(np.diff(run[name].values) > 0):
                 yield f"{name}: the edges do not increase; expected edges in ascending order"
-    unit = run["contact_modulus"] * run["rms_slope"]
+    unit = run["contact_modulus"] * run["unit_slope"]
     for name, expected, formula in (
         ("reduced_pressure", run["nominal_pressure"] / unit, "nominal_pressure/(contact_modulus rms_slope)"),
-        ("reduced_separation", run["mean_separation"] / run["rms_height"], "mean_separation/rms_height"),
+        ("reduced_separation", run["mean_separation"] / run["unit_height"], "mean_separation/unit_height"),
     ):
         error = abs(run[name] - expected)
         if expected.size and float(error.max()) > _ROUNDING * float(abs(expected).max()):

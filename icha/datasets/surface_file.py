@@ -1,5 +1,6 @@
 """Write and read the file of a surface, which contains heights, statistics, power spectrum and origin."""
 
+import json
 import os
 from collections.abc import Mapping
 
@@ -12,6 +13,7 @@ from icha.datasets.files import read_dataset, readable, write_dataset
 from icha.datasets.variables.surface import SURFACE
 from icha.datasets.variables.terms import ROUGHNESS
 from icha.surfaces.moments import SpectralMoments, radial_power_spectrum, spectral_moments
+from icha.surfaces.shapes import make_shape, shape_settings
 from icha.surfaces.surface import PERIODIC, Surface
 
 
@@ -59,6 +61,8 @@ def write_surface(
     if measured is not None:
         values["measured_rms_slope"] = measured.surface.rms_slope
     kind, origin = "Self-affine surface" if spectrum is not None else "Surface from a file", {}
+    if surface.smooth:
+        kind = "Smooth shape"
     if measured is not None:
         kind = "Measured topography"
         origin = {
@@ -73,6 +77,8 @@ def write_surface(
         keywords=["topography"],
     )
     origin |= {"surface": name, "boundary": surface.boundary}
+    if surface.shape:
+        origin["shape"] = json.dumps(shape_settings(surface.shape), sort_keys=True)
     write_dataset(build_dataset(SURFACE, values, attributes | origin | dict(attrs)), path)
 
 
@@ -100,7 +106,8 @@ def read_surface(path: str | os.PathLike) -> Surface:
             raise ValueError(f"{path}: not a surface file, because it has no variable {name!r}")
     try:
         heights = dataset["height"].transpose("y", "x").values
-        return Surface(heights, float(dataset["period"]), dataset.attrs.get("boundary", PERIODIC))
+        shape = make_shape(json.loads(dataset.attrs["shape"])) if "shape" in dataset.attrs else None
+        return Surface(heights, float(dataset["period"]), dataset.attrs.get("boundary", PERIODIC), shape)
     except (TypeError, ValueError) as error:
         raise ValueError(f"{path}: {error}") from None
 

@@ -127,5 +127,5 @@ def _events(run):
         "branch": run["branch"].sel(step=steps).values.astype(object)[shown],
         "x": run["event_x"].values[shown],
         "y": run["event_y"].values[shown],
-        "separation": run["event_separation"].values[shown] / float(run["rms_height"]),
+        "separation": run["event_separation"].values[shown] / float(run["unit_height"]),
     }

@@ -98,7 +98,7 @@ def singular_tail(members: Sequence[tuple[xr.Dataset, int]], lowest: float) -> t
     grid resolves, and ends at the pressure `lowest`. Without adhesion, the tail is empty.
     """
     (run, _), *_ = members
-    unit = float(run["contact_modulus"]) * float(run["rms_slope"])
+    unit = float(run["contact_modulus"]) * float(run["unit_slope"])
     first = -float(run["resolved_tension"]) / unit
     if not lowest < first < 0:
         return np.empty(0), np.empty(0)
@@ -111,8 +111,8 @@ def singular_tail(members: Sequence[tuple[xr.Dataset, int]], lowest: float) -> t
 def gap_densities(members: Sequence[tuple[xr.Dataset, int]]) -> tuple[np.ndarray, np.ndarray]:
     """Return reduced gaps u/h_rms, and for each snapshot the densities P(u) h_rms; bins with few cells are joined."""
     (first, _), *_ = members
-    edges = first["gap_bin_edges"].values / float(first["rms_height"])
-    contents = np.array([run["gap_density"].values[at] * float(run["rms_height"]) for run, at in members])
+    edges = first["gap_bin_edges"].values / float(first["unit_height"])
+    contents = np.array([run["gap_density"].values[at] * float(run["unit_height"]) for run, at in members])
     contents *= np.diff(edges)
     # The first bin begins at zero, which a logarithmic axis does not show.
     edges, densities = join_bins(edges[1:], contents[:, 1:], _LEAST_CELLS / int(first["grid"]) ** 2)
@@ -127,7 +127,7 @@ def pressure_densities(
     Empty bins are left out. If `joined` is True (for boundary elements), bins with few nodes are joined.
     """
     (first, _), *_ = members
-    unit = float(first["contact_modulus"]) * float(first["rms_slope"])
+    unit = float(first["contact_modulus"]) * float(first["unit_slope"])
     edges = first["pressure_bin_edges"].values / unit
     densities = np.array([run["pressure_density"].values[at] * unit for run, at in members])
     if joined:

@@ -55,7 +55,7 @@ def _over_pressure(run):
 
 def stiffness_points(run: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
     """Return p* and the reduced stiffness -dp*/d(u/h_rms) of all steps at which both quantities are positive."""
-    unit = float(run["contact_modulus"] * run["rms_slope"] / run["rms_height"])
+    unit = float(run["contact_modulus"] * run["unit_slope"] / run["unit_height"])
     p, stiffness = run["reduced_pressure"].values, run["contact_stiffness"].values / unit
     positive = (p > 0) & (stiffness > 0)
     return p[positive], stiffness[positive]

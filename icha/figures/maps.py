@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
 # Largest number of cells along a side that are distinguishable in a panel.
 _MOST_CELLS = 1024
+# Height at the end of the colour scale of a smooth surface, m.
+_FLAT = 1e-9
 
 
 class Topography(NamedTuple):
@@ -53,9 +55,9 @@ class Topography(NamedTuple):
 def topography_of(run: xr.Dataset, surface: xr.Dataset) -> Topography:
     """Return the topography of a run from the dataset of its surface file."""
     heights = surface["height"].transpose("y", "x").values
-    factor = float(run["rms_height"]) / float(surface["rms_height"])
+    factor = float(run["rms_height"]) / (float(surface["rms_height"]) or 1.0)
     # The array may be large, so no copy is made.
-    highest = max(float(heights.max()), -float(heights.min())) * factor
+    highest = max(float(heights.max()), -float(heights.min())) * factor or _FLAT
     period = float(run["period"])
     length, length_unit = choose_unit(period, "m")
     height, height_unit = choose_unit(highest, "m")

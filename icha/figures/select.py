@@ -264,7 +264,9 @@ def select_unloaded_runs(campaign: xr.DataTree, study: str) -> list[tuple[RunLab
     runs = _select_runs_with(unloading_legs, campaign, study)
     if not runs:
         raise NothingToDraw(f"study {study}: no run was unloaded; expected a study that unloads")
-    return [(labels, run.assign(reduced_separation=run["mean_separation"] / run["rms_height"])) for labels, run in runs]
+    return [
+        (labels, run.assign(reduced_separation=run["mean_separation"] / run["unit_height"])) for labels, run in runs
+    ]
 
 
 def _select_runs_with(condition, campaign, study):

@@ -127,7 +127,12 @@ def _state(results, path):
 
 def _computed_files(campaign, results, files, sha256_of_run) -> Iterator[Item]:
     """Yield the files of surfaces, runs, theories and boundary-element solutions at a finite range."""
-    summits, run_cost = cache(lambda surface: surface_facts(campaign, surface)["summits"]), cache(costs.run_cost)
+    run_cost = cache(costs.run_cost)
+
+    @cache
+    def summits(surface):
+        return 1 if campaign.surfaces[surface].smooth else surface_facts(campaign, surface)["summits"]
+
     for path, (name, _) in files.surfaces.items():
         grid = campaign.grid(name)
         cost, threads = costs.surface_cost(grid), costs.job_threads(grid)
@@ -138,7 +143,9 @@ def _computed_files(campaign, results, files, sha256_of_run) -> Iterator[Item]:
             state, reason = DAMAGED, ""
         grid = campaign.grid(case.surface)
         sweep = _cost_parameters(run_settings(campaign, case), campaign.period(case.surface))
-        ratio = energy_ratio(campaign, case) if sweep["adhesive"] else math.inf
+        # The contact of a shape stays small, however sticky its roughness is.
+        spreads = sweep["adhesive"] and campaign.surfaces[case.surface].shape is None
+        ratio = energy_ratio(campaign, case) if spreads else math.inf
         cost = run_cost(case.model, grid, summits(case.surface), energy_ratio=ratio, **sweep)
         part = f"study {case.study}" + (f", {MODELS[case.model].words}" if case.model != DEFAULT_MODEL else "")
         yield Item(part, "run", path, state, cost, costs.job_threads(grid), reason)
@@ -202,8 +209,8 @@ def _cost_parameters(settings, side) -> dict:
     # Reduced pressure of a target; about half of an area fraction, and `_UNKNOWN_LOAD` if the pressure is unknown.
     loads = {
         "reduced_pressure": lambda value: value,
-        "relative_load": lambda value: value / slope,
-        "force": lambda value: value / (modulus * side**2 * slope),
+        "relative_load": lambda value: value / (slope or 1.0),
+        "force": lambda value: value / (modulus * side**2 * (slope or 1.0)),
         "area_fraction": lambda value: value / 2,
         "contact_radius": lambda value: math.pi * value**2 / side**2 / 2,
     }

@@ -74,7 +74,7 @@ def surface_facts(campaign: Campaign, name: str) -> dict[str, float]:
         moments, grid, unsupported = self_affine_moments(*section.lengths_and_hurst), section.grid, 0
         summits = section.period**2 * summit_density(moments.m2, moments.m4)
         complete = gaussian_complete_pressure(section.period / section.short_wavelength)
-        skewness, kurtosis, anisotropy, free = 0.0, 3.0, 1.0, False
+        skewness, kurtosis, anisotropy, free = 0.0, 3.0, 1.0, section.free
     else:
         from icha.surfaces.summits import locate_summits
 
@@ -105,6 +105,8 @@ def expected_validity(campaign: Campaign) -> list[Statement]:
     facts_of = cache(lambda surface: surface_facts(campaign, surface))
     cases, tabor, sticky = [], {}, {}
     for case in run_cases(campaign):
+        if campaign.surfaces[case.surface].smooth:
+            continue  # a single contact
         facts, by_summits = facts_of(case.surface), MODELS[case.model].by_summits
         material = Material(**campaign.materials[case.material].model_dump(exclude_none=True))
         # Only the asperity model needs surfaces that are similar to the surfaces of its validation.

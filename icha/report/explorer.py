@@ -204,10 +204,10 @@ def encode_floats(values: np.ndarray) -> str:
 
 def encode_topography(surface: xr.Dataset) -> dict:
     """Return the heights of a surface file, divided by the rms height and averaged over blocks, in 256 levels."""
-    heights = surface["height"].transpose("y", "x").values / float(surface["rms_height"])
+    heights = surface["height"].transpose("y", "x").values / (float(surface["rms_height"]) or 1.0)
     means = average_blocks(heights, MOST_HEIGHTS)
     low, high = float(means.min()), float(means.max())
-    levels = np.rint((means - low) / (high - low) * LEVELS).astype(np.uint8)
+    levels = np.rint((means - low) / ((high - low) or 1.0) * LEVELS).astype(np.uint8)
     return {"grid": len(heights), "cells": len(means), "low": low, "high": high, "levels": _base64(levels.tobytes())}
 
 
@@ -226,7 +226,7 @@ def encode_run(run: xr.Dataset, maps: Sequence[str] | None) -> dict:
         "period": float(run["period"]),
         "periodic": str(run["boundary"].values) == "periodic",
         "grid": int(run["grid"]),
-        "rms_height": float(run["rms_height"]),
+        "rms_height": float(run["unit_height"]),
         "pressure": encode_floats(run["reduced_pressure"]),
         "area": encode_floats(run["contact_area_fraction"]),
         "gap": encode_floats(reduced_gap(run)),

@@ -32,6 +32,7 @@ def summarise_surface(surface: xr.Dataset) -> dict:
     """Return name, parameters and statistics of a surface file; for a scan, the statistics of the measured heights."""
     lengths = ("period", "rolloff_wavelength", "short_wavelength")
     scale = measured_scale(surface)
+    curvature = float(surface["rms_curvature"]) * scale
     return {
         "name": surface.attrs.get("surface", ""),
         "seed": int(surface["seed"]),
@@ -40,7 +41,7 @@ def summarise_surface(surface: xr.Dataset) -> dict:
         "measured": "measured_rms_slope" in surface,
         "rms_slope": float(surface["rms_slope"]) * scale,
         "rms_height": format_quantity(float(surface["rms_height"]) * scale, "m"),
-        "curvature_radius": format_quantity(1 / (float(surface["rms_curvature"]) * scale), "m"),
+        "curvature_radius": format_quantity(1 / curvature, "m") if curvature else "",
         **{name: float(surface[name]) if name in surface else None for name in ("hurst", "nayak_parameter")},
         **{name: format_quantity(float(surface[name]), "m") for name in lengths if name in surface},
     }
@@ -57,7 +58,7 @@ def picture_of_spectra(surfaces) -> str | None:
     """Draw the power spectra, averaged over the seeds of each surface, as a PNG in base64; None without spectra."""
     members: dict[str, list] = {}
     for surface in surfaces:
-        if "power_spectrum" in surface:
+        if "power_spectrum" in surface and surface["power_spectrum"].any():
             members.setdefault(surface.attrs.get("surface", ""), []).append(surface)
     if not members:
         return None

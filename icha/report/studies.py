@@ -168,7 +168,7 @@ def _means(dataset: xr.Dataset, complete: list[RunLabels]) -> dict:
     """Return the table of means over seeds at the targets, with the accuracy of each mean."""
     groups = [(row, runs) for row, runs in _ensembles(dataset, complete) if row["asked"] > 1]
     variables = ["reduced_pressure", "contact_area_fraction", "reduced_separation", "leg", "step_kind", "step_target"]
-    steps = dataset[[*variables, "step_count", "mean_gap", "rms_height", "boundary"]]
+    steps = dataset[[*variables, "step_count", "mean_gap", "unit_height", "boundary"]]
     members = []
     for row, labels in groups[:MOST_ROWS]:
         runs = [steps.isel(run_place(dataset, each)) for each in labels]
@@ -221,7 +221,7 @@ def _loop(runs: list[xr.Dataset]) -> dict:
     }
     if values("surface_energy")[0] > 0:
         cells |= {
-            "at": _with_unit(values("pull_off_separation") / values("rms_height")),
+            "at": _with_unit(values("pull_off_separation") / values("unit_height")),
             "over_strength": _with_unit(values("pull_off_over_strength")),
             "over_summits": _with_unit(values("pull_off_over_summits")),
             "detachment": _with_unit(values("detachment_pressure"), "Pa"),

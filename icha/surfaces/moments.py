@@ -166,10 +166,10 @@ def radial_power_spectrum(surface: Surface) -> tuple[np.ndarray, np.ndarray, np.
     last, edges = (surface.grid - 1) // 2, [0.5]
     while edges[-1] < last:
         edges.append(min(max(edges[-1] + 1, math.floor(1.1 * edges[-1]) + 0.5), last + 0.5))
-    periodic, scale = surface, 1.0
+    windowed, scale = surface, 1.0
     if surface.free:
         hann = np.sin(np.pi * (np.arange(surface.grid) + 0.5) / surface.grid) ** 2
-        periodic = replace(surface, heights=surface.heights * (hann[:, None] * hann), boundary="periodic", shape=None)
+        windowed = replace(surface, heights=surface.heights * (hann[:, None] * hann))
         scale = 1 / np.mean(hann**2) ** 2
 
     def rings(k2, count, power):
@@ -179,6 +179,6 @@ def radial_power_spectrum(surface: Surface) -> tuple[np.ndarray, np.ndarray, np.
         sums = (count, count * k, power)
         return [np.bincount(ring, weights=each.ravel(), minlength=len(edges) + 1) for each in sums]
 
-    count, wave_number, power = np.sum(periodic.by_wave_vector(rings), axis=0)[:, 1:-1]
+    count, wave_number, power = np.sum(windowed.by_wave_vector(rings), axis=0)[:, 1:-1]
     unit = 2 * np.pi / surface.period
     return unit * wave_number / count, scale * power / count / unit**2, unit * np.array(edges)

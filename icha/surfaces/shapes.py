@@ -5,6 +5,7 @@ All lengths are in metres. Heights are positive towards the elastic body. The ap
 
 import math
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -176,3 +177,15 @@ SHAPES: dict[str, type[Shape]] = {
     "cone": Cone,
     "wave": Wave,
 }
+
+
+def make_shape(settings: Mapping[str, Mapping]) -> Shape:
+    """Return the shape of settings in SI units, such as `{"sphere": {"radius": 1e-3}}`."""
+    ((name, arguments),) = settings.items()
+    return SHAPES[name](**arguments)
+
+
+def shape_settings(shape: Shape) -> dict[str, dict]:
+    """Return the settings of a shape, the inverse of `make_shape`."""
+    (name,) = (name for name, kind in SHAPES.items() if type(shape) is kind)
+    return {name: dict(vars(shape))}

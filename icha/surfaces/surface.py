@@ -142,8 +142,7 @@ class Surface:
         """
         if self.shape is None:
             return self.heights
-        x = (np.arange(self.grid) + 0.5) * self.spacing - self.apex
-        profile = self.heights + self.shape.heights(x, x[:, None])
+        profile = self.heights + self._form
         profile.flags.writeable = False
         return profile
 
@@ -163,18 +162,26 @@ class Surface:
         return 0.5 * self.period + _OFF_THE_NODES * self.spacing
 
     @cached_property
+    def _form(self) -> np.ndarray:
+        """Heights of the shape alone, (n, n), m."""
+        if self.shape is None:
+            return np.zeros_like(self.heights)
+        x = (np.arange(self.grid) + 0.5) * self.spacing - self.apex
+        return self.shape.heights(x, x[:, None])
+
+    @cached_property
     def _units(self) -> tuple[float, float]:
-        """Units of length (m) and of slope: rms height and slope, with a shape those of the profile near its apex."""
+        """Units of length (m) and of slope: rms height and slope; with a shape, the same for every roughness."""
         if self.shape is None:
             return self.rms_height, self.rms_slope
-        finite = self.profile[np.isfinite(self.profile)]
-        side = self.spacing * math.sqrt(finite.size)
-        height = max(float(np.std(finite)), self.rms_height, _LEAST_UNIT * side)
+        form = self._form[np.isfinite(self._form)]
+        side = self.spacing * math.sqrt(form.size)
+        height = max(float(np.std(form)), _LEAST_UNIT * side)
         return height, height / side
 
     @property
     def unit_height(self) -> float:
-        """Unit of separations and gaps, m: the rms height; with a shape, the rms height of the whole profile."""
+        """Unit of separations and gaps, m: the rms height; with a shape, the rms height of the shape."""
         return self._units[0]
 
     @property
@@ -275,7 +282,9 @@ class Surface:
         return -float(full_contact_pressure(self.heights, self.period, free=self.free).min())
 
     def scaled_to_rms_slope(self, rms_slope: float) -> Surface:
-        """Return the surface with heights that are scaled so that the rms slope is `rms_slope`."""
+        """Return the surface with heights scaled to the rms slope `rms_slope`; a smooth surface is not scaled."""
+        if self.smooth:
+            return self
         rms_slope = SLOPE.validate("rms_slope", rms_slope)
         factor = rms_slope / self.rms_slope
         scaled = replace(self, heights=self.heights * factor)

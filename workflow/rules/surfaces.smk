@@ -8,7 +8,7 @@ rule surface:
     input:
         unpack(
             lambda wildcards: (
-                {} if (surface := CAMPAIGN.surfaces[wildcards.surface]).random else {"height_map": surface.path}
+                {"height_map": surface.path} if (surface := CAMPAIGN.surfaces[wildcards.surface]).from_file else {}
             )
         ),
     output:

@@ -43,7 +43,7 @@ _TOPOGRAPHY = ("surface", "seed", "rms_slope")
 VARIES_WITH = {
     **dict.fromkeys(("contact_modulus", "surface_energy", "interaction_range", "flaw_radius"), ("material",)),
     **dict.fromkeys(("theoretical_strength", "interface_strength"), ("material",)),
-    **dict.fromkeys(("rms_height", "rms_curvature", "nayak_parameter"), _TOPOGRAPHY),
+    **dict.fromkeys(("rms_height", "rms_curvature", "unit_height", "unit_slope", "nayak_parameter"), _TOPOGRAPHY),
     **dict.fromkeys(("spectral_moment_0", "spectral_moment_2", "spectral_moment_4"), _TOPOGRAPHY),
     **dict.fromkeys(("height_skewness", "height_kurtosis", "slope_anisotropy"), _TOPOGRAPHY),
     **dict.fromkeys(("period", "grid", "boundary"), ("surface",)),
