@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 from threadpoolctl import threadpool_limits
 
-from icha.asperity.full_contact import FULL_CONTACT_BELOW, full_contact_energy_ratio
+from icha.asperity.full_contact import FULL_CONTACT_BELOW, HIGH_PULL_OFF_BELOW, full_contact_energy_ratio
 from icha.asperity.material import Material
 from icha.asperity.stickiness import stickiness
 from icha.checks.run import check_run, reasons_of_failure
@@ -31,7 +31,7 @@ from icha.contact.model import (
 from icha.contact.models import DEFAULT_MODEL, MODELS
 from icha.datasets.attributes import COMPUTED, file_attributes
 from icha.datasets.build import bin_values, build_dataset, concatenate_rows, describe_variables, get_values, stack_rows
-from icha.datasets.variables.run import CYCLE, FURTHER, LOOP, RUN
+from icha.datasets.variables.run import CYCLE, FURTHER, INDENTER, LOOP, RUN
 from icha.datasets.variables.terms import MATERIAL, ROUGHNESS, Table
 from icha.half_space.layer import softness_of
 from icha.path.energy_balance import Waypoint, summarise_loop
@@ -51,8 +51,10 @@ from icha.path.targets import (
     Path,
     Target,
 )
+from icha.references.indenter_runs import loop_values, sphere_radius, step_values
 from icha.support.rules import IntegerRange
 from icha.surfaces.moments import height_statistics, slope_anisotropy, spectral_moments
+from icha.surfaces.shapes import describe_shape
 from icha.surfaces.summits import SummitCoverage, locate_summits
 from icha.surfaces.surface import Surface, full_contact_pressure
 
@@ -60,6 +62,9 @@ from icha.surfaces.surface import Surface, full_contact_pressure
 _AREA_TOLERANCE = 1e-6
 # Largest mean separation of a snapshot, in h_rms. Contact forms at much smaller separations.
 _HIGHEST_SNAPSHOT = 20.0
+# Contact is concentrated at the edges of a free square if the share of contact in the outermost cells exceeds both the
+# first number, and the share of these cells multiplied by the second number.
+_EDGE_CONTACT, _EDGE_EXCESS = 0.05, 3.0
 # Kind of the snapshot at the largest tension during unloading.
 PULL_OFF = "pull_off"
 _STICKINESS_PAPER = "L. Pastewka and M. O. Robbins, PNAS 111 (2014) 3298-3303, doi:10.1073/pnas.1320846111 (stickiness)"
@@ -156,7 +161,7 @@ def _compute(solver, surface, material, path, model, seed, progress, kept):
         reachable = path.within_asperity_range() if MODELS[model].by_summits else path
         record = _record_path(contact, observables, path, reachable, progress)
         loading = [step["mean_separation"] for step in record.steps if step["leg"] == 0]
-        reasons = observables.reasons_against(loading, record.pressed)
+        reasons = observables.reasons_against(loading, record.pressed) + _reasons_of_edges(surface, record.steps)
         values = observables.of_contact()
         dataset = _dataset(surface, material, path, model, seed, record, contact.asperities, reasons, values)
     if record.failure:
@@ -168,7 +173,8 @@ def _compute(solver, surface, material, path, model, seed, progress, kept):
         summits_pull = 1.5 * np.pi * material.surface_energy * radii / contact.area
         loop = summarise_loop(record.steps, pull_off, material, summits_pull, record.unattributed)
         loop["uphill_jump_in_count"] = _count_uphill_jumps_in(record)
-        dataset = dataset.assign(describe_variables(LOOP, loop))
+        measured = loop_values(record.steps, loop, surface, material) if surface.free else {}
+        dataset = dataset.assign(describe_variables(LOOP | INDENTER, loop | measured))
     return dataset
 
 
@@ -196,6 +202,7 @@ def _dataset(surface, material, path, name, seed, record, summits, reasons, of_c
     table = RUN | FURTHER[name]
     values = {
         **_path_values(table, path, record, surface.grid),
+        **_indenter_values(surface, record.steps),
         **_surface_values(surface, material, seed),
         **of_contact,
         "asperity_count": len(summits),
@@ -204,12 +211,13 @@ def _dataset(surface, material, path, name, seed, record, summits, reasons, of_c
         **bin_values("pressure", PRESSURE_BINS * (material.contact_modulus * surface.unit_slope)),
     }
     dataset = build_dataset(
-        table | CYCLE | _describe_targets(table, path), values, _attributes(surface, material, path, name)
+        table | CYCLE | INDENTER | _describe_targets(table, path), values, _attributes(surface, material, path, name)
     )
     if MODELS[name].by_summits:
         largest = max((step["contact_area_fraction"] for step in record.steps), default=0.0)
         ratio = math.inf if surface.smooth else values["full_contact_energy_ratio"]
-        applicability = asperity_applicability(ratio, reasons, largest)
+        conformal = surface.shape is not None
+        applicability = asperity_applicability(ratio, reasons, largest, conformal=conformal)
     else:
         applicability = f"{MODELS[name].words} not applicable: {'; '.join(reasons)}" if reasons else ""
     dataset.attrs["applicability"] = applicability
@@ -218,8 +226,25 @@ def _dataset(surface, material, path, name, seed, record, summits, reasons, of_c
     return dataset.assign_attrs({"beyond_model" if record.beyond_model else "incomplete": record.failure})
 
 
+def _reasons_of_edges(surface: Surface, steps: Sequence[dict]) -> list[str]:
+    """Return a reason, as a sentence, if contact is concentrated at the edges of a free square; otherwise []."""
+    largest = max((step.get("edge_contact", 0.0) for step in steps), default=0.0)
+    share = 1 - (1 - 2 / surface.grid) ** 2
+    if largest <= max(_EDGE_CONTACT, _EDGE_EXCESS * share):
+        return []
+    expected = "use a larger square" if surface.shape else "level the scan, or use a larger scan"
+    return [
+        f"{largest:.0%} of the contact area is in the outermost cells of the square, which are {share:.1%} of all "
+        f"cells: the edges of the square carry the load; {expected}"
+    ]
+
+
 def asperity_applicability(
-    full_contact_energy_ratio: float, summit_reasons: Sequence[str] = (), contact_area_fraction: float = 0.0
+    full_contact_energy_ratio: float,
+    summit_reasons: Sequence[str] = (),
+    contact_area_fraction: float = 0.0,
+    *,
+    conformal: bool = False,
 ) -> str:
     """Return the reasons why the asperity model is not applicable, as text; the text is empty if the model applies.
 
@@ -228,12 +253,18 @@ def asperity_applicability(
     full_contact_energy_ratio : elastic energy of full contact divided by work of adhesion; infinite without adhesion.
     summit_reasons : reasons why the summits do not represent the surface.
     contact_area_fraction : largest contact area fraction A/A0 of the run.
+    conformal : True for roughness on a shape that presses it into the elastic body.
     """
     reasons = []
     if full_contact_energy_ratio < FULL_CONTACT_BELOW:
         reasons.append(
             "full contact has a lower energy than separated surfaces (U_full/dgamma = "
             f"{full_contact_energy_ratio:.3g}, less than {FULL_CONTACT_BELOW:g})"
+        )
+    elif conformal and full_contact_energy_ratio < HIGH_PULL_OFF_BELOW:
+        reasons.append(
+            "the elastic body conforms to most of the roughness under the shape (U_full/dgamma = "
+            f"{full_contact_energy_ratio:.3g}, less than {HIGH_PULL_OFF_BELOW:g})"
         )
     reasons += summit_reasons
     if contact_area_fraction > MAX_AREA_FRACTION * (1 + _AREA_TOLERANCE):
@@ -339,7 +370,8 @@ def _record_path(contact, observables, path, reachable, progress) -> _PathRecord
             events = events_between(before, state)
             counts = counts + events.counts()
             numbers = {f"{kind}_count": count for kind, count in zip(EVENT_KINDS, counts, strict=True)}
-            step = _require_finite(_step_values(contact, waypoint) | numbers | observables.of_step(state))
+            step = _step_values(contact, waypoint) | numbers | observables.of_step(state)
+            step = _require_finite(step | step_values(step, contact.area))
             record.steps.append(step)
             record.events.append(events)
             record.unattributed = waypoint.balance.unattributed if waypoint.balance else 0.0
@@ -366,7 +398,7 @@ def _require_finite(values: dict) -> dict:
     """Return the values; raise `NotConverged` if a value is not finite. Only a stiffness may be infinite."""
     for name, value in values.items():
         numbers = np.asarray(value)
-        if name == "contact_stiffness" and np.isposinf(numbers).all():
+        if name in ("contact_stiffness", "stiffness") and np.isposinf(numbers).all():
             continue
         if numbers.dtype.kind == "f" and not np.isfinite(numbers).all():
             raise NotConverged(f"with values of {name} that are not finite")
@@ -417,6 +449,19 @@ def _path_values(table: Table, path: Path, record: _PathRecord, grid: int) -> di
         "event_y": events.position[:, 1],
         "event_members": events.members,
     }
+
+
+def _indenter_values(surface: Surface, steps: Sequence[dict]) -> dict:
+    """Return the values of all steps as experiments have them, and the shape, by variable name; {} if periodic."""
+    if not surface.free:
+        return {}
+    # Models leave out values that they do not have.
+    names = [name for name, described in INDENTER.items() if described.dims and (not steps or name in steps[0])]
+    values = stack_rows({name: INDENTER[name] for name in names}, steps, "step") if steps else {}
+    if surface.shape is not None:
+        values["shape"] = describe_shape(surface.shape)
+    radius = sphere_radius(surface)
+    return values if radius is None else values | {"shape_radius": radius}
 
 
 def _describe_targets(table: Table, path: Path) -> Table:

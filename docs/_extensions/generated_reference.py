@@ -57,13 +57,14 @@ def _command(name, command):
 def run_variables() -> str:
     """Variables of the file of a run."""
     from icha.contact.models import MODELS
-    from icha.datasets.variables.run import CYCLE, FURTHER, LOOP, RUN
+    from icha.datasets.variables.run import CYCLE, FURTHER, INDENTER, LOOP, RUN
 
     sections = {
         "All runs": RUN,
         **{f"Runs with {MODELS[name].words}": variables for name, variables in FURTHER.items() if variables},
         "Runs that unload": CYCLE,
         "Runs that end without contact": LOOP,
+        "Runs on a free square": INDENTER,
     }
     return "\n".join(f"### {heading}\n\n{_table(_rows(variables))}" for heading, variables in sections.items())
 
@@ -71,10 +72,10 @@ def run_variables() -> str:
 def campaign_variables() -> str:
     """Variables of a campaign dataset besides those of its runs, and the dimensions of all."""
     from icha.datasets.labels import LABELS
-    from icha.datasets.variables.run import CYCLE, LOOP, RUN
+    from icha.datasets.variables.run import CYCLE, INDENTER, LOOP, RUN
 
     study = _small_campaign()["study"].to_dataset()
-    of_runs = RUN | CYCLE | LOOP
+    of_runs = RUN | CYCLE | LOOP | INDENTER
     own = {name: variable for name, variable in study.variables.items() if name not in of_runs}
     shared = {
         name: ", ".join(dim for dim in study[name].dims if dim not in of_runs[name].dims) or "none"

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.spatial import ConvexHull
 
 from icha.boundary_elements.patches import CellState, free_edges, label_patches, labels_at, patch_centres
 from icha.contact.model import PRESSURE_BINS, gap_bins
@@ -42,6 +44,17 @@ class PatchObservables:
             "pending_count": state.pending,
             "layer_compression": self._layer_compression(state),
             "outside_wu_fraction": outside if contact.adhesive else 0.0,
+            **(self._extent(state) if self.surface.free else {}),
+        }
+
+    def _extent(self, state):
+        """Return the radius of the convex hull of the cells in contact, m, and the share of contact at the edge."""
+        areas, at_edge = self.contact.area_of_cells(state), self.contact.at_edge(state)
+        # A front is several cells wide, so only cells count that are mostly in contact.
+        inside = state.cells[areas >= min(0.5, areas.max(initial=0.0))]
+        return {
+            "hull_radius": math.sqrt(hull_area(inside, self.contact.space.grid) / np.pi) * self.contact.spacing,
+            "edge_contact": float(np.sum(areas[at_edge]) / (np.sum(areas) or 1.0)),
         }
 
     def _layer_compression(self, state):
@@ -127,3 +140,15 @@ class PatchObservables:
             "spot_curvature_radius": radius[1:],
             "spot_members": np.bincount(of_summit, minlength=count + 1)[1:],
         }
+
+
+def hull_area(cells: np.ndarray, grid: int) -> float:
+    """Return the area of the convex hull of some cells of a grid that is not periodic, in cells; 0 without cells."""
+    if not len(cells):
+        return 0.0
+    row, column = np.divmod(cells, grid)
+    rows, first = np.unique(row, return_index=True)
+    # Only the first and the last cell of each row can be at the hull; cells are in ascending order.
+    left, right = column[first], column[np.append(first[1:], len(cells)) - 1] + 1
+    corners = [np.column_stack([at, rows + side]) for at in (left, right) for side in (0, 1)]
+    return float(ConvexHull(np.concatenate(corners)).volume)

@@ -9,7 +9,7 @@ import xarray as xr
 from icha.checks.findings import IDENTITY_LIMIT, Check, RunArrays, compare_with_limit, count_not_finite
 from icha.checks.loops import LOOP_CHECKS, check_events, check_loop, finite_stiffness
 from icha.contact.models import AREA_TOLERANCE_CELLS, AREA_TOLERANCE_PART, SMALLEST_LOAD, model_of
-from icha.datasets.variables.run import OF_MODELS, RUN
+from icha.datasets.variables.run import INDENTER, OF_MODELS, RUN
 from icha.datasets.variables.terms import INFINITE
 from icha.path.targets import AREAS, BETWEEN, CONTACT_RADIUS
 
@@ -25,7 +25,7 @@ CELL_LIMIT = 1e-3
 # Largest rise of the mean separation, in h_rms, in a step in which spots unite. After a union, the same load may need a
 # larger separation.
 SEPARATION_RISE_LIMIT = 1e-2
-_MAY_BE_INFINITE = {name for name, description in RUN.items() if INFINITE in description.further}
+_MAY_BE_INFINITE = {name for name, description in (RUN | INDENTER).items() if INFINITE in description.further}
 
 # Meanings of the checks by name.
 _CHECKS = LOOP_CHECKS | {

@@ -20,7 +20,7 @@ from icha.datasets.variables.campaign import (
     RAGGED,
     STATUS_ATTRIBUTES,
 )
-from icha.datasets.variables.run import FURTHER
+from icha.datasets.variables.run import FURTHER, INDENTER
 from icha.path.targets import BETWEEN
 
 # Variables of the campaign dataset that describe a run; datasets of runs do not have these variables.
@@ -114,8 +114,8 @@ def variables_of_run(tree: xr.DataTree, labels: RunLabels | tuple) -> tuple[dict
         if name in left_out:
             continue
         variable = of_study[tuple(index.get(dim, slice(None)) for dim in of_study.dims)].load()
-        if ended_early and variable.ndim == 0 and variable.dtype.kind == "f" and np.isnan(variable.values):
-            continue  # a run that ended early lacks this variable
+        if (ended_early or name in INDENTER) and variable.dtype.kind == "f" and np.isnan(variable.values).all():
+            continue  # the run lacks this variable
         if variable.dtype.kind == "f" and variable.encoding.get("dtype") == np.dtype("int32"):
             # If some runs lack an integer variable, xarray reads the variable as floats.
             variable = xr.Variable(variable.dims, variable.values.astype(np.int32), variable.attrs)
@@ -141,7 +141,7 @@ def _ragged_slice(study: xr.Dataset, dim: str, place: tuple[int, ...]) -> slice:
 
 
 def reduced_gap(data: xr.Dataset) -> xr.DataArray:
-    """Return the ratio of the mean gap to the rms height; figures show this ratio as the separation.
+    """Return the ratio of the mean gap to the unit of heights (rms height); figures show this ratio as the separation.
 
     On a periodic surface, mean gap and mean separation are equal. The mean separation of a free square is the
     distance to the half-space far from the square. Therefore only the mean gap is comparable among all surfaces.

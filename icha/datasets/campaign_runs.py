@@ -25,7 +25,7 @@ from icha.datasets.variables.campaign import (
     STATUS_ATTRIBUTES,
     VARIES_WITH,
 )
-from icha.datasets.variables.run import CELLS, CYCLE, LOOP, OF_MODELS, RUN
+from icha.datasets.variables.run import CELLS, CYCLE, INDENTER, LOOP, OF_MODELS, RUN
 from icha.support.input_files import text
 
 # Dimensions and values of variables, by name. Texts are arrays of characters; the dimension of characters has no name.
@@ -33,7 +33,7 @@ Values = dict[str, tuple[tuple[str, ...], np.ndarray]]
 # Labels of a run, and the dataset of the run or the path of its file.
 LabelledRun = tuple[RunLabels | tuple, xr.Dataset | str | os.PathLike]
 
-_DIMS = {name: description.dims for name, description in (RUN | OF_MODELS | CYCLE | LOOP).items()}
+_DIMS = {name: description.dims for name, description in (RUN | OF_MODELS | CYCLE | LOOP | INDENTER).items()}
 _ENDED_EARLY = (INCOMPLETE, BEYOND_MODEL)
 _ATTRIBUTES = ("contact_model", "config_sha256", "applicability", *STATUS_ATTRIBUTES.values())
 
@@ -90,9 +90,9 @@ class Entry(NamedTuple):
     applicability: str
 
     @property
-    def extent(self) -> tuple[bool, int]:
-        """Sort key: (run reached its end, number of steps). A run with the largest key has all variables."""
-        return self.status not in _ENDED_EARLY, self.sizes.get("step", 0)
+    def extent(self) -> tuple[bool, int, int]:
+        """Sort key: (run reached its end, numbers of variables and of steps). The largest key has all variables."""
+        return self.status not in _ENDED_EARLY, len(self.names), self.sizes.get("step", 0)
 
 
 def spool_runs(

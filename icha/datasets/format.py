@@ -115,6 +115,8 @@ def _problems_with_run(run: xr.Dataset) -> Iterator[str]:
     if model not in MODELS:
         yield f"attribute contact_model: {model!r}; expected {' or '.join(MODELS)}"
     tables = [of_run.RUN | of_run.FURTHER.get(model, {}), of_run.CYCLE, of_run.LOOP]
+    # A run on a free square has only some of these variables.
+    tables.append({name: described for name, described in of_run.INDENTER.items() if name in run})
     if problems := list(_problems_with_variables(run, *tables)):
         yield from problems
         return
@@ -127,7 +129,7 @@ def _problems_with_run(run: xr.Dataset) -> Iterator[str]:
                 yield f"{name}: the edges do not increase; expected edges in ascending order"
     unit = run["contact_modulus"] * run["unit_slope"]
     for name, expected, formula in (
-        ("reduced_pressure", run["nominal_pressure"] / unit, "nominal_pressure/(contact_modulus rms_slope)"),
+        ("reduced_pressure", run["nominal_pressure"] / unit, "nominal_pressure/(contact_modulus unit_slope)"),
         ("reduced_separation", run["mean_separation"] / run["unit_height"], "mean_separation/unit_height"),
     ):
         error = abs(run[name] - expected)

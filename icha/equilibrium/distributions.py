@@ -28,6 +28,28 @@ def cover_grid(period: float, grid: int, centres, radii, free_square: bool = Fal
     return np.concatenate(cover), np.concatenate(inside)
 
 
+def edge_share(period: float, grid: int, centres: np.ndarray, radii: np.ndarray) -> float:
+    """Return the share of the area of discs that is in the outermost cells of a free square, or outside the square.
+
+    Parameters
+    ----------
+    period : side of the square, m.
+    grid : number of grid nodes along a side; a cell is the square around a node.
+    centres, radii : (k, 2) and (k,) float, centres and radii of the discs, m.
+    """
+    area = float(np.sum(np.pi * radii**2))
+    if not area:
+        return 0.0
+    low, high = 0.5 * period / grid, (grid - 1.5) * period / grid
+    x, y = np.transpose(centres)
+
+    def below(right, top):
+        return _disc_area_left_below(right - x, top - y, radii)
+
+    inside = below(high, high) - below(low, high) - below(high, low) + below(low, low)
+    return max(1 - float(np.sum(inside)) / area, 0.0)
+
+
 def gap_distribution(law: JKR, surface: Surface, state: ContactState) -> dict:
     """Return the distribution P(u) of the gap u outside the spots, as a dictionary with the keys below.
 

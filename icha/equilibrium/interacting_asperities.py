@@ -11,7 +11,7 @@ from icha.asperity.jkr import JKR
 from icha.asperity.material import Material
 from icha.contact.model import AREA_FRACTION, PRESSURE, Control
 from icha.contact.models import DEFAULT_MODEL, MODELS
-from icha.equilibrium.distributions import gap_distribution, pressure_distribution
+from icha.equilibrium.distributions import edge_share, gap_distribution, pressure_distribution
 from icha.equilibrium.equations import derivative_by_radius, pressure_or_area_fraction, radius_slope
 from icha.equilibrium.sites import AsperityContact, ContactState, Sites
 from icha.equilibrium.solver import find_equilibrium
@@ -26,8 +26,14 @@ _UNSTABLE_RESPONSE = 10.0
 
 @dataclass(frozen=True, eq=False)
 class InteractingAsperities(AsperityContact):
-    """Asperities that interact through the half-space and unite where they overlap: a `ContactModel`."""
+    """Asperities that interact through the half-space and unite where they overlap: a `ContactModel`.
 
+    Attributes
+    ----------
+    mean_height : mean height of the surface, m: 0 without a shape.
+    """
+
+    mean_height: float = 0.0
     # Largest contact area fraction of a state. A target is at most 0.25, but the search for a target may exceed 0.25.
     largest_area_fraction = 1.5 * 0.25
     path_accuracy = MODELS[DEFAULT_MODEL].accuracy
@@ -67,13 +73,15 @@ class InteractingAsperities(AsperityContact):
     def mean_gap(self, state: ContactState) -> float:
         """Return the mean gap, m; on a periodic surface it is the mean separation.
 
-        On a free square the mean displacement is added, computed with a point force at the centre of each spot.
+        On a free square the mean displacement is added, computed with a point force at the centre of each spot. The
+        mean height of a shape is subtracted.
         """
         if not self.asperities.free:
             return state.separation
         spots = state.spots
         force = self.law.force(spots.contact_radius, spots.radius_of_curvature)
-        return state.separation + mean_displacement(self.asperities.period, self.contact_modulus, spots.position, force)
+        displacement = mean_displacement(self.asperities.period, self.contact_modulus, spots.position, force)
+        return state.separation - self.mean_height + displacement
 
     def spot_count(self, state: ContactState) -> int:
         """Return the number of contact spots."""
@@ -135,7 +143,11 @@ class AsperityObservables:
         law, spots = self.contact.law, state.spots
         verified = law.is_jump_in_verified(spots.radius_of_curvature[spots.members == 1])
         outside = np.count_nonzero(~verified) / max(len(verified), 1) if self.contact.adhesive else 0.0
-        return {"residual": state.residual, "pending_count": state.barred_count, "outside_wu_fraction": outside}
+        values = {"residual": state.residual, "pending_count": state.barred_count, "outside_wu_fraction": outside}
+        if self.surface.free:
+            square = self.surface.period, self.surface.grid
+            values["edge_contact"] = edge_share(*square, spots.position, spots.contact_radius)
+        return values
 
     def of_snapshot(self, state: ContactState) -> dict:
         """Return the distributions of gap and pressure, and for each spot the properties named `spot_…`, SI units."""
@@ -183,4 +195,6 @@ def contact_of(surface: Surface, material: Material) -> InteractingAsperities:
         raise ValueError(
             f"thickness: {material.thickness:g} m; the asperity model is only for a half-space. Use boundary elements"
         )
-    return InteractingAsperities(JKR(material), find_summits(surface), surface.unit_height, surface.unit_slope)
+    profile, units = surface.profile, (surface.unit_height, surface.unit_slope)
+    mean_height = float(np.mean(profile[np.isfinite(profile)])) if surface.shape else 0.0
+    return InteractingAsperities(JKR(material), find_summits(surface), *units, mean_height)

@@ -30,6 +30,7 @@ _ATTRIBUTES = {
     "spot_snapshot": _index_of("snapshot"),
     "full_contact_energy_ratio": {INFINITE: "without adhesion"},
     "contact_stiffness": {INFINITE: "in full contact"},
+    "stiffness": {INFINITE: "in full contact"},
     "slope_anisotropy": {INFINITE: "for straight grooves"},
     "event_kind": {
         "flag_values": np.arange(len(EVENT_KINDS), dtype=np.int8),
@@ -39,8 +40,9 @@ _ATTRIBUTES = {
     "loss_by_jump_in": _SUM,
     "loss_by_jump_off": _SUM,
 }
-# Variables of every run, of runs whose path continues after the first loading, and of runs that end in separation.
-RUN, CYCLE, LOOP = read_tables("run.txt", TERMS, _ATTRIBUTES, meaning=MEANING).values()
+# Variables of every run, of runs whose path continues after the first loading, of runs that end in separation, and of
+# runs on a free square. Not every run on a free square has all variables of INDENTER.
+RUN, CYCLE, LOOP, INDENTER = read_tables("run.txt", TERMS, _ATTRIBUTES, meaning=MEANING).values()
 # Variables that only runs with a certain model have, by name of the model.
 FURTHER = {
     name: {key: Variable(*facts, np.dtype(dtype).type) for key, (*facts, dtype) in model.variables.items()}

@@ -1,0 +1,104 @@
+"""Values of a run with a free square as experiments have them: force, indentation, radii, and works of adhesion."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from icha.asperity.material import Material
+from icha.references.jkr_fits import fit_work_of_adhesion
+from icha.surfaces.surface import Surface
+
+# A fit uses at most one state in each of this number of equal intervals of the indentation. Paths have many states near
+# jumps, which would otherwise have too much weight.
+INTERVALS = 100
+# Smallest number of states for a fit.
+_LEAST_STATES = 3
+
+
+def step_values(row: Mapping[str, float], area: float) -> dict[str, float]:
+    """Return the values of a step as experiments have them, by variable name.
+
+    row : nominal pressure, separation, area fraction and stiffness of the step. area : nominal area A0, m^2.
+    """
+    return {
+        "force": row["nominal_pressure"] * area,
+        "indentation": -row["mean_separation"],
+        "contact_radius": math.sqrt(row["contact_area_fraction"] * area / math.pi),
+        "stiffness": row["contact_stiffness"] * area,
+    }
+
+
+def loop_values(
+    rows: Sequence[Mapping[str, float]], loop: Mapping[str, float], surface: Surface, material: Material
+) -> dict[str, float]:
+    """Return the values of a loop that ends without contact, by variable name; without adhesion only the force.
+
+    Ratios to the theory of JKR, and fits of this theory, exist only for shapes with a radius on a half-space. A fit
+    exists only if there are enough states.
+
+    Parameters
+    ----------
+    rows : values of all steps, from `step_values`, with `leg`.
+    loop : values of `icha.path.energy_balance.summarise_loop`.
+    """
+    area, energy = surface.period**2, material.surface_energy
+    pull_off = loop["pull_off_pressure"] * area
+    values = {"pull_off_force": pull_off}
+    if not energy:
+        return values
+    if largest := loop["largest_contact_area_fraction"]:
+        values["loss_over_contact"] = loop["hysteresis_loss"] / (energy * largest)
+    radius = sphere_radius(surface)
+    if radius is None or material.layered:
+        return values
+    values["pull_off_force_over_jkr"] = pull_off / (1.5 * math.pi * energy * radius)
+    for branch, states in (("approach", first_approach(rows)), ("retraction", last_retraction(rows))):
+        work = apparent_work_of_adhesion(states, radius, material.contact_modulus)
+        if work is not None:
+            values[f"work_of_adhesion_{branch}"] = work
+    return values
+
+
+def sphere_radius(surface: Surface) -> float | None:
+    """Return the radius of the sphere with which contact of a surface is compared, m; None without such a sphere."""
+    return getattr(surface.shape, "sphere_radius", None)
+
+
+def first_approach(rows: Sequence[Mapping[str, float]]) -> list[Mapping[str, float]]:
+    """Return the steps of the first loading that have contact."""
+    return [row for row in rows if row["leg"] == 0 and row["contact_radius"] > 0]
+
+
+def last_retraction(rows: Sequence[Mapping[str, float]]) -> list[Mapping[str, float]]:
+    """Return the steps of the last unloading that have contact, up to the largest tension."""
+    last = [row for row in rows if row["leg"] == rows[-1]["leg"]]
+    end = int(np.argmin([row["force"] for row in last])) + 1
+    return [row for row in last[:end] if row["contact_radius"] > 0]
+
+
+def apparent_work_of_adhesion(
+    states: Sequence[Mapping[str, float]], radius: float, contact_modulus: float
+) -> float | None:
+    """Return the work of adhesion of the JKR sphere that fits the contact radii of some states at their forces, J/m^2.
+
+    The modulus is given. Return None if there are too few states at different indentations.
+    """
+    chosen = spaced_states([row["indentation"] for row in states])
+    if len(chosen) < _LEAST_STATES:
+        return None
+    force, contact_radius = (np.array([states[k][name] for k in chosen]) for name in ("force", "contact_radius"))
+    fit = fit_work_of_adhesion(force, radius, contact_radius=contact_radius, contact_modulus=contact_modulus)
+    return fit.work_of_adhesion
+
+
+def spaced_states(indentation: Sequence[float]) -> np.ndarray:
+    """Return the indices of the first state in each of `INTERVALS` equal intervals of the indentation, ascending."""
+    if len(indentation) == 0:
+        return np.zeros(0, int)
+    values = np.asarray(indentation, float)
+    width = np.ptp(values) / INTERVALS or 1.0
+    _, first = np.unique(np.floor((values - values.min()) / width), return_index=True)
+    return np.sort(first)

@@ -1,0 +1,121 @@
+"""Values of runs with an indenter: exact JKR loops, hulls and edges of exact figures, and what runs record."""
+
+import math
+
+import numpy as np
+import pytest
+
+import icha
+from icha.boundary_elements.observables import hull_area
+from icha.equilibrium.distributions import edge_share
+from icha.references import indentation as closed
+from icha.references.indenter_runs import loop_values, spaced_states
+from icha.surfaces.shapes import Cone, Paraboloid, Sphere, describe_shape
+
+SIDE, MODULUS, RADIUS, ENERGY = 64e-6, 1e6, 1e-3, 0.05
+SMOOTH = icha.Surface(np.zeros((64, 64)), SIDE, "free", Sphere(RADIUS))
+
+
+def rows_of(states, leg):
+    radius = np.asarray(states.contact_radius)
+    columns = states.force, states.indentation, radius
+    return [dict(force=f, indentation=d, contact_radius=a, leg=leg) for f, d, a in zip(*columns, strict=True)]
+
+
+def test_loop_of_two_jkr_spheres_returns_their_works_of_adhesion():
+    unit = float(closed.sphere_pull_off(RADIUS, MODULUS, ENERGY).contact_radius)
+    into = closed.sphere_contact(unit * np.linspace(1.5, 4, 40), RADIUS, MODULUS, 0.6 * ENERGY)
+    out = closed.sphere_contact(unit * np.linspace(4, 0.9, 400), RADIUS, MODULUS, ENERGY)
+    rows = [*rows_of(into, 0), *rows_of(out, 1), {"force": 0.0, "indentation": 1.0, "contact_radius": 0.0, "leg": 1}]
+    pull_off = -float(np.min(out.force))
+    loop = {"pull_off_pressure": pull_off / SIDE**2, "hysteresis_loss": 0.003, "largest_contact_area_fraction": 0.2}
+    values = loop_values(rows, loop, SMOOTH, icha.Material(MODULUS, ENERGY, 1e-9))
+    assert values["pull_off_force"] == pytest.approx(pull_off)
+    assert values["pull_off_force_over_jkr"] == pytest.approx(1.0, abs=1e-4)
+    assert values["work_of_adhesion_approach"] == pytest.approx(0.6 * ENERGY, rel=1e-5)
+    assert values["work_of_adhesion_retraction"] == pytest.approx(ENERGY, rel=1e-5)
+    assert values["loss_over_contact"] == pytest.approx(0.003 / (0.2 * ENERGY))
+
+
+def test_values_that_are_not_defined_are_left_out():
+    loop = {"pull_off_pressure": 1.0, "hysteresis_loss": 0.0, "largest_contact_area_fraction": 0.1}
+    rows = [{"force": -1.0, "indentation": 0.0, "contact_radius": 1e-6, "leg": 1}]
+    bare, sticky = icha.Material(MODULUS, 0.0, 1e-9), icha.Material(MODULUS, ENERGY, 1e-9)
+    assert loop_values(rows, loop, SMOOTH, bare).keys() == {"pull_off_force"}
+    assert "work_of_adhesion_retraction" not in loop_values(rows, loop, SMOOTH, sticky)
+    cone = icha.Surface(np.zeros((64, 64)), SIDE, "free", Cone(math.radians(80)))
+    assert loop_values(rows, loop, cone, sticky).keys() == {"pull_off_force", "loss_over_contact"}
+    layer = icha.Material(MODULUS, ENERGY, 1e-9, thickness=1e-5)
+    assert loop_values(rows, loop, SMOOTH, layer).keys() == {"pull_off_force", "loss_over_contact"}
+
+
+def test_states_for_a_fit_are_spread_over_the_indentation():
+    crowded = np.concatenate([np.linspace(0, 1, 11), 0.5 + 1e-6 * np.arange(1000)])
+    assert spaced_states(crowded).tolist() == list(range(11))
+
+
+def test_hull_of_cells():
+    grid = 20
+    square = np.zeros((grid, grid), bool)
+    square[3:8, 4:14] = True
+    square[4:7, 5:13] = False  # a hole does not change the hull
+    assert hull_area(np.flatnonzero(square), grid) == pytest.approx(50)
+    assert hull_area(np.array([2, 17 * grid + 2]), grid) == pytest.approx(18)
+    triangle = np.tril(np.ones((grid, grid), bool))
+    assert hull_area(np.flatnonzero(triangle), grid) == pytest.approx(grid**2 / 2 + grid - 0.5)
+    assert hull_area(np.zeros(0, int), grid) == 0
+
+
+def test_share_of_discs_at_the_edges_of_a_square():
+    """Cells of side 1 around nodes 0 to 9: the outermost cells end at 0.5 and 8.5."""
+    assert edge_share(10.0, 10, np.array([[4.5, 4.5]]), np.array([4.0])) == pytest.approx(0, abs=1e-12)
+    assert edge_share(10.0, 10, np.array([[0.5, 4.5]]), np.array([2.0])) == pytest.approx(0.5)
+    assert edge_share(10.0, 10, np.array([[0.5, 8.5], [4.5, 4.5]]), np.array([1.0, 1.0])) == pytest.approx(0.375)
+    assert edge_share(10.0, 10, np.zeros((0, 2)), np.zeros(0)) == 0
+
+
+def test_descriptions_of_shapes():
+    assert describe_shape(Sphere(1e-3)) == "sphere of radius 0.001 m"
+    assert describe_shape(Paraboloid((1e-3, 2e-3))) == "paraboloid of radii 0.001 and 0.002 m"
+    assert describe_shape(Cone(1.5)) == "cone of half angle 1.5 rad"
+
+
+@pytest.mark.parametrize("model", ["asperities", "boundary_elements"])
+def test_run_of_a_smooth_sphere_has_the_values_of_jkr(model):
+    energy = (4e-6) ** 3 * MODULUS / RADIUS**2  # four cells for (dgamma R^2/E*)^(1/3)
+    material = icha.Material(MODULUS, energy, 1e-12)
+    run = icha.simulate(SMOOTH, material, icha.Path(contact_radii=[9e-6], unload=True), model=model)
+    assert "failed_checks" not in run.attrs and run.attrs["applicability"] == ""
+    assert str(run["shape"].values) == "sphere of radius 0.001 m" and run["shape_radius"] == RADIUS
+    # Boundary elements with few cells are accurate to a few per cent.
+    accuracy = 1e-9 if model == "asperities" else 0.03
+    assert float(run["pull_off_force_over_jkr"]) == pytest.approx(1, abs=accuracy)
+    assert float(run["work_of_adhesion_approach"]) == pytest.approx(energy, rel=2 * accuracy)
+    assert float(run["work_of_adhesion_retraction"]) == pytest.approx(energy, rel=2 * accuracy)
+    np.testing.assert_allclose(run["force"], run["nominal_pressure"] * SIDE**2)
+    np.testing.assert_array_equal(run["indentation"], -run["mean_separation"])
+    assert np.all(run["edge_contact"] == 0)
+    if model == "boundary_elements":
+        touching = run["contact_radius"].values > 0
+        excess = (run["hull_radius"] - run["contact_radius"]).values[touching] / SMOOTH.spacing
+        assert np.all(run["hull_radius"].values[~touching] == 0)
+        assert 0 < excess.min() and excess.max() < 1
+
+
+def test_contact_at_the_edges_of_a_scan_is_said():
+    x = np.linspace(-1, 1, 32)
+    waves = 1e-7 * np.cos(np.arange(32) * np.pi / 4)
+    bowl = icha.Surface(1e-6 * x**2 + waves + waves[:, None], 32e-6, "free")
+    run = icha.simulate(
+        bowl, icha.Material(MODULUS, 0.0, 1e-9), icha.Path(area_fractions=[0.02]), model="boundary_elements"
+    )
+    assert float(run["edge_contact"].max()) > 0.5
+    assert "in the outermost cells of the square" in run.attrs["applicability"]
+
+
+def test_contact_of_a_shape_at_the_edge_ends_the_path_in_words():
+    path = icha.Path(indentations=[1e-7, 2e-6])
+    with pytest.raises(icha.ConvergenceError, match="reaches the edge of the square of side") as error:
+        icha.simulate(SMOOTH, icha.Material(MODULUS, 0.0, 1e-9), path, model="boundary_elements")
+    assert "reaches the edge" in error.value.dataset.attrs["beyond_model"]
+    assert error.value.dataset.sizes["step"] == 1
