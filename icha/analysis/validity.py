@@ -40,6 +40,8 @@ _RATIO = "full_contact_energy_ratio"
 COMPLETE, STRENGTH, THEORETICAL = "complete_contact_pressure", "interface_strength", "theoretical_strength"
 RESOLVED, SPACING = "resolved_tension", "spacing"
 RMS_HEIGHT, STICKY_HEIGHT = "rms_height", "sticky_rms_height"
+# 1 for a surface with a shape, otherwise 0.
+SHAPED = "shaped"
 _OF_FULL_CONTACT = (COMPLETE, STRENGTH, THEORETICAL, RESOLVED)
 
 # ICHA warns if more than this fraction of the single-asperity spots is outside the range of Wu's formula.
@@ -159,7 +161,8 @@ def statements(
 
 def _full_contact(cases):
     """Yield the statement on full contact for the run with the strongest adhesion, if any run has adhesion."""
-    adhesive = [case for case in cases if case.ratio < math.inf]
+    # The contact of an indenter stays smaller than the surface.
+    adhesive = [case for case in cases if case.ratio < math.inf and not case.facts.get(SHAPED)]
     if not adhesive:
         return
     lowest = min(adhesive, key=lambda case: case.ratio)
@@ -276,9 +279,10 @@ def _cases(study):
     """Yield a `Case` for every computed run of a study."""
     measured = [name for name in (*VALIDATED, *_OF_FULL_CONTACT) if name in study]
     status = study["status"].transpose(*LABELS)
+    counts = ("period", "grid", "asperity_count", "unsupported_summit_count", "boundary")
     values = {
         name: study[name].broadcast_like(status).transpose(*LABELS).values
-        for name in (*measured, "period", "grid", "asperity_count", "unsupported_summit_count", "boundary")
+        for name in (*measured, *counts, *(["shape"] if "shape" in study else []))
     }
     unsupported = values["unsupported_summit_count"]
     labels = [study[label].values for label in LABELS]
@@ -289,6 +293,7 @@ def _cases(study):
         summits = values["asperity_count"][at] + unsupported[at]
         facts["nodes_per_short_wave"] = cells_per_short_wave(values["grid"][at], summits)
         facts["unsupported_summits"] = float(unsupported[at] / max(summits, 1))
+        facts[SHAPED] = float("shape" in values and bool(values["shape"][at]))
         facts["free_edges"] = float(values["boundary"][at] != "periodic")
         yield Case(model, surface, material, facts)
 

@@ -7,6 +7,7 @@ from icha.analysis.validity import (
     COMPLETE,
     RESOLVED,
     RMS_HEIGHT,
+    SHAPED,
     SPACING,
     STICKY_HEIGHT,
     STRENGTH,
@@ -27,6 +28,7 @@ from icha.configuration.plausibility import energy_ratio
 from icha.configuration.surfaces import SelfAffineSurface
 from icha.configuration.topographies import read_surface
 from icha.contact.models import MODELS
+from icha.support.formatting import format_quantity
 from icha.surfaces.moments import (
     SpectralMoments,
     cells_per_short_wave,
@@ -37,6 +39,8 @@ from icha.surfaces.moments import (
     summit_density,
 )
 
+# Least number of cells in the contact radius at zero load for a pull-off force within a per cent (docs/indenter.md).
+_LEAST_CELLS = 10
 # Radius of the mean summit of a Gaussian surface, multiplied by the rms curvature of the surface (McCool 1986).
 # icha.references.summit_theories also contains this number, but takes long to import.
 _SUMMIT_RADIUS = 3 * math.sqrt(math.pi) / 8
@@ -112,6 +116,7 @@ def expected_validity(campaign: Campaign) -> list[Statement]:
         # Only the asperity model needs surfaces that are similar to the surfaces of its validation.
         known = (facts if by_summits else {}) | {
             "full_contact_energy_ratio": energy_ratio(campaign, case),
+            SHAPED: float(campaign.surfaces[case.surface].shape is not None),
             COMPLETE: facts[COMPLETE] * case.rms_slope * material.contact_modulus,
             STRENGTH: material.interface_strength,
             THEORETICAL: material.theoretical_strength,
@@ -134,7 +139,26 @@ def expected_validity(campaign: Campaign) -> list[Statement]:
             sticky[key] = max(value, sticky.get(key, 0.0))
     models = {name: study.models for name, study in campaign.studies.items()}
     outside = _describe_outside(tabor) if tabor else None
-    return statements(models, cases, outside, describe_sticky(sticky))
+    return [*statements(models, cases, outside, describe_sticky(sticky)), *_indenters(campaign)]
+
+
+def _indenters(campaign):
+    """Yield a statement for each sphere and adhesive material: what a smooth sphere would do by the theory of JKR."""
+    contacts = dict.fromkeys((case.surface, case.material) for case in run_cases(campaign))
+    for surface, name in contacts:
+        shape, material = campaign.surfaces[surface].shape, campaign.materials[name]
+        radius = shape.shape.sphere_radius if shape else None
+        if radius is None or not material.surface_energy or material.thickness:
+            continue
+        force = 1.5 * math.pi * material.surface_energy * radius
+        contact = math.cbrt(4.5 * math.pi * material.surface_energy * radius**2 / material.contact_modulus)
+        cell = campaign.period(surface) / campaign.grid(surface)
+        text = (
+            f"by the theory of JKR, {name} adheres to a smooth sphere of radius {format_quantity(radius, 'm')} with a "
+            f"pull-off force of {format_quantity(force, 'N')}; at zero load the contact radius is "
+            f"{format_quantity(contact, 'm')} ({contact / cell:.2g} cells of {surface})"
+        )
+        yield Statement("indenter", text, contact >= _LEAST_CELLS * cell)
 
 
 def _describe_outside(tabor):
