@@ -114,7 +114,8 @@ def variables_of_run(tree: xr.DataTree, labels: RunLabels | tuple) -> tuple[dict
         if name in left_out:
             continue
         variable = of_study[tuple(index.get(dim, slice(None)) for dim in of_study.dims)].load()
-        if (ended_early or name in INDENTER) and variable.dtype.kind == "f" and np.isnan(variable.values).all():
+        may_lack = name in INDENTER or (ended_early and variable.ndim == 0)
+        if may_lack and variable.dtype.kind == "f" and variable.size and np.isnan(variable.values).all():
             continue  # the run lacks this variable
         if variable.dtype.kind == "f" and variable.encoding.get("dtype") == np.dtype("int32"):
             # If some runs lack an integer variable, xarray reads the variable as floats.
@@ -146,7 +147,8 @@ def reduced_gap(data: xr.Dataset) -> xr.DataArray:
     On a periodic surface, mean gap and mean separation are equal. The mean separation of a free square is the
     distance to the half-space far from the square. Therefore only the mean gap is comparable among all surfaces.
     """
-    gap = (data["mean_gap"] / data["unit_height"]).transpose(*data["reduced_separation"].dims)
+    unit = data["unit_height" if "unit_height" in data else "rms_height"]  # not in datasets of earlier versions
+    gap = (data["mean_gap"] / unit).transpose(*data["reduced_separation"].dims)
     return data["reduced_separation"].where(data["boundary"] != "free", gap)
 
 
