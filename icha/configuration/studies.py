@@ -17,7 +17,7 @@ from pydantic import (
 
 from icha.asperity.cohesive_zone import resolution_problem
 from icha.asperity.material import Material
-from icha.configuration.surfaces import SURFACE_KINDS, MaterialSection
+from icha.configuration.surfaces import SURFACE_KINDS, MaterialSection, MeasuredSurface
 from icha.contact.models import DEFAULT_MODEL, MODELS
 from icha.path.snapshots import AreaFraction, Indentation, ReducedPressure, Snapshot
 from icha.path.targets import (
@@ -175,7 +175,8 @@ class TurningPoint(Snapshot):
 SCALARS: dict[str, str] = {}
 for _section in (*SURFACE_KINDS.values(), MaterialSection):
     for _name, _field in _section.model_fields.items():
-        if _name not in ("kind", "path", "crop", "shape"):
+        # The description of `boundary` is that of measured surfaces, which have most values.
+        if _name not in ("kind", "path", "crop", "shape") and (_name != "boundary" or _section is MeasuredSurface):
             SCALARS.setdefault(_name, str(_field.description))
 
 

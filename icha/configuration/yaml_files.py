@@ -10,7 +10,7 @@ import yaml
 
 from icha.configuration.campaign import Defaults
 from icha.configuration.errors import ConfigurationError
-from icha.configuration.surfaces import SURFACE_KINDS
+from icha.configuration.surfaces import SURFACE_KINDS, MeasuredSurface
 from icha.support import formatting
 from icha.support.input_files import problem_with_path
 
@@ -164,10 +164,15 @@ def apply_defaults(content: Mapping) -> dict:
 
 
 def _fill_in(entry: Mapping, given: Mapping) -> dict:
-    """Return an entry with default values `given`, except for keys that only surfaces of other kinds have."""
+    """Return an entry with default values `given`, except for keys that only surfaces of other kinds have.
+
+    A default `boundary` is meant for measured surfaces, which have most values of this key.
+    """
     kinds = [section.model_fields for section in SURFACE_KINDS.values()]
     kind = SURFACE_KINDS.get(str(entry.get("kind", given.get("kind"))))
     others = set().union(*kinds).difference(kind.model_fields) if kind else set()
+    if kind and kind is not MeasuredSurface:
+        others.add("boundary")
     return {key: value for key, value in given.items() if key not in others} | dict(entry)
 
 

@@ -56,7 +56,7 @@ class Sphere(Shape):
         if (farthest := float(np.max(r))) > self.radius:
             raise ValueError(
                 f"radius: {self.radius:.6g} m is less than the distance of {farthest:.6g} m between the apex and the "
-                "farthest node; use a larger radius or a smaller square"
+                "farthest node; expected a larger radius or a smaller square"
             )
         # This form does not subtract nearly equal numbers.
         return -(r**2) / (self.radius + np.sqrt((self.radius - r) * (self.radius + r)))
