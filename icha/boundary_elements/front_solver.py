@@ -315,9 +315,14 @@ class FrontRelaxation:
         change, pressure_change = newton_step(problem, active, self.damping)
         # To first order the step changes the energy by the sum of (G/W - 1) W df, with the local work of adhesion W.
         adhesion = (problem.front.local_strengths(active.mean_fraction) / problem.front.straight_strength) ** 2
-        if np.sum((active.intensity**2 - 1) * adhesion * change) > _WORK_ROUNDING * np.abs(change).sum():
-            self._damp(2, active.residual)
-            return
+        rises = (active.intensity**2 - 1) * adhesion * change
+        if np.sum(rises) > _WORK_ROUNDING * np.abs(change).sum():
+            # Keep only the changes that lower the energy. Shorter steps alone would stop where thousands of nearly
+            # closed cells must close together, as after full contact opens.
+            change[rises > 0] = 0
+            if not change.any():
+                self._damp(2, active.residual)
+                return
         accuracy = max(_SMALLEST_ERROR, min(self.coarsest, self._moving_accuracy(active)))
         try:
             new = problem.solve_elastic(active.apply_step(change, pressure_change), accuracy)
