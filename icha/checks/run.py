@@ -102,7 +102,7 @@ def _check_loading(run) -> Iterator[tuple]:
         "coalescence_count",
         "jump_in_count",
     )
-    loading = {name: run[name][first] for name in names}
+    loading = _without_overshoots({name: run[name][first] for name in names})
     adhesive, height = float(run["surface_energy"]) > 0, float(run["unit_height"])
     # Two targets of different kinds may lead to states that differ only by the error of the solver.
     limit = CELL_LIMIT if model_of(run.attrs).by_cells else TARGET_LIMIT
@@ -115,6 +115,16 @@ def _check_loading(run) -> Iterator[tuple]:
     yield "separation falls where spots unite", rise_at_unions / height, SEPARATION_RISE_LIMIT
     if not adhesive:
         yield "stiffness", np.count_nonzero(run["contact_stiffness"] < 0), 0
+
+
+def _without_overshoots(loading):
+    """Leave out states from which the path went back to a target.
+
+    If a jump passes a target, the path first reaches the state after the jump, and then goes back on the new branch.
+    """
+    back = (loading["step_kind"][1:] != BETWEEN) & (np.diff(loading["mean_separation"]) > 0)
+    kept = np.append(~(back & (loading["step_kind"][:-1] == BETWEEN)), True)
+    return {name: values[kept] for name, values in loading.items()}
 
 
 def _largest_fall_in_loading(loading, name):

@@ -141,14 +141,18 @@ def _ragged_slice(study: xr.Dataset, dim: str, place: tuple[int, ...]) -> slice:
     return slice(int(begin), int(end))
 
 
+def unit_height(data: xr.Dataset) -> xr.DataArray:
+    """Return the unit of separations, m: `unit_height`, or `rms_height` in datasets of earlier versions."""
+    return data["unit_height" if "unit_height" in data else "rms_height"]
+
+
 def reduced_gap(data: xr.Dataset) -> xr.DataArray:
     """Return the ratio of the mean gap to the unit of heights (rms height); figures show this ratio as the separation.
 
     On a periodic surface, mean gap and mean separation are equal. The mean separation of a free square is the
     distance to the half-space far from the square. Therefore only the mean gap is comparable among all surfaces.
     """
-    unit = data["unit_height" if "unit_height" in data else "rms_height"]  # not in datasets of earlier versions
-    gap = (data["mean_gap"] / unit).transpose(*data["reduced_separation"].dims)
+    gap = (data["mean_gap"] / unit_height(data)).transpose(*data["reduced_separation"].dims)
     return data["reduced_separation"].where(data["boundary"] != "free", gap)
 
 

@@ -24,6 +24,7 @@ from icha.datasets.variables.campaign import (
     RAGGED,
     STATUS_ATTRIBUTES,
     VARIES_WITH,
+    VARIES_WITH_SHAPES,
 )
 from icha.datasets.variables.run import CELLS, CYCLE, INDENTER, LOOP, OF_MODELS, RUN
 from icha.support.input_files import text
@@ -207,7 +208,7 @@ class Arrangement:
         dims = self.variables[name].dims
         if name in self.sizes or set(RAGGED) & set(dims):
             return (), dims
-        along = VARIES_WITH.get(name, LABELS)
+        along = (VARIES_WITH_SHAPES if "shape" in self.variables else VARIES_WITH).get(name, LABELS)
         if "rms_slope" in along and not set(self.slope_dims) <= set(along):
             along = tuple(label for label in LABELS if label in {*along, *self.slope_dims})
         return along, dims

@@ -261,12 +261,12 @@ def select_unloaded_runs(campaign: xr.DataTree, study: str) -> list[tuple[RunLab
     NothingToDraw
         If no run is complete, or if no run unloads.
     """
+    from icha.datasets.campaign import unit_height
+
     runs = _select_runs_with(unloading_legs, campaign, study)
     if not runs:
         raise NothingToDraw(f"study {study}: no run was unloaded; expected a study that unloads")
-    return [
-        (labels, run.assign(reduced_separation=run["mean_separation"] / run["unit_height"])) for labels, run in runs
-    ]
+    return [(labels, run.assign(reduced_separation=run["mean_separation"] / unit_height(run))) for labels, run in runs]
 
 
 def _select_runs_with(condition, campaign, study):

@@ -46,8 +46,10 @@ VARIES_WITH = {
     **dict.fromkeys(("rms_height", "rms_curvature", "unit_height", "unit_slope", "nayak_parameter"), _TOPOGRAPHY),
     **dict.fromkeys(("spectral_moment_0", "spectral_moment_2", "spectral_moment_4"), _TOPOGRAPHY),
     **dict.fromkeys(("height_skewness", "height_kurtosis", "slope_anisotropy"), _TOPOGRAPHY),
-    **dict.fromkeys(("period", "grid", "boundary"), ("surface",)),
+    **dict.fromkeys(("period", "grid", "boundary", "shape", "shape_radius"), ("surface",)),
     **dict.fromkeys(bin_table("gap", "m"), _TOPOGRAPHY),
     **dict.fromkeys(bin_table("pressure", "Pa"), ("rms_slope", "material")),
     **dict.fromkeys(("snapshot_kind", "snapshot_target", "control"), ()),
 }
+# The same in a study with shapes, where the unit of slopes depends on the shape and on the roughness.
+VARIES_WITH_SHAPES = VARIES_WITH | dict.fromkeys(bin_table("pressure", "Pa"), (*_TOPOGRAPHY, "material"))

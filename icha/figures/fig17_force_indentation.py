@@ -1,0 +1,75 @@
+"""Fig. 17: force against indentation, in loading and unloading, beside Hertz and JKR."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from icha.figures import select
+from icha.figures.declaration import Declaration
+from icha.figures.indenter_curves import IndenterFigure, first_run, select_series, theory_curves
+from icha.figures.looks import BRANCH_DASHES, legend_below
+from icha.figures.style import BLACK, GREY, in_style, legend_handle, new_panels
+from icha.support.formatting import choose_unit
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.figure import Figure
+
+DECLARATION = Declaration(
+    description="Force against indentation of indenters, in loading and unloading, with Hertz and JKR.",
+    options=IndenterFigure,
+)
+
+# Largest number of series in a panel.
+_MOST_SERIES = 3
+_LOOP = {"lw": 0.9, "alpha": 0.85}
+_THEORIES = {"JKR": {"color": GREY, "lw": 2.4, "alpha": 0.45}, "Hertz": {"color": GREY, "lw": 0.9, "ls": ":"}}
+# Space around the states of the runs, divided by their range.
+_MARGIN = 0.06
+
+
+@in_style
+def figure(campaign: xr.DataTree, *, study: str) -> Figure:
+    """Draw force against indentation for all runs of a study; many series have a panel each."""
+    series = select_series(campaign, study)
+    runs = [run for each in series for run in each.runs.by_seed.values()]
+    force, depth = (np.concatenate([run[name].values for run in runs]) for name in ("force", "indentation"))
+    (per_newton, force_unit), (per_metre, depth_unit) = (
+        choose_unit(float(np.abs(values).max()), unit) for values, unit in ((force, "N"), (depth, "m"))
+    )
+    shown = [series] if len(series) <= _MOST_SERIES else [[each] for each in series]
+    columns = min(len(shown), 2)
+    rows = -(-len(shown) // columns)
+    fig, panels = new_panels(2.7 * rows, rows, columns, width=3.55 * max(columns, 1.3), sharex=True, sharey=True)
+    largest = max(float(run["contact_radius"].max()) for run in runs)
+    theories = theory_curves(first_run(series), 1.5 * largest)
+    for ax, of_panel in zip(panels.ravel(), shown, strict=False):
+        for name, (x, y) in theories.items():
+            ax.plot(x * per_metre, y * per_newton, zorder=1, **_THEORIES[name])
+        for each in of_panel:
+            for run in each.runs.by_seed.values():
+                for branch, leg in select.branches(run):
+                    x, y = leg["indentation"] * per_metre, leg["force"] * per_newton
+                    ax.plot(x, y, color=each.colour, ls=BRANCH_DASHES[branch], **_LOOP)
+        ax.axhline(0, color=GREY, lw=0.5, zorder=0)
+        if len(shown) > 1:
+            ax.set_title(of_panel[0].name, loc="right")
+        ax.set(xlabel=f"indentation ({depth_unit})", ylabel=f"force ({force_unit})")
+        ax.set(xlim=_limits(depth * per_metre), ylim=_limits(force * per_newton))
+        ax.label_outer()
+    for ax in panels.ravel()[len(shown) :]:
+        ax.remove()
+    named = [] if len(shown) > 1 else series
+    handles = {each.name: legend_handle(color=each.colour, **_LOOP) for each in named}
+    handles |= {name: legend_handle(color=BLACK, ls=dashes, **_LOOP) for name, dashes in BRANCH_DASHES.items()}
+    handles |= {f"{name}, smooth sphere": legend_handle(**_THEORIES[name]) for name in theories}
+    legend_below(fig, handles)
+    return fig
+
+
+def _limits(values):
+    """Return the limits of an axis around some values."""
+    room = _MARGIN * np.ptp(values)
+    return float(values.min() - room), float(values.max() + room)

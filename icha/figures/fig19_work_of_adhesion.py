@@ -1,0 +1,78 @@
+"""Fig. 19: apparent work of adhesion of spherical indenters against the rms height of the roughness."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from icha.figures.declaration import Declaration
+from icha.figures.indenter_curves import IndenterFigure, select_series
+from icha.figures.looks import MATERIAL_COLOURS, legend_below
+from icha.figures.select import NothingToDraw
+from icha.figures.style import GREY, ONE_COLUMN, in_style, legend_handle, new_figure
+from icha.support.formatting import choose_unit
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.figure import Figure
+
+DECLARATION = Declaration(
+    description="Apparent work of adhesion of spherical indenters against the rms height of their roughness.",
+    options=IndenterFigure,
+)
+
+# Name in the legend and marker of each quantity.
+_QUANTITIES = {
+    "work_of_adhesion_approach": ("JKR fit to loading", "o"),
+    "work_of_adhesion_retraction": ("JKR fit to unloading", "s"),
+    "pull_off": ("pull-off force over that of JKR", "^"),
+}
+_ONE_SEED = {"ls": "none", "ms": 3.2, "mew": 0.6, "mfc": "white"}
+_MEAN = {"lw": 0.9, "ms": 5.0}
+
+
+@in_style
+def figure(campaign: xr.DataTree, *, study: str) -> Figure:
+    """Draw works of adhesion of fits and of pull-off, divided by the surface energy; lines join means over seeds."""
+    series = select_series(campaign, study)
+    if not any("pull_off_force_over_jkr" in run for each in series for run in each.runs.by_seed.values()):
+        raise NothingToDraw(f"study {study}: no sphere with adhesion was pulled off; see the surfaces and materials")
+    largest = max(float(run["rms_height"]) for each in series for run in each.runs.by_seed.values())
+    scale, unit = choose_unit(largest, "m")
+    materials = list(dict.fromkeys(each.runs.labels.material for each in series))
+    fig = new_figure(1.25 * ONE_COLUMN, 2.9)
+    ax = fig.subplots()
+    for (quantity, (_, marker)), material in ((q, m) for q in _QUANTITIES.items() for m in materials):
+        groups = [each.runs for each in series if each.runs.labels.material == material]
+        colour = MATERIAL_COLOURS[list(_QUANTITIES).index(quantity) + 3 * materials.index(material)]
+        means = []
+        for group in groups:
+            points = [(float(run["rms_height"]) * scale, value) for run, value in _values(group, quantity)]
+            if points:
+                ax.plot(*np.transpose(points), marker=marker, mec=colour, **_ONE_SEED)
+                means.append(np.mean(points, axis=0))
+        if means:
+            ax.plot(*np.transpose(means), marker=marker, color=colour, **_MEAN)
+    ax.axhline(1, color=GREY, lw=0.6, zorder=0)
+    ax.set(xlabel=f"rms height of the roughness ({unit})", ylabel=r"work of adhesion over $\Delta\gamma$")
+    ax.set_ylim(bottom=0)
+    handles = {}
+    for material in materials:
+        for quantity, (name, marker) in _QUANTITIES.items():
+            colour = MATERIAL_COLOURS[list(_QUANTITIES).index(quantity) + 3 * materials.index(material)]
+            words = f"{name}, {material}" if len(materials) > 1 else name
+            handles[words] = legend_handle(color=colour, marker=marker, **_MEAN)
+    legend_below(fig, handles)
+    return fig
+
+
+def _values(group, quantity):
+    """Return pairs of a run and its value, divided by the surface energy, for runs that have the quantity."""
+    found = []
+    for run in group.by_seed.values():
+        if quantity == "pull_off" and "pull_off_force_over_jkr" in run:
+            found.append((run, float(run["pull_off_force_over_jkr"])))
+        elif quantity in run:
+            found.append((run, float(run[quantity]) / float(run["surface_energy"])))
+    return found

@@ -1,0 +1,135 @@
+"""Fig. 20: maps of the contact pressure of boundary elements, on the way in and at pull-off."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from icha.contact.models import REFERENCE_MODEL
+from icha.datasets import results
+from icha.datasets.labels import RunLabels
+from icha.figures.declaration import Campaign, Declaration, Inputs, RunFigure
+from icha.figures.maps import average_blocks
+from icha.figures.style import in_style, material_label, new_panels
+from icha.support.formatting import choose_unit, format_quantity
+from icha.support.values import Problem
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.figure import Figure
+
+
+class MapsFigure(RunFigure):
+    """A figure of one run with boundary elements, with a map for each of its snapshots."""
+
+    def study_problems(self, campaign: Campaign, study) -> Iterator[Problem]:
+        """Also yield a problem if the study has no boundary elements, or no snapshot."""
+        yield from super().study_problems(campaign, study)
+        if REFERENCE_MODEL not in study.models:
+            expected = f"expected a study with {REFERENCE_MODEL!r} among its `models`"
+            yield ("study",), self.study, f"has no runs with boundary elements; {expected}"
+        if campaign.snapshots_of(self.study) == []:
+            yield ("study",), self.study, "has no snapshot to draw; expected a study with `snapshots`"
+
+    def run(self, campaign: Campaign) -> RunLabels:
+        """Return the first run with boundary elements that fits the options; a run with adhesion is preferred."""
+        return super().run(campaign)._replace(model=REFERENCE_MODEL)
+
+
+def inputs(campaign: Campaign, options: MapsFigure, files: results.ResultFiles) -> Inputs:
+    """Return the paths of the campaign dataset and of the file of the run, which contains the maps."""
+    return {"campaign": files.path(results.DATASET), "maps": files.path(results.RUN, options.run(campaign))}
+
+
+DECLARATION = Declaration(
+    description="Maps of the contact pressure of a run with boundary elements, at all its snapshots.",
+    options=MapsFigure,
+    inputs=inputs,
+    holds_topography=True,
+)
+
+_MOST_MAPS = 6
+_COLUMNS = 3
+# Fraction of the pressures in contact that the colours cover on either side; larger magnitudes have the last colour.
+_COVERED = 0.98
+# Space around the largest contact, divided by its width.
+_MARGIN = 0.15
+
+
+@in_style
+def figure(campaign: xr.DataTree, maps: xr.Dataset, *, run: Sequence) -> Figure:
+    """Draw the pressure at the snapshots of a run; with more than six snapshots, at six of them.
+
+    Parameters
+    ----------
+    campaign : the campaign dataset.
+    maps : dataset of the file of the run.
+    run : labels of the run.
+    """
+    from matplotlib.colors import TwoSlopeNorm
+
+    from icha.figures.select import NothingToDraw, select_complete_run
+
+    labels = RunLabels(*run)
+    select_complete_run(campaign, labels)
+    count = maps.sizes.get("snapshot", 0)
+    touching = maps["contact_map"].transpose("snapshot", "row", "column").values > 0
+    if not touching.any():
+        raise NothingToDraw(f"{labels}: no snapshot has contact")
+    order = np.argsort(maps["snapshot_step"].values, kind="stable")
+    shown = order[np.unique(np.rint(np.linspace(0, count - 1, min(count, _MOST_MAPS))).astype(int))]
+    pressure = maps["contact_pressure"].transpose("snapshot", "row", "column").values
+    inside = np.abs(pressure[touching])
+    factor, unit = choose_unit(float(np.quantile(inside, _COVERED)), "Pa")
+    most = float(np.quantile(inside, _COVERED)) * factor
+    length, length_unit = choose_unit(float(maps["period"]), "m")
+    side = float(maps["period"]) * length
+    columns = min(len(shown), _COLUMNS)
+    rows = -(-len(shown) // columns)
+    fig, panels = new_panels(2.5 * rows, rows, columns, width=2.15 * columns + 0.65, sharex=True, sharey=True)
+    window = _window(touching.any(axis=0), str(maps["boundary"].values) == "free")
+    for ax, k in zip(panels.ravel(), shown, strict=False):
+        cells = np.where(touching[k], pressure[k] * factor, np.nan)
+        half = side / len(cells) / 2
+        image = ax.imshow(
+            np.ma.masked_invalid(average_blocks(cells)),
+            extent=(-half, side - half) * 2,
+            origin="lower",
+            interpolation="nearest",
+            cmap="RdBu_r",
+            norm=TwoSlopeNorm(0, -most, most),
+        )
+        ax.set_title(_name_state(maps, k), loc="right", fontsize=8)
+        ax.set(xlim=np.array(window) * side, ylim=np.array(window) * side)
+        ax.set(xlabel=f"x ({length_unit})", ylabel=f"y ({length_unit})", facecolor="0.93")
+        ax.label_outer()
+    for ax in panels.ravel()[len(shown) :]:
+        ax.remove()
+    bar = fig.colorbar(image, ax=panels, shrink=0.9, pad=0.015, aspect=28, extend="both")
+    bar.set_label(f"pressure ({unit})")
+    title = (
+        f"{labels.surface}, seed {labels.seed}, {material_label(campaign[labels.study].to_dataset(), labels.material)}"
+    )
+    fig.suptitle(title, fontsize="medium")
+    return fig
+
+
+def _window(touched, free):
+    """Return the lower and the upper limit of both axes, divided by the side; on a periodic surface, 0 and 1."""
+    if not free:
+        return 0.0, 1.0
+    places = np.flatnonzero(touched.any(axis=0) | touched.any(axis=1)) / len(touched)
+    room = _MARGIN * (np.ptp(places) or 1.0)
+    return max(places[0] - room, 0.0), min(places[-1] + room, 1.0)
+
+
+def _name_state(maps, snapshot):
+    """Return branch and load of a snapshot as text; for a free square, the load is the force."""
+    step = int(maps["snapshot_step"].values[snapshot])
+    pull_off = str(maps["snapshot_kind"].values[snapshot]) == "pull_off"
+    name = "pull-off" if pull_off else str(maps["branch"].values[step])
+    if "force" in maps:
+        return f"{name}, F = {format_quantity(float(f'{float(maps.force[step]):.3g}'), 'N')}"
+    return f"{name}, A/A₀ = {float(maps['contact_area_fraction'][step]):.3g}"

@@ -1,0 +1,112 @@
+"""Runs of indenters for figures: series of runs, curves of Hertz and JKR, and states that a fit of JKR uses."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from icha.figures import select
+from icha.figures.declaration import Campaign, UnloadedFigure
+from icha.figures.looks import graded_colours
+from icha.figures.style import BLACK
+from icha.support.formatting import format_quantity
+from icha.support.values import Problem
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+# Points of a theoretical curve.
+_POINTS = 400
+
+
+class IndenterFigure(UnloadedFigure):
+    """A figure of the runs of a study with indenters, in loading and unloading."""
+
+    def study_problems(self, campaign: Campaign, study) -> Iterator[Problem]:
+        """Also yield a problem if a surface of the study is periodic."""
+        yield from super().study_problems(campaign, study)
+        if periodic := [name for name in study.surfaces if not campaign.is_free(name)]:
+            expected = "expected surfaces with `shape` or `boundary: free`"
+            yield ("study",), self.study, f"has the periodic surface {periodic[0]!r}; {expected}"
+
+
+class Series(NamedTuple):
+    """Runs that differ only in their seed.
+
+    Attributes
+    ----------
+    runs : the runs, their labels and their seeds.
+    name : rms height and other labels of the runs, for a legend.
+    colour : colour of the series: black without roughness, brighter for higher roughness.
+    """
+
+    runs: select.ContactRuns
+    name: str
+    colour: str
+
+
+def select_series(campaign: xr.DataTree, study: str) -> list[Series]:
+    """Return the series of a study on free squares that unload, by increasing rms height.
+
+    Raises
+    ------
+    NothingToDraw
+        If no run is complete and unloads, or if no run is on a free square.
+    """
+    runs = [(labels, run) for labels, run in select.select_unloaded_runs(campaign, study) if "force" in run]
+    if not runs:
+        raise select.NothingToDraw(f"study {study}: no run is on a free square; expected surfaces with a shape")
+    groups = sorted(select.group_by_contact(campaign, runs), key=_roughness)
+    several = len({group.labels.material for group in groups}) > 1
+    heights = list(dict.fromkeys(filter(None, map(_roughness, groups))))
+    palette = dict(zip(heights, graded_colours(len(heights)), strict=True))
+    found = []
+    for group in groups:
+        height = _roughness(group)
+        words = f"rms height {format_quantity(height, 'm')}" if height else "smooth"
+        name = f"{words}, {group.labels.material}" if several else words
+        found.append(Series(group, name, palette.get(height, BLACK)))
+    return found
+
+
+def _roughness(group):
+    """Return the mean rms height of a group of runs, m, to three digits; 0 without roughness."""
+    return float(f"{np.mean([float(run['rms_height']) for run in group.by_seed.values()]):.3g}")
+
+
+def first_run(series: list[Series]) -> xr.Dataset:
+    """Return the first run of some series."""
+    return next(iter(series[0].runs.by_seed.values()))
+
+
+def sphere_of(run: xr.Dataset) -> tuple[float, float, float] | None:
+    """Return radius (m), contact modulus (Pa) and work of adhesion (J/m^2) of a run; None without a radius."""
+    if "shape_radius" not in run:
+        return None
+    return tuple(float(run[name]) for name in ("shape_radius", "contact_modulus", "surface_energy"))
+
+
+def theory_curves(run: xr.Dataset, largest_radius: float) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+    """Return indentation (m) and force (N) of a smooth sphere up to a contact radius, by name of the theory."""
+    from icha.references.indentation import sphere_contact, sphere_jump_off
+
+    sphere = sphere_of(run)
+    if sphere is None:
+        return {}
+    radius, modulus, energy = sphere
+    hertz = sphere_contact(np.linspace(0, largest_radius, _POINTS), radius, modulus)
+    curves = {"Hertz": (hertz.indentation, hertz.force)}
+    if energy:
+        smallest = float(sphere_jump_off(radius, modulus, energy).contact_radius)
+        jkr = sphere_contact(np.linspace(smallest, largest_radius, _POINTS), radius, modulus, energy)
+        curves = {"JKR": (jkr.indentation, jkr.force)} | curves
+    return curves
+
+
+def steps_of(run: xr.Dataset) -> list[dict[str, float]]:
+    """Return force, indentation, contact radius and leg of every step of a run."""
+    names = "force", "indentation", "contact_radius", "leg"
+    rows = zip(*(run[name].values.tolist() for name in names), strict=True)
+    return [dict(zip(names, row, strict=True)) for row in rows]
