@@ -11,7 +11,7 @@ import typer
 from icha.cli.project import CAMPAIGNS, UserError, echo, find_workflow, list_campaigns, option, project, shorten_path
 from icha.cli.scans import describe_scan, read_measured_section
 
-TEMPLATE = Path(__file__).parent / "templates/campaign.yaml"
+TEMPLATES = Path(__file__).parent / "templates"
 # Explanations of the keys of a configuration: a schema for text editors, and a page for readers.
 SCHEMA, README = Path("workflow/schemas/config.schema.json"), Path("config/README.md")
 
@@ -28,6 +28,9 @@ def new(
     pull_off: Annotated[bool, typer.Option("--pull-off", help="Add a study of pull-off and hysteresis.")] = False,
     boundary_elements: Annotated[
         bool, typer.Option("--boundary-elements", help="Add runs with boundary elements.")
+    ] = False,
+    indenter: Annotated[
+        bool, typer.Option("--indenter", help="Press a sphere, smooth and rough, into a soft body and pull it off.")
     ] = False,
 ) -> None:
     """Write the commented file of a new campaign, config/campaigns/NAME.yaml, and print the next commands.
@@ -48,8 +51,11 @@ def new(
         raise UserError(f"{name} is the campaign of {shorten_path(list_campaigns()[name])}; choose another name")
     if data is not None and measured is None:
         raise UserError("--data needs a measured file; use it with --measured FILE")
+    if indenter and (measured or pull_off or boundary_elements):
+        raise UserError("--indenter cannot be combined with other options; expected --indenter alone")
     section = None if measured is None else read_measured_section(measured, data, file.parent)
-    template = Template(TEMPLATE.read_text(encoding="utf-8"), trim_blocks=True, keep_trailing_newline=True)
+    file_of_template = TEMPLATES / ("indenter.yaml" if indenter else "campaign.yaml")
+    template = Template(file_of_template.read_text(encoding="utf-8"), trim_blocks=True, keep_trailing_newline=True)
     text = template.render(
         name=name,
         schema=Path(os.path.relpath(_schema(), file.parent)).as_posix(),

@@ -133,7 +133,7 @@ def test_commands_import_only_libraries_that_they_use(project, arguments, withou
     assert call.stdout.splitlines()[-1] == "[]"
 
 
-@pytest.mark.parametrize("options", [[], ["--pull-off"], ["--boundary-elements", "--pull-off"]])
+@pytest.mark.parametrize("options", [[], ["--pull-off"], ["--boundary-elements", "--pull-off"], ["--indenter"]])
 def test_a_new_campaign_is_valid(project, options):
     assert "config/campaigns/mine.yaml written" in output("new", "mine", *options)
     file = project / CAMPAIGNS / "mine.yaml"
