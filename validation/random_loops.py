@@ -1,12 +1,14 @@
 """Random loops by boundary elements: each one must end where it was asked to end.
 
-python -m validation.random_loops [--count N] [--first K]
+python -m validation.random_loops [--count N] [--first K] [--indenters]
 
-Smooth, elliptic and rough surfaces and plateaus, half of them sticky, under control of separation, load or area. A
-target may lie inside a jump, where there is no equilibrium; any other failure is one of the solver.
+Smooth, elliptic and rough surfaces and plateaus, half of them sticky, under control of separation, load or area. With
+`--indenters`: spheres, paraboloids, cones and waves with roughness on a free half-space, under control of separation or
+load. A target may lie inside a jump, where there is no equilibrium; any other failure is one of the solver.
 """
 
 import argparse
+import math
 import time
 import warnings
 from typing import NamedTuple
@@ -16,8 +18,10 @@ from threadpoolctl import threadpool_limits
 
 from icha import ConvergenceError, Material, Path, SelfAffineSpectrum, Surface, simulate
 from icha.contact.models import REFERENCE_MODEL
+from icha.surfaces.shapes import Cone, Paraboloid, Sphere, Wave
 from validation.surfaces import bump
 
+INDENTERS = ("sphere", "paraboloid", "cone", "wave")
 KINDS = ("bump", "ellipse", "rough", "rough", "plateau")
 _PERIOD, _MODULUS, _RADIUS = 100e-6, 25e6, 1e-3
 
@@ -70,6 +74,36 @@ def random_loop(number: int, grid: int | None = None) -> Loop:
     return Loop(kind, control, surface, material, path)
 
 
+def random_indenter(number: int) -> Loop:
+    """Draw a loop of a rough indenter by its number; every other one is sticky."""
+    rng = np.random.default_rng(5000 + number)
+    grid, kind = int(rng.choice([48, 64, 96], p=[0.4, 0.4, 0.2])), INDENTERS[number % 4]
+    spacing, sticky = _PERIOD / grid, (number // 4) % 2 == 0
+    # Radius (dgamma R^2/E*)^(1/3) and unit of length (dgamma^2 R/E*^2)^(1/3) of a sphere with adhesion.
+    radius = float(rng.uniform(2, min(6, grid / 12))) * spacing
+    unit, energy = radius**2 / _RADIUS, radius**3 / _RADIUS**2 * _MODULUS
+    aspect, slope = float(rng.uniform(1.2, 3.0)) ** 0.5, math.sqrt(18 / math.pi * energy / _MODULUS / radius)
+    wavelength = float(rng.uniform(8, 16)) * spacing
+    shape = {
+        "sphere": Sphere(_RADIUS),
+        "paraboloid": Paraboloid((_RADIUS * aspect, _RADIUS / aspect)),
+        "cone": Cone(math.atan(1 / slope)),
+        "wave": Wave(_RADIUS, float(rng.uniform(0.01, 0.1)) * wavelength**2 / _RADIUS, wavelength),
+    }[kind]
+    rms_height = unit * float(10 ** rng.uniform(math.log10(0.02), math.log10(0.7)))
+    rough = SelfAffineSpectrum(_PERIOD, 0.5 * _PERIOD, 8 * spacing, 0.8, 0.1).realise(grid, int(rng.integers(1000)))
+    surface = Surface(rough.heights * rms_height / rough.rms_height, _PERIOD, "free", shape)
+    energy *= float(rng.uniform(0.3, 1)) if sticky else float(rng.choice([0.0, 1e-3]))
+    material = Material(_MODULUS, energy, 0.2 * unit)
+    contact_radius = np.sort(rng.uniform(0.05, 0.25, 2)) * _PERIOD
+    if rng.integers(2):
+        depth = math.pi / 2 * slope * contact_radius if kind == "cone" else contact_radius**2 / _RADIUS
+        return Loop(kind, "separation", surface, material, Path(indentations=depth, unload=True, snapshots=[]))
+    force = 4 / 3 * contact_radius**3 / _RADIUS if kind != "cone" else math.pi / 2 * slope * contact_radius**2
+    path = Path(forces=force * _MODULUS, unload=True, control="load", snapshots=[])
+    return Loop(kind, "load", surface, material, path)
+
+
 def follow_loop(loop: Loop) -> str:
     """Follow a loop; return an empty text, or why it ended before its end."""
     with warnings.catch_warnings():
@@ -86,10 +120,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--count", type=int, default=300)
     parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("--indenters", action="store_true", help="rough indenters on a free half-space")
     options = parser.parse_args()
-    failed = 0
+    failed, draw = 0, random_indenter if options.indenters else random_loop
     for number in range(options.first, options.first + options.count):
-        loop, clock = random_loop(number), time.process_time()
+        loop, clock = draw(number), time.process_time()
         with threadpool_limits(1):
             reason = follow_loop(loop)
         failed += bool(reason)

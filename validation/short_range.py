@@ -22,7 +22,7 @@ from threadpoolctl import threadpool_limits
 from validation import rough_contacts as rough
 from validation import single_contacts as single
 from validation.rough_contacts import HARD, SOFT
-from validation.tables import Table, percent, write_tables
+from validation.tables import Table, by, percent, write_tables
 
 RESULTS = Path(__file__).resolve().parent / "results/short_range"
 _OFFSETS = tuple(single.offsets(5))
@@ -153,16 +153,6 @@ def convergence(rows: list[dict]) -> Table:
         slope = -np.polyfit(np.log(grids), np.log(errors), 1)[0]
         lines.append([what, f"{slope:.1f}", *(f"{100 * error:.2f} %" for error in errors)])
     return Table(["", "order", *(f"{grid}²" for grid in grids)], lines)
-
-
-def by(rows: list[dict], columns: dict[str, tuple[str, str]]) -> Table:
-    """Table with a line for each row; columns give heading and format, `%` for errors in per cent."""
-
-    def written(value, form):
-        return percent(value) if form == "%" else format(value, form)
-
-    lines = [[written(row[name], form) for name, (_, form) in columns.items()] for row in rows]
-    return Table([heading for heading, _ in columns.values()], lines)
 
 
 # --- tables of some parts -----------------------------------------------------------------------------------------

@@ -54,6 +54,16 @@ def means(values: Sequence[np.ndarray], form: str) -> list[str]:
     return [f"{mean} ± {form.replace('+', '').format(d)}" for mean, d in zip(found, deviation, strict=True)]
 
 
+def by(rows: Sequence[Mapping], columns: Mapping[str, tuple[str, str]]) -> Table:
+    """Table with a line for each row; columns give heading and format, `%` for errors in per cent."""
+
+    def written(value, form):
+        return percent(value) if form == "%" else format(value, form)
+
+    lines = [[written(row[name], form) for name, (_, form) in columns.items()] for row in rows]
+    return Table([heading for heading, _ in columns.values()], lines)
+
+
 def pressures(values: np.ndarray) -> list[str]:
     """Return a heading for each reduced pressure."""
     return [f"p\\* = {p:.3g}" for p in values]

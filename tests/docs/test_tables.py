@@ -5,7 +5,7 @@ import re
 import pytest
 
 from benchmarks import tables as benchmarks
-from validation import faults, short_range
+from validation import faults, indenter, short_range
 from validation.tables import DOCS
 
 
@@ -20,9 +20,10 @@ def test_every_table_is_included_by_one_page():
     [
         lambda: benchmarks.tables(benchmarks.read_results()),
         lambda: short_range.tables(short_range.read_measurements()),
+        lambda: indenter.tables(indenter.read_measurements()),
         lambda: faults.tables(faults.read_counts()),
     ],
-    ids=["benchmarks", "short_range", "faults"],
+    ids=["benchmarks", "short_range", "indenter", "faults"],
 )
 def test_tables_agree_with_the_saved_measurements(tables):
     for name, table in tables().items():

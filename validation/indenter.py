@@ -1,0 +1,235 @@
+"""Compare single indenters on a free half-space or a layer with everything known: tables of docs/indenter.md.
+
+    python -m validation.indenter [--parts PART ...] [--tables]
+
+Each part is one kind of contact (`validation.indenter_contacts`, `validation.rough_indenters`). Measurements are saved
+in validation/results/indenter, and the tables are written from them; with `--tables` nothing is measured. The part
+`without_adhesion` needs ContactMechanics: make .venv-benchmarks/.installed
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import time
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from validation import indenter_contacts as single
+from validation import rough_indenters as rough
+from validation.tables import Table, by, percent, write_tables
+
+RESULTS = Path(__file__).resolve().parent / "results/indenter"
+# Cell sizes and grids: the contact of zero load has a radius of 6 to 20 cells.
+_GRIDS = ((1 / 4, 64), (1 / 6, 96), (1 / 9, 128))
+
+
+def _rows(solve: Callable, arguments: Iterable[tuple]):
+    """Yield the rows of a function for several tuples of arguments."""
+    for each in arguments:
+        found = solve(*each)
+        yield from [found] if isinstance(found, dict) else found
+
+
+PARTS: dict[str, Callable] = {
+    "hertz": lambda: _rows(single.hertz, [(c, place) for c in (4, 8, 12, 20) for place in single.PLACES]),
+    "sphere": lambda: _rows(
+        single.sphere,
+        [(*grid, place, how, 4.0) for grid in _GRIDS for place in single.PLACES for how in ("separation", "load")],
+    ),
+    "pull_off": lambda: _rows(single.sphere_pull_off, [(*grid, place) for grid in _GRIDS for place in single.PLACES]),
+    "punch": lambda: _rows(single.punch, [(cells, square) for square in (False, True) for cells in (8, 12, 16)]),
+    "cone": lambda: _rows(single.cone, [(1 / 2,), (1 / 4, 144)]),
+    "ellipse": lambda: _rows(single.ellipse, [(1 / 8, 2.0), (1 / 8, 4.0)]),
+    "wave": lambda: _rows(single.guduru, [(1 / 16, 0.25, 1.5), (1 / 16, 0.1, 1.0)]),
+    "along": lambda: _rows(single.ripples_along, [(20, 6), (20, 10), (30, 10), (40, 10), (40, 14)]),
+    "across": lambda: _rows(single.ripples_across, [(1 / 16, 0.1, 1.0), (1 / 24, 0.1, 1.0)]),
+    "without_adhesion": lambda: _rows(rough.without_adhesion, [("sphere",), ("rough square",), ("layer",)]),
+    "layer_limits": lambda: rough.layer_limits(),
+    "balance": lambda: _rows(rough.conformal_sphere, [(0.05, 1), (0.1, 2), (0.15, 3), (0.2, 4), (0.3, 5)]),
+    "convergence": lambda: _rows(rough.rough_loop, [(64,), (128,), (256,)]),
+    "smooth_loop": lambda: [rough.smooth_loop()],
+}
+
+
+# --- tables -------------------------------------------------------------------------------------------------------
+
+
+def _worst(rows: Iterable[dict], *names: str) -> float:
+    return max(abs(row[name]) for row in rows for name in names if name in row)
+
+
+def bounds(rows: dict[str, list[dict]]) -> Table:
+    """Table of all targets with the measured errors."""
+    lines = []
+
+    def add(what, error, bound, form="{:.3g} %"):
+        factor = 100 if "%" in form else 1
+        verdict = "met" if error <= bound else "**missed**"
+        lines.append([what, form.format(factor * error), form.format(factor * bound), verdict])
+
+    for places, where in ((single.PLACES[::3], "at general positions"), (single.PLACES[1:3], "on and between nodes")):
+        for least in (8, 12):
+            what = f"JKR sphere, {least} cells and more, apex {where}"
+            fine, off = (
+                [row for row in rows[part] if row["cells"] >= least and tuple(row["place"]) in places]
+                for part in ("sphere", "pull_off")
+            )
+            given = [row for row in fine if row["control"] == "separation"]
+            add(f"{what}: force at the radius", _worst(fine, "force_error"), 0.01)
+            add(f"{what}: force at the indentation", _worst(given, "given_error"), 0.01)
+            add(f"{what}: pull-off", _worst(off, "pull_off_error"), 0.005)
+    jumps = [row for row in rows["wave"] if row["control"] == "load"]
+    add("Guduru's waves: force at the jumps under load", _worst(jumps, "force_error"), 0.02)
+    add("wave along the front: stress intensity", _worst(rows["along"], "error"), 0.03)
+    add("wave across the front, 24 cells: stress intensity", _worst(rows["across"][-1:], "amplitude_error"), 0.03)
+    errors = ("area_error", "gap_error", "force_error")
+    add("ContactMechanics: area, gap and force", _worst(rows["without_adhesion"], *errors), 1e-4, "{:.1g}")
+    layers = [row for row in rows["without_adhesion"] if row["kind"] == "layer"]
+    add("ContactMechanics: compliance of layers", _worst(layers, "kernel_error"), 1e-10, "{:.1g}")
+    *coarse, finest = rows["convergence"]
+    for row in coarse[1:]:
+        error = abs(row["pull_off"] / finest["pull_off"] - 1)
+        add(f"rough sphere: pull-off with {row['grid']}² instead of {finest['grid']}² cells", error, 0.02)
+    limits = {256: 120, 512: 720}
+    add("time of a cycle, smooth sphere, 96² cells", rows["smooth_loop"][0]["seconds"], 6, "{:.3g} s")
+    for row in rows["convergence"]:
+        if row["grid"] in limits:
+            add(f"time of a cycle, rough sphere, {row['grid']}² cells", row["seconds"], limits[row["grid"]], "{:.3g} s")
+    return Table(["what", "largest error, or time", "target", ""], lines)
+
+
+def cost(rows: dict[str, list[dict]]) -> Table:
+    """Table of the computing times of cycles of single indenters, for the page of the benchmarks."""
+    cycles = [("smooth sphere", row) for row in rows["smooth_loop"]] + [
+        ("rough sphere", r) for r in rows["convergence"]
+    ]
+    lines = [[what, f"{row['grid']}²", str(row["steps"]), f"{row['seconds']:.1f} s"] for what, row in cycles]
+    return Table(["indenter", "grid", "equilibria", "processor"], lines, numbers=True)
+
+
+def by_radius(rows: list[dict], names: dict[str, str]) -> Table:
+    """Table of the mean and range of errors in classes of the contact radius and of the place of the apex."""
+    lines = []
+    for low, high in ((4, 8), (8, 12), (12, math.inf)):
+        for places, where in ((single.PLACES[::3], "general"), (single.PLACES[1:3], "node, middle")):
+            members = [row for row in rows if low <= row["cells"] < high and tuple(row["place"]) in places]
+            if not members:
+                continue
+            label = f"{low} to {high}" if math.isfinite(high) else f"over {low}"
+            cells = []
+            for name in names:
+                values = np.array([row[name] for row in members])
+                cells.append(f"{percent(values.mean())} ({percent(values.min())} to {percent(values.max())})")
+            lines.append([label, where, str(len(members)), *cells])
+    return Table(["cells in the radius", "apex", "states", *names.values()], lines)
+
+
+_CELLS = {"cells": ("cells in the radius", ".3g")}
+_ERRORS = {"force_error": ("force", "%"), "area_error": ("area", "%")}
+_PUNCH = {"square": ("square (1) or round (0)", "g"), "cells": ("radius in cells", "g")}
+_PUNCH |= {"stiffness": ("stiffness", ".4g"), "stiffness_of_nodes": ("stiffness by nodes", ".4g")}
+_PUNCH |= {"pull_off": ("pull-off", ".4g"), "pull_off_of_nodes": ("pull-off by nodes", ".4g")}
+_WAVE = {"wavelength": ("λ", "g"), "amplitude": ("A", "g"), "branch": ("branch", "s"), "control": ("jump under", "s")}
+_WAVE |= {"cells": ("radius in cells", ".3g"), "force": ("force", ".4f"), "force_exact": ("exact", ".4f")}
+_WAVE |= {"force_error": ("force error", "%"), "indentation_error": ("indentation error", ".4f")}
+_WAVE |= {"radius_error": ("radius error over λ", ".3f")}
+_ALONG = {"waves": ("waves", "g"), "cells": ("radius in cells", "g"), "wave_cells": ("cells in a wave", ".3g")}
+_ALONG |= {"error": ("K, circular front", "%"), "straight_error": ("K, straight front", "%")}
+_ACROSS = {"cells": ("radius in cells", ".3g"), "wave_cells": ("cells in a wave", ".3g")}
+_ACROSS |= {"amplitude_error": ("K", "%"), "phase_error": ("phase error in degrees", ".2f")}
+_OTHER = {"kind": ("contact", "s"), "thickness": ("thickness", "s"), "poisson": ("ν", "s")}
+_OTHER |= {"area": ("A/A0", ".3f"), "area_error": ("area", ".1g"), "force_error": ("force", ".1g")}
+_OTHER |= {"gap_error": ("gap", ".1g"), "kernel_error": ("compliance", "s")}
+_LIMITS = {
+    "limit": ("limit", "s"),
+    "thickness": ("thickness over √(Rδ)", ".3g"),
+    "cells": ("in cells", ".3g"),
+    "area_over": ("A/(πRδ)", ".3f"),
+}
+_BALANCE = {"energy": ("U_full/Δγ", "g"), "rms_height": ("h_rms", ".3f"), "expected": ("1 − U_full/Δγ", "g")}
+_BALANCE |= {"loading_contact_radius": ("loading, a³", ".3f"), "loading_indentation": ("loading, δ", ".3f")}
+_BALANCE |= {"unloading_contact_radius": ("unloading, a³", ".3f"), "unloading_indentation": ("unloading, δ", ".3f")}
+_BALANCE |= {"pull_off": ("pull-off", ".3f"), "loss_over_area": ("loss/(Δγ A)", ".3f")}
+_GRID = {"grid": ("grid", "g"), "wave_cells": ("cells in the shortest wave", "g"), "steps": ("equilibria", "g")}
+_GRID |= {"pull_off": ("pull-off", ".4f"), "loss": ("loss", ".3f"), "largest_area": ("largest area", ".3f")}
+_GRID |= {"seconds": ("time in s", ".1f")}
+
+
+def tables(rows: dict[str, list[dict]]) -> dict[str, Table]:
+    """Return all tables of the page from the rows of all parts."""
+    ellipses = [row for row in rows["ellipse"] if "cells" in row]
+    offs = [row for row in rows["ellipse"] if "pull_off_error" in row]
+    model = {"model": ("theory", "s"), "ratio": ("ratio of radii", "g")}
+    others = [
+        row
+        | {name: "" if row[name] is None else f"{row[name]:.2g}" for name in ("thickness", "poisson", "kernel_error")}
+        for row in rows["without_adhesion"]
+    ]
+    found = {
+        "bounds": bounds(rows),
+        "hertz": by_radius(rows["hertz"], {"area_error": "area", "force_error": "force", "gap_error": "gap"}),
+        "separation": by_radius(
+            [row for row in rows["sphere"] if row["control"] == "separation"],
+            {"force_error": "force at the radius", "approach_error": "indentation at the radius"}
+            | {"given_error": "force at the indentation"},
+        ),
+        "load": by_radius(
+            [row for row in rows["sphere"] if row["control"] == "load"],
+            {"force_error": "force at the radius", "approach_error": "indentation at the radius"}
+            | {"given_error": "indentation at the force"},
+        ),
+        "pull_off": by_radius(rows["pull_off"], {"pull_off_error": "pull-off", "jump_off_error": "jump-off"}),
+        "punch": by(rows["punch"], _PUNCH),
+        "cone": by(
+            rows["cone"],
+            {"adhesion": ("adhesion", "s")}
+            | _CELLS
+            | {"force_error": ("force", "%"), "approach_error": ("indentation", "%")},
+        ),
+        "ellipse": by(ellipses, model | _CELLS | {"indentation": ("indentation", ".2f")} | _ERRORS),
+        "ellipse_pull_off": by(offs, model | {"pull_off_error": ("pull-off", "%")}),
+        "wave": by([row for row in rows["wave"] if "force_error" in row], _WAVE),
+        "along": by(rows["along"], _ALONG),
+        "across": by(rows["across"], _ACROSS),
+        "without_adhesion": by(others, _OTHER),
+        "layer_limits": by(rows["layer_limits"], _LIMITS | {"force_error": ("force", "%")}),
+        "balance": by(rows["balance"], _BALANCE),
+        "convergence": by(rows["convergence"], _GRID),
+    }
+    return {f"indenter_{name}": table for name, table in found.items()} | {"benchmarks_indenter": cost(rows)}
+
+
+def read_measurements() -> dict[str, list[dict]]:
+    """Read the rows of all parts."""
+    return {part: json.loads((RESULTS / f"{part}.json").read_text(encoding="utf-8"))["rows"] for part in PARTS}
+
+
+def main() -> None:
+    """Measure parts, save their numbers, and write the tables."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--parts", nargs="+", choices=PARTS, default=PARTS, metavar="PART", help=", ".join(PARTS))
+    parser.add_argument("--tables", action="store_true", help="write the tables from saved measurements")
+    options = parser.parse_args()
+    RESULTS.mkdir(parents=True, exist_ok=True)
+    for part in () if options.tables else options.parts:
+        print(f"{part} ...", end=" ", flush=True)
+        clock = time.perf_counter()
+        with threadpool_limits(1):
+            rows = list(PARTS[part]())
+        found = {"seconds": round(time.perf_counter() - clock, 1), "rows": rows}
+        text = json.dumps(found, indent=1, default=lambda number: number.item())
+        (RESULTS / f"{part}.json").write_text(text + "\n", encoding="utf-8")
+        print(f"{len(rows)} rows in {found['seconds']:.0f} s", flush=True)
+    if missing := [part for part in PARTS if not (RESULTS / f"{part}.json").exists()]:
+        print(f"no tables written; not measured yet: {', '.join(missing)}")
+    else:
+        write_tables(tables(read_measurements()))
+
+
+if __name__ == "__main__":
+    main()
