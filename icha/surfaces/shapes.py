@@ -5,7 +5,8 @@ All lengths are in metres. Heights are positive towards the elastic body. The ap
 
 import math
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, fields
+from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
@@ -171,9 +172,9 @@ def describe_shape(shape: Shape) -> str:
     """Return name and parameters of a shape in SI units, such as "sphere of radius 0.001 m"."""
     names = {kind: name.replace("_", " ") for name, kind in SHAPES.items()}
     words = []
-    for each in fields(shape):
-        numbers = " and ".join(f"{value:.6g}" for value in np.atleast_1d(getattr(shape, each.name)))
-        words.append(f"{each.name.replace('_', ' ')} {numbers} {'rad' if each.name == 'half_angle' else 'm'}")
+    for name, values in vars(shape).items():
+        numbers = " and ".join(f"{value:.6g}" for value in np.atleast_1d(values))
+        words.append(f"{name.replace('_', ' ')} {numbers} {'rad' if name == 'half_angle' else 'm'}")
     return f"{names.get(type(shape), type(shape).__name__)} of {', '.join(words)}"
 
 
