@@ -152,6 +152,7 @@ _LIMITS = {
     "area_over": ("A/(πRδ)", ".3f"),
 }
 _BALANCE = {"energy": ("U_full/Δγ", "g"), "rms_height": ("h_rms", ".3f"), "expected": ("1 − U_full/Δγ", "g")}
+_BALANCE |= {"loading_law": ("loading, law", ".3f"), "unloading_law": ("unloading, law", ".3f")}
 _BALANCE |= {"loading_contact_radius": ("loading, a³", ".3f"), "loading_indentation": ("loading, δ", ".3f")}
 _BALANCE |= {"unloading_contact_radius": ("unloading, a³", ".3f"), "unloading_indentation": ("unloading, δ", ".3f")}
 _BALANCE |= {"pull_off": ("pull-off", ".3f"), "loss_over_area": ("loss/(Δγ A)", ".3f")}
