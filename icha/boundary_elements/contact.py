@@ -289,7 +289,8 @@ def contact_of(surface: Surface, material: Material) -> BoundaryElements:
     Raises
     ------
     ValueError
-        If adhesion is so weak that rounding of the heights would hide it.
+        If adhesion is so weak that rounding of the heights would hide it, or if a layer under a free
+        square is thinner than a cell.
     """
     law, asperities, h = JKR(material), locate_summits(surface), surface.spacing
     heights = np.pad(surface.profile, (0, MARGIN if surface.free else 0), constant_values=-np.inf)
@@ -310,6 +311,9 @@ def contact_of(surface: Surface, material: Material) -> BoundaryElements:
     if not topography.largest:  # a flat punch, whose indentations are rounded like heights of the unit
         topography = replace(topography, largest=surface.unit_height / h)
     layer = Layer(material.thickness / h, material.poisson_ratio) if material.layered else None
+    if layer and surface.free and layer.thickness < 1:
+        cell = f"{material.thickness:g} m is less than a grid cell of {h:g} m"
+        raise ValueError(f"thickness: {cell}; expected a thicker layer or a finer grid")
     space = HalfSpace.of(len(heights), layer, free=surface.free)
     return BoundaryElements(
         heights=heights,

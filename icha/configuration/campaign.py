@@ -254,6 +254,14 @@ class Campaign(Section):
             if MODELS[label].by_summits and self.materials[name].thickness is not None:
                 reason = f"need a half-space, because their law is that of a half-space, but {name!r} is a layer"
                 yield ("models", index), label, f"{reason}; expected [boundary_elements], or no `thickness` in {name!r}"
+        for name, label in itertools.product(study.surfaces, study.materials):
+            thickness, known = self.materials[label].thickness, self._grid_and_period(name)
+            if thickness and self.is_free(name) and hasattr(known, "grid") and thickness < known.period / known.grid:
+                cell = f"{known.period / known.grid:.3g} m"
+                reason = (
+                    f"contains the layer {label!r} of {thickness:g} m, thinner than a grid cell of {name!r} ({cell})"
+                )
+                yield ("materials",), study.materials, f"{reason}; expected a thicker layer or a finer grid"
         for (index, label), name in itertools.product(enumerate(study.models), study.surfaces):
             surface, model = self.surfaces[name], MODELS[label]
             least = model.least_cells
