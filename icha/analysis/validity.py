@@ -285,9 +285,10 @@ def _cases(study):
         for name in (*measured, *counts, *(["shape"] if "shape" in study else []))
     }
     unsupported = values["unsupported_summit_count"]
-    labels = [study[label].values for label in LABELS]
+    # Surfaces may have slopes of their own, so that the coordinate of slopes has two dimensions.
+    names = {LABELS.index(label): study[label].values for label in ("model", "surface", "material")}
     for at in map(tuple, np.argwhere(np.isin(status.values, COMPUTED_RUNS))):
-        model, surface, _, _, material = (str(values[index]) for values, index in zip(labels, at, strict=True))
+        model, surface, material = (str(known[at[column]]) for column, known in names.items())
         facts = {name: float(values[name][at]) for name in measured}
         facts[SPACING] = values["period"][at] / values["grid"][at]
         summits = values["asperity_count"][at] + unsupported[at]

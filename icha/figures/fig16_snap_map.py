@@ -119,6 +119,8 @@ def _draw_counts(ax, events):
 
 def _events(run):
     """Return kind, branch, position (m) and separation u/h_rms of the events in first loading and last unloading."""
+    from icha.datasets.campaign import unit_height
+
     steps = run["event_step"].values.astype(int)
     leg = run["leg"].sel(step=steps).values
     shown = (leg == 0) | (leg == unloading_legs(run)[-1]["leg"].values[-1])
@@ -127,5 +129,5 @@ def _events(run):
         "branch": run["branch"].sel(step=steps).values.astype(object)[shown],
         "x": run["event_x"].values[shown],
         "y": run["event_y"].values[shown],
-        "separation": run["event_separation"].values[shown] / float(run["unit_height"]),
+        "separation": run["event_separation"].values[shown] / float(unit_height(run)),
     }

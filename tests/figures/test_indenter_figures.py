@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import icha
+from icha.analysis.validity import statements_on_dataset
 from icha.datasets.campaign import campaign_tree
 from icha.datasets.labels import RunLabels
 from icha.figures import (
@@ -104,3 +105,11 @@ def test_reasons_for_an_empty_figure():
 @pytest.mark.parametrize("module", FIGURES)
 def test_captions_exist(module):
     assert len(caption_of(module.__name__.rsplit(".", 1)[1])) > 200
+
+
+def test_statements_on_validity_if_surfaces_have_slopes_of_their_own():
+    """A smooth surface has the slope 0 only, and there are more slopes than surfaces."""
+    run = press()
+    labels = [("smooth", 0.0), ("rough", 0.1), ("rough", 0.2), ("rough", 0.3)]
+    runs = [(RunLabels("press", "boundary_elements", name, 0, slope, "soft"), run) for name, slope in labels]
+    assert statements_on_dataset(campaign_tree(runs))
