@@ -6,8 +6,8 @@ All lengths are in metres. Heights are positive towards the elastic body. The ap
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import ClassVar
+from dataclasses import dataclass, fields
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -168,7 +168,7 @@ class Wave(Shape):
         return self.radius
 
 
-def describe_shape(shape: Shape) -> str:
+def describe_shape(shape: Any) -> str:
     """Return name and parameters of a shape in SI units, such as "sphere of radius 0.001 m"."""
     names = {kind: name.replace("_", " ") for name, kind in SHAPES.items()}
     words = []
