@@ -168,7 +168,7 @@ class Wave(Shape):
         return self.radius
 
 
-def describe_shape(shape: Any) -> str:
+def describe_shape(shape: Shape) -> str:
     """Return name and parameters of a shape in SI units, such as "sphere of radius 0.001 m"."""
     names = {kind: name.replace("_", " ") for name, kind in SHAPES.items()}
     words = []
