@@ -10,6 +10,7 @@ from icha.boundary_elements.observables import hull_area
 from icha.equilibrium.distributions import edge_share
 from icha.references import indentation as closed
 from icha.references.indenter_runs import loop_values, spaced_states
+from icha.simulation import asperity_applicability
 from icha.surfaces.shapes import Cone, Paraboloid, Sphere, describe_shape
 
 SIDE, MODULUS, RADIUS, ENERGY = 64e-6, 1e6, 1e-3, 0.05
@@ -129,3 +130,24 @@ def test_target_that_the_first_jump_passes_does_not_fail_checks():
     first = int(np.flatnonzero(run["step_kind"] == "contact_radius")[0])
     assert run["contact_radius"][first - 1] > run["contact_radius"][first] == pytest.approx(5e-6)
     assert "failed_checks" not in run.attrs
+
+
+@pytest.mark.parametrize("rms", [0.06, 0.19, 0.64])
+def test_asperities_are_not_applicable_to_conformal_roughness(rms):
+    """Such roughness conforms: full contact has a lower energy than separated surfaces."""
+    energy = (6e-6) ** 3 * MODULUS / RADIUS**2
+    unit = (energy**2 * RADIUS / MODULUS**2) ** (1 / 3)
+    spectrum = icha.SelfAffineSpectrum(
+        period=96e-6, rolloff_wavelength=24e-6, short_wavelength=8e-6, hurst=0.8, rms_slope=0.1
+    )
+    heights = spectrum.realise(grid=96, seed=2).heights
+    surface = icha.Surface(heights / heights.std() * rms * unit, 96e-6, "free", Sphere(RADIUS))
+    material = icha.Material(MODULUS, energy, 1e-12)
+    run = icha.simulate(surface, material, icha.Path(contact_radii=[8e-6]), model="asperities")
+    assert "asperity model not applicable: full contact has a lower energy" in run.attrs["applicability"]
+
+
+def test_asperities_under_a_shape_need_roughness_that_stays_apart():
+    assert asperity_applicability(1.5) == ""
+    assert "less than 2" in asperity_applicability(1.5, conformal=True)
+    assert asperity_applicability(2.5, conformal=True) == ""
