@@ -293,15 +293,15 @@ def _check_target(surface, material, target, by_summits):
     place = f"path: {target.kind} = {target.value!r} {UNITS.get(target.kind, '')}".rstrip()
     if target.kind in (RELATIVE_LOAD, FORCE):
         unit = material.contact_modulus * surface.period**2 if target.kind == FORCE else 1.0
-        pressure, load = target.value / (unit * surface.rms_slope), f"{place} on a surface of rms slope"
+        pressure, load = target.value / (unit * surface.unit_slope), f"{place} on a surface of rms slope"
         if 0 < abs(pressure) < LEAST_PRESSURE:
             raise ValueError(
-                f"{load} {surface.rms_slope:.4g} is too small; expected a reduced pressure of at least "
+                f"{load} {surface.unit_slope:.4g} is too small; expected a reduced pressure of at least "
                 f"{LEAST_PRESSURE} in absolute value, or 0 at a turning point that ends unloading"
             )
         if by_summits and pressure > MAX_REDUCED_PRESSURE:
             raise ValueError(
-                f"{load} {surface.rms_slope:.4g} is beyond the range of the asperity model; expected a reduced "
+                f"{load} {surface.unit_slope:.4g} is beyond the range of the asperity model; expected a reduced "
                 f"pressure of at most {MAX_REDUCED_PRESSURE}"
             )
     largest = (MAX_AREA_FRACTION if by_summits else 1.0) * surface.period**2
@@ -310,10 +310,11 @@ def _check_target(surface, material, target, by_summits):
         model = ", the limit of the asperity model" if by_summits else ""
         raise ValueError(f"{place} is too large on a square of side {surface.period:.4g} m; {expected}{model}")
     separation = {MEAN_SEPARATION: target.value, INDENTATION: -target.value}.get(target.kind, 0.0)
-    if target.snapshot and separation > _HIGHEST_SNAPSHOT * surface.rms_height:
+    highest = _HIGHEST_SNAPSHOT * surface.unit_height
+    if target.snapshot and separation > highest:
         raise ValueError(
             f"path: a snapshot at a mean separation of {separation!r} m is far above any contact; expected at "
-            f"most {_HIGHEST_SNAPSHOT:g} rms heights ({_HIGHEST_SNAPSHOT * surface.rms_height:.4g} m)"
+            f"most {_HIGHEST_SNAPSHOT:g} rms heights ({highest:.4g} m)"
         )
 
 

@@ -188,8 +188,8 @@ def _target_error(run):
     largest = np.array([np.max(np.abs(reached[kind])) for kind in kinds])
     # With adhesion a load may be a small difference of attraction and repulsion. Each of them is about as large as the
     # stiffness times h_rms. Therefore the error of a very small load is relative to SMALLEST_LOAD times this product.
-    gross = np.abs(finite_stiffness(run)) * float(run["rms_height"]) * adhesive
-    unit = {"reduced_pressure": scale * float(run["rms_slope"]), "relative_load": scale, "force": 1 / nominal_area}
+    gross = np.abs(finite_stiffness(run)) * float(run["unit_height"]) * adhesive
+    unit = {"reduced_pressure": scale * float(run["unit_slope"]), "relative_load": scale, "force": 1 / nominal_area}
     least = np.array([SMALLEST_LOAD * gross[k] / unit.get(kind, math.inf) for k, kind in enumerate(kinds)])
     return np.max(error / np.where(target != 0, np.maximum(np.abs(target), least), largest))
 

@@ -127,10 +127,12 @@ def _problems_with_run(run: xr.Dataset) -> Iterator[str]:
         for name in ("gap_bin_edges", "pressure_bin_edges"):
             if not np.all(np.diff(run[name].values) > 0):
                 yield f"{name}: the edges do not increase; expected edges in ascending order"
-    unit = run["contact_modulus"] * run["unit_slope"]
+    # Files of earlier versions have no shapes, and no units of their own.
+    height, slope = (run[f"unit_{name}" if f"unit_{name}" in run else f"rms_{name}"] for name in ("height", "slope"))
+    unit = run["contact_modulus"] * slope
     for name, expected, formula in (
         ("reduced_pressure", run["nominal_pressure"] / unit, "nominal_pressure/(contact_modulus unit_slope)"),
-        ("reduced_separation", run["mean_separation"] / run["unit_height"], "mean_separation/unit_height"),
+        ("reduced_separation", run["mean_separation"] / height, "mean_separation/unit_height"),
     ):
         error = abs(run[name] - expected)
         if expected.size and float(error.max()) > _ROUNDING * float(abs(expected).max()):

@@ -35,8 +35,8 @@ class TargetFunction:
     def excess(self, state: State) -> float:
         """Return the excess of a state over the target, relative to the absolute value of the target.
 
-        The excess rises on loading. For a separation it is relative to h_rms, for zero load to LEAST_PRESSURE, and for a
-        contact radius it is the excess of the area.
+        The excess rises on loading. For a separation it is relative to h_rms, and for zero load to LEAST_PRESSURE. For
+        a contact radius it is the excess of the area.
         """
         quantity, value = self.target.quantity, self.target.value
         if quantity.controlled is None:
@@ -64,8 +64,8 @@ class TargetFunction:
     def predict_separation(self, state: State) -> float:
         """Return the expected separation of the target, m.
 
-        For a separation or an indentation, it is that of the target. For a load or area, it is extrapolated exponentially, and is -inf
-        if the load or area in the state is not positive, or does not grow on loading.
+        For a separation or an indentation, it is that of the target. For a load or area, it is extrapolated
+        exponentially, and is -inf if the load or area in the state is not positive, or does not grow on loading.
         """
         control = self.control
         if control is None:

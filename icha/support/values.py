@@ -24,7 +24,14 @@ _UNIT = re.compile(r"[A-Za-zµμÅ°%²³⁻·][\w\s*/^().µμÅ°%²³⁻·-]*"
 _LONGEST = 100
 
 # Names of quantities, by SI unit.
-PHYSICAL_NAMES = {"m": "length", "Pa": "pressure", "J/m^2": "energy per area", "N": "force", "rad": "angle", "1": "ratio"}
+PHYSICAL_NAMES = {
+    "m": "length",
+    "Pa": "pressure",
+    "J/m^2": "energy per area",
+    "N": "force",
+    "rad": "angle",
+    "1": "ratio",
+}
 
 # The commonest units of pressure, energy per area and force. These units do not need pint, which takes long to load.
 # tests/support/test_units.py compares the factors with the factors of pint.

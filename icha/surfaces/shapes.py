@@ -6,8 +6,8 @@ All lengths are in metres. Heights are positive towards the elastic body. The ap
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
-from typing import Any, ClassVar
+from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 

@@ -169,6 +169,9 @@ def test_progress_reports_every_target(surface):
         ({"reduced_pressures": []}, "reduced_pressures: the list is empty"),
         ({"reduced_pressures": [1e-2, 1e-3]}, r"reduced_pressures\[1\].*increasing"),
         ({"mean_separations": [1e-6, 2e-6]}, r"mean_separations\[1\].*decreasing"),
+        ({"forces": [0.0, 1.0]}, r"forces\[0\]: 0.0 must be .* \(in N\)"),
+        ({"indentations": [1e-6, -1e-6]}, r"indentations\[1\].*increasing"),
+        ({"contact_radii": [0.0]}, r"contact_radii\[0\]: 0.0 must be .* \(in m\)"),
         ({"reduced_pressures": [101.0]}, r"reduced_pressures\[0\]: .* in \[1e-12, 100\]"),
         ({"reduced_pressures": [0.1], "unload": 1}, "unload: expected True or False, got 1"),
         ({"reduced_pressures": [0.1], "max_step": None}, "max_step"),
@@ -193,6 +196,7 @@ def test_progress_reports_every_target(surface):
                 ([("reduced_pressure", 0.05), ("reduced_pressure", 0.04)], r"^turning_points\[1\]: 0.04"),
                 ([("reduced_pressure", -0.01), ("reduced_pressure", -0.001)], r"^turning_points\[1\]"),
                 ([("mean_separation", -1e-6)], r"^turning_points\[0\]: -1e-06"),
+                ([("force", -1.0), ("force", -0.5)], r"^turning_points\[1\]: -0.5 .* \(in N\)"),
             )
         ),
         *(

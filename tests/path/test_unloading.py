@@ -127,6 +127,10 @@ def value_of(kind, contact, waypoint):
         return waypoint.state.separation
     if kind == "area_fraction":
         return contact.area_fraction(waypoint.state)
+    if kind == "indentation":
+        return -waypoint.state.separation
+    if kind == "force":
+        return contact.pressure(waypoint.state) * contact.area
     return contact.pressure(waypoint.state) * (contact.area / 1e3 if kind == "reduced_pressure" else 1.0)
 
 
@@ -136,6 +140,8 @@ def value_of(kind, contact, waypoint):
         pytest.param("reduced_pressure", 0.0, 0.012, "separation", marks=pytest.mark.slow),
         ("reduced_pressure", -0.002, 0.004, "load"),
         pytest.param("relative_load", -0.003 * 1e3 / 3600, 5.0 / 3600, "separation", marks=pytest.mark.slow),
+        ("force", -2.0, 4.0, "load"),
+        ("indentation", 0.5 - few.HEIGHT, 3.0 - few.HEIGHT, "separation"),
         ("area_fraction", 0.002, 0.006, "separation"),
         pytest.param("mean_separation", few.HEIGHT - 0.5, few.HEIGHT - 3.0, "separation", marks=pytest.mark.slow),
     ],
