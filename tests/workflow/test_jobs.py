@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from conftest import REPOSITORY, is_alive, wait_for
 
+from icha.datasets.surface_file import read_surface
 from icha.support.atomic_files import take_over, whole_file
 from icha.support.checksums import (
     hash_parameters,
@@ -24,6 +25,7 @@ from icha.support.checksums import (
     write_checksum,
 )
 from icha.support.program import beginning_of
+from icha.surfaces.shapes import make_shape
 
 RESULTS = "results/tiny"
 SCRIPT = f"""
@@ -233,6 +235,28 @@ def test_a_file_that_changed_after_its_inspection_is_neither_used_nor_copied(tmp
     with pytest.raises(ValueError, match=r"heights\.npy has changed"):
         write_configuration(tmp_path / "used.yaml", text="name: a", copies={copy: file}, sha256=[inspected])
     assert not surface.exists() and sha256_of(copy) == inspected
+
+
+def test_the_file_of_a_surface_keeps_the_shape_and_scales_the_roughness_alone(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(str(REPOSITORY / "workflow/scripts"))
+    from make_surface import make_surface
+
+    rough = {"kind": "self_affine", "period": 4e-4, "rolloff_wavelength": 1e-4, "short_wavelength": 5e-5, "hurst": 0.8}
+    rough |= {"grid": 64, "amplitudes": "fixed"}
+    smooth = {"kind": "smooth", "side": 4e-4, "grid": 64}
+    for shape in ({"sphere": {"radius": 1e-3}}, {"paraboloid": {"radii": [1e-3, 2e-3]}}):
+        for settings, slope in ((rough, 1.0), (smooth, 0.0)):
+            file = tmp_path / "surface.nc"
+            free = settings | {"boundary": "free", "shape": shape}
+            make_surface(file, name="own", seed=1, settings=free, attributes={"campaign": "a"})
+            surface = read_surface(file)
+            assert surface.free and surface.shape == make_shape(shape) and surface.period == 4e-4
+            assert surface.rms_slope == pytest.approx(slope, rel=1e-12)
+            # At another slope the shape stays as it is.
+            other = surface.scaled_to_rms_slope(slope / 50)
+            assert other.rms_slope == pytest.approx(slope / 50, rel=1e-12)
+            np.testing.assert_allclose(other.profile - other.heights, surface.profile - surface.heights, atol=1e-18)
+            file.unlink()
 
 
 def test_only_shell_commands_get_the_path_of_python_in_quotes(monkeypatch, before_jobs):

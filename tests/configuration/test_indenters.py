@@ -1,0 +1,94 @@
+"""Shapes, smooth surfaces, free squares and layers in a configuration."""
+
+import math
+
+import pytest
+
+from icha.configuration.cases import run_cases, run_settings, surface_cases, surface_settings
+from icha.surfaces.shapes import Cone, CylinderPunch, FlatPunch, Paraboloid, Sphere, Wave
+
+BALL = {"kind": "smooth", "side": "200 um", "grid": 64, "shape": {"sphere": {"radius": "1 mm"}}}
+# A study of boundary elements, because the asperity model does not accept layers.
+BY_CELLS = {"studies.one.models": ["boundary_elements"]}
+
+
+def paths(campaign):
+    return [case.path for case in run_cases(campaign)]
+
+
+def test_a_smooth_surface_has_neither_seeds_nor_slopes(load):
+    alone = {"surfaces.ball": BALL, "studies.one.surfaces": ["ball"], "studies.one.rms_slopes": None}
+    assert paths(load(alone).campaign) == ["one/ball/seed0/slope0/soft"]
+    campaign = load({"surfaces.ball": BALL, "studies.one.surfaces": ["ball", "rough"]}).campaign
+    assert surface_cases(campaign) == [("ball", 0), ("rough", 1), ("rough", 2)]
+    assert len(paths(campaign)) == 1 + 2 * 2
+    assert campaign.is_free("ball") and campaign.period("ball") == 200e-6
+
+
+def test_rough_surfaces_beside_smooth_ones_need_slopes(refused):
+    changes = {"surfaces.ball": BALL, "studies.one.surfaces": ["ball", "rough"], "studies.one.rms_slopes": None}
+    refused("", changes, "studies.one.rms_slopes: the key is missing")
+
+
+@pytest.mark.parametrize(
+    ("section", "shape"),
+    [
+        ({"sphere": {"radius": "1 mm"}}, Sphere(1e-3)),
+        ({"paraboloid": {"radii": ["1 mm", "2 mm"]}}, Paraboloid((1e-3, 2e-3))),
+        ({"cylinder_punch": {"radius": "30 um"}}, CylinderPunch(30e-6)),
+        ({"flat_punch": {"side": "50 um"}}, FlatPunch(50e-6)),
+        ({"cone": {"half_angle": "80 deg"}}, Cone(math.radians(80))),
+        (
+            {"wave": {"radius": "1 mm", "amplitude": "-100 nm", "wavelength": "20 um"}},
+            Wave(1e-3, -100e-9, 20e-6),
+        ),
+    ],
+    ids=lambda each: next(iter(each)) if isinstance(each, dict) else "",
+)
+def test_a_shape_is_read_with_its_units_and_makes_the_surface_free(section, shape, load):
+    campaign = load({"surfaces.rough.shape": section}).campaign
+    found = campaign.surfaces["rough"].shape.shape
+    assert type(found) is type(shape)
+    for name, value in vars(shape).items():
+        assert getattr(found, name) == pytest.approx(value, rel=1e-12)
+    assert campaign.is_free("rough")
+    assert surface_settings(campaign, "rough")["boundary"] == "free"
+
+
+def test_defaults_are_not_among_the_settings_on_which_checksums_depend(load):
+    """Results of campaigns without the keys of indenters stay valid, also if a default is written out."""
+    plain, written = load().campaign, load({"surfaces.rough.boundary": "periodic"}).campaign
+    assert surface_settings(plain, "rough") == surface_settings(written, "rough")
+    assert not {"boundary", "shape"} & set(surface_settings(plain, "rough"))
+    material = run_settings(plain, run_cases(plain)[0])["material"]
+    assert not {"thickness", "poisson_ratio"} & set(material)
+    assert surface_settings(load({"surfaces.rough.boundary": "free"}).campaign, "rough")["boundary"] == "free"
+
+
+def test_the_thickness_of_a_layer_is_varied(load):
+    changes = BY_CELLS | {"materials.soft.poisson_ratio": 0.5, "studies.one.vary": {"thickness": ["1 mm", "2 mm"]}}
+    campaign = load(changes).campaign
+    layers = {case.material: campaign.materials[case.material].thickness for case in run_cases(campaign)}
+    assert sorted(layers.values()) == [1e-3, 2e-3]
+
+
+def test_references_need_periodic_surfaces_and_half_spaces(refused):
+    layer = {"materials.soft.thickness": "1 mm", "materials.soft.poisson_ratio": 0.5}
+    entry = {"finite_range": {"truth": {"study": "one", "reduced_pressures": [0.003]}}}
+    refused("", layer | entry, "finite_range.truth.study: 'one' contains the layer 'soft'; expected")
+    free = {"surfaces.rough.boundary": "free"}
+    refused("", free | entry, "finite_range.truth.study: 'one' contains the surface 'rough' with free edges; expected")
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"surfaces.rough.shape": {"sphere": {"radius": "1 mm"}, "cone": {"half_angle": "80 deg"}}}, "given: cone, sp"),
+        ({"surfaces.rough.shape": {"spere": {"radius": "1 mm"}}}, "unknown key (did you mean 'sphere'?)"),
+        ({"surfaces.rough.shape": {"cone": {"half_angle": "95 deg"}}}, "shape.cone.half_angle: '95 deg' is out of ra"),
+        ({"surfaces.rough.shape": {"cylinder_punch": {"radius": "0.1 um"}}}, "is smaller than a grid cell of 1.25e-0"),
+        ({"surfaces.ball": BALL | {"period": "1 mm"}}, "surfaces.ball.period: unknown key"),
+    ],
+)
+def test_wrong_shapes_are_refused(changes, message, refused):
+    refused("", changes, message)
