@@ -221,7 +221,10 @@ def encode_run(run: xr.Dataset, maps: Sequence[str] | None) -> dict:
         maps is missing. For the asperity model, `maps` is None because `run` contains the spots.
     """
     stops = zip(run["step_kind"].values.astype(str), run["step_target"].values, strict=True)
+    # Indenters are shown as experiments are: force (uN) against indentation (um).
+    of_indenter = {"force": 1e6, "indentation": 1e6} if "shape" in run else {}
     return {
+        **{name: encode_floats(run[name] * factor) for name, factor in of_indenter.items()},
         "failure": why_no_result(run.attrs),
         "period": float(run["period"]),
         "periodic": str(run["boundary"].values) == "periodic",

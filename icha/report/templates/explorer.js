@@ -46,7 +46,7 @@ function choose() {
 
 // A run with its curves as numbers.
 function opened(run) {
-  return { ...run, ...Object.fromEntries(["pressure", "area", "gap"].map((name) => [name, floats(run[name])])) };
+  return { ...run, ...Object.fromEntries(["pressure", "area", "gap", "force", "indentation"].filter((name) => name in run).map((name) => [name, floats(run[name])])) };
 }
 
 // The step of a run at the position of the slider; -1 without such a step.
@@ -141,19 +141,29 @@ function pictureOf(run, snapshot) {
 }
 
 // The curves of all runs, each with the point of the present step.
-function drawCurves() {
+// For each of the two plots of curves: its element, the names of x and y, and both axes. Indenters have forces.
+function curvePlots() {
   const type = byId("log").checked ? "log" : "linear";
+  const area = { title: "contact area <i>A</i>/<i>A</i><sub>0</sub>" };
+  if (leading.force) {
+    const x = { title: "indentation (µm)" };
+    return [["area", "indentation", "area", x, area], ["separation", "indentation", "force", x, { title: "force (µN)" }]];
+  }
   const load = { title: "reduced pressure <i>p</i>/(<i>E</i>*<i>h</i>′<sub>rms</sub>)", type };
-  for (const [id, name, axis] of [
-    ["area", "area", { title: "contact area <i>A</i>/<i>A</i><sub>0</sub>", type }],
-    ["separation", "gap", { title: "mean gap <i>u</i>/<i>h</i><sub>rms</sub>" }],
-  ]) {
-    const curves = Object.entries(runs).map(([model, run]) => ({ x: run.pressure, y: run[name], mode: "lines", ...lineOf(model) }));
+  return [
+    ["area", "pressure", "area", load, { ...area, type }],
+    ["separation", "pressure", "gap", load, { title: "mean gap <i>u</i>/<i>h</i><sub>rms</sub>" }],
+  ];
+}
+
+function drawCurves() {
+  for (const [id, along, name, abscissa, axis] of curvePlots()) {
+    const curves = Object.entries(runs).map(([model, run]) => ({ x: run[along], y: run[name], mode: "lines", ...lineOf(model) }));
     const points = Object.keys(runs).map((model) => ({
       x: [], y: [], mode: "markers", showlegend: false, hoverinfo: "skip",
       marker: { color: colours[model], symbol: LOOKS[model].symbol, size: 12, line: { color: colours.paper, width: 1.5 } },
     }));
-    Plotly.react(id, [...curves, ...points], layoutOf(load, axis), PLOT);
+    Plotly.react(id, [...curves, ...points], layoutOf(abscissa, axis), PLOT);
   }
 }
 
@@ -206,9 +216,9 @@ function drawStop() {
     byId(`map-${model}`).setAttribute("aria-label", `Topography and contact, computed with ${WORDS[model]}${exact ? "" : ", in an earlier state"}`);
   }
   const points = now.map((_, k) => now.length + k);
-  for (const [id, name] of [["area", "area"], ["separation", "gap"]]) {
+  for (const [id, along, name] of curvePlots()) {
     const at = (values, step) => (step < 0 ? [] : [values[step]]);
-    Plotly.restyle(id, { x: now.map(({ run, step }) => at(run.pressure, step)), y: now.map(({ run, step }) => at(run[name], step)) }, points);
+    Plotly.restyle(id, { x: now.map(({ run, step }) => at(run[along], step)), y: now.map(({ run, step }) => at(run[name], step)) }, points);
   }
   drawDistributions(now);
   printState(now);
