@@ -74,6 +74,8 @@ TOLERANCES = FrontTolerances()
 _SMALLEST_ERROR = 1e-3 * TOLERANCES.front
 # Largest numbers of iterations, of Krylov vectors, of local relaxations between steps; largest damping.
 _MAX_ITERATIONS, _MAX_KRYLOV, _MAX_LOCAL_RELAXATIONS, _LARGEST_DAMPING = 400, 60, 5, 1e8
+# Damping from which a step that would raise the energy keeps the changes that lower it.
+_STRONG_DAMPING = 1e3
 # Relative rounding error of the energy. Relative rounding error of the first-order change of the energy in a step.
 _ENERGY_ROUNDING, _WORK_ROUNDING = 1e-12, 1e-11
 
@@ -317,10 +319,11 @@ class FrontRelaxation:
         adhesion = (problem.front.local_strengths(active.mean_fraction) / problem.front.straight_strength) ** 2
         rises = (active.intensity**2 - 1) * adhesion * change
         if np.sum(rises) > _WORK_ROUNDING * np.abs(change).sum():
-            # Keep only the changes that lower the energy. Shorter steps alone would stop where thousands of nearly
-            # closed cells must close together, as after full contact opens.
-            change[rises > 0] = 0
-            if not change.any():
+            if self.damping >= _STRONG_DAMPING:
+                # Keep only the changes that lower the energy. Shorter steps alone would stop where thousands of nearly
+                # closed cells must close together, as after full contact opens.
+                change[rises > 0] = 0
+            if self.damping < _STRONG_DAMPING or not change.any():
                 self._damp(2, active.residual)
                 return
         accuracy = max(_SMALLEST_ERROR, min(self.coarsest, self._moving_accuracy(active)))

@@ -4,7 +4,10 @@ import numpy as np
 import pytest
 
 import icha
+from icha.boundary_elements.adhesive import solve_adhesive_contact
 from icha.boundary_elements.contact import contact_of
+from icha.boundary_elements.elastic_contact import Contact
+from icha.boundary_elements.front_solver import TOLERANCES, FrontProblem
 from icha.checks.run import check_run
 from icha.contact.model import PRESSURE, Control
 from validation.closed_forms import Sinusoid
@@ -120,6 +123,23 @@ def test_full_contact_opens_at_the_strength_of_its_flaw():
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(("gap", "cells"), [(1e-3, 2), (3e-4, 20)])
+def test_few_cells_that_open_in_full_contact_reach_the_minimum_of_the_energy(gap, cells):
+    # The range of the attraction exceeds the roughness, so all cells open a little before all but some close again.
+    surface = icha.SelfAffineSpectrum(1.0, 0.5, 1 / 6, 0.8, 1.0).realise(48, 1)
+    energy = (5 * surface.spacing) ** 3 * surface.rms_curvature**2
+    contact = contact_of(surface, icha.Material(1.0, energy, 2 * np.sqrt(energy * surface.spacing)))
+    separation = gap * surface.rms_height / surface.spacing
+    problem = FrontProblem(contact.space, contact.front, contact.topography, separation)
+    order, energies = np.argsort(contact.full_contact_pressure.ravel()), []
+    for opened in (cells, 200):
+        closed = np.sort(order[opened:])
+        start = Contact(closed, np.ones(len(closed)), np.zeros(len(closed)))
+        state, _ = solve_adhesive_contact(problem, contact.summits, start, TOLERANCES.fine)
+        energies.append(problem.energy(state))
+    assert energies[0] == pytest.approx(energies[1], rel=1e-8)
+
+
 @pytest.mark.parametrize("number", range(8))
 def test_random_loops_end(number):
     """All of them are run by `python -m validation.random_loops`."""
