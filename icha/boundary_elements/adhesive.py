@@ -25,8 +25,8 @@ class Summits:
     cell : (k,) int, grid cell of each summit.
     above : (k,), height of the summit above the grid node of its cell.
     reach : (k,), largest gap at which the summit jumps into contact.
-    radius : (k,), radius of the disc that closes, equal to the contact radius of a lone summit after its jump. A
-        smaller disc could open.
+    radius : (k,), contact radius of a lone summit after its jump. A disc of this radius closes, but at most a quarter
+        of the side. A smaller disc could open.
     """
 
     cell: np.ndarray
@@ -37,8 +37,8 @@ class Summits:
     def contacts(self, chosen: np.ndarray, grid: int) -> np.ndarray:
         """Return the cells, ascending, that close when the chosen summits, (k,) bool, jump in: discs around them."""
         touched = np.zeros((grid, grid), bool)
-        # A larger disc would cover the surface with its periodic images.
-        for cell, radius in zip(self.cell[chosen], np.minimum(self.radius[chosen], 0.75 * grid), strict=True):
+        # A larger disc and its periodic images would leave no room for the gap, whose volume the separation fixes.
+        for cell, radius in zip(self.cell[chosen], np.minimum(self.radius[chosen], 0.25 * grid), strict=True):
             offset = np.arange(-int(radius), int(radius) + 1)
             rows, columns = np.nonzero(np.hypot(offset[:, None], offset) <= radius)
             row, column = divmod(int(cell), grid)
