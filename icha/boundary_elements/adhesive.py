@@ -130,15 +130,8 @@ def solve_adhesive_contact(
 
 
 def _form_contact(problem, contact, formed):
-    """Close cells `formed`, (m,), relax the front near them in windows and solve; without windows, only close them.
-
-    A given separation leaves a gap, so if all cells would be closed, only those with the smaller gaps are.
-    """
+    """Close cells `formed`, (m,), relax the front near them in windows and solve; without windows, only close them."""
     closed = contact.close_cells(formed)
-    if len(closed.cells) == problem.space.size:
-        gap = contact.gap.ravel()[formed]
-        formed = formed[gap < np.median(gap)]
-        closed = contact.close_cells(formed)
     relaxed = relax_in_windows(problem.space, problem.front, problem.separation, closed, contact.gap, formed)
     if relaxed is None:
         return closed
