@@ -84,7 +84,7 @@ def test_references_need_periodic_surfaces_and_half_spaces(refused):
     ("changes", "message"),
     [
         ({"surfaces.rough.shape": {"sphere": {"radius": "1 mm"}, "cone": {"half_angle": "80 deg"}}}, "given: cone, sp"),
-        ({"surfaces.rough.shape": {"spere": {"radius": "1 mm"}}}, "unknown key (did you mean 'sphere'?)"),
+        ({"surfaces.rough.shape": {"spheres": {"radius": "1 mm"}}}, "unknown key (did you mean 'sphere'?)"),
         ({"surfaces.rough.shape": {"cone": {"half_angle": "95 deg"}}}, "shape.cone.half_angle: '95 deg' is out of ra"),
         ({"surfaces.rough.shape": {"cylinder_punch": {"radius": "0.1 um"}}}, "is smaller than a grid cell of 1.25e-0"),
         ({"surfaces.ball": BALL | {"period": "1 mm"}}, "surfaces.ball.period: unknown key"),
