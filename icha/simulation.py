@@ -46,6 +46,7 @@ from icha.path.targets import (
     MAX_AREA_FRACTION,
     MAX_REDUCED_PRESSURE,
     MEAN_SEPARATION,
+    NOMINAL_PRESSURE,
     RELATIVE_LOAD,
     UNITS,
     Path,
@@ -291,9 +292,10 @@ def _check_arguments(surface, material, path, by_summits):
 def _check_target(surface, material, target, by_summits):
     """Raise `ValueError` for a load that is too small or too large, a large radius, or a snapshot far above contact."""
     place = f"path: {target.kind} = {target.value!r} {UNITS.get(target.kind, '')}".rstrip()
-    if target.kind in (RELATIVE_LOAD, FORCE):
-        unit = material.contact_modulus * surface.period**2 if target.kind == FORCE else 1.0
-        pressure, load = target.value / (unit * surface.unit_slope), f"{place} on a surface of rms slope"
+    modulus = material.contact_modulus
+    units = {RELATIVE_LOAD: 1.0, NOMINAL_PRESSURE: modulus, FORCE: modulus * surface.period**2}
+    if target.kind in units:
+        pressure, load = target.value / (units[target.kind] * surface.unit_slope), f"{place} on a surface of rms slope"
         if 0 < abs(pressure) < LEAST_PRESSURE:
             raise ValueError(
                 f"{load} {surface.unit_slope:.4g} is too small; expected a reduced pressure of at least "

@@ -11,6 +11,10 @@ from icha.support.rules import ADHESION_LENGTH, CONTACT_MODULUS, LENGTH, POISSON
 # (`validation/jump_in.py`).
 WU_HOLDS_FROM = 1.0
 
+# Default range of attraction, m: about the distance between molecules, where van der Waals forces are strongest (J. N.
+# Israelachvili, Intermolecular and Surface Forces, 3rd ed., 2011, section 13).
+VAN_DER_WAALS_RANGE = 0.5e-9
+
 
 @dataclass(frozen=True)
 class Material:
@@ -22,6 +26,7 @@ class Material:
     surface_energy : work of adhesion dgamma (gamma in the paper), J/m^2, at most 1e24; zero without adhesion.
         With adhesion, surface_energy/contact_modulus must be in [1e-40, 1e9] m.
     interaction_range : range of the attractive forces (epsilon in eq. 3 of Violano & Afferrante), m, in [1e-24, 1e9].
+        Default: 0.5 nm, about the distance between molecules, as for van der Waals forces.
     flaw_radius : radius of the largest flaw of the interface, m, in [1e-24, 1e9]; 0 for an interface without flaws.
     thickness : thickness of an elastic layer on a rigid base, m, in [1e-24, 1e9]; infinite for a half-space.
     poisson_ratio : Poisson ratio of the layer, in [0, 0.5]; a half-space does not depend on it at a given E*.
@@ -34,7 +39,7 @@ class Material:
 
     contact_modulus: float
     surface_energy: float
-    interaction_range: float
+    interaction_range: float = VAN_DER_WAALS_RANGE
     flaw_radius: float = 0.0
     thickness: float = math.inf
     poisson_ratio: float = 0.5

@@ -168,6 +168,7 @@ def _target_error(run):
         "relative_load": run["nominal_pressure"] / scale,
         "area_fraction": run["contact_area_fraction"],
         "mean_separation": run["mean_separation"],
+        "pressure": run["nominal_pressure"],
         "force": run["nominal_pressure"] * nominal_area,
         "indentation": -run["mean_separation"],
         "contact_radius": run["contact_area_fraction"],
@@ -189,7 +190,8 @@ def _target_error(run):
     # With adhesion a load may be a small difference of attraction and repulsion. Each of them is about as large as the
     # stiffness times h_rms. Therefore the error of a very small load is relative to SMALLEST_LOAD times this product.
     gross = np.abs(finite_stiffness(run)) * float(run["unit_height"]) * adhesive
-    unit = {"reduced_pressure": scale * float(run["unit_slope"]), "relative_load": scale, "force": 1 / nominal_area}
+    unit = {"reduced_pressure": scale * float(run["unit_slope"]), "relative_load": scale, "pressure": 1.0}
+    unit["force"] = 1 / nominal_area
     least = np.array([SMALLEST_LOAD * gross[k] / unit.get(kind, math.inf) for k, kind in enumerate(kinds)])
     return np.max(error / np.where(target != 0, np.maximum(np.abs(target), least), largest))
 

@@ -16,7 +16,15 @@ from pydantic import AfterValidator, Field, PrivateAttr
 
 from icha.configuration.figures import Figures, Measurement
 from icha.configuration.publication import Line, Prose, Publication
-from icha.configuration.studies import MEASURED, BesideStudy, BoundaryElementLoops, BoundaryElements, Study
+from icha.configuration.studies import (
+    BesideStudy,
+    BoundaryElementLoops,
+    BoundaryElements,
+    RmsHeight,
+    Study,
+    is_unread,
+    slope_of_height,
+)
 from icha.configuration.surfaces import AnySurface, MaterialSection
 from icha.contact.models import MODELS
 from icha.support.input_files import read_columns
@@ -32,7 +40,10 @@ _LEAST_CELLS, _ADVISABLE_CELLS = 4, 8
 
 
 class Contact(NamedTuple):
-    """Surface, seed, rms slope and material of a run. Until the surface's file is read, the slope may be `measured`."""
+    """Surface, seed, rms slope and material of a run.
+
+    The slope may be `measured` or an `RmsHeight` until the file of the surface is read.
+    """
 
     surface: str
     seed: int
@@ -48,6 +59,7 @@ class Topography(NamedTuple):
     grid : nodes along a side.
     period : side of the square, m.
     rms_slope : measured rms slope; None if no study uses the measured slope.
+    rms_height : rms height at rms slope 1, m.
     sha256 : SHA-256 of the file.
     full_contact_energy : elastic energy of full contact per area, divided by E*, at rms slope 1, m.
     complete_contact_pressure : pressure of complete contact without adhesion, divided by E*, at rms slope 1.
@@ -59,6 +71,11 @@ class Topography(NamedTuple):
     sha256: str
     full_contact_energy: float
     complete_contact_pressure: float
+    rms_height: float
+
+    def slope_of(self, slope: str | RmsHeight) -> float:
+        """Return the rms slope for the word `measured`, or the rms slope that gives an rms height."""
+        return slope_of_height(slope, self.rms_height) if isinstance(slope, RmsHeight) else self.rms_slope
 
 
 class Defaults(Section):
@@ -143,8 +160,9 @@ class Campaign(Section):
         """Return the campaign with properties of topographies from files; numbers replace the slope `measured`."""
 
         def with_slope(contact):
-            measured = contact.rms_slope == MEASURED
-            return contact._replace(rms_slope=topographies[contact.surface].rms_slope) if measured else contact
+            if not is_unread(contact.rms_slope):
+                return contact
+            return contact._replace(rms_slope=topographies[contact.surface].slope_of(contact.rms_slope))
 
         campaign = self.with_contacts({study: map(with_slope, runs) for study, runs in self._contacts.items()})
         campaign._topographies = dict(topographies)
@@ -207,7 +225,7 @@ class Campaign(Section):
 
         Problems that depend on files (measured slopes, grids) are left out until the files are read.
         """
-        unknown_slopes = any(MEASURED in study.rms_slopes for study in self.studies.values())
+        unknown_slopes = any(is_unread(slope) for study in self.studies.values() for slope in study.rms_slopes)
         for location, value, reason in self._problems():
             if not (unknown_slopes and any(str(key).startswith("rms_slope") for key in location)):
                 yield location, value, reason
@@ -236,17 +254,18 @@ class Campaign(Section):
             except ValueError as error:
                 yield ("measurements", label, "path"), entry.path, str(error)
 
-    def _units(self, study: str) -> tuple[float, float]:
-        """Return the smallest E* A0 h'rms (N) and the smallest side (m) of a study; infinite if they are unknown."""
+    def _units(self, study: str) -> tuple[float, float, float]:
+        """Return the smallest E* h'rms (Pa), E* A0 h'rms (N) and side (m) of a study; infinite if they are unknown."""
         known = [each for each in self.contacts(study) if hasattr(self._grid_and_period(each.surface), "period")]
         sides = {each.surface: self.period(each.surface) for each in known}
-        units = [
-            self.materials[each.material].contact_modulus * sides[each.surface] ** 2 * each.rms_slope
+        units = {
+            each: self.materials[each.material].contact_modulus * each.rms_slope
             for each in known
             # The reduced pressure of a surface with a shape does not depend on its roughness.
-            if each.rms_slope != MEASURED and self.surfaces[each.surface].shape is None
-        ]
-        return min(units, default=math.inf), min(sides.values(), default=math.inf)
+            if not is_unread(each.rms_slope) and self.surfaces[each.surface].shape is None
+        }
+        forces = (pressure * sides[each.surface] ** 2 for each, pressure in units.items())
+        return tuple(min(values, default=math.inf) for values in (units.values(), forces, sides.values()))
 
     def _model_problems(self, study: Study) -> Iterator[Problem]:
         """Yield a problem for each surface or material that a model of the study does not support."""

@@ -17,7 +17,7 @@ from pydantic import ValidationError
 
 from icha.configuration.campaign import BESIDE_STUDIES, Campaign, Contact
 from icha.configuration.errors import MOST_PROBLEMS, problem_of
-from icha.configuration.studies import MEASURED, SCALARS, Study
+from icha.configuration.studies import MEASURED, SCALARS, RmsHeight, Study, slope_of_height
 from icha.configuration.surfaces import SURFACE_KINDS, MaterialSection
 from icha.datasets.labels import number_label
 from icha.support.rules import FloatRange
@@ -28,6 +28,8 @@ MAX_RUNS = 100_000
 _MAX_TARGETS = 5_000_000
 # Keys of the lists of a study, and the corresponding keys of a case.
 _LISTS = {"surfaces": "surface", "seeds": "seed", "rms_slopes": "rms_slope", "materials": "material"}
+# Keys of lists in the key `zip`.
+_ZIPPED = _LISTS | {"rms_heights": "rms_slope"}
 # Order of the lists of a study. The last list changes fastest from run to run.
 _OF_MATERIAL = MaterialSection.model_fields
 _ORDER = ("surface", *(name for name in SCALARS if name not in _OF_MATERIAL), "seed", "rms_slope", "material")
@@ -78,6 +80,9 @@ def _lists(label: str, study: Study) -> dict[str, list[_Located]]:
 
     varied = study.vary.model_dump(exclude_none=True) if study.vary else {}
     lists = {one: located(getattr(study, many), many) for many, one in _LISTS.items()}
+    if study.rms_heights is not None:
+        heights = [RmsHeight(value) for value in study.rms_heights]
+        lists["rms_slope"] = located(heights, "rms_heights")
     # Smooth surfaces have no slopes. One entry instead of none, so that there is one run for each seed and material.
     lists["rms_slope"] = lists["rms_slope"] or [(("studies", label, "rms_slopes"), None)]
     lists |= {name: located(values, "vary", name) for name, values in varied.items()}
@@ -104,7 +109,7 @@ def _cases(study: Study) -> list[dict[str, Any]]:
 
 def _axes(study: Study, lists: Mapping, fixed: Mapping) -> Iterator[list[str]]:
     """Yield groups of lists. The lists of one group are combined entry by entry, and different groups in all ways."""
-    groups = [[_LISTS.get(name, name) for name in group] for group in study.zip]
+    groups = [[_ZIPPED.get(name, name) for name in group] for group in study.zip]
     done = set(fixed)
     for name in lists:
         if name not in done:
@@ -158,6 +163,10 @@ def _study_problems(campaign: Campaign, label: str, study: Study) -> Iterator[Pr
         if one == "rms_slope":
             names = (campaign.surfaces.get(name) for _, name in values("surface"))
             needed = needed and not all(surface and surface.smooth for surface in names)
+            if study.rms_heights is not None:
+                needed = False
+                if study.rms_slopes:
+                    yield (*prefix, many), study.rms_slopes, "is given beside `rms_heights`; expected one of both"
         if needed and not getattr(study, many):
             description = " ".join(str(Study.model_fields[many].description).split())
             yield (*prefix, many), NOTHING, f"the key is missing; expected: {description}"
@@ -182,7 +191,7 @@ def _zip_problems(prefix, study, lists) -> Iterator[Problem]:
     for index, group in enumerate(study.zip):
         lengths = {}
         for position, name in enumerate(group):
-            location, one = (*prefix, "zip", index, position), _LISTS.get(name, name)
+            location, one = (*prefix, "zip", index, position), _ZIPPED.get(name, name)
             if name in plural or one not in lists:
                 yield location, name, f"is not a list of this study; expected one of {expected}"
                 continue
@@ -219,11 +228,17 @@ class _Variants:
             kinds = ", ".join(k for k, section in SURFACE_KINDS.items() if name in section.model_fields)
             reason = f"is not a key of surface {surface!r}; expected only surfaces of kind {kinds}, or separate studies"
             self.problems[location[:4]] = (location[:4], value, reason)
-        section = self._campaign.surfaces[surface]
+        section, slope = self._campaign.surfaces[surface], point["rms_slope"][1]
+        variant = self._variant("surfaces", surface, of_surface)
+        if section.smooth:
+            slope = 0.0
+        elif section.random and isinstance(slope, RmsHeight):
+            random = self.derived["surfaces"].get(variant, section)
+            slope = slope_of_height(slope, random.rms_height_at_unit_slope)
         return Contact(
-            self._variant("surfaces", surface, of_surface),
+            variant,
             point["seed"][1] if section.random else 0,
-            0.0 if section.smooth else point["rms_slope"][1],
+            slope,
             self._variant("materials", material, of_material),
         )
 

@@ -17,6 +17,7 @@ from icha.configuration.plausibility import (
     CONFIRMED,
     plausibility_problems,
     sticky_runs,
+    unusual_heights,
     unusual_topography,
     unusual_values,
 )
@@ -80,6 +81,7 @@ def load_configuration(
     for name, each in topographies.items():
         location = "surfaces", campaign.origin("surfaces", name)
         unusual += unusual_topography(location, campaign.surfaces[name], each.period, each.rms_slope)
+    unusual += unusual_heights(campaign)
     sticky = list(sticky_runs(campaign))
     # Other unusual values are reported first, because they may cause the low U_full/dgamma.
     implausible = list(plausibility_problems(unusual, confirmed)) or plausibility_problems(sticky, confirmed)

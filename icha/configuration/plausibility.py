@@ -133,6 +133,18 @@ def plausibility_problems(
             yield each.location, each.value, f"{reason}{addition.format(each.key)} if you intend this value"
 
 
+def unusual_heights(campaign: Campaign) -> Iterator[Unusual]:
+    """For each study with rms heights, yield the first height that gives an unusual rms slope."""
+    for name, study in campaign.studies.items():
+        if study.rms_heights is None:
+            continue
+        for contact in campaign.contacts(name):
+            if not campaign.surfaces[contact.surface].smooth and not _SLOPE.contains(contact.rms_slope):
+                value, source = f"rms slope {contact.rms_slope:.3g}", f" on {contact.surface}"
+                yield Unusual(("studies", name, "rms_heights"), value, _SLOPE, source)
+                break
+
+
 _RATIO = Usual(
     "1",
     f"{FULL_CONTACT_BELOW:g}",

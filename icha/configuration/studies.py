@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Iterator
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, NamedTuple
 
 from pydantic import (
     AfterValidator,
@@ -28,18 +28,21 @@ from icha.path.targets import (
     LARGEST_REDUCED_PRESSURE,
     MAX_AREA_FRACTION,
     MAX_REDUCED_PRESSURE,
+    NOMINAL_PRESSURE,
     QUANTITIES,
     RELATIVE_LOAD,
     STEP,
     Path,
 )
-from icha.support.rules import FORCES, NUMBER, REFINEMENT, SLOPE, TOLERANCE, FloatRange
+from icha.support.rules import FORCES, NUMBER, PRESSURES, REFINEMENT, SLOPE, TOLERANCE, FloatRange
 from icha.support.values import (
     Force,
     Label,
     Length,
     Name,
+    OrWord,
     Positive,
+    Pressure,
     Problem,
     Section,
     Seed,
@@ -61,6 +64,30 @@ from icha.support.values import (
 
 # Value of `rms_slopes` that means the measured slope of a topography.
 MEASURED = "measured"
+
+
+class RmsHeight(NamedTuple):
+    """Rms height to which a surface is scaled.
+
+    Attributes
+    ----------
+    metres : rms height, m.
+    """
+
+    metres: float
+
+
+def is_unread(slope: Any) -> bool:
+    """Return whether an rms slope is unknown until the file of a surface is read."""
+    return slope == MEASURED or isinstance(slope, RmsHeight)
+
+
+def slope_of_height(height: RmsHeight, unit: float) -> float:
+    """Return the rms slope at which a surface has an rms height; `unit` is the rms height at rms slope 1, m.
+
+    The slope has six digits, because names of files contain it.
+    """
+    return float(f"{height.metres / unit:.6g}")
 
 
 def _slope(value: Any) -> float | str:
@@ -116,6 +143,8 @@ class Targets(Section):
     )
     mean_separations: stops(Length, decreasing) | None = None
     """Mean separations with unit, decreasing."""
+    pressures: stops(Pressure, increasing) | None = None
+    """Nominal pressures F/A0 with unit, such as `[10 kPa, 20 kPa]`, increasing."""
     forces: stops(Force, increasing) | None = None
     """Normal forces with unit, such as `[1 mN, 2 mN]`, increasing."""
     indentations: stops(Indentation, increasing) | None = None
@@ -149,14 +178,7 @@ def _list_or_word(value: Any, read_list: Callable[[Any], Any]) -> Any:
     return value if value == EVERY_STOP else read_list(value)
 
 
-class _OrEveryStop:
-    """Annotation that adds the word `every_stop` to the JSON schema of a list."""
-
-    def __get_pydantic_json_schema__(self, core_schema: Any, handler: Callable[[Any], dict]) -> dict:
-        """Return the JSON schema: the list, or the word `every_stop`."""
-        return {"anyOf": [handler(core_schema), {"const": EVERY_STOP}]}
-
-
+_ANY_PRESSURE = FloatRange("Pa", least=-PRESSURES.most, most=PRESSURES.most)
 _ANY_FORCE = FloatRange("N", least=-FORCES.most, most=FORCES.most)
 
 
@@ -167,16 +189,19 @@ class TurningPoint(Snapshot):
     """Reduced pressure p/(E* h'rms) of the turning point."""
     relative_load: number(NUMBER) | None = None
     """Relative load p/E* = F/(E* A0) of the turning point."""
+    pressure: quantity(_ANY_PRESSURE, "-10 kPa") | None = None
+    """Nominal pressure F/A0 of the turning point, with its unit."""
     force: quantity(_ANY_FORCE, "-1 mN") | None = None
     """Normal force of the turning point, with its unit."""
 
 
-# Names and descriptions of the parameters that a study may vary: all keys except `kind`, `path`, `crop` and `shape`.
+# Names and descriptions of the parameters that a study may vary: all keys except these.
+_NOT_VARIED = ("kind", "path", "crop", "shape", "bodies")
 SCALARS: dict[str, str] = {}
 for _section in (*SURFACE_KINDS.values(), MaterialSection):
     for _name, _field in _section.model_fields.items():
         # The description of `boundary` is that of measured surfaces, which have most values.
-        if _name not in ("kind", "path", "crop", "shape") and (_name != "boundary" or _section is MeasuredSurface):
+        if _name not in _NOT_VARIED and (_name != "boundary" or _section is MeasuredSurface):
             SCALARS.setdefault(_name, str(_field.description))
 
 
@@ -214,6 +239,9 @@ class Study(Section):
     rms_slopes: Slopes = []
     """Rms slopes h'rms. The heights of each topography are scaled to these slopes. With `measured`, a topography from a
     file keeps its own slope. A surface with `kind: smooth` has no slope: it is used once, with the rms slope 0."""
+    rms_heights: Annotated[list[Length], Field(min_length=1), AfterValidator(distinct)] | None = None
+    """Rms heights with unit, such as `[100 nm]`, instead of `rms_slopes`. The heights of each topography are scaled to
+    these values. The corresponding slopes are rounded to six digits."""
     materials: list_of_names() = []
     """Names of materials."""
     vary: Vary | None = None
@@ -231,7 +259,7 @@ class Study(Section):
     targets: Targets
     """Targets of the loading path."""
     snapshots: (
-        Annotated[list[Snapshot], AfterValidator(distinct), WrapValidator(_list_or_word), _OrEveryStop()] | None
+        Annotated[list[Snapshot], AfterValidator(distinct), WrapValidator(_list_or_word), OrWord(EVERY_STOP)] | None
     ) = None
     """States at which each run saves its contact spots and distributions. The path reaches each of these states
     exactly. `every_stop` means all targets. Default: the last target."""
@@ -269,21 +297,26 @@ class Study(Section):
         return settings
 
     def problems(
-        self, snapshots: list[tuple[str, float]] | None, force_unit: float = math.inf, side: float = math.inf
+        self,
+        snapshots: list[tuple[str, float]] | None,
+        pressure_unit: float = math.inf,
+        force_unit: float = math.inf,
+        side: float = math.inf,
     ) -> Iterator[Problem]:
         """Yield the problems that prevent the study from running.
 
         Parameters
         ----------
         snapshots : states from `Campaign.snapshots_of`.
+        pressure_unit : smallest E* h'rms of all contacts, Pa; infinite if it is unknown.
         force_unit : smallest E* A0 h'rms of all contacts, N; infinite if it is unknown.
         side : side of the smallest surface, m; infinite if it is unknown.
         """
         alone, by_summits = self.models == [DEFAULT_MODEL], DEFAULT_MODEL in self.models
         # At a given load, the smallest slope has the largest reduced pressure. Smooth surfaces have the slope 0.
-        slope = min((slope for slope in self.rms_slopes if slope != MEASURED and slope > 0), default=math.inf)
+        slope = min((slope for slope in self.rms_slopes if not is_unread(slope) and slope > 0), default=math.inf)
         most = MAX_REDUCED_PRESSURE if by_summits else LARGEST_REDUCED_PRESSURE
-        units = {RELATIVE_LOAD: (slope, ""), FORCE: (force_unit, " N")}
+        units = {RELATIVE_LOAD: (slope, ""), NOMINAL_PRESSURE: (pressure_unit, " Pa"), FORCE: (force_unit, " N")}
         largest_radius = side * math.sqrt((MAX_AREA_FRACTION if by_summits else 1.0) / math.pi)
         for location, kind, value in self._states():
             # If a study has both models, asperity runs may end early at the limit of the asperity model. Therefore only
@@ -368,7 +401,7 @@ class BesideStudy(Section):
                     expected = list_names(getattr(study, key))
                     yield (key, index), value, f"is not in study {self.study!r}; expected one of {expected}"
         contacts = campaign.contacts_beside(self)
-        if not contacts and MEASURED not in study.rms_slopes:
+        if not contacts and not any(map(is_unread, study.rms_slopes)):
             reason = "has no run with these surfaces, seeds, slopes and materials; expected combinations of the study"
             yield ("study",), self.study, reason
         pairs = list(dict.fromkeys((each.surface, each.material) for each in contacts))

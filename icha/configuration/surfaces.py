@@ -1,10 +1,21 @@
 """Sections `surfaces` and `materials`: rough surfaces, and elastic half-spaces or layers."""
 
 import math
+from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import BeforeValidator, ConfigDict, Field, WithJsonSchema, field_validator, model_validator
+from pydantic import (
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    TypeAdapter,
+    ValidationError,
+    WithJsonSchema,
+    field_validator,
+    model_validator,
+)
 
+from icha.asperity.material import VAN_DER_WAALS_RANGE
 from icha.configuration.shapes import ShapeSection
 from icha.support.rules import GRID, HURST, LENGTH, POISSON_RATIO, FloatRange, IntegerRange
 from icha.support.values import (
@@ -13,6 +24,7 @@ from icha.support.values import (
     File,
     Length,
     Modulus,
+    OrWord,
     Section,
     SurfaceEnergy,
     Text,
@@ -22,19 +34,50 @@ from icha.support.values import (
     to_si,
 )
 
+# Word for a body that does not deform.
+RIGID = "rigid"
+
+
+class Body(Section):
+    """An elastic body of a contact."""
+
+    youngs_modulus: Modulus
+    """Young's modulus E."""
+    poisson_ratio: number(POISSON_RATIO)
+    """Poisson ratio ν, from 0 to 0.5; rubber has nearly 0.5."""
+
+
+def _body(value: Any) -> Any:
+    """Return None for a rigid body; raise ValueError for other words."""
+    if isinstance(value, str) and value != RIGID:
+        raise ValueError("is not a body; expected `{youngs_modulus: 2 MPa, poisson_ratio: 0.5}`, or the word rigid")
+    return None if value == RIGID else value
+
+
+_Bodies = Annotated[
+    list[Annotated[Body | None, BeforeValidator(_body), OrWord(RIGID)]], Field(min_length=2, max_length=2)
+]
+
 
 class MaterialSection(Section):
     """Material of the elastic body, and adhesion between this body and the rough surface."""
 
     model_config = ConfigDict(title="Material")
 
+    bodies: _Bodies | None = Field(
+        default=None,
+        exclude=True,
+        description="The two bodies, instead of `contact_modulus`, such as `[{youngs_modulus: 2 MPa, poisson_ratio: "
+        "0.5}, rigid]`. Their contact modulus is 1/E* = (1 - ν1²)/E1 + (1 - ν2²)/E2.",
+    )
     contact_modulus: Modulus
-    """Composite elastic modulus E* (contact modulus)."""
+    """Composite elastic modulus E* (contact modulus). Required without `bodies`."""
     surface_energy: SurfaceEnergy
     """Work of adhesion Δγ. The value `0 J/m^2` means no adhesion."""
-    interaction_range: Length
+    interaction_range: Length = Field(default=f"{VAN_DER_WAALS_RANGE * 1e9:g} nm", validate_default=True)
     """Range ε of the attraction. The range determines when asperities jump into contact. The Tabor parameter is μ =
-    (RΔγ²/E*²)^(1/3)/ε, where 1/R is the rms curvature of the surface."""
+    (RΔγ²/E*²)^(1/3)/ε, where 1/R is the rms curvature of the surface. The default is about the distance between
+    molecules, as for van der Waals forces."""
     flaw_radius: Length | None = None
     """Radius a of the largest flaw of the interface. A flaw grows as a penny-shaped crack at the tension √(πE*Δγ/(2a)).
     Full contact opens at the smaller of this tension and the theoretical strength 1.03 Δγ/ε. Default: no flaw."""
@@ -44,6 +87,28 @@ class MaterialSection(Section):
     poisson_ratio: number(POISSON_RATIO) | None = None
     """Poisson ratio of the layer, from 0 to 0.5; rubber has nearly 0.5. Required with `thickness`. A half-space does
     not depend on this ratio, because E* is given."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _combine_bodies(cls, content: Any) -> Any:
+        """Compute the contact modulus, and the Poisson ratio of a layer, from the bodies."""
+        if not isinstance(content, Mapping) or content.get("bodies") is None:
+            return content
+        if "contact_modulus" in content:
+            raise ValueError("bodies: is given beside `contact_modulus`; expected one of both keys")
+        try:
+            bodies = TypeAdapter(_Bodies).validate_python(content["bodies"])
+        except ValidationError:
+            # The field reports the problem. The placeholder prevents a second message about the contact modulus.
+            return {**content, "contact_modulus": "1 Pa"}
+        elastic = [body for body in bodies if body is not None]
+        if not elastic:
+            raise ValueError("bodies: both bodies are rigid; expected at least one with youngs_modulus, poisson_ratio")
+        modulus = 1 / sum((1 - body.poisson_ratio**2) / body.youngs_modulus for body in elastic)
+        combined = {**content, "contact_modulus": f"{modulus!r} Pa"}
+        if len(elastic) == 1 and content.get("thickness") is not None:
+            combined.setdefault("poisson_ratio", elastic[0].poisson_ratio)
+        return combined
 
     @model_validator(mode="after")
     def _check_layer(self):
@@ -277,6 +342,13 @@ class SelfAffineSurface(_Surface):
     def lengths_and_hurst(self) -> tuple[float, float, float, float]:
         """Period, roll-off wavelength and shortest wavelength, m, and Hurst exponent."""
         return self.period, self.rolloff_wavelength, self.short_wavelength, self.hurst
+
+    @property
+    def rms_height_at_unit_slope(self) -> float:
+        """Rms height of the spectrum at rms slope 1, m; with `amplitudes: gaussian`, root of the mean square."""
+        from icha.surfaces.spectrum import SelfAffineSpectrum  # imports SciPy, which takes time
+
+        return SelfAffineSpectrum(*self.lengths_and_hurst).rms_height
 
     @property
     def cells_per_short_wave(self) -> float:

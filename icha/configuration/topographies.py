@@ -65,6 +65,7 @@ def inspect_file(section: MeasuredSurface | FileSurface) -> Topography:
             sha256_of(Path(section.path)),
             surface.full_contact_energy / slope**2,
             surface.complete_contact_pressure / slope,
+            surface.rms_height / slope,
         )
     return _KNOWN[key]
 

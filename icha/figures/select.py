@@ -203,6 +203,7 @@ _KIND_LABELS = {
     "relative_load": r"$F/(E^{\ast}A_0)$",
     "area_fraction": r"$A/A_0$",
     "mean_separation": r"$\bar{u}$ (m)",
+    "pressure": r"$p$ (Pa)",
     "force": r"$F$ (N)",
     "indentation": r"$-\bar{u}$ (m)",
     "contact_radius": r"$\sqrt{A/\pi}$ (m)",

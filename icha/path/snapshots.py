@@ -4,7 +4,7 @@ from pydantic import Field, model_validator
 
 from icha.path.targets import QUANTITIES
 from icha.support.rules import INDENTATIONS
-from icha.support.values import Force, Length, Positive, Section, exactly_one, number, quantity
+from icha.support.values import Force, Length, Positive, Pressure, Section, exactly_one, number, quantity
 
 ReducedPressure = number(QUANTITIES["reduced_pressure"].rule)
 AreaFraction = number(QUANTITIES["area_fraction"].rule)
@@ -24,6 +24,7 @@ class Snapshot(Section):
         default=None, description="Contact area fraction A/A0 of the state."
     )
     mean_separation: Length | None = Field(default=None, description="Mean separation of the state, with its unit.")
+    pressure: Pressure | None = Field(default=None, description="Nominal pressure F/A0 of the state, such as `10 kPa`.")
     force: Force | None = Field(default=None, description="Normal force of the state, such as `1 mN`.")
     indentation: Indentation | None = Field(  # type: ignore[valid-type]
         default=None,

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from icha.contact.model import AREA_FRACTION as CONTROLLED_AREA
 from icha.contact.model import PRESSURE, ContactModel, Control, State
-from icha.support.rules import FORCES, INDENTATIONS, LENGTH, NUMBER, POSITIVE, FloatRange
+from icha.support.rules import FORCES, INDENTATIONS, LENGTH, NUMBER, POSITIVE, PRESSURES, FloatRange
 
 # Largest reduced pressure and area fraction of a target with the asperity model. At larger values the spots are not
 # separate, and without adhesion the mean gap soon becomes zero.
@@ -73,7 +73,8 @@ class TargetQuantity:
         return None if self.controlled is None else Control(self.controlled, self.prescribed(contact, value))
 
 
-REDUCED_PRESSURE, RELATIVE_LOAD, FORCE = "reduced_pressure", "relative_load", "force"
+REDUCED_PRESSURE, RELATIVE_LOAD = "reduced_pressure", "relative_load"
+NOMINAL_PRESSURE, FORCE = "pressure", "force"
 AREA_FRACTION, CONTACT_RADIUS = "area_fraction", "contact_radius"
 MEAN_SEPARATION, INDENTATION = "mean_separation", "indentation"
 _PRESSURES = FloatRange(least=LEAST_PRESSURE, most=LARGEST_REDUCED_PRESSURE)
@@ -90,6 +91,7 @@ QUANTITIES = {
         TargetQuantity(RELATIVE_LOAD, POSITIVE, PRESSURE, lambda contact: contact.contact_modulus),
         TargetQuantity(AREA_FRACTION, _AREAS, CONTROLLED_AREA, lambda contact: 1.0),
         TargetQuantity(MEAN_SEPARATION, LENGTH, None, lambda contact: 1.0),
+        TargetQuantity(NOMINAL_PRESSURE, PRESSURES, PRESSURE, lambda contact: 1.0),
         TargetQuantity(FORCE, FORCES, PRESSURE, lambda contact: 1 / contact.area),
         TargetQuantity(INDENTATION, INDENTATIONS, None, lambda contact: -1.0),
         TargetQuantity(
@@ -97,7 +99,7 @@ QUANTITIES = {
         ),
     )
 }
-LOADS = (REDUCED_PRESSURE, RELATIVE_LOAD, FORCE)
+LOADS = (REDUCED_PRESSURE, RELATIVE_LOAD, NOMINAL_PRESSURE, FORCE)
 AREAS = (AREA_FRACTION, CONTACT_RADIUS)
 # Kind of the target of an equilibrium between the targets of a path. The value of this target is the mean separation.
 BETWEEN = "path"
@@ -141,14 +143,15 @@ class Path:
     reduced_pressures : values of p/(E* h'_rms), increasing, in [1e-12, 100]; with the asperity model at most 0.15.
     area_fractions : values of A/A0, increasing, in [1e-9, 1]; with the asperity model at most 0.25.
     mean_separations : values of u in m, decreasing, in [1e-24, 1e9].
+    pressures : values of the nominal pressure F/A0 in Pa, increasing, in [1e-30, 1e30].
     forces : values of the normal force in N, increasing, in [1e-30, 1e30].
     indentations : values of -u in m, increasing, in [-1e9, 1e9]; negative before the undeformed surfaces meet.
-    contact_radii : values of sqrt(A/pi) in m, increasing, in [1e-24, 1e9]. Give exactly one of these six lists.
+    contact_radii : values of sqrt(A/pi) in m, increasing, in [1e-24, 1e9]. Give exactly one of these seven lists.
     snapshots : pairs (kind, value), in any order, of states of the first loading whose distributions and spots are
         saved. The kind is "reduced_pressure", "relative_load" (F/(E* A0)), "area_fraction", "mean_separation" (m),
-        "force" (N), "indentation" (m) or "contact_radius" (m). A snapshot is an additional target unless the list
-        contains the same kind and value. Snapshots are in the dataset in the order in which the path reaches them.
-        Default: the last target of the list.
+        "pressure" (Pa), "force" (N), "indentation" (m) or "contact_radius" (m). A snapshot is an additional target
+        unless the list contains the same kind and value. Snapshots are in the dataset in the order in which the path
+        reaches them. Default: the last target of the list.
     turning_points : pairs (kind, value) at which the path turns after its last target: the first one ends unloading,
         the second one ends loading, and so on. The kinds are those of snapshots. Loads that end unloading may be
         tensile (negative) or zero.
@@ -178,6 +181,7 @@ class Path:
         area_fractions: Iterable[float] | None = None,
         mean_separations: Iterable[float] | None = None,
         *,
+        pressures: Iterable[float] | None = None,
         forces: Iterable[float] | None = None,
         indentations: Iterable[float] | None = None,
         contact_radii: Iterable[float] | None = None,
@@ -189,7 +193,7 @@ class Path:
     ) -> None:
         """Validate the values and build the list of targets."""
         lists = {REDUCED_PRESSURE: reduced_pressures, AREA_FRACTION: area_fractions, MEAN_SEPARATION: mean_separations}
-        lists |= {FORCE: forces, INDENTATION: indentations, CONTACT_RADIUS: contact_radii}
+        lists |= {NOMINAL_PRESSURE: pressures, FORCE: forces, INDENTATION: indentations, CONTACT_RADIUS: contact_radii}
         given = [kind for kind, values in lists.items() if values is not None]
         if len(given) != 1:
             names, found = (", ".join(QUANTITIES[kind].plural for kind in kinds) for kinds in (lists, given))

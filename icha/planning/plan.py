@@ -211,6 +211,7 @@ def _cost_parameters(settings, side) -> dict:
     loads = {
         "reduced_pressure": lambda value: value,
         "relative_load": lambda value: value / (slope or 1.0),
+        "pressure": lambda value: value / (modulus * (slope or 1.0)),
         "force": lambda value: value / (modulus * side**2 * (slope or 1.0)),
         "area_fraction": lambda value: value / 2,
         "contact_radius": lambda value: math.pi * value**2 / side**2 / 2,

@@ -19,7 +19,7 @@ from icha.analysis.validity import (
     statements,
 )
 from icha.asperity.full_contact import gaussian_complete_pressure
-from icha.asperity.material import WU_HOLDS_FROM, Material
+from icha.asperity.material import VAN_DER_WAALS_RANGE, WU_HOLDS_FROM, Material
 from icha.asperity.stickiness import stickiness, sticky_rms_height
 from icha.boundary_elements.front import Front
 from icha.configuration.campaign import Campaign
@@ -139,7 +139,27 @@ def expected_validity(campaign: Campaign) -> list[Statement]:
             sticky[key] = max(value, sticky.get(key, 0.0))
     models = {name: study.models for name, study in campaign.studies.items()}
     outside = _describe_outside(tabor) if tabor else None
-    return [*statements(models, cases, outside, describe_sticky(sticky)), *_indenters(campaign)]
+    stated = statements(models, cases, outside, describe_sticky(sticky))
+    return [*stated, *_default_ranges(campaign), *_indenters(campaign)]
+
+
+def _default_ranges(campaign):
+    """Yield a statement if materials with adhesion have the default range of attraction."""
+    used = dict.fromkeys(case.material for case in run_cases(campaign))
+    names = [
+        name
+        for name in used
+        if campaign.materials[name].surface_energy > 0
+        and "interaction_range" not in campaign.materials[name].model_fields_set
+    ]
+    if names:
+        value = f"{VAN_DER_WAALS_RANGE * 1e9:g} nm"
+        yield Statement(
+            "interaction range",
+            f"{value} for {join_first(names)}, the default for van der Waals forces; the range decides when separated "
+            "surfaces jump into contact",
+            True,
+        )
 
 
 def _indenters(campaign):

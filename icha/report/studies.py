@@ -28,6 +28,7 @@ SHOWN_AT = {
     "relative_load": ("area", "gap"),
     "area_fraction": ("pressure", "gap"),
     "mean_separation": ("pressure", "area"),
+    "pressure": ("area", "gap"),
     "force": ("area", "gap"),
     "indentation": ("pressure", "area"),
     "contact_radius": ("pressure", "gap"),

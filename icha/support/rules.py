@@ -96,6 +96,7 @@ POSITIVE = FloatRange(above=0)
 LENGTH = FloatRange("m", least=1e-24, most=1e9)
 INDENTATIONS = FloatRange("m", least=-1e9, most=1e9)
 FORCES = FloatRange("N", least=1e-30, most=1e30)
+PRESSURES = FloatRange("Pa", least=1e-30, most=1e30)
 
 # Surfaces.
 HURST = FloatRange(above=0, most=1)

@@ -5,7 +5,7 @@ import math
 import operator
 import re
 import unicodedata
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from decimal import Decimal
 from functools import cache, lru_cache
 from itertools import pairwise
@@ -13,7 +13,17 @@ from typing import Annotated, Any
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, WithJsonSchema
 
-from icha.support.rules import CONTACT_MODULUS, FORCES, LENGTH, POSITIVE, SEED, SURFACE_ENERGY, FloatRange, IntegerRange
+from icha.support.rules import (
+    CONTACT_MODULUS,
+    FORCES,
+    LENGTH,
+    POSITIVE,
+    PRESSURES,
+    SEED,
+    SURFACE_ENERGY,
+    FloatRange,
+    IntegerRange,
+)
 
 # A number as text. PyYAML reads `1.0e6` and `1e-3` as text, so text must be accepted as a number.
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
@@ -276,10 +286,29 @@ def _file(value: str) -> str:
 File = Annotated[Text, AfterValidator(_file)]
 Length = quantity(LENGTH, "100 um")
 Force = quantity(FORCES, "1 mN")
+Pressure = quantity(PRESSURES, "10 kPa")
 Modulus = quantity(CONTACT_MODULUS, "25 MPa")
 SurfaceEnergy = quantity(SURFACE_ENERGY, "50 mJ/m^2")
 Positive = number(POSITIVE)
 Seed = integer(SEED)
+
+
+class OrWord:
+    """Annotation that adds a word to the JSON schema of a value.
+
+    Attributes
+    ----------
+    word : text that is valid instead of the value.
+    """
+
+    def __init__(self, word: str):
+        self.word = word
+
+    def __get_pydantic_json_schema__(self, core_schema: Any, handler: Callable[[Any], dict]) -> dict:
+        """Return the JSON schema: the value without null, or the word."""
+        schema = handler(core_schema)
+        given = [each for each in schema.get("anyOf", [schema]) if each != {"type": "null"}]
+        return {"anyOf": [*given, {"const": self.word}]}
 
 
 def stops(kind, in_order):

@@ -4,9 +4,12 @@ import numpy as np
 import pytest
 from demo_configuration import LONG_RANGE, TRUTH, file_surface, measured_surface
 
+from icha.asperity.material import VAN_DER_WAALS_RANGE
 from icha.configuration.cases import run_cases, run_settings, solution_cases, surface_cases, surface_settings
 from icha.configuration.design import value_label
 from icha.configuration.errors import ConfigurationError
+from icha.surfaces.spectrum import SelfAffineSpectrum
+from icha.surfaces.surface import Surface
 
 
 def paths(campaign):
@@ -95,3 +98,58 @@ def test_the_preparation_of_a_measured_surface_is_varied(load):
     ]
     # A mirror image has the slope of what it is of; a plane is part of a slope, and a paraboloid of another.
     assert len({case.rms_slope for case in cases}) > 1
+
+
+def test_rms_heights_scale_surfaces_as_their_spectra_or_their_files_demand(load, tmp_path):
+    np.save(tmp_path / "own.npy", heights := np.random.default_rng(1).random((32, 32)))
+    changes = {
+        "studies.one.seeds": [1],
+        "studies.one.rms_slopes": None,
+        "studies.one.rms_heights": ["100 nm"],
+        "studies.one.vary": {"hurst": [0.5]},
+        "materials.soft.surface_energy": "0 J/m^2",
+    }
+    ((_, slope),) = slopes_of(load(changes).campaign)
+    surface = SelfAffineSpectrum(100e-6, 20e-6, 10e-6, 0.5, rms_slope=slope).realise(80, 7)
+    assert np.std(surface.heights) == pytest.approx(100e-9, rel=1e-6)
+    changes |= {"surfaces.own": file_surface("own.npy"), "studies.one.surfaces": ["own"]}
+    del changes["studies.one.vary"]
+    ((_, slope),) = slopes_of(load(changes).campaign)
+    own = Surface((heights - heights.mean()) * 1e-6, 1e-3)
+    assert slope / own.rms_slope * own.rms_height == pytest.approx(100e-9, rel=1e-6)
+
+
+def slopes_of(campaign):
+    return {(case.surface, case.rms_slope) for case in run_cases(campaign)}
+
+
+def test_rms_heights_go_along_with_other_lists(load):
+    changes = {
+        "studies.one.rms_slopes": None,
+        "studies.one.rms_heights": ["100 nm", "200 nm"],
+        "studies.one.vary": {"surface_energy": ["5 mJ/m^2", "10 mJ/m^2"]},
+        "studies.one.zip": [["rms_heights", "surface_energy"]],
+        "studies.one.seeds": [1],
+    }
+    first, second = run_cases(load(changes).campaign)
+    assert second.rms_slope == pytest.approx(2 * first.rms_slope, rel=1e-5)
+    assert (first.material, second.material) == ("soft-surface_energy5mJ", "soft-surface_energy10mJ")
+
+
+def test_bodies_give_the_contact_modulus_and_the_ratio_of_a_layer(load):
+    rubber = {"youngs_modulus": "2 MPa", "poisson_ratio": 0.5}
+    glass = {"youngs_modulus": "70 GPa", "poisson_ratio": 0.2}
+    changes = {"materials.soft.contact_modulus": None, "studies.one.models": ["boundary_elements"]}
+
+    def material(**keys):
+        for key, value in keys.items():
+            changes[f"materials.soft.{key}"] = value
+        campaign = load(changes).campaign
+        return run_settings(campaign, run_cases(campaign)[0])["material"]
+
+    both = material(bodies=[rubber, glass])
+    assert both["contact_modulus"] == pytest.approx(1 / (0.75 / 2e6 + 0.96 / 70e9), rel=1e-14)
+    assert "bodies" not in both and "poisson_ratio" not in both
+    layer = material(bodies=["rigid", rubber], thickness="100 um")
+    assert (layer["contact_modulus"], layer["poisson_ratio"]) == (pytest.approx(2e6 / 0.75, rel=1e-14), 0.5)
+    assert material(interaction_range=None)["interaction_range"] == VAN_DER_WAALS_RANGE
