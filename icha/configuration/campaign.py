@@ -27,6 +27,7 @@ from icha.configuration.studies import (
 )
 from icha.configuration.surfaces import AnySurface, MaterialSection
 from icha.contact.models import MODELS
+from icha.datasets.labels import is_coarse_study
 from icha.support.input_files import read_columns
 from icha.support.values import ROUNDING, Name, Problem, Section, Text, distinct
 
@@ -124,7 +125,8 @@ class Campaign(Section):
     publication: Publication = Publication()
     """Metadata of a deposit. Metadata do not change any result."""
 
-    _contacts: dict[str, tuple[Contact, ...]] = PrivateAttr(default={})
+    # Model and contact of each run of a study, model by model.
+    _runs: dict[str, tuple[tuple[str, Contact], ...]] = PrivateAttr(default={})
     _topographies: dict[str, Topography] = PrivateAttr(default={})
     _origins: dict[tuple[str, str], str] = PrivateAttr(default={})
 
@@ -141,30 +143,36 @@ class Campaign(Section):
         return set(section.models) == set(MODELS) and bool(section.targets.reduced_pressures)
 
     def contacts(self, study: str) -> list[Contact]:
-        """Return surface, seed, slope and material of each run of a study."""
-        return list(self._contacts[study])
+        """Return surface, seed, slope and material of each run of a study; runs of several models count once."""
+        return list(dict.fromkeys(contact for _, contact in self._runs[study]))
 
-    def with_contacts(self, contacts: Mapping[str, Iterable[Contact]]) -> Campaign:
-        """Return the campaign with the given contacts; the values in the contacts replace the lists of each study."""
-        contacts = {study: tuple(dict.fromkeys(runs)) for study, runs in contacts.items()}
+    def runs(self, study: str) -> list[tuple[str, Contact]]:
+        """Return model and contact of each run of a study, model by model."""
+        return list(self._runs[study])
+
+    def with_runs(self, runs: Mapping[str, Iterable[tuple[str, Contact]]]) -> Campaign:
+        """Return the campaign with the given runs (model, contact); their values replace the lists of each study."""
+        runs = {study: tuple(dict.fromkeys(each)) for study, each in runs.items()}
         studies = {}
         for label, study in self.studies.items():
-            lists = [list(dict.fromkeys(column)) for column in zip(*contacts[label], strict=True)]
-            keys = ("surfaces", "seeds", "rms_slopes", "materials")
+            models, contacts = zip(*runs[label], strict=True)
+            lists = [list(dict.fromkeys(column)) for column in (*zip(*contacts, strict=True), models)]
+            keys = ("surfaces", "seeds", "rms_slopes", "materials", "models")
             studies[label] = study.model_copy(update=dict(zip(keys, lists, strict=True)))
         campaign = self.model_copy(update={"studies": studies})
-        campaign._contacts = contacts
+        campaign._runs = runs
         return campaign
 
     def with_topographies(self, topographies: Mapping[str, Topography]) -> Campaign:
         """Return the campaign with properties of topographies from files; numbers replace the slope `measured`."""
 
-        def with_slope(contact):
+        def with_slope(run):
+            model, contact = run
             if not is_unread(contact.rms_slope):
-                return contact
-            return contact._replace(rms_slope=topographies[contact.surface].slope_of(contact.rms_slope))
+                return run
+            return model, contact._replace(rms_slope=topographies[contact.surface].slope_of(contact.rms_slope))
 
-        campaign = self.with_contacts({study: map(with_slope, runs) for study, runs in self._contacts.items()})
+        campaign = self.with_runs({study: map(with_slope, runs) for study, runs in self._runs.items()})
         campaign._topographies = dict(topographies)
         return campaign
 
@@ -218,7 +226,7 @@ class Campaign(Section):
                 for name, value, values in zip(Contact._fields, contact, asked, strict=True)
             )
 
-        return list(filter(is_asked_for, self._contacts[entry.study]))
+        return list(filter(is_asked_for, self.contacts(entry.study)))
 
     def problems(self) -> Iterator[Problem]:
         """Yield the problems that concern several values of the campaign, such as names that are not defined.
@@ -297,7 +305,9 @@ class Campaign(Section):
     def warnings(self) -> list[str]:
         """Return a warning for each random surface whose grid is valid but coarse."""
         expected: dict[str, int] = {}
-        for study in self.studies.values():
+        for label, study in self.studies.items():
+            if is_coarse_study(label, self.studies):
+                continue
             least = _ADVISABLE_CELLS if any(MODELS[model].by_cells for model in study.models) else _LEAST_CELLS
             expected |= {name: max(least, expected.get(name, 0)) for name in study.surfaces}
         found = []

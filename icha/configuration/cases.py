@@ -17,8 +17,8 @@ def run_cases(campaign: Campaign) -> list[RunLabels]:
     """Return the labels of all runs of a campaign, study by study and model by model, in the order of the file."""
     return [
         RunLabels(label, model, *contact)
-        for label, study in campaign.studies.items()
-        for model, contact in itertools.product(study.models, campaign.contacts(label))
+        for label in campaign.studies
+        for model, contact in campaign.runs(label)
     ]
 
 

@@ -19,7 +19,8 @@ from icha.configuration.campaign import BESIDE_STUDIES, Campaign, Contact
 from icha.configuration.errors import MOST_PROBLEMS, problem_of
 from icha.configuration.studies import MEASURED, SCALARS, RmsHeight, Study, slope_of_height
 from icha.configuration.surfaces import SURFACE_KINDS, MaterialSection
-from icha.datasets.labels import number_label
+from icha.contact.models import DEFAULT_MODEL, REFERENCE_MODEL
+from icha.datasets.labels import coarse_study, is_coarse_study, number_label
 from icha.support.rules import FloatRange
 from icha.support.values import LONGEST_LABEL, NOTHING, Problem, list_names
 
@@ -61,15 +62,30 @@ def expand_design(campaign: Campaign, content: Mapping) -> tuple[Campaign, list[
     if problems:
         return campaign, problems
     variants = _Variants(campaign, content)
-    contacts = {
-        label: [variants.contact(point) for point in _points(label, study)] for label, study in campaign.studies.items()
-    }
+    runs, studies = {}, {}
+    for label, study in campaign.studies.items():
+        contacts = [variants.contact(point) for point in _points(label, study)]
+        runs[label], studies[label] = list(itertools.product(study.models, contacts)), study
+        if study.levels is not None:
+            runs |= _runs_of_levels(label, study.levels, contacts, variants)
+            if study.levels.coarse:
+                studies[coarse_study(label)] = study.model_copy(update={"levels": None})
     if variants.problems:
         return campaign, list(variants.problems.values())
     sections = {name: getattr(campaign, name) | derived for name, derived in variants.derived.items()}
-    expanded = campaign.model_copy(update=sections).with_contacts(contacts)
+    expanded = campaign.model_copy(update=sections | {"studies": studies}).with_runs(runs)
     expanded._origins = variants.origin
     return expanded, list(_too_many_solutions(expanded))
+
+
+def _runs_of_levels(label, levels, contacts, variants):
+    """Return the runs of the studies that compute the levels of a study, by name."""
+    level_of_model = {DEFAULT_MODEL: set(levels.asperities or ()), REFERENCE_MODEL: set(levels.fine)}
+    runs = {label: [(m, c) for m, seeds in level_of_model.items() for c in contacts if c.seed in seeds]}
+    if levels.coarse:
+        coarse = [variants.on_half_grid(contact, label) for contact in contacts if contact.seed in set(levels.coarse)]
+        runs[coarse_study(label)] = [(REFERENCE_MODEL, contact) for contact in coarse]
+    return runs
 
 
 def _lists(label: str, study: Study) -> dict[str, list[_Located]]:
@@ -80,6 +96,8 @@ def _lists(label: str, study: Study) -> dict[str, list[_Located]]:
 
     varied = study.vary.model_dump(exclude_none=True) if study.vary else {}
     lists = {one: located(getattr(study, many), many) for many, one in _LISTS.items()}
+    if study.levels is not None:
+        lists["seed"] = located(study.levels.seeds, "levels")
     if study.rms_heights is not None:
         heights = [RmsHeight(value) for value in study.rms_heights]
         lists["rms_slope"] = located(heights, "rms_heights")
@@ -175,6 +193,11 @@ def _study_problems(campaign: Campaign, label: str, study: Study) -> Iterator[Pr
             if name not in names:
                 yield location, name, f"is not defined; expected one of {list_names(names)}"
     yield from _zip_problems(prefix, study, lists)
+    if is_coarse_study(label, campaign.studies):
+        reason = "is the name of the runs of another study on half the grid; expected a name that does not end in -coarse"
+        yield prefix, NOTHING, reason
+    if study.levels is not None:
+        yield from _level_problems(campaign, label, study, [name for _, name in values("surface")])
     for location, slope in values("rms_slope"):
         if slope != MEASURED:
             continue
@@ -182,6 +205,17 @@ def _study_problems(campaign: Campaign, label: str, study: Study) -> Iterator[Pr
         for name in [surface] if surface else study.surfaces:
             if name in campaign.surfaces and campaign.surfaces[name].random:
                 yield location, slope, f"needs a measured surface, but {name!r} is random; expected numbers"
+
+
+def _level_problems(campaign, label, study, surfaces):
+    """Yield the problems of the key `levels` of a study."""
+    location = ("studies", label, "levels")
+    for key in ("seeds", "models"):
+        if key in study.model_fields_set:
+            yield (*location[:2], key), getattr(study, key), "is given beside `levels`, which contain it. Remove the key"
+    for name in dict.fromkeys(surfaces):
+        if name in campaign.surfaces and not campaign.surfaces[name].random:
+            yield location, NOTHING, f"need random surfaces, but {name!r} has no seeds; expected only random surfaces"
 
 
 def _zip_problems(prefix, study, lists) -> Iterator[Problem]:
@@ -212,6 +246,8 @@ class _Variants:
         self._names: dict[tuple, str] = {}
         self.derived: dict[str, dict[str, Any]] = {"surfaces": {}, "materials": {}}
         self.origin: dict[tuple[str, str], str] = {}
+        # Changes that made a variant, by the name of the variant.
+        self._changes: dict[str, dict[str, _Located]] = {}
         # Problems by location, so that each wrong value is reported once.
         self.problems: dict[tuple, Problem] = {}
 
@@ -242,6 +278,15 @@ class _Variants:
             self._variant("materials", material, of_material),
         )
 
+    def on_half_grid(self, contact: Contact, study: str) -> Contact:
+        """Return a contact on the same surface with half the number of nodes along each side."""
+        every = self._campaign.surfaces | self.derived["surfaces"]
+        base, grid = contact.surface, every[contact.surface].grid
+        half = (("studies", study, "levels", "coarse"), grid // 2)
+        origin = self.origin.get(("surfaces", base), base)
+        changes = {name: value for name, value in self._changes.get(base, {}).items() if name != "grid"}
+        return contact._replace(surface=self._variant("surfaces", origin, changes | {"grid": half}))
+
     def _variant(self, section: str, base: str, changes: Mapping[str, _Located]) -> str:
         """Return the name of a variant: a surface or material with changed values. Create the variant if it is new."""
         key = (section, base, *((name, repr(value)) for name, (_, value) in changes.items()))
@@ -270,6 +315,7 @@ class _Variants:
             reason += f" at most {LONGEST_LABEL} characters. Rename an entry"
             self.problems[section, name] = (*next(iter(changes.values())), reason)
         self.derived[section][name] = variant
+        self._changes[name] = dict(changes)
         self.origin[section, name] = base
         return name
 

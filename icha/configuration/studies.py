@@ -1,5 +1,6 @@
 """Sections `studies`, `finite_range` and `boundary_element_loops`; entries of the last two refer to a study."""
 
+import itertools
 import math
 from collections.abc import Callable, Iterator
 from typing import Annotated, Any, Literal, NamedTuple
@@ -228,6 +229,36 @@ Case = _section_of_scalars(
 )
 
 
+class Levels(Section):
+    """Seeds of three levels of accuracy, from which ICHA estimates the mean of each result with an interval.
+
+    The seeds of `fine` must be among those of `coarse`, and the seeds of `coarse` among those of `asperities`.
+    """
+
+    asperities: Seeds | None = None
+    """Seeds of the asperity model. Leave the key out for surfaces that are too sticky for the asperity model."""
+    coarse: Seeds | None = None
+    """Seeds of boundary elements on half the grid, which must have at least 4 cells per shortest wavelength."""
+    fine: Seeds
+    """Seeds of boundary elements on the grid of the surface."""
+
+    @model_validator(mode="after")
+    def _check_nested(self):
+        given = [(name, getattr(self, name)) for name in type(self).model_fields if getattr(self, name)]
+        for (outer, many), (inner, few) in itertools.pairwise(given):
+            if missing := sorted(set(few) - set(many)):
+                raise ValueError(f"{inner}: seed {missing[0]} is not among those of {outer}; expected seeds of {outer}")
+        for name, seeds in given:
+            if len(seeds) < 2:
+                raise ValueError(f"{name}: has one seed, so that its scatter is unknown; expected two seeds or more")
+        return self
+
+    @property
+    def seeds(self) -> list[int]:
+        """Seeds of all levels."""
+        return self.asperities or self.coarse or self.fine
+
+
 class Study(Section):
     """Runs for all combinations of surfaces, seeds, slopes and materials. All runs follow the same loading path."""
 
@@ -256,6 +287,9 @@ class Study(Section):
     """Contact models of every run. `asperities` is fast. `boundary_elements` assumes a very short range of attraction,
     and needs a grid with at least 4 (better 8) cells per shortest wavelength. On a surface with free edges, boundary
     elements take about four times as long as on a periodic surface."""
+    levels: Levels | None = None
+    """Seeds of three levels of accuracy, instead of `seeds` and `models`. ICHA estimates each result with an interval,
+    and `icha answer` prints the estimates."""
     targets: Targets
     """Targets of the loading path."""
     snapshots: (

@@ -32,6 +32,16 @@ def model_folder(model: str) -> str:
     return MODELS[model].folder
 
 
+def coarse_study(study: str) -> str:
+    """Return the name of the study with the runs of another study on half the grid."""
+    return f"{study}-coarse"
+
+
+def is_coarse_study(study: str, studies: Iterable[str]) -> bool:
+    """Return whether a study has the runs of another of the `studies` on half the grid."""
+    return any(coarse_study(other) == study for other in studies)
+
+
 class RunLabels(NamedTuple):
     """Labels of a run.
 

@@ -1,0 +1,134 @@
+"""Estimate the results of every study that has boundary elements for several seeds, with intervals.
+
+The asperity model for many seeds, boundary elements on half the grid for some seeds, and boundary elements on the grid
+for a few seeds are combined (`icha.analysis.control_variates`). The coarse runs of a study are in the study that
+`coarse_study` names.
+"""
+
+import itertools
+import math
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+import xarray as xr
+
+from icha.analysis.control_variates import estimate_mean
+from icha.contact.models import DEFAULT_MODEL, REFERENCE_MODEL
+from icha.datasets.attributes import DERIVED, combine_attributes
+from icha.datasets.build import build_dataset, stack_rows
+from icha.datasets.campaign import loading_stops
+from icha.datasets.labels import LABELS, coarse_study, slopes_at
+from icha.datasets.variables.answers import ANSWERS
+from icha.datasets.variables.campaign import COMPLETE, LOADED_RUNS
+from icha.path.targets import AREAS, INDENTATION, LOADS, MEAN_SEPARATION
+
+# Quantities of each state of the first loading, and kinds of targets that prescribe the quantity.
+_AT_STOPS = {
+    "contact_area_fraction": AREAS,
+    "mean_gap": (MEAN_SEPARATION, INDENTATION),
+    "contact_stiffness": (),
+    "spot_count": (),
+    "nominal_pressure": LOADS,
+}
+_OF_LOOPS = ("pull_off_pressure", "hysteresis_loss")
+LOOP = "loop"
+
+
+def estimate_campaign(tree: xr.DataTree, *, attrs: Mapping[str, str] = {}) -> xr.DataTree:
+    """Return a tree with the answers of each study that has boundary elements for several seeds.
+
+    Parameters
+    ----------
+    tree : the campaign dataset.
+    attrs : further global attributes.
+
+    Returns
+    -------
+    DataTree with one group for each study with answers. The variables are those of
+    `icha.datasets.variables.answers`, along the dimension `answer`.
+    """
+    groups = {}
+    for name, node in tree.children.items():
+        coarse = tree.children.get(coarse_study(name))
+        rows = list(_answers(node.to_dataset(), coarse.to_dataset() if coarse else None))
+        if rows:
+            described = combine_attributes(f"Answers of study {name}", _SUMMARY, DERIVED, [node.attrs])
+            values = stack_rows(ANSWERS, rows, "answer")
+            groups[f"/{name}"] = build_dataset(ANSWERS, values, described | {"study": name})
+    root = combine_attributes("Answers of every study", _SUMMARY, DERIVED, [each.attrs for each in groups.values()])
+    return xr.DataTree.from_dict({"/": xr.Dataset(attrs=root | dict(attrs))} | groups)
+
+
+_SUMMARY = "Means over random surfaces with intervals of 90 %, from up to three levels of accuracy."
+
+
+def _answers(study: xr.Dataset, coarse: xr.Dataset | None) -> Iterator[dict]:
+    """Yield the answers of a study; `coarse` has the same contacts on half the grid."""
+    if REFERENCE_MODEL not in study["model"].values or study.sizes["seed"] < 2:
+        return
+    levels = {"asperities": (study, DEFAULT_MODEL), "coarse": (coarse, REFERENCE_MODEL)}
+    levels |= {"fine": (study, REFERENCE_MODEL)}
+    for (kind, target), quantity in itertools.product([*_stops(study), (LOOP, 0.0)], (*_AT_STOPS, *_OF_LOOPS)):
+        if (kind == LOOP) != (quantity in _OF_LOOPS) or kind in _AT_STOPS.get(quantity, ()) or quantity not in study:
+            continue
+        values = {
+            level: _values(data, model, quantity, kind, target) for level, (data, model) in levels.items()
+        }
+        for surface, slope, material in itertools.product(*(range(study.sizes[dim]) for dim in _CONTACT)):
+            by_seed = {level: _by_seed(of_level, surface, slope, material) for level, of_level in values.items()}
+            found = estimate_mean(by_seed["asperities"], by_seed["coarse"], by_seed["fine"])
+            if found is None:
+                continue
+            place = {"surface": surface, "rms_slope": slope}
+            yield {
+                "quantity": quantity,
+                "units": study[quantity].attrs["units"],
+                "surface": str(study["surface"].values[surface]),
+                "rms_slope": float(slopes_at(study, place)[slope] if study["rms_slope"].ndim > 1 else study["rms_slope"][slope]),
+                "material": str(study["material"].values[material]),
+                "stop_kind": kind,
+                "stop_target": target,
+                "estimate": math.exp(found.mean),
+                "estimate_low": math.exp(found.mean - found.half_width),
+                "estimate_high": math.exp(found.mean + found.half_width),
+                "share_seeds": found.scatter,
+                "share_model": found.model,
+                "share_refinement": found.refinement,
+                "share_grid": found.grid,
+                "asperity_coefficient": found.coefficient,
+                "asperity_seeds": len(by_seed["asperities"]),
+                "coarse_seeds": len(by_seed["coarse"]),
+                "fine_seeds": len(by_seed["fine"]),
+            }
+
+
+_CONTACT = ("surface", "rms_slope", "material")
+
+
+def _stops(study):
+    """Return kind and value of the targets of the first loading of a study, in the order of the path."""
+    shown = loading_stops(study).transpose(*LABELS, "step").values
+    kinds, targets = (study[name].transpose(*LABELS, "step").values[shown] for name in ("step_kind", "step_target"))
+    return sorted({(str(kind), float(target)) for kind, target in zip(kinds, targets, strict=True)})
+
+
+def _values(data, model, quantity, kind, target):
+    """Return the values of a quantity along seed, surface, slope and material, and the seeds; None without runs."""
+    if data is None or model not in data["model"].values or quantity not in data:
+        return None
+    runs = data.isel(model=data["model"].values.tolist().index(model))
+    usable = runs["status"].isin((COMPLETE,) if kind == LOOP else LOADED_RUNS) & (runs["applicability"] == "")
+    values = runs[quantity]
+    if kind != LOOP:
+        same = np.isclose(runs["step_target"], target, rtol=1e-9, atol=0)
+        values = values.where(loading_stops(runs) & (runs["step_kind"] == kind) & same).max("step")
+    return values.where(usable).transpose("seed", *_CONTACT).values, data["seed"].values.tolist()
+
+
+def _by_seed(of_level, surface, slope, material):
+    """Return the logarithms of the positive values of a contact by seed."""
+    if of_level is None:
+        return {}
+    values, seeds = of_level
+    column = values[:, surface, slope, material].astype(float)
+    return {seed: math.log(value) for seed, value in zip(seeds, column, strict=True) if value > 0}
