@@ -69,6 +69,7 @@ localrules:
     campaign_dataset,
     comparison,
     model_error,
+    answers,
     checks,
     verdict,
     figure,
@@ -108,6 +109,7 @@ rule dataset:
         FILES.dataset,
         FILES.comparison,
         FILES.model_error,
+        FILES.answers,
         FILES.checks,
         FILES.verdict,
 

@@ -118,6 +118,13 @@ def model_error_variables() -> str:
     return _table(_rows({name: own._replace(dims=(*AXES, *own.dims)) for name, own in MODEL_ERROR.items()}))
 
 
+def answer_variables() -> str:
+    """Variables of the answers of a study."""
+    from icha.datasets.variables.answers import ANSWERS
+
+    return _table(_rows(ANSWERS))
+
+
 def theory_variables() -> str:
     """Variables of the theories of a surface."""
     import icha

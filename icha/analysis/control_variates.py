@@ -127,4 +127,6 @@ def _regression(below, above, mean):
     coefficient = float(np.sum((below - below.mean()) * (above - above.mean()))) / spread
     rest = above - coefficient * below
     variance = float(np.sum((rest - rest.mean()) ** 2)) / (count - 2)
-    return _Term(float(rest.mean()), variance * (1 / count + (mean - below.mean()) ** 2 / spread), count - 2), coefficient
+    return _Term(
+        float(rest.mean()), variance * (1 / count + (mean - below.mean()) ** 2 / spread), count - 2
+    ), coefficient

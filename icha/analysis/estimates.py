@@ -17,7 +17,7 @@ from icha.contact.models import DEFAULT_MODEL, REFERENCE_MODEL
 from icha.datasets.attributes import DERIVED, combine_attributes
 from icha.datasets.build import build_dataset, stack_rows
 from icha.datasets.campaign import loading_stops
-from icha.datasets.labels import LABELS, coarse_study, slopes_at
+from icha.datasets.labels import LABELS, coarse_study, is_coarse_study, slopes_at
 from icha.datasets.variables.answers import ANSWERS
 from icha.datasets.variables.campaign import COMPLETE, LOADED_RUNS
 from icha.path.targets import AREAS, INDENTATION, LOADS, MEAN_SEPARATION
@@ -49,6 +49,8 @@ def estimate_campaign(tree: xr.DataTree, *, attrs: Mapping[str, str] = {}) -> xr
     """
     groups = {}
     for name, node in tree.children.items():
+        if is_coarse_study(name, tree.children):
+            continue
         coarse = tree.children.get(coarse_study(name))
         rows = list(_answers(node.to_dataset(), coarse.to_dataset() if coarse else None))
         if rows:
@@ -71,20 +73,17 @@ def _answers(study: xr.Dataset, coarse: xr.Dataset | None) -> Iterator[dict]:
     for (kind, target), quantity in itertools.product([*_stops(study), (LOOP, 0.0)], (*_AT_STOPS, *_OF_LOOPS)):
         if (kind == LOOP) != (quantity in _OF_LOOPS) or kind in _AT_STOPS.get(quantity, ()) or quantity not in study:
             continue
-        values = {
-            level: _values(data, model, quantity, kind, target) for level, (data, model) in levels.items()
-        }
+        values = {level: _values(data, model, quantity, kind, target) for level, (data, model) in levels.items()}
         for surface, slope, material in itertools.product(*(range(study.sizes[dim]) for dim in _CONTACT)):
             by_seed = {level: _by_seed(of_level, surface, slope, material) for level, of_level in values.items()}
             found = estimate_mean(by_seed["asperities"], by_seed["coarse"], by_seed["fine"])
             if found is None:
                 continue
-            place = {"surface": surface, "rms_slope": slope}
             yield {
                 "quantity": quantity,
                 "units": study[quantity].attrs["units"],
                 "surface": str(study["surface"].values[surface]),
-                "rms_slope": float(slopes_at(study, place)[slope] if study["rms_slope"].ndim > 1 else study["rms_slope"][slope]),
+                "rms_slope": float(slopes_at(study, {"surface": surface})[slope]),
                 "material": str(study["material"].values[material]),
                 "stop_kind": kind,
                 "stop_target": target,

@@ -4,6 +4,7 @@ from typing import Annotated
 
 import typer
 
+from icha.cli.answer import answer
 from icha.cli.check import check
 from icha.cli.deposits import reproduce, upload, verify
 from icha.cli.describe import describe
@@ -47,7 +48,7 @@ def icha(
     """
 
 
-for command in (new, describe, run, show, explore, check, verify, reproduce, upload):
+for command in (new, describe, run, answer, show, explore, check, verify, reproduce, upload):
     app.command()(reports_errors(command))
 
 

@@ -194,7 +194,9 @@ def _study_problems(campaign: Campaign, label: str, study: Study) -> Iterator[Pr
                 yield location, name, f"is not defined; expected one of {list_names(names)}"
     yield from _zip_problems(prefix, study, lists)
     if is_coarse_study(label, campaign.studies):
-        reason = "is the name of the runs of another study on half the grid; expected a name that does not end in -coarse"
+        reason = (
+            "is the name of the runs of another study on half the grid; expected a name that does not end in -coarse"
+        )
         yield prefix, NOTHING, reason
     if study.levels is not None:
         yield from _level_problems(campaign, label, study, [name for _, name in values("surface")])
@@ -212,7 +214,11 @@ def _level_problems(campaign, label, study, surfaces):
     location = ("studies", label, "levels")
     for key in ("seeds", "models"):
         if key in study.model_fields_set:
-            yield (*location[:2], key), getattr(study, key), "is given beside `levels`, which contain it. Remove the key"
+            yield (
+                (*location[:2], key),
+                getattr(study, key),
+                "is given beside `levels`, which contain it. Remove the key",
+            )
     for name in dict.fromkeys(surfaces):
         if name in campaign.surfaces and not campaign.surfaces[name].random:
             yield location, NOTHING, f"need random surfaces, but {name!r} has no seeds; expected only random surfaces"

@@ -26,6 +26,7 @@ SOLUTION = "boundary-element solution at a finite range"
 _OTHERS = {
     "comparison of runs at common loads": "seed_count",
     "error of the model": "area_error",
+    "answers of studies": "estimate_low",
     "theories and published points": "bush_gibson_thomas_area_fraction",
     SOLUTION: "target_reduced_pressure",
     "boundary-element loop at a finite range": "dissipated",

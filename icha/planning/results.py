@@ -21,6 +21,7 @@ class CampaignFiles:
     solutions, loops : labels of each boundary-element solution or loop at a finite range, by path.
     compared : labels of each boundary-element run in a study with both models, by path.
     model_error : path of the file of model errors; empty if there are no boundary-element results.
+    answers : path of the file of answers; empty if no study has boundary elements for several seeds.
     """
 
     surfaces: dict[str, tuple[str, int]]
@@ -32,6 +33,7 @@ class CampaignFiles:
     comparison: str
     compared: dict[str, RunLabels]
     model_error: list[str]
+    answers: list[str]
     checks: str
     verdict: str
     figures: list[str]
@@ -55,6 +57,7 @@ class CampaignFiles:
             self.dataset,
             self.comparison,
             *self.model_error,
+            *self.answers,
             self.checks,
             self.verdict,
             *self.figures,
@@ -87,6 +90,7 @@ def campaign_files(campaign: Campaign, folder: str = "") -> CampaignFiles:
         comparison=path(results.COMPARISON),
         compared=compared,
         model_error=[path(results.MODEL_ERROR)] if compared or solutions else [],
+        answers=[path(results.ANSWERS)] if _has_answers(runs.values()) else [],
         checks=path(results.CHECKS),
         verdict=path(results.VERDICT),
         figures=[
@@ -99,3 +103,12 @@ def campaign_files(campaign: Campaign, folder: str = "") -> CampaignFiles:
         configuration=path(results.CONFIGURATION),
         deposit=path(results.DEPOSIT, version=campaign.deposit_metadata().version or "without_version"),
     )
+
+
+def _has_answers(cases):
+    """Return whether boundary elements have several seeds of the same contact, so that a study has answers."""
+    seeds: dict[RunLabels, set[int]] = {}
+    for case in cases:
+        if case.model == REFERENCE_MODEL:
+            seeds.setdefault(case._replace(seed=0), set()).add(case.seed)
+    return any(len(each) > 1 for each in seeds.values())

@@ -15,6 +15,7 @@ from pathlib import Path
 
 import xarray as xr
 
+from icha.analysis.answers import answers_of, paragraph
 from icha.analysis.checks import worst
 from icha.analysis.validity import statements_on_dataset
 from icha.checks.findings import Check
@@ -57,6 +58,7 @@ def write_report(
     figures: Sequence[ReportFigure],
     checks: Iterable[Check],
     model_error: xr.DataTree | None = None,
+    answers: xr.DataTree | None = None,
     surfaces: Iterable[xr.Dataset] = (),
     configuration: str = "",
     dataset_path: str | os.PathLike | None = None,
@@ -74,6 +76,7 @@ def write_report(
     figures : figures in their order. A figure of one study is in the section of this study; the others come first.
     checks : results of `icha.analysis.checks.check_campaign`.
     model_error : result of `icha.analysis.model_error.model_error`; None for a campaign without boundary elements.
+    answers : result of `icha.analysis.estimates.estimate_campaign`; None without answers.
     surfaces : datasets of the surfaces, with or without heights, for statistics and power spectra.
     configuration : text of the configuration as used.
     dataset_path : file of the campaign dataset, to which the page links.
@@ -91,6 +94,7 @@ def write_report(
         path,
         "report.html",
         **_content(campaign, list(checks), model_error, list(surfaces)),
+        answers=[] if answers is None else [_answers(name, node) for name, node in answers.children.items()],
         most_rows=MOST_ROWS,
         folded=FOLDED_ROWS,
         paper=MODEL_PAPER.line,
@@ -129,6 +133,12 @@ def _content(campaign, checks, model_error, surfaces):
         "entries": [summarise_errors(node.to_dataset()) for node in errors],
         "references": list(dict.fromkeys(source.strip() for source in texts.split(";") if source.strip())),
     }
+
+
+def _answers(name, node):
+    """Return the answers of a study for the page: name, paragraph and rows of a table."""
+    rows = answers_of(node.to_dataset())
+    return {"study": name, "paragraph": paragraph(name, rows).partition(": ")[2], "rows": rows}
 
 
 def _pictures(figures: Sequence[ReportFigure], campaign: xr.DataTree, link) -> list[dict]:

@@ -153,3 +153,32 @@ def test_bodies_give_the_contact_modulus_and_the_ratio_of_a_layer(load):
     layer = material(bodies=["rigid", rubber], thickness="100 um")
     assert (layer["contact_modulus"], layer["poisson_ratio"]) == (pytest.approx(2e6 / 0.75, rel=1e-14), 0.5)
     assert material(interaction_range=None)["interaction_range"] == VAN_DER_WAALS_RANGE
+
+
+LEVELS = {"asperities": "1..4", "coarse": [1, 2, 3], "fine": [1, 2]}
+ON_LEVELS = {"studies.one.seeds": None, "studies.one.rms_slopes": [0.5], "studies.one.levels": LEVELS}
+
+
+def test_levels_are_runs_of_both_models_and_a_study_on_half_the_grid(load):
+    configuration = load(ON_LEVELS)
+    campaign = configuration.campaign
+    assert configuration.warnings == ()
+    assert [(case.study, case.model, case.surface, case.seed) for case in run_cases(campaign)] == [
+        *(("one", "asperities", "rough", seed) for seed in (1, 2, 3, 4)),
+        *(("one", "boundary_elements", "rough", seed) for seed in (1, 2)),
+        *(("one-coarse", "boundary_elements", "rough-grid40", seed) for seed in (1, 2, 3)),
+    ]
+    assert campaign.period("rough-grid40") == campaign.period("rough")
+
+
+def test_levels_of_variants_halve_the_grid_of_each_variant(load):
+    vary = {"grid": [80, 96], "hurst": [0.5]}
+    campaign = load({**ON_LEVELS, "studies.one.vary": vary, "materials.soft.surface_energy": "0 J/m^2"}).campaign
+    names = {case.study: [] for case in run_cases(campaign)}
+    for case in run_cases(campaign):
+        if case.surface not in names[case.study]:
+            names[case.study].append(case.surface)
+    assert names == {
+        "one": ["rough-hurst0.5-grid80", "rough-hurst0.5-grid96"],
+        "one-coarse": ["rough-hurst0.5-grid40", "rough-hurst0.5-grid48"],
+    }

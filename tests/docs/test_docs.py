@@ -11,12 +11,15 @@ from functools import cache
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
+import compared_campaign as compared
 import numpy as np
 import own_slopes_campaign as crops
 import pytest
+import xarray as xr
 import yaml
 
 import icha
+from icha.analysis.estimates import estimate_campaign
 from icha.configuration.campaign import Campaign
 from icha.configuration.cases import run_cases
 from icha.configuration.load import load_configuration
@@ -179,6 +182,8 @@ def with_results(folder):
     ((_, measured), *_) = campaigns(DOCS / "howto/measured_campaign.md")
     measured["studies"]["ensemble"]["seeds"] = [1, 2]
     write_results(folder, loaded(folder, measured))
+    answers = estimate_campaign(compared.tree_of_both())["one"].to_dataset()
+    write_dataset(xr.DataTree.from_dict({"/load": answers}), folder / "results/mine/aggregated/answers.nc")
     write_dataset(crops.tree(), folder / "results/crops/dataset/crops.nc")
     return folder
 

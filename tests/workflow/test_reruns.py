@@ -17,7 +17,17 @@ from conftest import REPOSITORY, SMOKE, copy_project, snakemake
 from icha.contact.models import MODELS
 
 BESIDE_RUNS = {"reference", "boundary_elements", "boundary_element_loop"}
-RUNS_AND_AFTER = {"run", "campaign_dataset", "comparison", "model_error", "checks", "verdict", "figure", "report_page"}
+RUNS_AND_AFTER = {
+    "run",
+    "campaign_dataset",
+    "comparison",
+    "model_error",
+    "answers",
+    "checks",
+    "verdict",
+    "figure",
+    "report_page",
+}
 
 
 def planned(project, *arguments):

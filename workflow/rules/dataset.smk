@@ -1,5 +1,5 @@
 # Rules for the configuration as used, the campaign dataset (all runs, one group for each study), the comparison of the
-# runs at common loads, the error of the asperity model, the checks of all results, and the verdict.
+# runs at common loads, the error of the asperity model, estimates with intervals, the checks of all results, and the verdict.
 
 from icha.configuration.cases import campaign_sha256
 from icha.deposit.metadata import discovery_attributes
@@ -114,6 +114,29 @@ rule model_error:
         "Error of the model, compared with boundary elements"
     script:
         "../scripts/measure_model_error.py"
+
+
+rule answers:
+    input:
+        FILES.dataset,
+    output:
+        "<results>/aggregated/answers.nc",
+    log:
+        "<logs>/answers.log",
+    benchmark:
+        "<benchmarks>/answers.jsonl"
+    conda:
+        "../envs/icha.yaml"
+    resources:
+        mem_mb=4000,
+        runtime=30,
+    params:
+        attributes=as_it_is(ATTRIBUTES),
+        code=code_of("estimate_answers.py"),
+    message:
+        "Estimates with intervals"
+    script:
+        "../scripts/estimate_answers.py"
 
 
 rule checks:

@@ -10,6 +10,7 @@ rule report_page:
         comparison=FILES.comparison,
         checks=FILES.checks,
         model_error=FILES.model_error,
+        answers=FILES.answers,
         configuration=FILES.configuration,
         surfaces=list(FILES.surfaces),
         figures=FILES.figures,

@@ -17,6 +17,8 @@ if "snakemake" in globals():
         page, times = snakemake.output.page, snakemake.output.times
         model_error = "".join(files.model_error)  # empty without boundary elements
         linked = {"Configuration": files.configuration, "Comparison": files.comparison, "Checks": files.checks}
+        answers = "".join(files.answers)  # empty without boundary elements for several seeds
+        linked |= {"Answers": answers} if answers else {}
         linked |= {"Times and memory of the jobs": times} | ({"Error of the model": model_error} if model_error else {})
         write_report(
             page,
@@ -29,6 +31,7 @@ if "snakemake" in globals():
             ],
             checks=read_checks(files.checks),
             model_error=read_campaign(model_error) if model_error else None,
+            answers=read_campaign(answers) if answers else None,
             surfaces=[read_surface_statistics(path) for path in files.surfaces],
             configuration=Path(files.configuration).read_text(encoding="utf-8"),
             dataset_path=files.campaign,

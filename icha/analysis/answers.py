@@ -1,0 +1,179 @@
+"""The answers of a campaign in words: each estimate with its interval, what limits it, and what would narrow it."""
+
+import math
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from icha.analysis.control_variates import PROBABILITY
+from icha.analysis.estimates import LOOP
+from icha.path.targets import UNITS
+from icha.support.formatting import choose_unit, format_quantity
+
+# Words for quantities and for targets.
+WORDS = {
+    "contact_area_fraction": "contact area",
+    "mean_gap": "mean gap",
+    "contact_stiffness": "stiffness",
+    "spot_count": "number of contact patches",
+    "nominal_pressure": "pressure",
+    "pull_off_pressure": "pull-off tension",
+    "hysteresis_loss": "loss of a loop",
+}
+_LEVELS = {
+    "asperity_seeds": "the asperity model",
+    "coarse_seeds": "boundary elements on half the grid",
+    "fine_seeds": "boundary elements",
+}
+_STOPS = {"reduced_pressure": "p*", "relative_load": "p/E*", "area_fraction": "A/A0"}
+
+
+class Answer(NamedTuple):
+    """One estimate.
+
+    Attributes
+    ----------
+    contact : text with surface, rms slope and material.
+    state : text with the target of the state; empty for a quantity of a loop.
+    quantity : name of the quantity in words.
+    value, half_width : estimate and half-width of its interval in `unit`.
+    unit : unit; "" for counts.
+    shares : half-width in `unit` by cause: seeds, model, grid.
+    limit : sentence that names what limits the accuracy.
+    """
+
+    contact: str
+    state: str
+    quantity: str
+    value: float
+    half_width: float
+    unit: str
+    shares: dict[str, float]
+    limit: str
+
+    @property
+    def number(self) -> str:
+        """Estimate with interval, and the contributions to the interval, as text."""
+        digits = max(0, 1 - math.floor(math.log10(self.half_width))) if self.half_width > 0 else 3
+        unit = f" {self.unit}" if self.unit else ""
+        parts = ", ".join(f"{name} {part:.2g}" for name, part in self.shares.items())
+        return f"{self.value:.{digits}f}{unit} ± {self.half_width:.{digits}f}{unit} ({parts})"
+
+
+def answers_of(study: xr.Dataset) -> list[Answer]:
+    """Return the answers of a study; `study` is a group of the dataset of `icha.analysis.estimates`."""
+    return [_answer(study.isel(answer=k)) for k in range(study.sizes["answer"])]
+
+
+def _answer(row: xr.Dataset) -> Answer:
+    quantity, value = str(row["quantity"].item()), float(row["estimate"])
+    factor, unit = _unit(quantity, value, str(row["units"].item()))
+    shares = {name: float(row[f"share_{name}"]) for name in ("seeds", "model", "refinement", "grid")}
+    known = {name: 0.0 if math.isnan(share) else share for name, share in shares.items()}
+    grid = math.hypot(known["refinement"], known["grid"])
+    half = float(row["estimate_high"] - row["estimate_low"]) / 2
+    kind = str(row["stop_kind"].item())
+    return Answer(
+        f"{row['material'].item()} on {row['surface'].item()}, h'rms = {float(row['rms_slope']):.4g}",
+        "" if kind == LOOP else _state(kind, float(row["stop_target"])),
+        WORDS[quantity],
+        value * factor,
+        half * factor,
+        unit,
+        {
+            name: share * value * factor
+            for name, share in (("seeds", known["seeds"]), ("model", known["model"]), ("grid", grid))
+        },
+        _limit(row, shares),
+    )
+
+
+def _unit(quantity, value, unit):
+    """Return a factor and a unit in which a value has few digits."""
+    if quantity == "contact_area_fraction":
+        return 100.0, "%"
+    if unit == "1":
+        return 1.0, ""
+    # Such as Pa m^-1: the unit of the numerator gets a prefix.
+    numerator, _, denominator = unit.partition(" ")
+    factor, prefixed = choose_unit(value, numerator)
+    return factor, prefixed + {"": "", "m^-1": "/m", "m^-2": "/m²"}[denominator]
+
+
+def _state(kind, target):
+    unit = UNITS.get(kind, "")
+    words = kind.replace("_", " ")
+    return f"{words} {format_quantity(target, unit)}" if unit else f"{_STOPS[kind]} = {target:g}"
+
+
+def _limit(row, shares):
+    """Return a sentence on what limits the accuracy, and how the interval would narrow with twice as many seeds."""
+    sources = {"asperity_seeds": "seeds", "coarse_seeds": "model", "fine_seeds": "refinement"}
+    present = {level: int(row[level]) for level in sources if int(row[level])}
+    cheapest, *others = present
+    variances = {cheapest: shares["seeds"] ** 2} | {
+        level: shares["model" if cheapest == "asperity_seeds" and level == others[0] else "refinement"] ** 2
+        for level in others
+    }
+    grid = 0.0 if math.isnan(shares["grid"]) else shares["grid"] ** 2
+    total = sum(variances.values()) + grid
+    if not total:
+        return "The seeds do not differ."
+    if grid > max(variances.values()):
+        return (
+            f"The grid limits the accuracy: ± {100 * math.sqrt(grid):.2g} % of the value. A finer grid would narrow it."
+        )
+    level = max(variances, key=variances.__getitem__)
+    narrower = math.sqrt((total - variances[level] / 2) / total)
+    unknown = " The error of the grid is unknown." if math.isnan(shares["grid"]) else ""
+    return (
+        f"The {present[level]} seeds of {_LEVELS[level]} limit the accuracy: with twice as many, the interval would be "
+        f"{100 * (1 - narrower):.0f} % narrower.{unknown}"
+    )
+
+
+def paragraph(name: str, answers: list[Answer]) -> str:
+    """Return one paragraph on the answers of a study: the last state of each contact, and what limits it."""
+    found = []
+    for contact in dict.fromkeys(each.contact for each in answers):
+        of_contact = [each for each in answers if each.contact == contact]
+        state = next((each.state for each in reversed(of_contact) if each.state), "")
+        main = [each for each in of_contact if each.state in (state, "")][:2]
+        numbers = "; ".join(f"{each.quantity} {each.number}" for each in main)
+        at = f" at {state}" if state else ""
+        found.append(f"{contact}{at}: {numbers}. {main[0].limit}")
+    return (
+        f"{name}: "
+        + " ".join(found)
+        + f" Intervals contain the mean over all realisations in {100 * PROBABILITY:g} % of cases."
+    )
+
+
+def as_csv(answers: xr.DataTree) -> str:
+    """Return all answers as a table in CSV, with one line of names."""
+    lines = ["study," + ",".join(str(name) for name in next(iter(answers.children.values())).data_vars)]
+    for study, node in answers.children.items():
+        columns = [node[name].values for name in node.data_vars]
+        lines += [",".join([study, *(_cell(value) for value in row)]) for row in zip(*columns, strict=True)]
+    return "\n".join(lines) + "\n"
+
+
+def _cell(value):
+    text = f"{value:.9g}" if isinstance(value, float | np.floating) else str(value)
+    return f'"{text}"' if "," in text else text
+
+
+def as_latex(answers: xr.DataTree) -> Iterator[str]:
+    """Yield the lines of a LaTeX table (booktabs) for each study."""
+    for study, node in answers.children.items():
+        yield f"% study {study}"
+        yield r"\begin{tabular}{llll}"
+        yield r"\toprule contact & state & quantity & estimate \\ \midrule"
+        for each in answers_of(node.to_dataset()):
+            number = each.number.partition(" (")[0].replace("%", r"\%").replace("±", r"$\pm$")
+            cells = [text.replace("_", r"\_").replace("'", "$'$") for text in (each.contact, each.state, each.quantity)]
+            yield " & ".join([*cells, number]) + r" \\"
+        yield r"\bottomrule"
+        yield r"\end{tabular}"

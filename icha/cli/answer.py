@@ -1,0 +1,41 @@
+"""The command `icha answer`: print the estimated results of a campaign with their intervals."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from icha.cli.project import UserError, echo, project
+
+
+def answer(
+    results: Annotated[str, typer.Argument(help="Folder of results such as results/NAME, or the name of a campaign.")],
+    csv: Annotated[bool, typer.Option("--csv", help="Print a table with all values as CSV.")] = False,
+    latex: Annotated[bool, typer.Option("--latex", help="Print a table for LaTeX.")] = False,
+) -> None:
+    """Print the results of each study with intervals, what limits their accuracy, and what would narrow them.
+
+    A study has answers if it has boundary elements for two seeds or more. The key `levels` of a study gives the seeds
+    of three levels of accuracy, which together need less time than boundary elements for every seed.
+    """
+    from icha.analysis.answers import answers_of, as_csv, as_latex, paragraph
+    from icha.datasets.files import read_campaign
+    from icha.datasets.results import ANSWERS
+
+    folder = Path(results) if Path(results).is_dir() else project() / "results" / results
+    file = folder / ANSWERS
+    if not file.is_file():
+        raise UserError(
+            f"{file}: there are no answers; expected a campaign with `levels`, or with boundary elements for several "
+            "seeds, that `icha run` has computed"
+        )
+    tree = read_campaign(file)
+    if csv or latex:
+        echo(as_csv(tree).rstrip("\n") if csv else "\n".join(as_latex(tree)))
+        return
+    for name, node in tree.children.items():
+        answers = answers_of(node.to_dataset())
+        echo(paragraph(name, answers))
+        for each in answers:
+            echo("  ".join(filter(None, ("", each.contact, each.state, each.quantity, each.number))))
+        echo()

@@ -1,0 +1,99 @@
+"""Answers of a study: the levels of a campaign dataset, and the answers in words."""
+
+import csv
+import io
+import math
+
+import compared_campaign as compared
+import numpy as np
+import pytest
+import xarray as xr
+
+from icha.analysis.answers import answers_of, as_csv, as_latex, paragraph
+from icha.analysis.estimates import estimate_campaign
+from icha.datasets.campaign import campaign_tree
+from icha.datasets.labels import coarse_study
+
+COARSE, FINE = 1.3, 1.25
+
+
+def levels():
+    """Asperities for three seeds; boundary elements with more area on half the grid (three seeds) and the grid (two)."""
+    fine = compared.patches(lambda labels: labels.seed < 3, area=FINE)
+    coarse = [(labels._replace(study=coarse_study(labels.study)), run) for labels, run in compared.patches(area=COARSE)]
+    return campaign_tree([*compared.runs().items(), *fine, *coarse])
+
+
+@pytest.fixture(scope="module")
+def answers():
+    return estimate_campaign(levels())
+
+
+def test_estimates_have_the_mean_of_all_seeds_and_the_level_of_the_fine_grid(answers):
+    assert list(answers.children) == ["one"]
+    study = answers["one"].to_dataset()
+    areas = {
+        seed: [float(run["contact_area_fraction"][k]) for k in (0, 1)]
+        for (_, _, _, seed, _, material), run in compared.runs().items()
+        if material == "soft"
+    }
+    here = study.where((study["quantity"] == "contact_area_fraction") & (study["material"] == "soft"), drop=True)
+    np.testing.assert_allclose(here["stop_target"], compared.PRESSURES)
+    mean = np.exp(np.mean([np.log(areas[seed]) for seed in (1, 2, 3)], axis=0))
+    np.testing.assert_allclose(here["estimate"], FINE * mean, rtol=1e-9)
+    # All seeds have the same ratio of the levels, so only the scatter and the error of the grid widen the interval.
+    np.testing.assert_allclose(here["share_model"], 0, atol=1e-9)
+    np.testing.assert_allclose(here["share_refinement"], 0, atol=1e-9)
+    np.testing.assert_allclose(here["share_grid"], math.log(COARSE / FINE) / (2**0.9 - 1))
+    np.testing.assert_allclose(
+        np.log(here["estimate_high"] / here["estimate"]), np.hypot(here["share_seeds"], here["share_grid"])
+    )
+    assert here[["asperity_seeds", "coarse_seeds", "fine_seeds"]].to_array().values.T.tolist() == [[3, 3, 2]] * 2
+    assert "nominal_pressure" not in study["quantity"].values  # the targets prescribe it
+
+
+def test_failed_runs_and_those_without_a_model_do_not_count():
+    def broken(labels, run):
+        bad = labels.seed == 1 and labels.model == "asperities" and labels.material == "soft"
+        return run.assign_attrs(applicability="the model is not applicable") if bad else run
+
+    runs = [(labels, broken(labels, run)) for labels, run in [*compared.runs().items(), *compared.patches()]]
+    study = estimate_campaign(campaign_tree(runs))["one"].to_dataset()
+    counts = set(zip(study["material"].values.tolist(), study["asperity_seeds"].values.tolist(), strict=True))
+    assert counts == {("soft", 2), ("hertz", 3)}
+
+
+def test_a_study_without_several_seeds_of_boundary_elements_has_no_answers():
+    assert not estimate_campaign(compared.tree()).children
+    one = compared.patches(lambda labels: labels.seed == 1)
+    assert not estimate_campaign(campaign_tree([*compared.runs().items(), *one])).children
+
+
+def test_words_tables_and_latex_state_the_same_numbers(answers):
+    rows = answers_of(answers["one"].to_dataset())
+    (area,) = (a for a in rows if a.quantity == "contact area" and a.state == "p* = 0.01" and a.contact[:4] == "soft")
+    assert area.unit == "%" and f"contact area {area.number}" in paragraph("one", rows)
+    assert area.number.startswith(f"{area.value:.1f}"[:3])
+    table = list(csv.DictReader(io.StringIO(as_csv(answers))))
+    assert len(table) == len(rows) == answers["one"].sizes["answer"]
+    wanted = {"quantity": "contact_area_fraction", "material": "soft", "stop_target": "0.01"}
+    (line,) = (line for line in table if wanted.items() <= line.items())
+    assert 100 * float(line["estimate"]) == pytest.approx(area.value, rel=1e-8)
+    assert sum(r"\\" in line for line in as_latex(answers)) == len(rows) + 1
+
+
+def test_the_largest_cause_is_named(answers):
+    study = answers["one"].to_dataset().isel(answer=[0])
+
+    def limit(**shares):
+        changed = study.assign(
+            {f"share_{name}": xr.full_like(study["share_grid"], value) for name, value in shares.items()}
+        )
+        (found,) = answers_of(changed)
+        return found.limit
+
+    assert "The grid limits the accuracy: ± 9 % of the value" in limit(grid=0.09, seeds=0.01)
+    assert limit(seeds=0.09, grid=0.0).startswith("The 3 seeds of the asperity model limit the accuracy: with twice as")
+    assert "29 % narrower" in limit(seeds=0.09, grid=0.0)
+    assert "2 seeds of boundary elements limit" in limit(refinement=0.09, grid=0.0, seeds=0.01)
+    assert "The error of the grid is unknown." in limit(seeds=0.09, grid=math.nan)
