@@ -18,9 +18,9 @@ COARSE, FINE = 1.3, 1.25
 
 
 def levels():
-    """Asperities for three seeds; boundary elements with more area on half the grid (three seeds) and the grid (two)."""
+    """Asperities for three seeds; boundary elements with more area on half the grid (three) and the grid (two)."""
     fine = compared.patches(lambda labels: labels.seed < 3, area=FINE)
-    coarse = [(labels._replace(study=coarse_study(labels.study)), run) for labels, run in compared.patches(area=COARSE)]
+    coarse = [(each._replace(study=coarse_study(each.study)), run) for each, run in compared.patches(area=COARSE)]
     return campaign_tree([*compared.runs().items(), *fine, *coarse])
 
 
