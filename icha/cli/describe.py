@@ -30,6 +30,9 @@ def describe(
     runs: Annotated[bool, typer.Option("--runs", help="List every file, not only totals.")] = False,
     cores: Cores = None,
     folder: Folder = None,
+    plot: Annotated[
+        bool, typer.Option("--plot", help="Draw each measured surface before and after its preparation.")
+    ] = False,
 ) -> None:
     """Print what a campaign computes, which results exist, and the time, memory and disk space for missing results.
 
@@ -41,11 +44,11 @@ def describe(
     path = find_configuration(config)
     campaign = read_configuration(path).campaign
     print_plan(path, campaign, find_workflow(), (folder or project()).resolve(), cores or DEFAULT_CORES, runs=runs)
-    _print_scans(campaign)
+    _print_scans(campaign, (folder or project()).resolve() / "results" / campaign.name if plot else None)
 
 
-def _print_scans(campaign) -> None:
-    """Print the descriptions of the measured surfaces that studies use."""
+def _print_scans(campaign, plots: Path | None) -> None:
+    """Print the descriptions of the measured surfaces that studies use; draw them to the folder `plots`, if given."""
     from icha.configuration.cases import run_cases
     from icha.configuration.surfaces import MeasuredSurface
     from icha.contact.models import MODELS
@@ -63,6 +66,20 @@ def _print_scans(campaign) -> None:
         section = campaign.surfaces[name]
         for line in describe_scan(name, examine_scan(section.path, section.preparation), models=used):
             echo(line)
+        if plots is not None:
+            _draw_scan(section, plots / f"scan_{name}.png")
+
+
+def _draw_scan(section, file: Path) -> None:
+    """Draw a measured surface before and after its preparation."""
+    from icha.figures.preparation import draw_preparation
+    from icha.surfaces.measured.resolution import without_preparation
+    from icha.surfaces.measured.topography import prepared_topography
+
+    before = without_preparation(section.path, section.preparation)
+    file.parent.mkdir(parents=True, exist_ok=True)
+    draw_preparation(before, prepared_topography(section.path, section.preparation).surface).savefig(file)
+    echo(f"before and after the preparation: {shorten_path(file)}")
 
 
 def print_plan(path: Path, campaign, workflow: Path, home: Path, cores: int, *, runs=False, profile=None) -> None:

@@ -19,8 +19,11 @@ if TYPE_CHECKING:
 
 # A warning recommends another measurement if more than this fraction of the points is filled.
 MOST_FILLED = 0.05
+# A line on curvature is printed if a paraboloid takes more than this fraction of the variance, and a line on anisotropy
+# if the ratio of rms slopes is larger than this value.
+MUCH_CURVATURE, ANISOTROPIC = 0.5, 1.5
 # A file may lack these keys. ICHA then assumes the values of GUESSES (in m), and shows those of EXAMPLES to the user.
-GUESSES = {"height_unit": 1e-9, "size": (1e-4, 1e-4)}
+GUESSES = {"height_unit": 1e-9, "size": (1e-4, 1e-4), "scattered": "interpolate"}
 EXAMPLES = {"height_unit": "nm", "lateral_unit": "um", "size": "[90 um, 90 um]"}
 
 
@@ -34,7 +37,12 @@ def describe_scan(name: str, scan, *, to_scale: bool = True, models: Iterable[Mo
     to_scale : whether the units of the heights and of the side lengths are known.
     models : contact models of the runs on the surface; empty if no runs are defined yet.
     """
-    lines = [*_reading(scan), *_resolution(scan, to_scale, list(models)), *(_noise(scan) if to_scale else ())]
+    lines = [
+        *_reading(scan),
+        *_defects(scan, to_scale),
+        *_resolution(scan, to_scale, list(models)),
+        *(_noise(scan) if to_scale else ()),
+    ]
     return (f"{name}: {line}" for line in lines)
 
 
@@ -54,6 +62,34 @@ def _reading(scan) -> Iterator[str]:
         yield (
             "warning: `boundary: periodic`, but opposite edges differ by much more than neighbouring nodes, so there "
             "is a step at the edges; use `boundary: window`, `mirror` or `free`"
+        )
+
+
+def _defects(scan, to_scale: bool) -> Iterator[str]:
+    """Yield lines on outliers, offsets of scan lines, curvature and anisotropy, with the keys that remove them."""
+    defects, settings = scan.defects, scan.settings
+    if defects.outliers and settings.outliers == "keep":
+        count, verb = format_count(defects.outliers, "outlier"), "deviates" if defects.outliers == 1 else "deviate"
+        yield (
+            f"warning: {count} {verb} from the points around, the largest by {defects.largest:.3g} rms heights; "
+            "`outliers: remove` replaces outliers"
+        )
+    for levelling, step in defects.offsets.items():
+        if settings.levelling != levelling:
+            size = f" of {formatting.length(float(f'{step:.2g}'))} rms" if to_scale else ""
+            yield (
+                f"warning: the lines along {'x' if levelling == 'lines' else 'y'} have steps{size} from line to line, "
+                f"which the surface does not have in the other direction; `levelling: {levelling}` removes them"
+            )
+    if defects.curvature > MUCH_CURVATURE and settings.detrend == "tilt":
+        yield (
+            f"a paraboloid takes {defects.curvature:.0%} of the variance; if the sample is curved, write "
+            "`detrend: curvature`"
+        )
+    if scan.anisotropy > ANISOTROPIC:
+        yield (
+            f"anisotropic: the largest rms slope of all directions is {scan.anisotropy:.2g} times the smallest; the "
+            "asperity model has been validated for isotropic surfaces only"
         )
 
 
@@ -100,6 +136,11 @@ def _noise(scan) -> Iterator[str]:
             f"the spectrum ends in a noise floor of {rms} rms; waves shorter than {wavelength} are mostly noise, and "
             f"contribute {noise.slope_share:.0%} of the mean square slope"
         )
+        if scan.cutoff:
+            yield (
+                f"with `cutoff: {formatting.length(scan.cutoff)}`, noise contributes "
+                f"{scan.noise_share_after_filter:.0%} of the mean square slope"
+            )
     if scan.advice:
         keys = " and ".join(f"`{key}: {value}`" for key, value in format_advice(scan.advice).items())
         cutoff = scan.advice.get("cutoff")
@@ -154,6 +195,10 @@ def read_measured_section(path: Path, data: str | None, folder: Path) -> dict[st
         points += f", heights from {np.nanmin(scan.heights) * 1e6:.4g} um to {np.nanmax(scan.heights) * 1e6:.4g} um"
     lines.append(points)
     lines += [f"{key}:        # to fill in (not in the file), for example {EXAMPLES[key]}" for key in missing]
+    if "scattered" in guessed:
+        lines.append(
+            "scattered: interpolate       # the points are on no regular grid; with `refuse`, this is an error"
+        )
     if gaps:
         lines.append(f"missing: fill                # {gaps} points have no height; with `refuse`, this is an error")
     advice = {} if missing else format_advice(resolution.advice)
@@ -179,7 +224,8 @@ def _load(path: Path, data: str | None):
                 hint = "; choose one with --data NAME" if error.key == "data" else ""
                 raise UserError(f"--measured {path}: {error.key} {error}{hint}") from None
             guessed[error.key] = GUESSES[error.key]
-            missing[error.key] = str(error)
+            if error.key != "scattered":
+                missing[error.key] = str(error)
     if "size" in missing:
         rows, columns = scan.heights.shape  # most scans have square pixels
         guessed["size"] = columns * 1e-6, rows * 1e-6

@@ -263,6 +263,16 @@ class MeasuredSurface(_SurfaceFromFile):
     missing: Literal["refuse", "fill"] = "refuse"
     """Treatment of points without a height. `refuse`: ICHA refuses the file. `fill`: the solution of Laplace's equation
     fills the points."""
+    scattered: Literal["refuse", "interpolate"] = "refuse"
+    """Treatment of points of an xyz file that are on no regular grid. `refuse`: ICHA refuses the file. `interpolate`:
+    linear interpolation on triangles gives the heights on a grid with as many points per area."""
+    outliers: Literal["keep", "remove"] = "keep"
+    """Treatment of outliers: points that deviate from the points around them by far more than other points. `remove`
+    replaces outliers by the solution of Laplace's equation."""
+    levelling: Literal["none", "lines", "columns"] = "none"
+    """Removal of offsets between scan lines, as of scanning probe microscopes: the mean height of each line of points
+    along x (`lines`) or y (`columns`) and, if the tilts of the lines also have steps, the tilt of each line. This also
+    removes the mean height that the surface itself has along each line."""
     crop: Crop | None = None
     """The square to cut out of the scan. Default: the largest square in the middle of the scan."""
     detrend: Literal["none", "tilt", "curvature"] | None = None
@@ -304,9 +314,9 @@ class MeasuredSurface(_SurfaceFromFile):
         if self.cutoff is None:
             # Settings without this key have the same checksums as in earlier versions, so old results remain valid.
             del settings["cutoff"]
-        if self.columns is None:
-            del settings["columns"]
-        return settings
+        # The same holds for keys that were added later and have their defaults.
+        defaults = {"columns": None, "scattered": "refuse", "outliers": "keep", "levelling": "none"}
+        return {key: value for key, value in settings.items() if key not in defaults or value != defaults[key]}
 
 
 class SelfAffineSurface(_Surface):

@@ -9,8 +9,16 @@ from functools import cached_property
 import numpy as np
 import scipy.fft
 
-from icha.surfaces.measured.topography import LEAST_PIXELS, PreparedTopography, prepared_topography
-from icha.surfaces.moments import LEAST_CELLS_OF_SUMMIT, RESOLVED_CELLS, cells_per_short_wave, radial_power_spectrum
+from icha.surfaces.measured.defects import Defects
+from icha.surfaces.measured.settings import Preparation
+from icha.surfaces.measured.topography import LEAST_PIXELS, PreparedTopography, defects_of, prepared_topography
+from icha.surfaces.moments import (
+    LEAST_CELLS_OF_SUMMIT,
+    RESOLVED_CELLS,
+    cells_per_short_wave,
+    radial_power_spectrum,
+    slope_anisotropy,
+)
 from icha.surfaces.summits import Asperities, SummitCoverage, locate_summits
 from icha.surfaces.surface import FREE, PERIODIC, Surface, edges_fit
 
@@ -47,10 +55,32 @@ class ScanResolution(PreparedTopography):
     ----------
     measured : square that is cut out of the scan, before filter, treatment of edges and change of grid.
     cutoff : nesting index of the filter, m; None without a filter.
+    settings : settings of the preparation.
     """
 
     measured: Surface
     cutoff: float | None
+    settings: Preparation
+
+    @cached_property
+    def defects(self) -> Defects:
+        """Outliers, offsets of scan lines and curvature of the scan, before they are removed."""
+        return defects_of(self.square)
+
+    @cached_property
+    def anisotropy(self) -> float:
+        """Ratio of the largest to the smallest rms slope along all directions, of the prepared surface."""
+        return slope_anisotropy(self.surface)
+
+    @property
+    def noise_share_after_filter(self) -> float:
+        """Fraction of the mean square slope of the filtered surface that is noise; 0 without a noise floor."""
+        if self.noise is None:
+            return 0.0
+        q, power, edges = radial_power_spectrum(self.measured)
+        slopes = q**2 * np.diff(edges**2) * 4.0 ** -((self.cutoff * q / (2 * np.pi)) ** 2)
+        floor = np.minimum(power, (self.noise.rms * self.measured.spacing / (2 * math.pi)) ** 2)
+        return float(np.sum(slopes * floor) / np.sum(slopes * power))
 
     @property
     def edges_fit(self) -> bool:
@@ -120,8 +150,18 @@ def examine_scan(path: str | os.PathLike, preparation: Mapping) -> ScanResolutio
         raw |= {"boundary": FREE, "grid": None}
     measured = prepared_topography(path, raw).surface
     return ScanResolution(
-        **vars(prepared_topography(path, preparation)), measured=measured, cutoff=preparation.get("cutoff")
+        **vars(prepared_topography(path, preparation)),
+        measured=measured,
+        cutoff=preparation.get("cutoff"),
+        settings=Preparation(**preparation),
     )
+
+
+def without_preparation(path: str | os.PathLike, preparation: Mapping) -> Surface:
+    """Return the square of a scan with filled points and without tilt, but with all defects; for a comparison."""
+    steps = ("cutoff", "taper", "outliers", "levelling", "grid", "shape")
+    raw = {key: preparation[key] for key in preparation if key not in steps}
+    return prepared_topography(path, raw | {"boundary": FREE, "detrend": "tilt", "missing": "fill"}).surface
 
 
 def noise_floor(surface: Surface) -> NoiseFloor | None:

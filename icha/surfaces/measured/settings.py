@@ -43,11 +43,14 @@ class Preparation:
     touches_first : "high" or "low": points with high or with low numbers touch the elastic body first.
     missing : treatment of points without a height, "refuse" or "fill".
     crop : x, y and side (m) of the square to cut out; None for the largest square in the middle of the scan.
+    outliers : treatment of outliers, "keep" or "remove".
+    levelling : "none", or "lines" or "columns": remove offsets between the lines of points along x or y.
     detrend : trend to remove, "none", "tilt" or "curvature".
     cutoff : nesting index of the S-filter, m; None for no filter.
     taper : width, divided by the side, of the strip at each edge in which the window reduces the heights.
     grid : nodes along a side of the surface; None for the number of nodes of the scan.
     columns : numbers (from 1) of the columns with x, y and z in a text file; None if the file has only three columns.
+    scattered : treatment of points on no regular grid, "refuse" or "interpolate".
     """
 
     format: str
@@ -65,6 +68,9 @@ class Preparation:
     taper: float | None = None
     grid: int | None = None
     columns: tuple[int, int, int] | None = None
+    outliers: str = "keep"
+    levelling: str = "none"
+    scattered: str = "refuse"
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,9 +119,9 @@ def grid_indices(values: np.ndarray, axis: str) -> tuple[np.ndarray, int, float]
         if count <= GRID.most and np.max(np.abs(values - low - index * step)) <= _OFF_GRID * step:
             return index.astype(int), count, step
     raise UnfitTopography(
-        "path",
-        f"has coordinates {axis} that are not on a regular grid of at most {GRID.most} points; expected rows and "
-        "columns of points. Interpolate the heights in the program of the instrument, or in Gwyddion",
+        "scattered",
+        f"does not allow coordinates {axis} that are not on a regular grid of at most {GRID.most} points; expected "
+        "interpolate, or a file with rows and columns of points",
     )
 
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.fft
 
+from icha.support import formatting
 from icha.support.input_files import require_room
 from icha.support.rules import GRID
 from icha.surfaces.measured.array_files import is_instrument_text, read_instrument
@@ -126,7 +127,14 @@ def read_xyz(file: SourceFile, settings: Preparation) -> FileContent:
     points = file.values[:, [column - 1 for column in columns]]
     if len(points) > 1 and any(np.ptp(points[:, axis]) == 0 for axis in (0, 1)):
         raise UnfitTopography("path", LINE_SCAN.format(len(points)))
-    (column, nx, dx), (row, ny, dy) = (grid_indices(points[:, axis], "xy"[axis]) for axis in (0, 1))
+    scattered = ""
+    try:
+        (column, nx, dx), (row, ny, dy) = (grid_indices(points[:, axis], "xy"[axis]) for axis in (0, 1))
+    except UnfitTopography:
+        if settings.scattered != "interpolate":
+            raise
+        points, scattered = _interpolate(points)
+        (column, nx, dx), (row, ny, dy) = (grid_indices(points[:, axis], "xy"[axis]) for axis in (0, 1))
     node = row * nx + column
     order = np.argsort(node, kind="stable")
     repeated = np.flatnonzero(np.diff(node[order]) == 0)
@@ -145,8 +153,29 @@ def read_xyz(file: SourceFile, settings: Preparation) -> FileContent:
         units[2] or heading.height_unit,
         (nx * dx * x_unit, ny * dy * y_unit) if x_unit and y_unit and settings.lateral_unit is None else None,
         (nx * dx, ny * dy),
-        remark=remark if titles and columns != sorted(columns) else "",
+        remark="; ".join(filter(None, (remark if titles and columns != sorted(columns) else "", scattered))),
     )
+
+
+def _interpolate(points):
+    """Interpolate scattered points (x, y, z) onto a square grid; return the new points, and a remark.
+
+    The grid has as many nodes per area as the points. The interpolation is linear on Delaunay's triangles. Nodes
+    outside the convex hull of the points have no height.
+    """
+    # Slow to import, and rarely needed.
+    from scipy.interpolate import LinearNDInterpolator
+
+    known = points[np.isfinite(points).all(axis=1)]
+    low, high = known[:, :2].min(axis=0), known[:, :2].max(axis=0)
+    step = math.sqrt(float(np.prod(high - low)) / len(known))
+    nx, ny = (int(length / step) + 1 for length in high - low)
+    require_room(4 * 8 * nx * ny)
+    y, x = np.meshgrid(low[1] + step * np.arange(ny), low[0] + step * np.arange(nx), indexing="ij")
+    z = LinearNDInterpolator(known[:, :2], known[:, 2], rescale=True)(x, y)
+    empty = formatting.share(int(np.count_nonzero(np.isnan(z))), z.size)
+    remark = f"{len(known)} scattered points interpolated onto {nx} x {ny} nodes, {empty} of which have no height"
+    return np.column_stack([x.ravel(), y.ravel(), z.ravel()]), remark
 
 
 def _titles(layout):

@@ -1,8 +1,8 @@
 """Prepare a surface from the file of a measured topography.
 
 The steps are: read heights and lengths in metres (`scan`); make heights positive on the side that touches first; cut
-out a square; remove the trend; fill missing points; make pixels square; filter short waves; treat the edges as
-`boundary` requires; change the grid.
+out a square; remove outliers, offsets of lines and the trend; fill missing points; make pixels square; filter short
+waves; treat the edges as `boundary` requires; change the grid.
 
 SurfaceTopography reads the files of instruments. SurfaceTopography could also remove trends and fill holes. ICHA does
 these steps itself, because the import of SurfaceTopography takes seconds.
@@ -22,6 +22,7 @@ import scipy.sparse.linalg
 from icha.support import formatting
 from icha.support.checksums import sha256_of
 from icha.support.input_files import TooLarge, require_room
+from icha.surfaces.measured.defects import Defects, find_outliers, level_lines, line_offsets
 from icha.surfaces.measured.scan import Scan, load_scan
 from icha.surfaces.measured.settings import MIRROR, WINDOW, Preparation, UnfitTopography
 from icha.surfaces.square import problem_with_heights
@@ -54,6 +55,7 @@ class PreparedTopography:
     reading : points, pixels, units and omitted parts of the file, as text for users.
     filled : number of missing points that were filled.
     points : number of points in the whole square, not along a side, before resampling.
+    square : the square that is cut out of the scan, before its preparation.
     """
 
     surface: Surface
@@ -65,6 +67,7 @@ class PreparedTopography:
     reading: str
     filled: int
     points: int
+    square: Scan
 
 
 def prepared_topography(path: str | os.PathLike, preparation: Mapping) -> PreparedTopography:
@@ -85,7 +88,14 @@ def prepared_topography(path: str | os.PathLike, preparation: Mapping) -> Prepar
     touching = scan.heights if settings.touches_first == "high" else -scan.heights
     square = crop_square(scan.after(touching, f"{settings.touches_first} numbers touch first"), settings)
     prepared = square
-    for step in (remove_trend, fill_missing_points, resample_to_square_pixels, filter_short_waves):
+    for step in (
+        remove_outliers,
+        level,
+        remove_trend,
+        fill_missing_points,
+        resample_to_square_pixels,
+        filter_short_waves,
+    ):
         prepared = step(prepared, settings)
     refuse_flat(prepared, square, settings)
     surface, steps = treat_edges(prepared, settings)
@@ -99,6 +109,7 @@ def prepared_topography(path: str | os.PathLike, preparation: Mapping) -> Prepar
         reading="; ".join([scan.steps[0], *(step for step in steps if "resampled" in step)]),
         filled=int(np.count_nonzero(~np.isfinite(square.heights))),
         points=square.heights.size,
+        square=square,
     )
 
 
@@ -138,6 +149,42 @@ def crop_square(scan: Scan, settings: Preparation) -> Scan:
     return scan.after(square, *step, size=(nx * dx, ny * dy))
 
 
+def remove_outliers(scan: Scan, settings: Preparation) -> Scan:
+    """Replace outliers by the solution of Laplace's equation, if the setting `outliers` is "remove"."""
+    if settings.outliers != "remove":
+        return scan
+    outliers, largest = find_outliers(without_trend(scan.heights, 1))
+    if not outliers.any():
+        return scan
+    heights, gaps = scan.heights.copy(), outliers | ~np.isfinite(scan.heights)
+    heights[gaps] = _harmonic(heights, gaps, periodic=settings.boundary == PERIODIC)
+    heights[gaps & ~outliers] = np.nan
+    count = int(np.count_nonzero(outliers))
+    share = formatting.share(count, outliers.size)
+    return scan.after(
+        heights, f"{count} outliers replaced, {share} of the points, the largest of {largest:.3g} rms heights"
+    )
+
+
+def level(scan: Scan, settings: Preparation) -> Scan:
+    """Remove offsets between lines of points, if the setting `levelling` names the direction of the lines."""
+    if settings.levelling == "none":
+        return scan
+    rows = settings.levelling == "lines"
+    heights, tilted = level_lines(scan.heights if rows else scan.heights.T)
+    removed = f"mean height{' and tilt' if tilted else ''} of each line along {'x' if rows else 'y'} removed"
+    return scan.after(heights if rows else heights.T, removed)
+
+
+def defects_of(scan: Scan) -> Defects:
+    """Return the defects of a scan, before they are removed."""
+    level = without_trend(scan.heights, 1)
+    outliers, largest = find_outliers(level)
+    level = without_trend(np.where(outliers, np.nan, level), 1)
+    curvature = 1 - float(np.nanvar(without_trend(level, 2)) / (np.nanvar(level) or 1.0))
+    return Defects(int(np.count_nonzero(outliers)), largest, line_offsets(level), curvature)
+
+
 def remove_trend(scan: Scan, settings: Preparation) -> Scan:
     """Remove the plane or the paraboloid that fits the known heights best."""
     known = np.isfinite(scan.heights)
@@ -146,18 +193,23 @@ def remove_trend(scan: Scan, settings: Preparation) -> Scan:
     degree = {"none": 0, "tilt": 1, "curvature": 2}[settings.detrend]
     if degree == 0:
         return scan
-    rows, columns = scan.heights.shape
+    return scan.after(without_trend(scan.heights, degree), f"{settings.detrend} removed")
+
+
+def without_trend(heights: np.ndarray, degree: int) -> np.ndarray:
+    """Return heights without the polynomial of x and y of some degree that fits the known heights best."""
+    known = np.isfinite(heights)
+    rows, columns = heights.shape
     powers = [(i, j) for i in range(degree + 1) for j in range(degree + 1 - i)]
     y, x = (np.vander(np.linspace(-1, 1, n), 2 * degree + 1, increasing=True) for n in (rows, columns))
     # Sum the products of powers over the known points by matrix products, which need little memory.
     moments = y.T @ known.astype(float) @ x
-    weighted = y.T @ np.where(known, scan.heights, 0.0) @ x
+    weighted = y.T @ np.where(known, heights, 0.0) @ x
     matrix = np.array([[moments[i + k, j + m] for k, m in powers] for i, j in powers])
     right = np.array([weighted[i, j] for i, j in powers])
     coefficients = np.zeros((degree + 1, degree + 1))
     coefficients[tuple(np.transpose(powers))] = np.linalg.lstsq(matrix, right, rcond=None)[0]
-    trend = y[:, : degree + 1] @ coefficients @ x[:, : degree + 1].T
-    return scan.after(scan.heights - trend, f"{settings.detrend} removed")
+    return heights - y[:, : degree + 1] @ coefficients @ x[:, : degree + 1].T
 
 
 def refuse_flat(prepared: Scan, square: Scan, settings: Preparation) -> None:
