@@ -130,7 +130,7 @@ def test_scattered_points_are_interpolated_on_request(tmp_path):
     np.savetxt(tmp_path / "cloud.xyz", np.column_stack([x, y, plane]))
     settings = {"format": "auto", "boundary": "free", "height_unit": 1e-9, "lateral_unit": 1e-6}
     with pytest.raises(
-        UnfitTopography, match="coordinates x that are not on a regular grid .* expected interpolate"
+        UnfitTopography, match=r"coordinates x that are not on a regular grid .* expected interpolate"
     ) as e:
         prepared_topography(tmp_path / "cloud.xyz", settings)
     assert e.value.key == "scattered"
