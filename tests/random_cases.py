@@ -213,7 +213,7 @@ OF_STICKY_SURFACES = (*OF_UNIONS, "jumps lose energy", "jumps in lose energy")
 
 def wrong(run) -> list[str]:
     """Return the failures of the dataset of a run; if it ended early, of the targets that it reached."""
-    ended, marked = "incomplete" in run.attrs, run.attrs.get("failed_checks", "")
+    ended, marked = bool({"incomplete", "beyond_model"} & run.attrs.keys()), run.attrs.get("failed_checks", "")
     found = [check for check in check_run(run) if not check.passed and not (ended and check.name not in _OF_STEPS)]
     assert ended or all(f"{check.name}: " in marked for check in found)
     marked_only = OF_STICKY_SURFACES if float(run["full_contact_energy_ratio"]) < FULL_CONTACT_BELOW else OF_UNIONS

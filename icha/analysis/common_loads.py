@@ -90,6 +90,8 @@ def compare_runs(study: xr.Dataset) -> xr.Dataset:
     """
     status = study["status"].transpose(*LABELS).values
     loaded, asked = np.isin(status, LOADED_RUNS), np.isin(status, (*COMPUTED_RUNS, MISSING))
+    # Adhesion may end a run before its first target.
+    loaded &= study["step_count"].transpose(*LABELS).values > 0
     averaged = loaded & (study["applicability"].transpose(*LABELS).values == "")
     seeds = LABELS.index("seed")
     variables = {

@@ -100,7 +100,7 @@ def print_plan(path: Path, campaign, workflow: Path, home: Path, cores: int, *, 
 
     from icha.deposit.metadata import licence_problem
     from icha.planning.ownership import find_conflict
-    from icha.planning.plan import plan
+    from icha.planning.plan import FAILED, plan
     from icha.planning.requirements import find_shortages, missing_software
     from icha.planning.validity import expected_validity
     from icha.support.checksums import damaged
@@ -121,7 +121,7 @@ def print_plan(path: Path, campaign, workflow: Path, home: Path, cores: int, *, 
     for file in damaged(results):
         print_line("red", "damaged", f"{file}: will be computed again")
     for item in items:
-        if item.is_run and item.reason:
+        if item.is_run and item.state == FAILED:
             print_line("red", "failed", f"{item.path}: {item.reason}")
     for statement in expected_validity(campaign):
         print_line("bold", statement.about, statement.text)

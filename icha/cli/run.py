@@ -10,6 +10,7 @@ import subprocess
 import sys
 import tempfile
 import threading
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated
 
@@ -314,14 +315,15 @@ def _print_outcome(status: int, stopped: bool, progress, campaign, folder: Path,
 def _print_failures(status: int, stopped: bool, progress, campaign, folder: Path, log: Path) -> None:
     """Print the failed jobs, and the runs without a result, with the reason for each failure."""
     from icha.cli.live import read_error
-    from icha.planning.plan import failed_runs
+    from icha.planning.plan import early_ends
 
     results = folder / "results" / campaign.name
-    incomplete = failed_runs(campaign, results) if status or campaign.publication.known_failures else {}
-    if incomplete:
-        echo(f"{format_count(len(incomplete), 'run')} without a result:", fg="red")
-        for path, reason in incomplete.items():
-            _print_failure(f"  {path}", [reason], bold=True)
+    incomplete, ended = early_ends(campaign, results)
+    if status or campaign.publication.known_failures:
+        _print_early_ends("without a result", incomplete, campaign, results / "logs/failed_runs.txt", "red")
+    what = "ended before the last target, as physics decides"
+    _print_early_ends(what, ended, campaign, results / "logs/ended_runs.txt")
+    incomplete = [case.path for case in incomplete]
     failed = [job for job in progress.failed if not stopped or read_error(job, folder)]
     if failed:
         echo(f"{format_count(len(failed), 'job')} failed:", fg="red")
@@ -332,6 +334,33 @@ def _print_failures(status: int, stopped: bool, progress, campaign, folder: Path
             _print_failure(f"  {job.title}", reason or [unknown], bold=True)
             if job.log:
                 echo(f"    log: {shorten_path(folder / job.log)}")
+
+
+def _print_early_ends(what: str, reasons: Mapping, campaign, file: Path, colour: str | None = None) -> None:
+    """Print the runs that failed or ended early, one line for all seeds of a contact; write all reasons to a file."""
+    from icha.configuration.cases import run_cases
+    from icha.contact.models import DEFAULT_MODEL, MODELS
+    from icha.datasets.labels import RunLabels
+
+    if not reasons:
+        return
+    file.parent.mkdir(parents=True, exist_ok=True)
+    file.write_text("".join(f"{case.path}: {reason}\n" for case, reason in reasons.items()), encoding="utf-8")
+    echo(f"{format_count(len(reasons), 'run')} {what}; all reasons: {shorten_path(file)}", fg=colour)
+    groups: dict[RunLabels, list[RunLabels]] = {}
+    for case in reasons:
+        groups.setdefault(case._replace(seed=0), []).append(case)
+    for contact, cases in itertools.islice(groups.items(), MOST_LINES):
+        asked = sum(each.path == contact.path for each in (case._replace(seed=0) for case in run_cases(campaign)))
+        seeds = f"{len(cases)} of {asked} seeds" if asked > 1 else "1 run"
+        model = "" if contact.model == DEFAULT_MODEL else f", {MODELS[contact.model].words}"
+        echo(
+            f"  {contact.study}: {seeds} of {contact.surface}, slope {contact.rms_slope:g}, {contact.material}{model}",
+            bold=True,
+        )
+        echo(f"    {reasons[cases[0]]}")
+    if len(groups) > MOST_LINES:
+        echo(f"  … and {len(groups) - MOST_LINES} more groups in the file")
 
 
 def _print_failure(heading: str, lines: list[str], **style) -> None:

@@ -36,7 +36,7 @@ class NotConverged(Exception):
 
 
 class BeyondModel(NotConverged):
-    """Error: the next target is outside the range of the model. The path before the target is a valid result."""
+    """Error: physics ends the path, or the next target is outside the range of the model. The path so far is valid."""
 
 
 class FullContact(NotConverged):

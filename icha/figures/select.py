@@ -74,12 +74,15 @@ def select_runs(
     """
     import xarray as xr
 
-    from icha.datasets.campaign import reduced_gap, runs_of_status, select_run
+    from icha.datasets.campaign import reduced_gap, run_place, runs_of_status, select_run
     from icha.datasets.variables.campaign import LOADED_RUNS, RAGGED
 
     dataset = campaign[study].to_dataset()
     wanted = model or shown_model(dataset)
     found = [labels for labels in runs_of_status(dataset, study, LOADED_RUNS) if labels.model == wanted]
+    # Adhesion may end a run before its first target.
+    counts = dataset["step_count"].transpose(*LABELS).values
+    found = [labels for labels in found if counts[tuple(run_place(dataset, labels).values())]]
     if not found and model is None:
         raise NothingToDraw(f"study {study}: no run is complete")
     if not ragged:

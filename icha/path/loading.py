@@ -79,28 +79,27 @@ class PathProgress:
     def require_valid_state(
         self, before: State, after: State, target: TargetFunction | None, pending: list[TargetFunction], loading: bool
     ) -> None:
-        """Raise `NotConverged` if the model is not valid in the state `after`, at the end of a step.
+        """Raise `BeyondModel` if the model is not valid in the state `after`, at the end of a step.
 
-        It is a `BeyondModel` if the contact gives a reason (`ContactModel.reason_beyond`).
-        The contact area must not be larger than `contact.largest_area_fraction`. Between targets the mean gap must be
-        positive, unless the model is valid up to full contact. At a target the mean gap may be negative, because the
-        range of targets is already limited.
+        The contact may give a reason (`ContactModel.reason_beyond`). The contact area must not be larger than
+        `contact.largest_area_fraction`. Between targets the mean gap must be positive, unless the model is valid up to
+        full contact. At a target the mean gap may be negative, because the range of targets is already limited.
 
         target : target that the state after the step meets; None if there is no such target.
         before, loading : start and direction of the step. pending : targets not met yet. They serve only the message.
         """
         contact = self.contact
         if reason := contact.reason_beyond(after):
-            raise BeyondModel(str(self.make_path_error(before, loading, NotConverged(reason))))
+            raise self.make_path_error(before, loading, BeyondModel(reason))
         ahead = target or (pending[0] if pending else None)
         name = ahead.target.describe() if ahead else "separation"
         area = contact.area_fraction(after)
         if area > contact.largest_area_fraction:
             reason = f"the contact area grows to {area:.2f} of the nominal area, outside the range of the model,"
-            raise self.make_path_error(before, loading, NotConverged(f"{reason} before {name}"))
+            raise self.make_path_error(before, loading, BeyondModel(f"{reason} before {name}"))
         if target is None and contact.largest_area_fraction < 1 and contact.mean_gap(after) <= 0:
             reason = f"the mean planes meet before {name}, outside the range of the model"
-            raise self.make_path_error(after, loading, NotConverged(reason))
+            raise self.make_path_error(after, loading, BeyondModel(reason))
 
     def halve_step(self, step: float, failure: NotConverged, state: State, loading: bool) -> float:
         """Return half the length, m, of a step without an equilibrium; raise `NotConverged` if that is too short."""
@@ -112,6 +111,8 @@ class PathProgress:
         """Return the exception for a path that cannot continue after a state.
 
         The message gives position, errors of skipped targets, failures, and on loading whether the surface is sticky.
+        The exception is a `BeyondModel` if physics ends the path: if the model is not valid further on, if all failures
+        are targets inside jumps, or if adhesion pulls a surface towards full contact and the model ends before.
         """
         contact, failures = self.contact, (*self.skipped, *failures)
         sticky = ""
@@ -120,7 +121,9 @@ class PathProgress:
         if contact.adhesive and loading and (contact.pressure(state) < 0 or no_equilibrium):
             reason = "no equilibrium exists after first contact" if no_equilibrium else "the load is still tensile"
             sticky = f"; {reason}: the surface is sticky, adhesion pulls it towards full contact"
-        return NotConverged(
+        ends = all(isinstance(each, (InsideJump, BeyondModel)) for each in failures)
+        by_physics = ends or (sticky and contact.largest_area_fraction < 1)
+        return (BeyondModel if by_physics else NotConverged)(
             f"at a mean separation of {state.separation / contact.rms_height:.4f} h_rms, "
             f"A/A0 = {contact.area_fraction(state):.3g}, after {self.reached} of {self.total} stops: "
             f"{'; '.join(map(str, failures))}{sticky}"

@@ -13,6 +13,7 @@ from icha.configuration.plausibility import energy_ratio
 from icha.contact.models import DEFAULT_MODEL, MODELS
 from icha.datasets import results as results_files
 from icha.datasets.attributes import why_no_result
+from icha.datasets.labels import RunLabels
 from icha.datasets.results import ResultFiles, job_file
 from icha.figures.registry import DECLARATIONS
 from icha.path.targets import QUANTITIES
@@ -230,14 +231,14 @@ def _cost_parameters(settings, side) -> dict:
 
 
 def run_state(file: Path, sha256: str) -> tuple[str, str]:
-    """Return the state of a run's file, and the reason if the run failed; `sha256` is the checksum of the settings."""
+    """Return the state of a run's file, and why the run failed or ended early; `sha256` is that of the settings."""
     import h5py
 
     if not file.is_file():
         return TO_DO, ""
     try:
         with h5py.File(file, "r") as data:
-            names = ("config_sha256", "incomplete", "failed_checks")
+            names = ("config_sha256", "incomplete", "failed_checks", "beyond_model")
             attributes = {name: text(data.attrs[name]) for name in names if name in data.attrs}
     except OSError as error:
         if error.errno is not None:  # the file cannot be read, for example without permission
@@ -246,16 +247,19 @@ def run_state(file: Path, sha256: str) -> tuple[str, str]:
     if attributes.get("config_sha256") != sha256:
         return CHANGED, ""
     reason = why_no_result(attributes)
-    return (FAILED, reason) if reason else (DONE, "")
+    return (FAILED, reason) if reason else (DONE, attributes.get("beyond_model", ""))
 
 
-def failed_runs(campaign: Campaign, results: Path) -> dict[str, str]:
-    """Return path and reason of each run that failed with the present settings."""
-    states = {
-        case.path: run_state(results / path, run_sha256(campaign, case))
-        for path, case in campaign_files(campaign).runs.items()
-    }
-    return {path: reason for path, (state, reason) in states.items() if state == FAILED}
+def early_ends(campaign: Campaign, results: Path) -> tuple[dict[RunLabels, str], dict[RunLabels, str]]:
+    """Return the reasons of runs that failed, and of runs that physics ended early, with the present settings."""
+    failed, ended = {}, {}
+    for path, case in campaign_files(campaign).runs.items():
+        state, reason = run_state(results / path, run_sha256(campaign, case))
+        if state == FAILED:
+            failed[case] = reason
+        elif state == DONE and reason:
+            ended[case] = reason
+    return failed, ended
 
 
 def whole_cost(campaign: Campaign, results: Path) -> costs.Cost:

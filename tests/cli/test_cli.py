@@ -28,7 +28,7 @@ from icha.datasets.campaign_file import write_campaign
 from icha.datasets.files import read_dataset, write_dataset
 from icha.datasets.surface_file import write_surface
 from icha.planning.ownership import claim, find_conflict
-from icha.planning.plan import CHANGED, DAMAGED, DONE, FAILED, TO_DO, failed_runs, plan, time_on
+from icha.planning.plan import CHANGED, DAMAGED, DONE, FAILED, TO_DO, early_ends, plan, time_on
 from icha.references.theories import reference_dataset
 from icha.support.checksums import damaged, write_checksum
 from icha.support.formatting import format_quantity
@@ -344,7 +344,7 @@ def test_the_states_of_runs_are_distinguished(tiny):
     states = {item.path: item.state for item in plan(campaign, results)}
     for case, state in ((done, DONE), (changed, CHANGED), (failed, FAILED), (missing, TO_DO)):
         assert states[f"runs/{case.path}.nc"] == state
-    assert failed_runs(campaign, results) == {failed.path: reason}
+    assert early_ends(campaign, results) == ({failed: reason}, {})
     described = printed("describe", "tiny.yaml", "--runs")
     assert "4 runs, 2 to do" in described and "1 run made with other settings" in described
     assert f"failed: runs/{failed.path}.nc: {reason}" in described

@@ -8,6 +8,7 @@ import sys
 import time
 
 import pytest
+import yaml
 from conftest import REPOSITORY, copy_project, modules_of, snakemake
 from tiny_campaign import CAMPAIGN as TINY
 
@@ -87,14 +88,27 @@ def test_a_job_that_crashes_is_named_with_its_log_and_stops_no_other(project):
     assert "Error in rule run" in log.read_text()
 
 
+def test_an_end_that_physics_decides_is_a_result(project):
+    output = run(project, "dataset")
+    assert "1 run ended before the last target, as physics decides; all reasons: results/tiny/logs/ended" in output
+    assert "\n  load: 1 run of rough, slope 1, sticky\n    the path ends at" in output
+    reasons = (project / "results/tiny/logs/ended_runs.txt").read_text()
+    assert reasons.startswith("load/rough/seed1/slope1/sticky: the path ends at") and reasons.count("\n") == 1
+
+
 def test_a_run_that_fails_leaves_a_dataset_and_is_listed_with_its_reason(project):
-    output = run(project, "dataset", status=1)
-    assert "1 run without a result:\n  load/rough/seed1/slope1/sticky\n    the path ends" in output
-    assert "Verdict on the checks" in output and "dataset: results/tiny/dataset/tiny.nc" in output
+    # The snapshot is far above the surface.
+    far = yaml.safe_load(TINY) | {"name": "far"}
+    far["studies"]["load"] |= {"materials": ["bare"], "snapshots": [{"mean_separation": "1 m"}]}
+    (project / "config/campaigns/far.yaml").write_text(yaml.safe_dump(far))
+    output = run(project, "dataset", campaign="far", status=1)
+    assert "2 runs without a result; all reasons: results/far/logs/failed_runs.txt" in output
+    assert "\n  load: 2 of 2 seeds of rough, slope 1, bare\n    nothing was computed: path: " in output
+    assert "Verdict on the checks" in output and "dataset: results/far/dataset/far.nc" in output
     lines = [line for line in output.splitlines() if line.startswith("[")]
     assert len(lines) >= 4 and " left] " in lines[0]
     # A second call repeats the verdict only.
-    assert "Nothing to do" in run(project, "runs")
+    assert "Nothing to do" in run(project, "runs", campaign="far")
 
 
 @pytest.mark.slow

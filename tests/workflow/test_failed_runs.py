@@ -78,8 +78,8 @@ def test_the_file_of_a_run_without_stops_states_the_reason(sweep):
     file, said = sweep("sticky", STICKY)
     run = read_run(file)
     assert run.sizes["step"] == run.sizes["snapshot"] == run.sizes["spot"] == 0
-    assert "after 0 of 1 stops" in run.attrs["incomplete"]
-    assert said[-1] == f"Failed: {run.attrs['incomplete']}"
+    assert "after 0 of 1 stops" in run.attrs["beyond_model"]
+    assert said[-1] == f"Ended by physics: {run.attrs['beyond_model']}"
     assert float(run["surface_energy"]) == 48.0 and run.attrs["config_sha256"] == "0"
     assert sweep("again", STICKY)[0].read_bytes() == file.read_bytes()
 
@@ -89,7 +89,9 @@ def test_the_verdict_lists_the_failed_run_and_the_others_are_used(sweep, dataset
     from judge_results import judge_results
 
     # The failed run comes first; the variables of the study are those of the other run.
-    files = {"glue": sweep("glue", STICKY, BOTH_WAYS)[0], "soft": sweep("soft", BARE, BOTH_WAYS)[0]}
+    # The snapshot is far above the surface.
+    far = BOTH_WAYS | {"snapshots": [("mean_separation", 1.0)]}
+    files = {"glue": sweep("glue", STICKY, far)[0], "soft": sweep("soft", BARE, BOTH_WAYS)[0]}
     file, labels = dataset(files)
     broken = read_run(files["glue"])
     reason = broken.attrs["incomplete"]
@@ -119,11 +121,12 @@ def test_the_verdict_lists_the_failed_run_and_the_others_are_used(sweep, dataset
     assert first.endswith("known failures:") and line == "sticky/rough/seed1/slope1/glue: sticky"
 
 
-def test_a_campaign_of_failed_runs_has_a_dataset_and_an_empty_figure(sweep, dataset, tmp_path):
+def test_a_campaign_of_runs_without_stops_has_a_dataset_and_an_empty_figure(sweep, dataset, tmp_path):
     file, _ = dataset({name: sweep(name, STICKY)[0] for name in ("one", "two")})
     tree = read_campaign(file)
     assert tree["sticky"].sizes["step"] == 0
-    assert {check.name for check in check_campaign(tree) if not check.passed} == {"completed"}
+    assert all(check.passed for check in check_campaign(tree))
+    assert tree["sticky"]["status"].values.ravel().tolist() == [5, 5]
     with pytest.raises(NothingToDraw):
         figure(tree, study="sticky")
     files = [tmp_path / f"fig2.{ending}" for ending in ("png", "pdf")]

@@ -55,6 +55,8 @@ def run_sweep(
         dataset = empty_run(*contact, reason, model=model, seed=seed)
     if "incomplete" in dataset.attrs:
         progress(f"Failed: {dataset.attrs['incomplete']}")
+    elif "beyond_model" in dataset.attrs:
+        progress(f"Ended by physics: {dataset.attrs['beyond_model']}")
     write_dataset(dataset.assign_attrs(attributes), output)
 
 
