@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from operator import itemgetter
@@ -25,6 +26,9 @@ _SMALLEST_STEP = 2.0**-14
 # Largest number of equilibria in which no target is met and the separation changes by less than the longest step.
 _MOST_EQUILIBRIA = 2000
 
+# A path reports an equilibrium between targets if the last report is at least this old, s.
+REPORT_AFTER = 20.0
+
 
 @dataclass(eq=False)
 class PathProgress:
@@ -40,6 +44,7 @@ class PathProgress:
     skipped : errors of the targets that lie inside jumps.
     progress_from : separation, m; progress means a change from it, up or down, of at least the longest step.
     idle : number of equilibria since the last progress: since the last target, or since `progress_from` was set.
+    reported : time of the last report, s.
     """
 
     contact: ContactModel
@@ -50,9 +55,17 @@ class PathProgress:
     skipped: list[InsideJump] = field(default_factory=list)
     progress_from: float = np.inf
     idle: int = 0
+    reported: float = field(default_factory=time.monotonic)
 
     def record_equilibrium(self, state: State, loading: bool) -> None:
-        """Count an equilibrium, or start from 0 again after progress; raise `NotConverged` if the count is too high."""
+        """Count an equilibrium, or start from 0 again after progress; raise `NotConverged` if the count is too high.
+
+        If the last report is `REPORT_AFTER` seconds old, report the equilibrium.
+        """
+        if self.report is not None and time.monotonic() - self.reported >= REPORT_AFTER:
+            self.report_position(
+                f"{'loading' if loading else 'unloading'}, {self.reached} of {self.total} stops", state
+            )
         if abs(state.separation - self.progress_from) >= self.longest:
             self.progress_from, self.idle = state.separation, 0
             return
@@ -70,10 +83,11 @@ class PathProgress:
     def report_position(self, name: str, state: State) -> None:
         """Report the separation (in h_rms), the area fraction A/A0 and the number of spots of a state."""
         if self.report is not None:
-            contact = self.contact
+            contact, self.reported = self.contact, time.monotonic()
             self.report(
                 f"{name}, separation {state.separation / contact.rms_height:.4f} h_rms, "
-                f"A/A0 {contact.area_fraction(state):.4e}, {contact.spot_count(state)} spots"
+                f"A/A0 {contact.area_fraction(state):.4e}, p {contact.pressure(state):.4g} Pa, "
+                f"{contact.spot_count(state)} spots"
             )
 
     def require_valid_state(

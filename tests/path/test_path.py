@@ -271,3 +271,16 @@ def test_hardly_any_load_is_met_beside_a_large_attraction(surface):
     pressure = run.nominal_pressure.values
     unit = MODULUS * surface.rms_slope
     assert np.all(np.abs(pressure - np.array([1e-12, 1e-10]) * unit) < 1e-9 * gross)
+
+
+def test_a_path_that_lasts_reports_where_it_is_between_its_targets(surface, monkeypatch):
+    monkeypatch.setattr("icha.path.loading.REPORT_AFTER", 0.0)
+    lines = []
+    simulate(surface, BARE, Path([1e-2], unload=True, max_step=0.1), progress=lines.append)
+    first, *_ = lines
+    assert first.startswith("loading, 0 of 1 stops, separation ") and " Pa, " in first and "A/A0 " in first
+    assert any(line.startswith("unloading, 1 of 1 stops, ") for line in lines)
+    monkeypatch.setattr("icha.path.loading.REPORT_AFTER", 60.0)
+    lines.clear()
+    simulate(surface, BARE, Path([1e-2]), progress=lines.append)
+    assert len(lines) == 1 and lines[0].startswith("stop 1 of 1: reduced_pressure = 0.01, separation ")
