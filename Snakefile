@@ -67,6 +67,7 @@ localrules:
     publish,
     configuration,
     campaign_dataset,
+    table,
     comparison,
     model_error,
     answers,
@@ -107,6 +108,7 @@ rule dataset:
     input:
         rules.runs.input,
         FILES.dataset,
+        FILES.table,
         FILES.comparison,
         FILES.model_error,
         FILES.answers,

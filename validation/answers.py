@@ -113,9 +113,9 @@ def read_values():
     """Return logarithms of values by case, level and seed, and seconds per run by case and level."""
     values, seconds = defaultdict(lambda: defaultdict(dict)), defaultdict(lambda: defaultdict(list))
     for hurst, waves, ratio, level, _, seed, quantity, pressure, value, duration in read_rows():
-        if float(value) > 0:
+        if float(value):
             case = (hurst, waves, ratio, quantity, float(pressure))
-            values[case][level][int(seed)] = math.log(float(value))
+            values[case][level][int(seed)] = math.log(abs(float(value)))  # pull-off pressures are negative
             seconds[case][level].append(float(duration))
     return values, seconds
 

@@ -130,4 +130,6 @@ def _by_seed(of_level, surface, slope, material):
         return {}
     values, seeds = of_level
     column = values[:, surface, slope, material].astype(float)
-    return {seed: math.log(value) for seed, value in zip(seeds, column, strict=True) if value > 0}
+    # Pull-off pressures are negative.
+    known = np.isfinite(column) & (column != 0)
+    return {seed: math.log(abs(value)) for seed, value, each in zip(seeds, column, known, strict=True) if each}

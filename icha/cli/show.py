@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from icha.cli.project import UserError, echo
+from icha.cli.project import UserError, echo, option
 from icha.datasets.attributes import reasons_not_applicable, why_no_result
 from icha.support.formatting import format_count, format_quantity, printable
 
@@ -14,7 +14,15 @@ CURVES = {"contact_area_fraction": "A/A0", "reduced_pressure": "p*", "reduced_se
 COLUMNS = ("reduced_pressure", "contact_area_fraction", "reduced_separation", "spot_count")
 
 
-def show(file: Annotated[Path, typer.Argument(help="A run, surface or campaign dataset (.nc).")]) -> None:
+def show(
+    file: Annotated[Path, typer.Argument(help="A run, surface or campaign dataset (.nc).")],
+    csv: Annotated[
+        bool, typer.Option("--csv", help="Print a table with a row for each run and target of a campaign dataset.")
+    ] = False,
+    parquet: Annotated[
+        Path | None, option("Write the same table to a Parquet file. This needs the package pyarrow.", "--parquet")
+    ] = None,
+) -> None:
     """Print a summary of a run, a surface or a campaign dataset, with its main numbers."""
     from icha.datasets.format import CAMPAIGN, RUN, SURFACE, UnknownFile, identify_file
 
@@ -22,6 +30,9 @@ def show(file: Annotated[Path, typer.Argument(help="A run, surface or campaign d
         kind, data = identify_file(file)
     except UnknownFile as error:
         raise UserError(str(error)) from None
+    if csv or parquet is not None:
+        _print_table(kind, data, file, parquet)
+        return
     printers = {RUN: _print_run, SURFACE: _print_surface, CAMPAIGN: _print_campaign}
     if kind not in printers:
         raise UserError(f"{file}: {kind}; expected a run, a surface or a campaign dataset. Try `ncdump -h`")
@@ -29,6 +40,23 @@ def show(file: Annotated[Path, typer.Argument(help="A run, surface or campaign d
         printers[kind](data, file)
     except (AttributeError, LookupError, TypeError, ValueError) as error:  # a file that another program wrote
         raise UserError(f"{file}: {kind} of another format ({error!r}); `icha check` lists the problems") from None
+
+
+def _print_table(kind: str, data, file: Path, parquet: Path | None) -> None:
+    """Print the tidy table of a campaign dataset as CSV, or write it to a Parquet file."""
+    from icha.datasets.format import CAMPAIGN
+    from icha.datasets.table import as_csv, tidy_table
+
+    if kind != CAMPAIGN:
+        raise UserError(f"{file}: {kind}; expected a campaign dataset, such as results/NAME/dataset/NAME.nc")
+    table = tidy_table(data)
+    if parquet is None:
+        typer.echo(as_csv(table), nl=False)
+        return
+    try:
+        table.to_parquet(parquet, index=False)
+    except ImportError:
+        raise UserError("--parquet needs the package pyarrow; install it with `pip install pyarrow`") from None
 
 
 def _print_run(run, file: Path) -> None:

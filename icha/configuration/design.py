@@ -341,3 +341,26 @@ def value_label(section, name: str) -> str:
     power = min(max(power, min(_PREFIXES)), max(_PREFIXES))
     digits = format(exact.scaleb(-power).normalize(), "f")
     return f"{digits}{_PREFIXES[power]}{_SYMBOLS[unit]}"
+
+
+def varied_values(campaign: Campaign) -> dict[str, dict[str, tuple[str, str, dict]]]:
+    """Return, for each study, the varied parameters by name: label (surface or material), unit, and value by label."""
+    found: dict[str, dict[str, tuple[str, str, dict]]] = {}
+    for label, study in campaign.studies.items():
+        given = [study.vary, *(study.cases or ())]
+        names = dict.fromkeys(name for each in given if each for name in SCALARS if getattr(each, name) is not None)
+        for name in names:
+            of_material = name in _OF_MATERIAL
+            entries = campaign.materials if of_material else campaign.surfaces
+            shown = study.materials if of_material else study.surfaces
+            values = {each: getattr(entries[each], name, None) for each in shown}
+            unit = next((unit for each in shown if (unit := unit_of(entries[each], name))), "1")
+            found.setdefault(label, {})[name] = "material" if of_material else "surface", unit, values
+    return found
+
+
+def unit_of(section, name: str) -> str:
+    """Return the SI unit of a key of a section, in the notation of CF; "" for a key without a unit."""
+    metadata = type(section).model_fields[name].metadata if name in type(section).model_fields else ()
+    unit = next((each.unit for each in metadata if isinstance(each, FloatRange)), "")
+    return unit.replace("/m^2", " m^-2")

@@ -115,8 +115,14 @@ def _group_attributes(study: Arrangement, attrs: Mapping[str, str]) -> dict:
     )
 
 
-def define_group(group: netCDF4.Dataset, study: Arrangement, attrs: Mapping[str, str]) -> Group:
-    """Define dimensions, variables and attributes of a study's group; `attrs` are the attributes of the file."""
+def define_group(
+    group: netCDF4.Dataset, study: Arrangement, attrs: Mapping[str, str], varied: Mapping[str, tuple[str, str, dict]]
+) -> Group:
+    """Define dimensions, variables and attributes of a study's group; `attrs` are the attributes of the file.
+
+    varied : varied parameters of the study, as in `write_campaign`. Variables of the runs keep their values.
+    """
+    varied = {name: each for name, each in varied.items() if name not in study.variables}
     counts = {
         dim: sum(entry.sizes.get(dim, 0) for entry in study.entries)
         for dim in RAGGED
@@ -127,7 +133,8 @@ def define_group(group: netCDF4.Dataset, study: Arrangement, attrs: Mapping[str,
     group.setncatts(_group_attributes(study, attrs))
     dims_in_file = {name: sum(study.dims_of(name), ()) for name in study.variables}
     dims_in_file |= {name: described.dims for name, described in CAMPAIGN.items()} | {"rms_slope": study.slope_dims}
-    coordinates = coordinates_of(study.variables, study.coordinates, dims_in_file)
+    dims_in_file |= {name: (label,) for name, (label, *_) in varied.items()}
+    coordinates = coordinates_of(study.variables, {*study.coordinates, *varied}, dims_in_file)
     varying = [dims for along, dims in map(study.dims_of, study.variables) if along == LABELS]
     block = _block(sizes, LABELS, max(math.prod(sizes[dim] for dim in dims) for dims in varying))
 
@@ -166,6 +173,17 @@ def define_group(group: netCDF4.Dataset, study: Arrangement, attrs: Mapping[str,
             values = np.nan_to_num(values, nan=FLOAT_FILL)
         width = values.shape[-1] if is_texts else 0
         known.append((define(name, attributes, along, dims, values.dtype, width, fill), values))
+    for name, (label, unit, by_name) in varied.items():
+        given = [by_name.get(each) for each in study.known[label]]
+        numbers = all(isinstance(value, int | float) or value is None for value in given)
+        values = (
+            np.array([math.nan if value is None else value for value in given], float)
+            if numbers
+            else characters(np.array(["" if value is None else str(value) for value in given], object))
+        )
+        attributes = {"units": unit, "long_name": f"{name.replace('_', ' ')} of the {label}", "varied": "true"}
+        width = 0 if numbers else values.shape[-1]
+        known.append((define(name, attributes, (), (label,), values.dtype, width), values))
     ragged = {dim: {name: each.variable for name, each in columns.items() if each.dims == (dim,)} for dim in counts}
     for dim, variables in ragged.items():
         for label in LABELS:
@@ -210,6 +228,7 @@ def write_campaign(
     design: Iterable[RunLabels | tuple] | None = None,
     settings: Mapping[RunLabels | tuple, str] = {},
     attrs: Mapping[str, str] = {},
+    varied: Mapping[str, Mapping[str, tuple[str, str, dict]]] = {},
 ) -> None:
     """Write all runs of a campaign to one netCDF-4 file, with one group for each study and arrays along labels.
 
@@ -224,6 +243,8 @@ def write_campaign(
     design : labels of all runs of the campaign. Default: the labels in `runs`. Other combinations of these labels have
         the status `not_in_design`.
     settings : expected checksums of the settings of runs (attribute `config_sha256`), by the labels of the runs.
+    varied : for each study, its varied parameters by name: label on which the parameter depends (surface or material),
+        unit, and value for each value of the label. They become coordinates.
     attrs : global attributes of the file (title, summary, campaign, license, …).
 
     Raises
@@ -242,7 +263,9 @@ def write_campaign(
             described = combine_attributes("Campaign of rough contacts", _STUDIES, COLLECTED, origins)
             file.setncatts(described | {"comment": _ACCESS.format(", ".join(names), names[0])} | dict(attrs))
             # Writing is faster if all variables are defined first: see icha.datasets.files.
-            groups = [define_group(file.createGroup(study.name), study, attrs) for study in studies]
+            groups = [
+                define_group(file.createGroup(each.name), each, attrs, varied.get(each.name, {})) for each in studies
+            ]
             for group in groups:
                 _write(group, spool)
 

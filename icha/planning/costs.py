@@ -84,6 +84,7 @@ LAWS = {
     "finite range, adhesion, cycle": PowerLaw(0, 1.4e-6, {"nodes": 1.72, "step": -0.1}),
     "reference": PowerLaw(0.28, 0, {}),
     "campaign_dataset": PowerLaw(0.07, 0.015, {"runs": 1}),
+    "table": PowerLaw(0.1, 0.008, {"runs": 1}),
     "comparison": PowerLaw(0.07, 0.003, {"runs": 1}),
     "model_error": PowerLaw(0.07, 0.05, {"runs": 1}),
     "answers": PowerLaw(0.1, 0.003, {"runs": 1}),

@@ -180,6 +180,7 @@ def _derived_files(campaign, files: CampaignFiles, computed: list[Item]) -> Iter
     beside = [*files.compared, *files.solutions]
     tables = [
         ("campaign_dataset", [files.dataset], 1, files.runs, runs, 0.5 * disk),
+        ("table", [files.table], 2, [files.dataset], runs, 0.1 * disk),
         ("comparison", [files.comparison], 2, [files.dataset], runs, 0.03 * disk + 90e3),
         ("model_error", files.model_error, 2, [files.dataset, *beside], len(beside), 150e3),
         ("answers", files.answers, 2, [files.dataset], runs, 100e3),

@@ -30,6 +30,7 @@ class CampaignFiles:
     solutions: dict[str, SolutionLabels]
     loops: dict[str, ContactLabels]
     dataset: str
+    table: str
     comparison: str
     compared: dict[str, RunLabels]
     model_error: list[str]
@@ -55,6 +56,7 @@ class CampaignFiles:
             *self.runs,
             *self.references,
             self.dataset,
+            self.table,
             self.comparison,
             *self.model_error,
             *self.answers,
@@ -87,6 +89,7 @@ def campaign_files(campaign: Campaign, folder: str = "") -> CampaignFiles:
         solutions=solutions,
         loops=each(results.LOOP, loop_cases(campaign)),
         dataset=path(results.DATASET),
+        table=path(results.TABLE),
         comparison=path(results.COMPARISON),
         compared=compared,
         model_error=[path(results.MODEL_ERROR)] if compared or solutions else [],

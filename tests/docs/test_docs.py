@@ -24,7 +24,8 @@ from icha.configuration.campaign import Campaign
 from icha.configuration.cases import run_cases
 from icha.configuration.load import load_configuration
 from icha.datasets.campaign import campaign_tree
-from icha.datasets.files import write_dataset
+from icha.datasets.files import read_campaign, write_dataset
+from icha.datasets.table import as_csv, tidy_table
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
@@ -182,6 +183,8 @@ def with_results(folder):
     ((_, measured), *_) = campaigns(DOCS / "howto/measured_campaign.md")
     measured["studies"]["ensemble"]["seeds"] = [1, 2]
     write_results(folder, loaded(folder, measured))
+    table = as_csv(tidy_table(read_campaign(folder / "results/mine/dataset/mine.nc")))
+    (folder / "results/mine/dataset/mine.csv").write_text(table, encoding="utf-8")
     answers = estimate_campaign(compared.tree_of_both())["one"].to_dataset()
     write_dataset(xr.DataTree.from_dict({"/load": answers}), folder / "results/mine/aggregated/answers.nc")
     write_dataset(crops.tree(), folder / "results/crops/dataset/crops.nc")

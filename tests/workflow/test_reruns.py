@@ -20,6 +20,7 @@ BESIDE_RUNS = {"reference", "boundary_elements", "boundary_element_loop"}
 RUNS_AND_AFTER = {
     "run",
     "campaign_dataset",
+    "table",
     "comparison",
     "model_error",
     "answers",

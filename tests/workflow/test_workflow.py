@@ -29,7 +29,7 @@ references/challenge.nc
 references/boundary_elements/adhesionless/challenge/seed2/slope1/cmc_adhesionless/p0.0316.nc
 references/boundary_elements/adhesive/challenge/seed1/slope1/cmc_300nm/p0.01.nc
 references/loops/adhesive/challenge/seed1/slope1/cmc_300nm.nc
-aggregated/answers.nc
+dataset/smoke.csv aggregated/answers.nc
 aggregated/model_error.nc aggregated/smoke.nc dataset/smoke.nc checks.json verdict.txt config.used.yaml report.html
 publish/smoke-0.0.1/SHA256SUMS publish/smoke-0.0.1/dataset/smoke.nc publish/smoke-0.0.1.zip
 """

@@ -2,6 +2,7 @@
 # runs at common loads, the error of the asperity model, estimates with intervals, the checks of all results, and the verdict.
 
 from icha.configuration.cases import campaign_sha256
+from icha.configuration.design import varied_values
 from icha.deposit.metadata import discovery_attributes
 from icha.support.checksums import sha256_of
 
@@ -48,6 +49,7 @@ rule campaign_dataset:
         runtime=30,
     params:
         labels=[tuple(labels) for labels in FILES.runs.values()],
+        varied=as_it_is(varied_values(CAMPAIGN)),
         settings=[SHA256_OF_RUN(labels) for labels in FILES.runs.values()],
         size=len(FILES.runs),
         attributes=as_it_is(
@@ -64,6 +66,28 @@ rule campaign_dataset:
         "Campaign dataset of {params.size} runs"
     script:
         "../scripts/make_dataset.py"
+
+
+rule table:
+    input:
+        FILES.dataset,
+    output:
+        FILES.table,
+    log:
+        "<logs>/table.log",
+    benchmark:
+        "<benchmarks>/table.jsonl"
+    conda:
+        "../envs/icha.yaml"
+    resources:
+        mem_mb=4000,
+        runtime=30,
+    params:
+        code=code_of("make_table.py"),
+    message:
+        "Table of the campaign"
+    script:
+        "../scripts/make_table.py"
 
 
 rule comparison:

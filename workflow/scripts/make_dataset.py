@@ -5,10 +5,11 @@ from job import attributes, job_context
 from icha.datasets.campaign_file import write_campaign
 
 
-def make_dataset(runs, output, *, labels, settings, attributes):
+def make_dataset(runs, output, *, labels, settings, attributes, varied=()):
     """Combine run files into a campaign dataset, with the labels and the checksum of the settings of each run."""
     settings = dict(zip(labels, settings, strict=True))
-    write_campaign(zip(labels, runs, strict=True), output, design=labels, settings=settings, attrs=attributes)
+    pairs = zip(labels, runs, strict=True)
+    write_campaign(pairs, output, design=labels, settings=settings, attrs=attributes, varied=dict(varied))
 
 
 if "snakemake" in globals():
@@ -19,4 +20,5 @@ if "snakemake" in globals():
             labels=snakemake.params.labels,
             settings=snakemake.params.settings,
             attributes=attributes(snakemake),
+            varied=snakemake.params.varied,
         )

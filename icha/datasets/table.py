@@ -1,0 +1,83 @@
+"""Tidy table of a campaign: one row for each run and target, one column for each label and quantity."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from icha.datasets.campaign import runs_of_status, variables_of_run
+from icha.datasets.labels import LABELS, place_of
+from icha.datasets.variables.campaign import COMPUTED_RUNS, STATUS_MEANINGS
+from icha.path.targets import BETWEEN
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import xarray as xr
+
+# Ends of the names of columns, by unit.
+_ENDINGS = {
+    "1": "",
+    "m": "_m",
+    "Pa": "_Pa",
+    "N": "_N",
+    "m^2": "_m2",
+    "m^-1": "_per_m",
+    "m^-2": "_per_m2",
+    "Pa m^-1": "_Pa_per_m",
+    "N m^-1": "_N_per_m",
+    "J m^-2": "_J_per_m2",
+}
+
+
+def column_name(name: str, unit: str) -> str:
+    """Return the name of the column of a variable: its name and unit, such as `mean_separation_m`."""
+    return name + _ENDINGS[unit]
+
+
+def tidy_table(campaign: xr.DataTree) -> pd.DataFrame:
+    """Return a table of all targets that the runs of a campaign reached.
+
+    The columns are: study and labels of the run; varied parameters; status of the run; number, branch and target of the
+    step; all quantities of the step; all quantities of the run. Names of columns end in the unit, if the unit is not 1.
+    """
+    import pandas as pd
+
+    return pd.concat([_study_table(campaign, name) for name in campaign.children], ignore_index=True)
+
+
+def _study_table(campaign, name):
+    """Return the table of one study."""
+    import pandas as pd
+
+    study = campaign[name].to_dataset()
+    status = study["status"].transpose(*LABELS).values
+    frames = []
+    for labels in runs_of_status(study, name, COMPUTED_RUNS):
+        variables, _ = variables_of_run(campaign, labels)
+        targets = np.flatnonzero(variables["step_kind"].values.astype(str) != BETWEEN)
+        place = place_of(study, {label: getattr(labels, label) for label in LABELS})
+        columns = {"study": name} | {label: getattr(labels, label) for label in LABELS}
+        for varied, values in study.coords.items():
+            if "varied" in values.attrs:
+                unit = values.attrs["units"]
+                columns[column_name(varied, unit)] = values.values[place[values.dims[0]]]
+        columns["status"] = STATUS_MEANINGS[int(status[tuple(place[label] for label in LABELS)])]
+        of_steps, of_run = {}, {}
+        for key, variable in variables.items():
+            if variable.dims not in (("step",), ()) or key in LABELS:
+                continue
+            # The unit of a target depends on its kind.
+            named = key if key == "step_target" else column_name(key, variable.attrs["units"])
+            if variable.dims:
+                of_steps[named] = variable.values[targets]
+            else:
+                of_run[named] = variable.values.item()
+        if len(targets):
+            frames.append(pd.DataFrame(columns | of_steps | of_run))
+    return pd.concat(frames, ignore_index=True) if frames else pd.DataFrame({"study": []})
+
+
+def as_csv(table: pd.DataFrame) -> str:
+    """Return a table as CSV; numbers have ten digits, and missing values are empty."""
+    return table.to_csv(index=False, float_format="%.10g", lineterminator="\n")
