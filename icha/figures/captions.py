@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from icha.contact.models import REFERENCE_MODEL
 from icha.datasets.labels import LABELS
+from icha.datasets.variables.model_error import FINITE_RANGE
+from icha.support.statistics import ENOUGH
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -23,9 +27,47 @@ def _texts() -> dict[str, str]:
     return {name: " ".join(text.split()) for name, text in tomllib.loads(file.read_text(encoding="utf-8")).items()}
 
 
-def caption_of(name: str) -> str:
-    """Return the caption of a figure."""
-    return _texts()[name].format_map(_texts())
+# A text of a caption that depends on the contents of the figure, such as `[bare: Open shapes are …]`.
+_CONDITIONAL = re.compile(r"\[(\w+): (.*?)\] ?")
+
+
+def caption_of(name: str, contents: Collection[str] | None = None) -> str:
+    """Return the caption of a figure with these `contents` (`contents_of`); None stands for all contents."""
+    text = _texts()[name].format_map(_texts())
+
+    def choose(found):
+        return f"{found[2]} " if contents is None or found[1] in contents else ""
+
+    return _CONDITIONAL.sub(choose, text).strip()
+
+
+def contents_of(campaign: xr.DataTree, studies: Sequence[str], model_error: xr.DataTree | None = None) -> set[str]:
+    """Return the contents of a figure of some studies, as captions name them.
+
+    Contents are `seeds` (several), `few` (2 to 4) and `many` (5 or more) seeds; materials without (`bare`) and with
+    adhesion (`adhesive`); `free` squares; several `surfaces`; `unloading`; boundary elements beside asperities in the
+    limit of a short range (`truth`) and at a `finite` range, also in `loops`.
+    """
+    found = set()
+    shown = [campaign[name].to_dataset() for name in studies if name in campaign.children]
+    for study in shown:
+        seeds, energy = study.sizes["seed"], study["surface_energy"].values
+        conditions = {
+            "seeds": seeds > 1,
+            "few": 1 < seeds < ENOUGH,
+            "many": seeds >= ENOUGH,
+            "bare": (energy == 0).any(),
+            "adhesive": (energy > 0).any(),
+            "free": (study["boundary"] == "free").any(),
+            "surfaces": study.sizes["surface"] > 1,
+            "unloading": study["leg"].max() > 0,
+        }
+        found |= {name for name, holds in conditions.items() if holds}
+    models = {model for study in shown for model in study["model"].values.tolist()}
+    found |= {"truth"} if REFERENCE_MODEL in models and len(models) > 1 else set()
+    entries = [] if model_error is None else [node.attrs for node in model_error.children.values()]
+    finite = any(entry.get("truth") == FINITE_RANGE and entry.get("study") in studies for entry in entries)
+    return found | ({"finite", "loops"} if finite else set())
 
 
 def count_runs(campaign: xr.DataTree, studies: Sequence[str]) -> str:

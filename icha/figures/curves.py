@@ -15,6 +15,7 @@ from icha.figures.ensembles import draw_members, lines_handles, mark_fewer
 from icha.figures.looks import (
     ASPERITIES_NAME,
     BRANCH_DASHES,
+    CROSSES,
     FEW_LINES,
     MODEL_MARKERS,
     TRUTH_LINE,
@@ -32,7 +33,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
 
-PRESSURE_LABEL = r"reduced pressure  $F/(E^{\ast}h_{\mathrm{rms}}^{\prime}A_0)$"
+PRESSURE_LABEL = r"reduced pressure  $F/(E^{\ast}h′_{\mathrm{rms}}A_0)$"
 AREA_LABEL = r"contact area  $A/A_0$"
 SEPARATION_LABEL = r"mean separation  $\bar{u}/h_{\mathrm{rms}}$"
 GAP_LABEL = r"mean gap  $\langle u\rangle/h_{\mathrm{rms}}$"
@@ -95,11 +96,21 @@ def study_curves(campaign: xr.DataTree, study: str, boundary_elements: str | Non
         lines.append(_curve(group, look))
     other = boundary_elements or (study if name == ASPERITIES_NAME else None)
     truths = select.select_runs(campaign, other, ragged=False, model=REFERENCE_MODEL) if other else []
-    crosses = [_curve(truth, cross_look(looks, truth.contact)) for truth in select.group_by_contact(campaign, truths)]
+    grouped = select.group_by_contact(campaign, truths)
+    crosses = [_curve(truth, cross_look(looks, truth.contact)) for truth in grouped]
+    # If markers distinguish surfaces and slopes, the crosses have different numbers of arms.
+    names = {looks.place_name(tuple(truth.contact[1:])): truth.contact for truth in grouped}
+    if looks.by_place or len(names) == 1:
+        truth_handles = {SHORT_RANGE: model_handle(SHORT_RANGE)} if crosses else {}
+    else:
+        truth_handles = {
+            f"{SHORT_RANGE}, {name}": model_handle(SHORT_RANGE, marker=cross_look(looks, contact)["marker"])
+            for name, contact in names.items()
+        }
     changed |= {"ls": "-" if looks.many or any(len(group.by_seed) > 1 for group in groups) else "none"}
     changed |= {} if looks.by_place else {"marker": MODEL_MARKERS[name]}
     handles = looks.handles(**changed) | {name: model_handle(name, mfc="white")}
-    return Curves(lines, crosses, looks, handles | ({SHORT_RANGE: model_handle(SHORT_RANGE)} if crosses else {}))
+    return Curves(lines, crosses, looks, handles | truth_handles)
 
 
 def _curve(runs, look):
@@ -112,7 +123,9 @@ def cross_look(looks: Looks, contact: Contact, model: str = SHORT_RANGE) -> dict
     # Crosses without adhesion are larger than crosses with adhesion, so that both are visible if they coincide.
     size = (8 if adhesive else 11) * (1 if len(looks.contacts) <= FEW_LINES else 0.7)
     look = {"color": colour, "mec": colour, "ms": size, "zorder": 6 + adhesive}
-    return look | {"ls": "none", "marker": MODEL_MARKERS[model], "mew": 1.0}
+    rank = 0 if looks.by_place or model != SHORT_RANGE else looks.rank(contact)
+    marker = CROSSES[rank % len(CROSSES)] if rank else MODEL_MARKERS[model]
+    return look | {"ls": "none", "marker": marker, "mew": 1.0}
 
 
 def model_name(dataset: xr.Dataset) -> str:

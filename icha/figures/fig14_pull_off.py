@@ -73,11 +73,11 @@ def figure(campaign: xr.DataTree, *, study: str, load_studies: Sequence[str] = (
         ax.set_ylabel(f"pull-off pressure ({unit})")
     slopes = sorted({point.labels.rms_slope for line in by_slope.values() for point in line})
     scale = "log" if slopes[-1] > 3 * slopes[0] else "linear"
-    panels[0].set(xlabel=r"rms slope  $h_{\mathrm{rms}}^{\prime}$", xscale=scale)
+    panels[0].set(xlabel=r"rms slope  $h′_{\mathrm{rms}}$", xscale=scale)
     panels[0].set_xticks(slopes, [f"{slope:g}" for slope in slopes])
     panels[0].minorticks_off()
     if by_load:
-        panels[1].set_xlabel(r"largest reduced pressure  $F/(E^{\ast}h_{\mathrm{rms}}^{\prime}A_0)$")
+        panels[1].set_xlabel(r"largest reduced pressure  $F/(E^{\ast}h′_{\mathrm{rms}}A_0)$")
         if loads.min() > 0:
             logarithmic_axes(panels[1], "x")
             panels[1].set_xlim(loads.min() / 1.6, loads.max() * 1.6)

@@ -158,7 +158,12 @@ def _draw_references(left, right, references, limits):
         points = {"fmt": "x", "color": BLACK, "ms": 6, "mew": 1.2, "lw": 1.2, "zorder": 5}
         left.errorbar(*(values.values for values in gfmd), label="GFMD, no adhesion", **points)
     if "persson_reduced_separation" in references:
-        right.plot(p[shown], references["persson_reduced_separation"].values[shown], label="Yang & Persson", **black)
+        right.plot(
+            p[shown],
+            references["persson_reduced_separation"].values[shown],
+            label="Yang & Persson",
+            **black | {"ls": (0, (7, 2))},
+        )
 
 
 def _draw_separate_summits(left, right, references, dataset, looks):

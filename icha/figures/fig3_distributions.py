@@ -85,7 +85,7 @@ def _finish(left, right, pressures, highest, load):
     if highest > 0:
         right.set_ylim(highest * 5e-5, highest * 3)
     right.axvline(0, color="0.75", lw=0.6, zorder=0)
-    unit = r"E^{\ast}h_{\mathrm{rms}}^{\prime}"
+    unit = r"E^{\ast}h′_{\mathrm{rms}}"
     left.set(xlabel=r"gap  $u/h_{\mathrm{rms}}$", ylabel=r"$P(u)\; h_{\mathrm{rms}}$")
     right.set(xlabel=f"contact pressure  $p/({unit})$", ylabel=rf"$P(p)\; {unit}$")
 

@@ -15,7 +15,7 @@ from icha.figures.declaration import Campaign, Declaration, Inputs, RunFigure, S
 from icha.figures.looks import NOT_APPLICABLE_ALONE
 from icha.figures.maps import draw_map, draw_spots, topography_of, wrap_circles
 from icha.figures.select import is_applicable, select_complete_run
-from icha.figures.style import format_number, in_style, material_label, new_panels
+from icha.figures.style import format_number, in_style, legend_handle, material_label, new_panels
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -100,7 +100,7 @@ def figure(
     if beside is not None:
         covered = contact_of_spots(data, at, len(beside["contact_map"]))
         _draw_boundary_elements(panels, topography, (corner, width), heights, beside, covered)
-    load = rf"$F/(E^{{\ast}}h_{{\mathrm{{rms}}}}^{{\prime}}A_0)$ = {format_number(float(state['reduced_pressure']))}"
+    load = rf"$F/(E^{{\ast}}h′_{{\mathrm{{rms}}}}A_0)$ = {format_number(float(state['reduced_pressure']))}"
     title = f"{labels.surface}, {material_label(campaign[labels.study].to_dataset(), labels.material)}, {load}"
     fig.suptitle(title if is_applicable(data) else f"{title}\n{NOT_APPLICABLE_ALONE}", fontsize="medium")
     for ax in panels.ravel():
@@ -148,6 +148,15 @@ def _draw_boundary_elements(panels, topography, window, heights, beside, covered
     draw_map(solution, fraction, topography.side, cmap=red, vmin=0, vmax=1)
     nodes, borders = _window(fraction, topography.side, *window)
     enlarged.contour(nodes, [0.5], extent=borders, origin="lower", colors="black", linewidths=0.9)
+    enlarged.legend(
+        handles=[
+            Patch(fc=(*_RED, 0.4), ec=(0.75, 0, 0), label="asperities"),
+            legend_handle(color="black", lw=0.9, label="boundary elements (edge)"),
+        ],
+        loc="upper center",
+        bbox_to_anchor=(0.5, -0.17),
+        ncols=2,
+    )
     palette = np.array([to_rgb(colour) for _, colour in _STATES])
     draw_map(compared, palette[1 * covered + 2 * contact], topography.side)
     keys = [Patch(fc=colour, label=name) for name, colour in _STATES if name]

@@ -6,6 +6,8 @@ import os
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from icha.datasets import results
 from icha.figures.curves import AREA_LABEL, PRESSURE_LABEL, add_legend, area_points, draw_curves, study_curves
 from icha.figures.declaration import Campaign, Declaration, Inputs, TruthFigure
@@ -49,6 +51,10 @@ DECLARATION = Declaration(
 )
 
 
+# Height of the lower panels divided by the height of the upper panels.
+_LOWER = 0.5
+
+
 @in_style
 def figure(
     campaign: xr.DataTree,
@@ -69,13 +75,19 @@ def figure(
     """
     # Open markers do not hide each other where curves coincide.
     curves = study_curves(campaign, study, boundary_elements, mfc="none")
-    fig, [(left, right)] = new_panels(3.5, sharey=True)
-    draw_curves(curves, {left: area_points, right: _points_at_load}, unloading=True)
+    fig, panels = new_panels(4.9, 2, sharex="col", sharey="row", height_ratios=(1, _LOWER))
+    (left, right), (left_ratio, right_ratio) = panels
+    ratios = {left_ratio: _area_per_pressure, right_ratio: _area_per_pressure_at_load}
+    *_, (_, drawn), _ = draw_curves(curves, {left: area_points, right: _points_at_load} | ratios, unloading=True)
+    for axes in ratios:
+        axes.set_yscale("linear")
+    left_ratio.set_ylim(0.9 * drawn.min(), 1.1 * drawn.max())
     for k, (table, known) in enumerate(zip(tables, measurements, strict=True)):
         colour = curves.looks.material_colour(known["material"])
         _draw_measured(left, right, table, known, colour, DASHES[k % len(DASHES)])
-    left.set(xlabel=PRESSURE_LABEL, ylabel=AREA_LABEL)
-    right.set_xlabel(r"relative load  $F/(E^{\ast}A_0)$")
+    left.set_ylabel(AREA_LABEL)
+    left_ratio.set(xlabel=PRESSURE_LABEL, ylabel=r"$A E^{\ast}h′_{\mathrm{rms}}/F$")
+    right_ratio.set_xlabel(r"relative load  $F/(E^{\ast}A_0)$")
     add_legend(fig, [left, right], curves)
     return fig
 
@@ -92,3 +104,13 @@ def _draw_measured(left, right, table, known, colour, dashes):
 
 def _points_at_load(run):
     return run["reduced_pressure"].values * float(run["rms_slope"]), run["contact_area_fraction"].values
+
+
+def _area_per_pressure(run):
+    """Return reduced pressures, and contact area fractions divided by reduced pressures."""
+    pressure, area = area_points(run)
+    return pressure, np.divide(area, pressure, out=np.full(area.shape, np.nan), where=pressure > 0)
+
+
+def _area_per_pressure_at_load(run):
+    return _points_at_load(run)[0], _area_per_pressure(run)[1]

@@ -102,4 +102,5 @@ def _draw_slopes(ax, runs, kind, colours, length):
             start = 90 + share * list(colours).index(slope)
             ax.add_collection(PatchCollection([Wedge((x, y), r, start, start + share) for x, y, r in circles], **look))
     ax.set(xlim=(0, side), ylim=(0, side))
-    ax.set_title(snapshot_label(run, at[slope]), loc="right")
+    sectors = "" if kind == "relative_load" or len(runs) == 1 else ", a sector for each slope"
+    ax.set_title(snapshot_label(run, at[slope]) + sectors, loc="right")

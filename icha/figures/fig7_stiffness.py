@@ -40,7 +40,7 @@ def figure(campaign: xr.DataTree, references: xr.Dataset | None = None, *, study
         left.plot(p[shown], theory[shown], **look)
         right.plot(p[shown], theory[shown] / p[shown], **look)
         ratio = np.concatenate([ratio, theory[shown] / p[shown]])
-    stiffness_label = r"contact stiffness  $K h_{\mathrm{rms}}/(E^{\ast}h_{\mathrm{rms}}^{\prime})$"
+    stiffness_label = r"contact stiffness  $K h_{\mathrm{rms}}/(E^{\ast}h′_{\mathrm{rms}})$"
     y = (drop_rounding_errors(stiffnesses).min() / 2, stiffnesses.max() * 2)
     left.set(xlim=x, xlabel=PRESSURE_LABEL, ylim=y, ylabel=stiffness_label)
     right.set(xlim=x, xlabel=PRESSURE_LABEL, ylim=(0, 1.15 * ratio.max()), ylabel=r"$K h_{\mathrm{rms}}/p$")

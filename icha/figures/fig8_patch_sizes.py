@@ -13,7 +13,7 @@ from icha.figures.declaration import Declaration, SnapshotFigure
 from icha.figures.ensembles import draw_members, join_bins
 from icha.figures.looks import MODEL_MARKERS, TRUTH_LINE
 from icha.figures.select import select_snapshots
-from icha.figures.style import in_style, logarithmic_axes, new_panels
+from icha.figures.style import GREY, in_style, logarithmic_axes, new_panels
 from icha.support.formatting import choose_unit
 
 if TYPE_CHECKING:
@@ -28,6 +28,8 @@ DECLARATION = Declaration(
 # Smallest number of patches in a bin of the density. Bins with fewer patches are joined with their neighbours.
 _LEAST_PATCHES = 10
 _BINS_PER_DECADE = 8
+# Fewest bins for which a density is drawn.
+_FEWEST_BINS = 3
 # Largest number of points of a cumulative curve; more points would not be distinguishable.
 _CURVE_POINTS = 300
 
@@ -40,7 +42,7 @@ def figure(campaign: xr.DataTree, *, study: str, kind: str | None = None, target
     fig, [(left, right)] = new_panels(3.1, sharex=True)
     period = float(lines[0].members[0][0]["period"])
     factor, unit = choose_unit(period, "m")
-    cell = (period * factor) ** 2
+    cell, most_bins = (period * factor) ** 2, 0
     for line, look in zip(lines, each_look, strict=True):
         areas, true_areas = (
             [patch_areas(run, at) * factor**2 for run, at in members] for members in (line.members, line.truths)
@@ -50,10 +52,17 @@ def figure(campaign: xr.DataTree, *, study: str, kind: str | None = None, target
             (left, patch_density, look, MODEL_MARKERS[SHORT_RANGE]),
             (right, patches_above, smooth, "none"),
         ):
-            draw_members(ax, *points(areas, cell), line_look, positive=True, asked=line.runs.asked)
+            size, values = points(areas, cell)
+            if ax is left:
+                most_bins = max(most_bins, len(size))
+                if len(size) < _FEWEST_BINS:
+                    continue
+            draw_members(ax, size, values, line_look, positive=True, asked=line.runs.asked)
             if line.truths:
                 area, values = points(true_areas, cell)
                 ax.plot(area, values.mean(axis=0), color=look["color"], marker=marker, **TRUTH_LINE)
+    if most_bins < _FEWEST_BINS:
+        left.text(0.5, 0.5, "too few patches for a density", transform=left.transAxes, ha="center", color=GREY)
     for ax in (left, right):
         logarithmic_axes(ax)
         ax.set_xlabel(f"patch area  $A$ ({unit}²)")

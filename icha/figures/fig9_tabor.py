@@ -86,7 +86,7 @@ def _finish(ax, smallest):
     low, high = ax.get_xlim()
     # The tolerance allows for a range of attraction that was rounded.
     if smallest < WU_HOLDS_FROM / 1.01:
-        ax.axvspan(low, WU_HOLDS_FROM, color="0.93", lw=0, zorder=0)
+        ax.axvspan(low, WU_HOLDS_FROM, color="0.93", lw=0, zorder=0, label="jump-in distance not verified")
     ax.set_xlim(low, high)
     ax.set_xlabel(r"Tabor parameter  $\mu$")
     # The limits of the axis are wider than the values, so that differences of a few per mille do not fill the panel.

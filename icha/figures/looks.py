@@ -17,6 +17,7 @@ import numpy as np
 from icha.contact.models import MODELS
 from icha.datasets.variables.model_error import FINITE_RANGE, SHORT_RANGE
 from icha.figures.style import BLACK, COLOURS, GREY, INTERFACE, legend_handle, material_label, slope_label
+from icha.support.formatting import format_quantity
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -32,6 +33,8 @@ MATERIAL_COLOURS = (*COLOURS[:-1], "#004166", "#803800", "#005A42", "#80436A", "
 MARKERS = ("o", "s", "^", "D", "v", "p", "*")
 
 ASPERITIES_NAME = MODELS["asperities"].words
+# Crosses of boundary elements for the second and further surfaces or slopes; the first one has four arms.
+CROSSES = ((4, 2, 0), (5, 2, 0), (6, 2, 0), (8, 2, 0))
 # Markers in legends by the name of the model.
 MODEL_MARKERS = {ASPERITIES_NAME: "o", SHORT_RANGE: "+", FINITE_RANGE: "1"}
 UNLOADING_MARKERS = {SHORT_RANGE: "x", FINITE_RANGE: "2"}
@@ -76,6 +79,7 @@ class Looks:
         self, campaign: xr.DataTree, interfaces: xr.Dataset, contacts: Iterable[Contact], *, by_place: bool = False
     ):
         """Assign colours and markers to the lines."""
+        self._campaign = campaign
         self.contacts = list(dict.fromkeys(contacts))
         self.interfaces = interfaces
         self.materials = list(dict.fromkeys(material for material, *_ in self.contacts))
@@ -154,8 +158,13 @@ class Looks:
         """Return surface and rms slope as text; a surface or slope that all lines have in common is left out."""
         surface, slope = place
         surfaces, slopes = (set(each) for each in zip(*self.places, strict=True))
-        words = [surface] if len(surfaces) > 1 else []
+        words = [surface_label(self._campaign, surface)] if len(surfaces) > 1 else []
         return ", ".join([*words, slope_label(slope)] if slope is not None and len(slopes) > 1 else words)
+
+    def rank(self, contact: Contact) -> int:
+        """Return the number of a surface and slope in the order of the markers, from 0; 0 for unknown ones."""
+        places = list(self._markers)
+        return places.index(contact[1:]) if contact[1:] in places else 0
 
     def name(self, contact: Contact) -> str:
         """Return a name that distinguishes a line from the other lines of the figure."""
@@ -165,6 +174,41 @@ class Looks:
         if place and self.by_place and len(self.materials) == 1:
             return place
         return ", ".join(filter(None, [self.material_name(material), place]))
+
+
+# Symbols of varied parameters of surfaces.
+_SYMBOLS = {
+    "hurst": "$H$",
+    "rolloff_wavelength": r"$\lambda_{\mathrm{r}}$",
+    "short_wavelength": r"$\lambda_{\mathrm{s}}$",
+    "period": "$L$",
+    "grid": "$n$",
+    "cutoff": r"$\lambda_{\mathrm{c}}$",
+}
+
+
+def surface_label(campaign: xr.DataTree, surface: str) -> str:
+    """Return the name of a surface; if parameters are varied, the name of the original surface and the parameters."""
+    for study in campaign.children.values():
+        names = study["surface"].values.tolist()
+        coordinates = study.coords.items()
+        varied = {name: each for name, each in coordinates if "varied" in each.attrs and each.dims == ("surface",)}
+        if surface in names and varied:
+            words = [_symbol_and_value(name, each, names.index(surface)) for name, each in varied.items()]
+            # Names of variants begin with the name of the original surface, a hyphen and the first varied parameter.
+            origins = {each: each.partition(f"-{next(iter(varied))}")[0] for each in names}
+            return ", ".join(([origins[surface]] if len(set(origins.values())) > 1 else []) + words)
+    return surface
+
+
+def _symbol_and_value(name, values, k):
+    """Return the symbol of a varied parameter with the value at index `k`, as text."""
+    value = values.values[k]
+    if isinstance(value, str):
+        shown = value
+    else:
+        shown = format_quantity(value, "m") if values.attrs["units"] == "m" else f"{value:g}"
+    return f"{_SYMBOLS.get(name, name.replace('_', ' '))} = {shown}"
 
 
 def looks_of_studies(campaign: xr.DataTree, studies: Sequence[str], contacts: Iterable[Contact]) -> Looks:

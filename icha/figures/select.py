@@ -202,7 +202,7 @@ def select_snapshots(
 
 
 _KIND_LABELS = {
-    "reduced_pressure": r"$F/(E^{\ast}h_{\mathrm{rms}}^{\prime}A_0)$",
+    "reduced_pressure": r"$F/(E^{\ast}h′_{\mathrm{rms}}A_0)$",
     "relative_load": r"$F/(E^{\ast}A_0)$",
     "area_fraction": r"$A/A_0$",
     "mean_separation": r"$\bar{u}$ (m)",

@@ -174,4 +174,4 @@ def material_label(study: xr.Dataset, material: str) -> str:
 
 def slope_label(slope: float) -> str:
     """Return a legend text with an rms slope."""
-    return rf"$h_{{\mathrm{{rms}}}}^{{\prime}}$ = {slope:g}"
+    return rf"$h′_{{\mathrm{{rms}}}}$ = {slope:g}"

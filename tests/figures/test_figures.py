@@ -31,6 +31,7 @@ from icha.figures import (
     fig10_model_error,
     fig11_distribution_error,
 )
+from icha.figures.captions import caption_of, contents_of
 from icha.figures.looks import material_colours, some_of
 from icha.figures.maps import average_blocks, wrap_circles
 from icha.figures.select import NothingToDraw, branches, path_steps, select_runs
@@ -49,6 +50,12 @@ from icha.surfaces.moments import spectral_moments
 
 LABELS = RunLabels("one", "asperities", "rough", 1, 1.0, "soft")
 KIND = "reduced_pressure"
+
+
+@pytest.fixture(autouse=True)
+def densities_of_few_patches(monkeypatch):
+    """The small surfaces of these tests have few patches."""
+    monkeypatch.setattr(fig8_patch_sizes, "_FEWEST_BINS", 1)
 
 
 def truth(area=1.5):
@@ -186,7 +193,7 @@ def test_fig5_draws_measurements_over_the_curves(tmp_path):
     (tmp_path / "other.csv").write_text("p, a\n1e-3, 3e-3\n1e-2, 3e-2\n2e-2, 5e-2\n")
     measured = {"columns": {"p": 1e3, "a": 0.01}, "load_unit": 1e6, "material": "soft", "rms_slope": 0.2}
     without_slope = {"columns": {"p": 1.0, "a": 1.0}, "load_unit": 1.0, "material": None, "rms_slope": None}
-    left, right = fig5_multi_slope.figure(
+    left, right, *_ = fig5_multi_slope.figure(
         small.tree(),
         [tmp_path / "one.csv", tmp_path / "other.csv"],
         study="slopes",
@@ -349,10 +356,12 @@ def test_fig5_marks_boundary_elements_of_the_study_or_of_another():
     for study, options in (("slopes", {}), ("truth", {"boundary_elements": "truth"})):
         beside = labels._replace(study=study, model="boundary_elements")
         figure = fig5_multi_slope.figure(campaign_tree([*runs, (beside, own)]), study="slopes", **options)
-        for axes, factor in zip(figure.axes, (1.0, labels.rms_slope), strict=True):
+        for axes, factor in zip(figure.axes, (1.0, labels.rms_slope) * 2, strict=True):
             (crosses,) = lines_of(axes, "+")
             np.testing.assert_allclose(crosses.get_xdata(), factor * np.array(small.PRESSURES), rtol=1e-6)
-            assert np.all(np.isin(crosses.get_ydata(), own["contact_area_fraction"].values))
+            areas = crosses.get_ydata() * (1.0 if axes in figure.axes[:2] else np.array(small.PRESSURES))
+            found = np.isclose(areas[:, None], own["contact_area_fraction"].values, rtol=1e-6)
+            assert found.any(axis=1).all()
             drawn = {line.get_color() for line in axes.get_lines() if line.get_marker() not in ("+", "None")}
             assert crosses.get_color() in drawn
         assert legend(figure).count("boundary elements") == 1
@@ -623,3 +632,24 @@ def test_fig4_does_not_show_another_run_where_its_own_failed(surface):
     tree = campaign_tree(runs)
     with pytest.raises(NothingToDraw, match="one/rough/seed1/slope1/soft: this run is not complete"):
         fig4_contact_map.figure(tree, surface, run=LABELS)
+
+
+def test_a_density_of_fewer_than_three_bins_is_not_drawn(monkeypatch):
+    monkeypatch.setattr(fig8_patch_sizes, "_FEWEST_BINS", 3)
+    left, right = fig8_patch_sizes.figure(small.tree(), study="single").axes
+    assert not [line for line in left.get_lines() if len(line.get_xdata())] and right.get_lines()
+    assert "too few patches for a density" in [text.get_text() for text in left.texts]
+
+
+def test_captions_state_only_what_the_figure_contains():
+    tree = small.tree()
+    bare = caption_of("fig2_area_and_gap", contents_of(tree, ["slopes"]))
+    assert "Open shapes are results without adhesion." in bare and "boundary elements" not in bare
+    assert "Lines are means" not in bare and "Thin dashed" not in bare and "[" not in bare
+    seeds = caption_of("fig2_area_and_gap", contents_of(tree, ["single"]))
+    assert "Lines are means over the seeds" in seeds and "Pale thin lines" in seeds and "A band" not in seeds
+    both = caption_of("fig2_area_and_gap", contents_of(compared.tree_of_both(), ["one"]))
+    assert "The lower panels show" in both and "Open shapes" in both
+    errors = compared.errors()
+    assert "three arms" in caption_of("fig2_area_and_gap", contents_of(compared.tree(), ["one"], errors))
+    assert "three arms" not in both and len(caption_of("fig2_area_and_gap")) > len(both)

@@ -6,7 +6,7 @@ from job import job_context
 
 from icha.analysis.checks import read_checks
 from icha.datasets.files import read_campaign
-from icha.figures.captions import caption_of
+from icha.figures.captions import caption_of, contents_of
 from icha.report.report import ReportFigure, write_report
 from icha.report.run_times import write_times
 from icha.report.sections import read_surface_statistics
@@ -20,17 +20,19 @@ if "snakemake" in globals():
         answers = "".join(files.answers)  # empty without boundary elements for several seeds
         linked |= {"Answers": answers} if answers else {}
         linked |= {"Times and memory of the jobs": times} | ({"Error of the model": model_error} if model_error else {})
+        campaign, errors = read_campaign(files.campaign), read_campaign(model_error) if model_error else None
+        shown = []
+        for (name, studies), png, pdf in zip(
+            params.figures.items(), files.figures[::2], files.figures[1::2], strict=True
+        ):
+            contents = contents_of(campaign, studies, errors) if studies else None
+            shown.append(ReportFigure(name, caption_of(name, contents), png, pdf, tuple(studies)))
         write_report(
             page,
-            campaign=read_campaign(files.campaign),
-            figures=[
-                ReportFigure(name, caption_of(name), png, pdf, tuple(studies))
-                for (name, studies), png, pdf in zip(
-                    params.figures.items(), files.figures[::2], files.figures[1::2], strict=True
-                )
-            ],
+            campaign=campaign,
+            figures=shown,
             checks=read_checks(files.checks),
-            model_error=read_campaign(model_error) if model_error else None,
+            model_error=errors,
             answers=read_campaign(answers) if answers else None,
             surfaces=[read_surface_statistics(path) for path in files.surfaces],
             configuration=Path(files.configuration).read_text(encoding="utf-8"),
