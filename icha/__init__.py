@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 _HOME = {
     "SelfAffineSpectrum": "surfaces.spectrum",
     "Surface": "surfaces.surface",
+    **dict.fromkeys(("SpectrumTable", "merge_spectra", "read_spectrum_table"), "surfaces.tabulated_spectrum"),
     **dict.fromkeys(("Sphere", "Paraboloid", "CylinderPunch", "FlatPunch", "Cone", "Wave"), "surfaces.shapes"),
     "Material": "asperity.material",
     "Path": "path.targets",
@@ -29,6 +30,9 @@ if TYPE_CHECKING:  # for editors and type checkers only
     from icha.surfaces.shapes import Wave as Wave
     from icha.surfaces.spectrum import SelfAffineSpectrum as SelfAffineSpectrum
     from icha.surfaces.surface import Surface as Surface
+    from icha.surfaces.tabulated_spectrum import SpectrumTable as SpectrumTable
+    from icha.surfaces.tabulated_spectrum import merge_spectra as merge_spectra
+    from icha.surfaces.tabulated_spectrum import read_spectrum_table as read_spectrum_table
 
     __version__: str
 else:

@@ -72,7 +72,9 @@ def _answer(row: xr.Dataset) -> Answer:
     factor, unit = _unit(quantity, value, str(row["units"].item()))
     shares = {name: float(row[f"share_{name}"]) for name in ("seeds", "model", "refinement", "grid")}
     known = {name: 0.0 if math.isnan(share) else share for name, share in shares.items()}
-    grid = math.hypot(known["refinement"], known["grid"])
+    causes = {"seeds": known["seeds"], "model": known["model"]}
+    if not math.isnan(shares["grid"]):
+        causes["grid"] = math.hypot(known["refinement"], known["grid"])
     half = float(row["estimate_high"] - row["estimate_low"]) / 2
     kind = str(row["stop_kind"].item())
     return Answer(
@@ -82,10 +84,7 @@ def _answer(row: xr.Dataset) -> Answer:
         value * factor,
         half * factor,
         unit,
-        {
-            name: share * value * factor
-            for name, share in (("seeds", known["seeds"]), ("model", known["model"]), ("grid", grid))
-        },
+        {name: share * value * factor for name, share in causes.items()},
         _limit(row, shares),
     )
 

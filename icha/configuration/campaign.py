@@ -107,7 +107,8 @@ class Campaign(Section):
     defaults: Defaults = Defaults()
     """Default values for all surfaces, materials or studies."""
     surfaces: Annotated[dict[Name, AnySurface], Field(min_length=1)]
-    """Surfaces by name. Each surface has `kind: self_affine`, `kind: measured`, `kind: file` or `kind: smooth`."""
+    """Surfaces by name. Each surface has `kind: self_affine`, `kind: spectrum`, `kind: measured`, `kind: file` or
+    `kind: smooth`."""
     materials: Annotated[dict[Name, MaterialSection], Field(min_length=1)]
     """Materials by name."""
     studies: Annotated[dict[Name, Study], Field(min_length=1)]

@@ -48,6 +48,8 @@ def surface_settings(campaign: Campaign, name: str) -> dict:
         settings = surface.model_dump(exclude_none=True, exclude={"boundary", "shape"})
     elif isinstance(surface, MeasuredSurface):
         settings = {"kind": surface.kind} | surface.preparation
+    elif surface.random:
+        settings = surface.model_dump(exclude={"path", "boundary", "shape"})
     else:
         settings = {"kind": surface.kind, "period": surface.period, "metres_per_unit": surface.height_unit}
     return settings | surface.boundary_and_shape

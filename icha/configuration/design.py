@@ -205,7 +205,7 @@ def _study_problems(campaign: Campaign, label: str, study: Study) -> Iterator[Pr
             continue
         surface = cases[location[3]].surface if location[2] == "cases" else None
         for name in [surface] if surface else study.surfaces:
-            if name in campaign.surfaces and campaign.surfaces[name].random:
+            if name in campaign.surfaces and campaign.surfaces[name].random and not campaign.surfaces[name].from_file:
                 yield location, slope, f"needs a measured surface, but {name!r} is random; expected numbers"
 
 
@@ -274,7 +274,7 @@ class _Variants:
         variant = self._variant("surfaces", surface, of_surface)
         if section.smooth:
             slope = 0.0
-        elif section.random and isinstance(slope, RmsHeight):
+        elif not section.from_file and isinstance(slope, RmsHeight):
             random = self.derived["surfaces"].get(variant, section)
             slope = slope_of_height(slope, random.rms_height_at_unit_slope)
         return Contact(

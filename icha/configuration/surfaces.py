@@ -406,6 +406,34 @@ class FileSurface(_SurfaceFromFile):
     shape: ShapeSection | None = _SHAPE
 
 
+class SpectrumSurface(_SurfaceFromFile):
+    """A random periodic surface with the spectrum in a table, such as the merged spectrum of several scans."""
+
+    random: ClassVar[bool] = True
+
+    kind: Literal["spectrum"]
+    """A random surface with the spectrum of a table."""
+    path: File
+    """Path of a text file with two columns, the wave number q and the power spectral density C(q) of an isotropic
+    surface, relative to the configuration file. `icha.merge_spectra` makes such a file from scans."""
+    length_unit: UnitOfLength = Field(default="m", validate_default=True)
+    """Unit of length of the table, such as `um`: q is in rad/um, and C in um⁴."""
+    period: Length
+    """Side L of the periodic cell. Waves longer than the cell are left out."""
+    grid: integer(GRID)
+    """Number of nodes along a side of the periodic cell. The shortest wave of the table needs at least 2 cells; 8 are
+    recommended."""
+    amplitudes: Literal["fixed", "gaussian"] = "fixed"
+    """Amplitudes of the waves, as for `kind: self_affine`."""
+    boundary: Literal["periodic", "free"] = _BOUNDARY
+    shape: ShapeSection | None = _SHAPE
+
+    @model_validator(mode="after")
+    def _check_size_of_shape(self):
+        self._check_shape(self.period, self.grid)
+        return self
+
+
 class SmoothSurface(_Surface):
     """A shape alone, without roughness. A study uses it once, without seeds and rms slopes."""
 
@@ -439,5 +467,8 @@ SURFACE_KINDS = {
     "file": FileSurface,
     "measured": MeasuredSurface,
     "smooth": SmoothSurface,
+    "spectrum": SpectrumSurface,
 }
-AnySurface = Annotated[SelfAffineSurface | FileSurface | MeasuredSurface | SmoothSurface, Field(discriminator="kind")]
+AnySurface = Annotated[
+    SelfAffineSurface | FileSurface | MeasuredSurface | SmoothSurface | SpectrumSurface, Field(discriminator="kind")
+]

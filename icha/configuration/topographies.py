@@ -14,7 +14,7 @@ from pydantic import ValidationError
 from icha.configuration.campaign import Campaign, Topography
 from icha.configuration.errors import problem_of, refuse
 from icha.configuration.studies import MEASURED
-from icha.configuration.surfaces import FileSurface, MeasuredSurface
+from icha.configuration.surfaces import FileSurface, MeasuredSurface, SpectrumSurface
 from icha.support.checksums import sha256_of
 from icha.support.values import NOTHING, Problem
 
@@ -46,7 +46,7 @@ def inspect_topographies(campaign: Campaign) -> tuple[dict[str, Topography], lis
 _KNOWN: dict[tuple, Topography] = {}
 
 
-def inspect_file(section: MeasuredSurface | FileSurface) -> Topography:
+def inspect_file(section: MeasuredSurface | FileSurface | SpectrumSurface) -> Topography:
     """Return the properties of a surface from a file; an unchanged file is read only once."""
     try:
         stat = os.stat(section.path)
@@ -70,8 +70,10 @@ def inspect_file(section: MeasuredSurface | FileSurface) -> Topography:
     return _KNOWN[key]
 
 
-def read_surface(section: MeasuredSurface | FileSurface) -> Surface:
+def read_surface(section: MeasuredSurface | FileSurface | SpectrumSurface, seed: int = 1) -> Surface:
     """Read a surface from a file, and prepare the surface with the keys of its section.
+
+    For a spectrum, return the realisation with this seed.
 
     A ValueError about the shape has the attribute `key`.
     """
@@ -81,8 +83,15 @@ def read_surface(section: MeasuredSurface | FileSurface) -> Surface:
 
         surface = prepared_topography(section.path, section.preparation).surface
         return _with_shape(surface, section)
-    from icha.surfaces.measured.scan import read_height_map
     from icha.surfaces.surface import Surface
+
+    if isinstance(section, SpectrumSurface):
+        from icha.surfaces.tabulated_spectrum import read_spectrum_table
+
+        spectrum = read_spectrum_table(section.path, section.length_unit).in_cell(section.period)
+        surface = spectrum.realise(section.grid, seed, section.amplitudes)
+        return _with_shape(Surface(surface.heights, section.period, "free") if section.free else surface, section)
+    from icha.surfaces.measured.scan import read_height_map
 
     surface = Surface(
         read_height_map(section.path, section.height_unit), section.period, "free" if section.free else "periodic"

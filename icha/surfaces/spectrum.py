@@ -1,4 +1,6 @@
-"""Self-affine spectra with roll-off, and random surfaces with such a spectrum (Violano & Afferrante, eq. PSD).
+"""Spectra of isotropic surfaces, and random surfaces with such a spectrum.
+
+Self-affine spectra with roll-off follow Violano & Afferrante, eq. PSD:
 
 C(q) = C0 for q_L <= q < q_0, C0 (q/q_0)^(-2(1+H)) for q_0 <= q < q_1, and 0 elsewhere; q_L = 2 pi / L. By convention,
 the integral of C over the plane of wave vectors is h_rms^2. So a mode of the cell has |h_q|^2 = C(q) (2 pi/L)^2.
@@ -23,61 +25,27 @@ _ROUNDING = 1e-9
 _LINES = 64
 
 
-@dataclass(frozen=True)
-class SelfAffineSpectrum:
-    """Power spectral density of a self-affine surface with a given rms slope.
+class IsotropicSpectrum:
+    """Power spectral density of an isotropic surface in a periodic cell; base class of all spectra.
 
-    Parameters
+    Attributes
     ----------
-    period : L, side of the periodic cell, m; all lengths of a spectrum must be in [1e-24, 1e9] m.
-    rolloff_wavelength : 2 pi / q_0, m; at most the period.
-    short_wavelength : 2 pi / q_1, the short cut-off, m; less than the roll-off wavelength.
-    hurst : H, in (0, 1].
-    rms_slope : h'_rms, in [1e-9, 1e6]; h'_rms^2 is exactly the sum of q^2 |h_q|^2 over the wave vectors of the cell.
-
-    Raises
-    ------
-    ValueError
-        If a value is out of range; the message names the parameter.
+    period : side of the periodic cell, m.
+    short_wavelength : shortest wavelength, m.
+    plateau : factor of `_shape`, m^4.
     """
 
     period: float
-    rolloff_wavelength: float
     short_wavelength: float
-    hurst: float
-    rms_slope: float = 1.0
+    plateau: float
 
-    def __post_init__(self):
-        """Check the values."""
-        for name in ("period", "rolloff_wavelength", "short_wavelength"):
-            object.__setattr__(self, name, LENGTH.validate(name, getattr(self, name)))
-        object.__setattr__(self, "rms_slope", SLOPE.validate("rms_slope", self.rms_slope))
-        object.__setattr__(self, "hurst", HURST.validate("hurst", self.hurst))
-        if self.rolloff_wavelength > self.period * (1 + _ROUNDING):
-            raise ValueError(
-                f"rolloff_wavelength: {self.rolloff_wavelength!r} m must not exceed the period {self.period!r} m"
-            )
-        if self.short_wavelength >= self.rolloff_wavelength:
-            raise ValueError(
-                f"short_wavelength: {self.short_wavelength!r} m must be less than the roll-off wavelength "
-                f"{self.rolloff_wavelength!r} m"
-            )
-        if not len(self._band[0]):
-            raise ValueError(
-                f"short_wavelength: no wave longer than {self.short_wavelength!r} m fits the period {self.period!r} m"
-            )
+    def _shape(self, k):
+        """Compute the spectrum divided by `plateau`, for wave numbers in units of 2 pi / L."""
+        raise NotImplementedError
 
     def psd(self, q: np.ndarray | float) -> np.ndarray:
         """Compute C(q) in m^4 for wave numbers `q` (any shape) in rad/m."""
-        q = np.asarray(q, dtype=float)
-        return self.plateau * self._shape(q * self.period / (2 * np.pi))
-
-    def _shape(self, k):
-        """Compute C/C0 for wave numbers in units of 2 pi / L."""
-        k0 = self.period / self.rolloff_wavelength
-        k1 = self.period / self.short_wavelength
-        falling = np.maximum(k / k0, 1.0) ** (-2 * (1 + self.hurst))
-        return np.where((k >= 1 - _ROUNDING) & (k < k1 * (1 - _ROUNDING)), falling, 0.0)
+        return self.plateau * self._shape(np.asarray(q, dtype=float) * self.period / (2 * np.pi))
 
     @cached_property
     def _band(self):
@@ -96,14 +64,6 @@ class SelfAffineSpectrum:
         k = np.hypot(kx, ky)
         inside = self._shape(k) > 0
         return kx[inside], ky[inside], k[inside], inside
-
-    @cached_property
-    def plateau(self) -> float:
-        """Plateau C0 of the spectrum in m^4, for which the modes of the cell have exactly the given rms slope."""
-        _, _, k, _ = self._band
-        q = 2 * np.pi / self.period
-        slope2 = 2 * float(np.sum(self._shape(k) * k**2)) * q**4
-        return self.rms_slope**2 / slope2
 
     @property
     def rms_height(self) -> float:
@@ -167,3 +127,63 @@ class SelfAffineSpectrum:
         on_cores(along_y, blocks(half.shape[1], _LINES))
         on_cores(along_x, blocks(grid, _LINES))
         return Surface(heights, self.period)
+
+
+@dataclass(frozen=True)
+class SelfAffineSpectrum(IsotropicSpectrum):
+    """Power spectral density of a self-affine surface with a given rms slope.
+
+    Parameters
+    ----------
+    period : L, side of the periodic cell, m; all lengths of a spectrum must be in [1e-24, 1e9] m.
+    rolloff_wavelength : 2 pi / q_0, m; at most the period.
+    short_wavelength : 2 pi / q_1, the short cut-off, m; less than the roll-off wavelength.
+    hurst : H, in (0, 1].
+    rms_slope : h'_rms, in [1e-9, 1e6]; h'_rms^2 is exactly the sum of q^2 |h_q|^2 over the wave vectors of the cell.
+
+    Raises
+    ------
+    ValueError
+        If a value is out of range; the message names the parameter.
+    """
+
+    period: float
+    rolloff_wavelength: float
+    short_wavelength: float
+    hurst: float
+    rms_slope: float = 1.0
+
+    def __post_init__(self):
+        """Check the values."""
+        for name in ("period", "rolloff_wavelength", "short_wavelength"):
+            object.__setattr__(self, name, LENGTH.validate(name, getattr(self, name)))
+        object.__setattr__(self, "rms_slope", SLOPE.validate("rms_slope", self.rms_slope))
+        object.__setattr__(self, "hurst", HURST.validate("hurst", self.hurst))
+        if self.rolloff_wavelength > self.period * (1 + _ROUNDING):
+            raise ValueError(
+                f"rolloff_wavelength: {self.rolloff_wavelength!r} m must not exceed the period {self.period!r} m"
+            )
+        if self.short_wavelength >= self.rolloff_wavelength:
+            raise ValueError(
+                f"short_wavelength: {self.short_wavelength!r} m must be less than the roll-off wavelength "
+                f"{self.rolloff_wavelength!r} m"
+            )
+        if not len(self._band[0]):
+            raise ValueError(
+                f"short_wavelength: no wave longer than {self.short_wavelength!r} m fits the period {self.period!r} m"
+            )
+
+    def _shape(self, k):
+        """Compute C/C0 for wave numbers in units of 2 pi / L."""
+        k0 = self.period / self.rolloff_wavelength
+        k1 = self.period / self.short_wavelength
+        falling = np.maximum(k / k0, 1.0) ** (-2 * (1 + self.hurst))
+        return np.where((k >= 1 - _ROUNDING) & (k < k1 * (1 - _ROUNDING)), falling, 0.0)
+
+    @cached_property
+    def plateau(self) -> float:  # type: ignore[override]
+        """Plateau C0 of the spectrum in m^4, for which the modes of the cell have exactly the given rms slope."""
+        _, _, k, _ = self._band
+        q = 2 * np.pi / self.period
+        slope2 = 2 * float(np.sum(self._shape(k) * k**2)) * q**4
+        return self.rms_slope**2 / slope2

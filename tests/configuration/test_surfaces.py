@@ -7,6 +7,8 @@ from demo_configuration import file_surface
 from icha.configuration.cases import run_cases, surface_cases, surface_settings
 from icha.configuration.errors import ConfigurationError
 from icha.datasets.labels import number_label
+from icha.surfaces.spectrum import SelfAffineSpectrum
+from icha.surfaces.tabulated_spectrum import SpectrumTable
 
 
 def test_the_slope_that_a_topography_has(load, tmp_path):
@@ -49,3 +51,27 @@ def test_a_surface_file_is_one_realisation_beside_the_configuration(load, tmp_pa
     assert surface_cases(campaign) == [("rough", 0)]
     assert campaign.surfaces["rough"].path == str(tmp_path / "heights.npy")
     assert surface_settings(campaign, "rough") == {"kind": "file", "period": 1e-3, "metres_per_unit": 1e-6}
+
+
+def test_surfaces_with_a_tabulated_spectrum_have_seeds_and_the_slope_of_their_table(load, refused, tmp_path):
+    spectrum = SelfAffineSpectrum(100e-6, 25e-6, 10e-6, 0.8, rms_slope=0.3)
+    q = np.geomspace(2 * np.pi / 100e-6, 2 * np.pi / 10.001e-6, 200)
+    SpectrumTable(q, spectrum.psd(q)).save(tmp_path / "table.txt")
+    section = {"kind": "spectrum", "path": "table.txt", "period": "100 um", "grid": 80}
+    changes = {"surfaces.rough": section, "studies.one.rms_slopes": "measured"}
+    campaign = load(changes).campaign
+    assert surface_cases(campaign) == [("rough", 1), ("rough", 2)]
+    (slope,) = {case.rms_slope for case in run_cases(campaign)}
+    assert slope == pytest.approx(0.3, rel=5e-3)
+    assert surface_settings(campaign, "rough") == {
+        "kind": "spectrum",
+        "length_unit": 1.0,
+        "period": 100e-6,
+        "grid": 80,
+        "amplitudes": "fixed",
+    }
+    (tmp_path / "wrong.txt").write_text("1 2\nthree 4\n", encoding="utf-8")
+    refused("", changes | {"surfaces.rough": section | {"path": "wrong.txt"}}, "surfaces.rough.path: '")
+    refused(
+        "", changes | {"surfaces.rough": section | {"grid": 16}}, "cells per shortest wavelength; expected at least"
+    )

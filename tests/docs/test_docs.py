@@ -83,6 +83,8 @@ def write_data(folder):
     y, x = np.indices(heights.shape) / len(heights)
     folder.mkdir(parents=True, exist_ok=True)
     np.save(folder / "heights.npy", heights / 1e-6)
+    q = np.geomspace(2 * np.pi / 100e-6, 2 * np.pi / 13e-6, 20)
+    icha.SpectrumTable(q, spectrum.psd(q)).save(folder / "sample.txt")
     (folder / "rubber.csv").write_text("pressure,area\n0.8,0.12\n2.4,0.37\n", encoding="utf-8")
     z = heights / 1e-4
     np.savetxt(folder / "surface.2048x2048.ASCII.dat", z)
@@ -201,7 +203,8 @@ def test_every_piece_of_python_runs(page, with_results, monkeypatch, tmp_path):
     monkeypatch.setenv("MPLBACKEND", "agg")
     code = blocks(page, "python")
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "results").symlink_to(with_results / "results")
+    for name in ("results", "config"):
+        (tmp_path / name).symlink_to(with_results / name)
     names = {"__name__": "page"}
     # One after the other, as they are read.
     for line, block in code:

@@ -11,6 +11,7 @@ from icha.surfaces.measured.topography import prepared_topography
 from icha.surfaces.shapes import make_shape
 from icha.surfaces.spectrum import SelfAffineSpectrum
 from icha.surfaces.surface import FREE, PERIODIC, Surface
+from icha.surfaces.tabulated_spectrum import read_spectrum_table
 
 SPECTRUM = ("period", "rolloff_wavelength", "short_wavelength", "hurst")
 
@@ -36,6 +37,9 @@ def make_surface(output, *, name, seed, settings, height_map=None, sha256=None, 
             height_map, {key: settings[key] for key in settings if key not in ("kind", "shape")}
         )
         surface = measured.surface
+    elif settings["kind"] == "spectrum":
+        table = read_spectrum_table(height_map, settings["length_unit"])
+        surface = table.in_cell(settings["period"]).realise(settings["grid"], seed, settings["amplitudes"])
     elif settings["kind"] == "smooth":
         heights = np.zeros((settings["grid"], settings["grid"]))
         surface = Surface(heights, settings["side"], FREE, make_shape(settings["shape"]))

@@ -1,0 +1,274 @@
+"""Spectra from tables: read and write a table, and merge the spectra of several scans and profiles of one sample."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+from scipy.special import gamma
+
+from icha.support.atomic_files import whole_file
+from icha.support.rules import LENGTH
+from icha.surfaces.moments import radial_power_spectrum
+from icha.surfaces.spectrum import IsotropicSpectrum
+from icha.surfaces.surface import Surface
+
+# Trusted wave numbers begin at this multiple of 2 pi/L, because the removal of the trend weakens longer waves. They end
+# at a wavelength of this number of pixels.
+_LONGEST, _PIXELS = 2.0, 4.0
+# Rows of a merged table per decade of the wave number.
+_PER_DECADE = 10
+_HEADING = (
+    "wave number (rad/m), power spectral density C (m^4); the integral of C over the plane is the mean square height"
+)
+
+
+@dataclass(frozen=True, eq=False)
+class SpectrumTable:
+    """Isotropic power spectral density as a table.
+
+    Attributes
+    ----------
+    wave_number : (n,) float, wave numbers q, rad/m, increasing.
+    power : (n,) float, C(q), m^4, positive.
+    sources : one line for each scan or profile: its trusted range, and what limits the range.
+    """
+
+    wave_number: np.ndarray
+    power: np.ndarray
+    sources: tuple[str, ...] = ()
+
+    def __post_init__(self):
+        """Check the table."""
+        q, power = (np.asarray(each, float) for each in (self.wave_number, self.power))
+        if q.ndim != 1 or q.shape != power.shape or len(q) < 2:
+            raise ValueError("table: expected at least two rows of a wave number and a power")
+        if not (np.isfinite(q).all() and np.isfinite(power).all() and (q > 0).all() and (power > 0).all()):
+            raise ValueError("table: expected positive, finite wave numbers and powers")
+        if not (np.diff(q) > 0).all():
+            raise ValueError("table: expected wave numbers in increasing order, each once")
+        object.__setattr__(self, "wave_number", q)
+        object.__setattr__(self, "power", power)
+
+    def in_cell(self, period: float) -> TabulatedSpectrum:
+        """Return the spectrum of surfaces in a periodic cell with a side of `period`, m."""
+        return TabulatedSpectrum(period, self)
+
+    def save(self, path: str | os.PathLike) -> None:
+        """Write the table as text, in SI units, with the sources as remarks."""
+        remarks = "\n".join([*self.sources, _HEADING])
+        with whole_file(path) as temporary:
+            np.savetxt(temporary, np.column_stack([self.wave_number, self.power]), fmt="%.9e", header=remarks)
+
+
+@dataclass(frozen=True, eq=False)
+class TabulatedSpectrum(IsotropicSpectrum):
+    """Spectrum of surfaces in a periodic cell, by interpolation of a table in double logarithmic scale.
+
+    Waves outside the table, and waves longer than the cell, have no amplitude.
+
+    Parameters
+    ----------
+    period : L, side of the periodic cell, m, in [1e-24, 1e9].
+    table : the table.
+    """
+
+    period: float
+    table: SpectrumTable
+    plateau: float = field(default=1.0, init=False)
+
+    def __post_init__(self):
+        """Check that some waves of the table fit the cell."""
+        object.__setattr__(self, "period", LENGTH.validate("period", self.period))
+        if not len(self._band[0]):
+            raise ValueError(
+                f"period: no wave of the table fits a cell of {self.period!r} m; expected more than "
+                f"{self.short_wavelength:.3g} m"
+            )
+
+    @property
+    def short_wavelength(self) -> float:  # type: ignore[override]
+        """Shortest wavelength of the table, m."""
+        return 2 * math.pi / float(self.table.wave_number[-1])
+
+    def _shape(self, k):
+        """Compute C, m^4, for wave numbers in units of 2 pi / L."""
+        q = np.asarray(k) * 2 * np.pi / self.period
+        known = np.log(self.table.wave_number), np.log(self.table.power)
+        with np.errstate(divide="ignore"):
+            inside = np.exp(np.interp(np.log(q), *known))
+        ends = self.table.wave_number[[0, -1]] * (1 - 1e-9, 1 + 1e-9)
+        return np.where((q >= ends[0]) & (q <= ends[1]), inside, 0.0)
+
+    @cached_property
+    def rms_slope(self) -> float:
+        """Rms slope of a periodic cell with this spectrum."""
+        _, _, k, _ = self._band
+        q = 2 * np.pi / self.period
+        return math.sqrt(2 * float(np.sum(self._shape(k) * k**2)) * q**4)
+
+
+def read_spectrum_table(path: str | os.PathLike, length_unit: float = 1.0) -> SpectrumTable:
+    """Read a table of q and C(q) from a text file with two columns; lines that begin with # are remarks.
+
+    Parameters
+    ----------
+    path : file with blanks, tabs, commas or semicolons between the columns.
+    length_unit : unit of length of the table, m: q is in rad per unit, C in the fourth power of the unit.
+
+    Raises
+    ------
+    ValueError
+        If a line has no two numbers, or if the numbers are not a spectrum.
+    """
+    rows = []
+    for number, line in enumerate(Path(path).read_text(encoding="utf-8").splitlines(), 1):
+        text = line.partition("#")[0].replace(",", " ").replace(";", " ").split()
+        if not text:
+            continue
+        try:
+            q, power = map(float, text)
+        except ValueError:
+            raise ValueError(
+                f"has {line.strip()[:40]!r} in line {number}; expected a wave number and a power"
+            ) from None
+        rows.append((q / length_unit, power * length_unit**4))
+    if len(rows) < 2:
+        raise ValueError(f"has {len(rows)} rows; expected at least two rows of a wave number and a power")
+    return SpectrumTable(*np.transpose(rows))
+
+
+def merge_spectra(
+    scans: Iterable[Surface] = (),
+    profiles: Iterable[tuple[np.ndarray, np.ndarray]] = (),
+    *,
+    tip_radius: float | None = None,
+) -> SpectrumTable:
+    """Merge the spectra of scans and profiles of one isotropic sample at several magnifications.
+
+    Each scan is trusted from half its side down to four pixels, to the noise floor of its spectrum, or to the
+    wavelength below which a tip of `tip_radius` distorts the heights (SurfaceTopography), whichever is longest. The
+    table contains the mean of all spectra that are trusted at a wave number.
+
+    Parameters
+    ----------
+    scans : measured surfaces, such as from `icha.read_scan`, in their own units of length.
+    profiles : positions x and heights z, m, of line scans with equal steps. Their spectra are converted under the
+        assumption of an isotropic surface whose spectrum is locally a power law (Jacobs, Junge & Pastewka, 2017).
+    tip_radius : radius of the tip of the instrument, m; None if the tip does not matter.
+
+    Raises
+    ------
+    ValueError
+        If nothing is given, or if no wave is trusted.
+    """
+    members = [(*_of_scan(surface), _trusted_range(surface, tip_radius)) for surface in scans]
+    scan_count = len(members)
+    members += _of_profiles([(np.asarray(x, float), np.asarray(z, float)) for x, z in profiles])
+    if not members:
+        raise ValueError("scans: expected at least one scan or profile")
+    trusted = []
+    for q, power, (low, high, _) in members:
+        known = (q >= low) & (q <= high) & (power > 0)
+        trusted.append((q[known], power[known]))
+    lows, highs = ([end[k] for q, _ in trusted if len(q) for end in [(q[0], q[-1])]] for k in (0, 1))
+    if not lows:
+        raise ValueError("scans: no wave is between the longest wave and the noise, pixel or tip of a scan")
+    count = max(2, math.ceil(_PER_DECADE * math.log10(max(highs) / min(lows))) + 1)
+    grid = np.geomspace(min(lows), max(highs), count)
+    logarithms = np.full((len(trusted), count), np.nan)
+    for row, (q, power) in zip(logarithms, trusted, strict=True):
+        if len(q) > 1:
+            inside = (grid >= q[0] * (1 - 1e-9)) & (grid <= q[-1] * (1 + 1e-9))
+            row[inside] = np.interp(np.log(grid[inside]), np.log(q), np.log(power))
+    covered = np.isfinite(logarithms).any(axis=0)
+    sources = tuple(
+        f"{f'scan {k + 1}' if k < scan_count else 'profiles'}: wavelengths from {2 * math.pi / high:.4g} m to "
+        f"{2 * math.pi / low:.4g} m; {reason}"
+        for k, (_, _, (low, high, reason)) in enumerate(members)
+    )
+    return SpectrumTable(grid[covered], np.nanmean(np.exp(logarithms[:, covered]), axis=0), sources)
+
+
+def _of_scan(surface):
+    q, power, _ = radial_power_spectrum(surface)
+    return q, power
+
+
+def _trusted_range(surface: Surface, tip_radius: float | None) -> tuple[float, float, str]:
+    """Return the smallest and the largest trusted wave number of a scan, rad/m, and what limits the largest."""
+    from icha.surfaces.measured.resolution import noise_floor
+
+    low = _LONGEST * 2 * math.pi / surface.period if surface.free else 2 * math.pi / surface.period
+    shortest = {f"{_PIXELS:g} pixels": _PIXELS * surface.spacing}
+    if (noise := noise_floor(surface)) is not None:
+        shortest["noise floor"] = noise.wavelength
+    if tip_radius is not None:
+        from SurfaceTopography import Topography
+
+        tip = {"instrument": {"parameters": {"tip_radius": {"value": tip_radius, "unit": "m"}}}}
+        sides = (surface.period, surface.period)
+        topography = Topography(surface.heights, sides, unit="m", periodic=not surface.free, info=tip)
+        if (cutoff := topography.short_reliability_cutoff()) is not None:
+            shortest["tip radius"] = float(cutoff)
+    reason = max(shortest, key=shortest.__getitem__)
+    return low, 2 * math.pi / shortest[reason], f"shorter waves: {reason}"
+
+
+def _of_profiles(profiles):
+    """Return wave numbers, isotropic spectrum and trusted range of each group of profiles with equal positions."""
+    groups: dict[tuple[float, int], list[np.ndarray]] = {}
+    for x, z in profiles:
+        steps = np.diff(x)
+        equal = x.ndim == 1 and x.shape == z.shape and len(x) >= 16 and steps[0] > 0
+        if not equal or not np.allclose(steps, steps[0], rtol=1e-3):
+            raise ValueError("profiles: expected positions with equal, positive steps and as many heights, at least 16")
+        groups.setdefault((float(f"{steps[0]:.6g}"), len(x)), []).append(_spectrum_of_profile(x, z))
+    found = []
+    for (step, count), spectra in groups.items():
+        # The mean over profiles comes first, because the conversion needs a smooth spectrum.
+        q, one = _in_rings(2 * np.pi / (step * count) * np.arange(1, len(spectra[0]) + 1), np.mean(spectra, axis=0))
+        trusted = _LONGEST * 2 * np.pi / (step * count), 2 * np.pi / (_PIXELS * step), _ISOTROPIC
+        found.append((q, isotropic_from_profile(q, one), trusted))
+    return found
+
+
+def _spectrum_of_profile(x, z):
+    """Return C1D, m^3, at the multiples of 2 pi/length; its integral over all q is the mean square height."""
+    level = z - np.polyval(np.polyfit(x, z, 1), x)
+    window = np.sin(np.pi * (np.arange(len(x)) + 0.5) / len(x)) ** 2
+    modes = np.abs(np.fft.rfft(level * window, norm="forward")) ** 2 / np.mean(window**2)
+    return modes[1:-1] * (x[1] - x[0]) * len(x) / (2 * np.pi)
+
+
+def _in_rings(q, power):
+    """Return means of wave numbers and powers in intervals with equal steps of the logarithm."""
+    edges = np.geomspace(0.999 * q[0], 1.001 * q[-1], max(3, math.ceil(_PER_DECADE * math.log10(q[-1] / q[0])) + 1))
+    ring = np.searchsorted(edges, q) - 1
+    count = np.bincount(ring)
+    return tuple(np.bincount(ring, weights=each)[count > 0] / count[count > 0] for each in (q, power))
+
+
+_ISOTROPIC = "one-dimensional spectrum, converted for an isotropic surface with a local power law"
+
+
+def isotropic_from_profile(q: Sequence[float], one: Sequence[float]) -> np.ndarray:
+    """Convert the spectrum of profiles of an isotropic surface to the spectrum of the surface.
+
+    For C(q) = c q^-(2+2H), the integral over the other wave number gives
+    C1D(q) = c sqrt(pi) Gamma(H + 1/2)/Gamma(H + 1) q^-(1+2H). The exponent is that of the neighbouring wave numbers.
+
+    Parameters
+    ----------
+    q : wave numbers, rad/m, increasing.
+    one : C1D(q), m^3; its integral over positive and negative wave numbers is the mean square height.
+    """
+    wave_number, power = np.asarray(q, float), np.asarray(one, float)
+    exponent = -np.gradient(np.log(power), np.log(wave_number))
+    hurst = np.clip((exponent - 1) / 2, -0.4, 2.0)
+    return power / wave_number * gamma(hurst + 1) / (math.sqrt(math.pi) * gamma(hurst + 0.5))

@@ -1,0 +1,111 @@
+"""Tabulated spectra: realisations, merging of scans at several magnifications, profiles, wrong tables."""
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+import icha
+from icha.surfaces.moments import radial_power_spectrum, spectral_moments
+from icha.surfaces.tabulated_spectrum import (
+    SpectrumTable,
+    isotropic_from_profile,
+    merge_spectra,
+    read_spectrum_table,
+)
+
+SIDE = 100e-6
+TRUE = icha.SelfAffineSpectrum(SIDE, 25e-6, 5e-6, 0.8, rms_slope=0.1)
+Q = np.geomspace(2 * np.pi / SIDE, 2 * np.pi / 5e-6 * 0.9999, 400)
+TABLE = SpectrumTable(Q, TRUE.psd(Q))
+
+
+def test_a_table_of_a_self_affine_spectrum_gives_the_same_surface():
+    spectrum = TABLE.in_cell(SIDE)
+    assert spectrum.rms_slope == pytest.approx(0.1, rel=2e-3)
+    assert spectrum.rms_height == pytest.approx(TRUE.rms_height, rel=2e-3)
+    one, other = spectrum.realise(160, 3), TRUE.realise(160, 3)
+    np.testing.assert_allclose(one.heights, other.heights, atol=0.02 * other.rms_height)
+    moments, expected = (spectral_moments(each) for each in (one, other))
+    np.testing.assert_allclose([moments.m0, moments.m2, moments.m4], [expected.m0, expected.m2, expected.m4], rtol=0.01)
+
+
+def test_a_table_is_written_and_read_in_any_unit_of_length(tmp_path):
+    TABLE.save(tmp_path / "table.csv")
+    np.testing.assert_allclose(read_spectrum_table(tmp_path / "table.csv").power, TABLE.power, rtol=1e-8)
+    rows = [f"{q * 1e-6:.9e},{power * 1e24:.9e}" for q, power in zip(TABLE.wave_number, TABLE.power, strict=True)]
+    (tmp_path / "um.csv").write_text("# q, C\n" + "\n".join(rows), encoding="utf-8")
+    found = read_spectrum_table(tmp_path / "um.csv", 1e-6)
+    np.testing.assert_allclose(found.wave_number, Q, rtol=1e-8)
+    np.testing.assert_allclose(found.power, TABLE.power, rtol=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("1 2\nx y\n", "'x y' in line 2; expected a wave number and a power"),
+        ("1 2 3\n", "in line 1; expected a wave number and a power"),
+        ("1 2\n", "has 1 rows; expected at least two"),
+        ("1 2\n1 3\n", "increasing order"),
+        ("1 2\n2 -3\n", "positive, finite"),
+    ],
+)
+def test_wrong_tables_are_refused(text, message, tmp_path):
+    (tmp_path / "table.txt").write_text(text, encoding="utf-8")
+    with pytest.raises(ValueError, match=message):
+        read_spectrum_table(tmp_path / "table.txt")
+    with pytest.raises(ValueError, match="no wave of the table fits"):
+        TABLE.in_cell(4e-6)
+
+
+def part(whole, corner, nodes, step=1, noise=0.0):
+    """Cut a free square out of a periodic surface; `step` leaves out nodes, as a lower magnification does."""
+    heights = whole.heights[corner : corner + nodes * step : step, corner : corner + nodes * step : step]
+    heights = heights + noise * np.random.default_rng(corner).normal(size=heights.shape)
+    return icha.Surface(heights, whole.spacing * step * nodes, "free")
+
+
+def test_scans_at_two_magnifications_merge_to_the_spectrum_of_the_sample():
+    whole = icha.SelfAffineSpectrum(400e-6, 100e-6, 5e-6, 0.8, rms_slope=0.1)
+    sample = whole.realise(1024, 1)
+    noise = 2e-9
+    scans = [part(sample, 0, 256, 4, noise), *(part(sample, corner, 200, 1, noise) for corner in (0, 300, 600))]
+    merged = merge_spectra(scans)
+    assert 2 * np.pi / merged.wave_number[0] > 150e-6 and 2 * np.pi / merged.wave_number[-1] < 6e-6
+    ratio = merged.power / whole.psd(merged.wave_number)
+    known = np.isfinite(ratio) & (merged.wave_number < 2 * np.pi / 6e-6)
+    assert abs(np.mean(np.log(ratio[known]))) < 0.15 and np.std(np.log(ratio[known])) < 0.5
+    assert merged.sources[0].startswith("scan 1: wavelengths from 6.25e-06 m") and "4 pixels" in merged.sources[0]
+    assert "noise floor" in merged.sources[1]
+
+
+def test_a_blunt_tip_shortens_the_trusted_range():
+    scan = part(TRUE.realise(512, 1), 0, 200)
+    sharp, blunt = (merge_spectra([scan], tip_radius=radius) for radius in (1e-9, 5e-6))
+    assert blunt.wave_number[-1] < 0.8 * sharp.wave_number[-1] and "tip radius" in blunt.sources[0]
+
+
+@pytest.mark.parametrize("hurst", [0.3, 0.8])
+def test_the_spectrum_of_profiles_is_that_of_the_surface_for_a_power_law(hurst):
+    q = np.geomspace(1.0, 100.0, 60)
+    one = [2 * quad(lambda y, x=x: (x**2 + y**2) ** -(1 + hurst), 0, np.inf)[0] for x in q]
+    np.testing.assert_allclose(isotropic_from_profile(q, one), q ** -(2 + 2 * hurst), rtol=1e-3)
+
+
+def test_profiles_of_an_isotropic_surface_give_its_spectrum():
+    whole = icha.SelfAffineSpectrum(400e-6, 400e-6, 4e-6, 0.8, rms_slope=0.1)
+    sample = whole.realise(512, 1)
+    x = np.arange(512) * sample.spacing
+    merged = merge_spectra(profiles=[(x, row) for row in sample.heights[::8]])
+    shown = (merged.wave_number > 2 * np.pi / 100e-6) & (merged.wave_number < 2 * np.pi / 10e-6)
+    ratio = merged.power[shown] / whole.psd(merged.wave_number[shown])
+    assert abs(np.mean(np.log(ratio))) < 0.15 and np.std(np.log(ratio)) < 0.3
+    assert "converted for an isotropic surface" in merged.sources[0] and merged.sources[0].startswith("profiles: ")
+    q, power, _ = radial_power_spectrum(sample)
+    assert np.isfinite(power).all() and len(q)
+
+
+def test_nothing_to_merge_is_refused():
+    with pytest.raises(ValueError, match="expected at least one scan or profile"):
+        merge_spectra()
+    with pytest.raises(ValueError, match="equal, positive steps"):
+        merge_spectra(profiles=[(np.arange(20.0) ** 2, np.zeros(20))])
