@@ -12,6 +12,7 @@ _HOME = {
     "Path": "path.targets",
     "read_scan": "configuration.topographies",
     "simulate": "simulation",
+    **dict.fromkeys(("plot_area", "plot_contact", "plot_separation"), "figures.quick"),
     "ConvergenceError": "simulation",
 }
 __all__ = ["__version__", *_HOME]
@@ -19,6 +20,9 @@ __all__ = ["__version__", *_HOME]
 if TYPE_CHECKING:  # for editors and type checkers only
     from icha.asperity.material import Material as Material
     from icha.configuration.topographies import read_scan as read_scan
+    from icha.figures.quick import plot_area as plot_area
+    from icha.figures.quick import plot_contact as plot_contact
+    from icha.figures.quick import plot_separation as plot_separation
     from icha.path.targets import Path as Path
     from icha.simulation import ConvergenceError as ConvergenceError
     from icha.simulation import simulate as simulate

@@ -1,6 +1,7 @@
 """Simulate the contact of one surface and one material along a path; the result is an xarray dataset."""
 
 import importlib
+import logging
 import math
 import pathlib
 import warnings
@@ -71,6 +72,9 @@ PULL_OFF = "pull_off"
 _STICKINESS_PAPER = "L. Pastewka and M. O. Robbins, PNAS 111 (2014) 3298-3303, doi:10.1073/pnas.1320846111 (stickiness)"
 
 
+_LOGGER = logging.getLogger("icha")
+
+
 class ConvergenceError(RuntimeError):
     """Error: the path could not be computed to its end, for example because it leaves the range of the model.
 
@@ -107,7 +111,8 @@ def simulate(
     model : "asperities" or "boundary_elements". Boundary elements are slower, and use the limit of a short range
         of attraction.
     seed : seed of the surface, for the record in the dataset; -1 for a surface without a seed.
-    progress : function that is called with a line of text at every target.
+    progress : function that is called with a line of text at every target, and in a long path also between targets.
+        Default: messages of level INFO of the logger "icha".
     kept : folder of checkpoints (`icha.contact.checkpoints`), only with boundary elements. If a call was interrupted, a
         call with the same arguments resumes from the checkpoints.
 
@@ -141,6 +146,8 @@ def simulate(
     # Only the chosen model is imported, because the fingerprint of a run must not depend on other models.
     solver = importlib.import_module(MODELS[model].module)
     seed = IntegerRange(-1).validate("seed", seed)
+    if progress is None and _LOGGER.isEnabledFor(logging.INFO):
+        progress = _LOGGER.info
     dataset = _compute(solver, surface, material, path, model, seed, progress, kept)
     if failed := reasons_of_failure(check_run(dataset)):
         dataset = dataset.assign_attrs(failed_checks=failed)

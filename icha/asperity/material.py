@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from icha.support.formatting import format_quantity, html_table
 from icha.support.rules import ADHESION_LENGTH, CONTACT_MODULUS, LENGTH, POISSON_RATIO, SURFACE_ENERGY
 
 # Smallest Tabor parameter for which Wu's distance of the jump into contact is within 0.5 % of the exact distance
@@ -54,6 +55,17 @@ class Material:
             object.__setattr__(self, name, rule.validate(name, getattr(self, name)))
         if self.surface_energy:
             ADHESION_LENGTH.validate("surface_energy over contact_modulus", self.adhesion_length)
+
+    def _repr_html_(self) -> str:
+        """Return a table for notebooks."""
+        rows = {
+            "contact modulus": format_quantity(self.contact_modulus, "Pa"),
+            "work of adhesion": format_quantity(self.surface_energy, "J/m²"),
+            "range of attraction": format_quantity(self.interaction_range, "m"),
+        }
+        if self.layered:
+            rows |= {"thickness": format_quantity(self.thickness, "m"), "Poisson ratio": f"{self.poisson_ratio:g}"}
+        return html_table("Material", rows)
 
     @property
     def layered(self) -> bool:

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 from icha.contact.model import AREA_FRACTION as CONTROLLED_AREA
 from icha.contact.model import PRESSURE, ContactModel, Control, State
+from icha.support.formatting import html_table
 from icha.support.rules import FORCES, INDENTATIONS, LENGTH, NUMBER, POSITIVE, PRESSURES, FloatRange
 
 # Largest reduced pressure and area fraction of a target with the asperity model. At larger values the spots are not
@@ -216,6 +217,13 @@ class Path:
         vars(self).update(
             targets=tuple(targets), turning_points=turns, unload=unload, control=control, max_step=max_step
         )
+
+    def _repr_html_(self) -> str:
+        """Return a table for notebooks."""
+        units = {target.kind: UNITS.get(target.kind, "") for target in self.targets}
+        targets = ", ".join(f"{each.value:g} {units[each.kind]}".strip() for each in self.targets)
+        rows = {QUANTITIES[self.targets[0].kind].plural.replace("_", " "): targets, "unload": str(self.unload)}
+        return html_table("Path", rows | {"control": self.control})
 
     def within_asperity_range(self) -> Path:
         """Return a copy without reduced pressures and areas outside `ASPERITY_RANGES`; turning points always stay."""

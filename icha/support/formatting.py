@@ -7,6 +7,8 @@ functions replace such characters by Python escapes, such as `\x1b` and `\u202e`
 
 import math
 import re
+from collections.abc import Mapping
+from html import escape
 
 _PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 _CONTROLS = r"\x00-\x08\x0b-\x1f\x7f-\x9f"
@@ -81,3 +83,9 @@ def printable_lines(text: object) -> str:
 
 def _escaped(found: re.Match) -> str:
     return found[0].encode("unicode_escape").decode("ascii")
+
+
+def html_table(title: str, rows: Mapping[str, str]) -> str:
+    """Return a small table as HTML, for notebooks."""
+    lines = "".join(f"<tr><th>{escape(name)}</th><td>{escape(value)}</td></tr>" for name, value in rows.items())
+    return f"<table><caption>{escape(title)}</caption>{lines}</table>"

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import scipy.fft
 
+from icha.support.formatting import choose_unit, format_quantity, html_table
 from icha.support.parallel import blocks, on_cores
 from icha.support.rules import LENGTH, SLOPE, FloatRange, IntegerRange
 from icha.surfaces.square import problem_with_heights
@@ -113,6 +114,52 @@ class Surface:
         caller = sys._getframe(2).f_globals.get("__name__", "")
         if not self.free and not caller.startswith(("icha.", "dataclasses")) and not edges_fit(heights):
             warnings.warn(MISFIT_OF_EDGES, EdgeWarning, stacklevel=3)
+
+    def detrended(self, degree: int = 1) -> Surface:
+        """Return a free square without its tilt (`degree` 1), or also without its curvature (`degree` 2)."""
+        from icha.surfaces.measured.topography import without_trend
+
+        if degree not in (1, 2):
+            raise ValueError(f"degree: {degree!r} must be 1 or 2")
+        if not self.free:
+            raise ValueError(f"boundary: {self.boundary!r}; a periodic surface has no trend; expected {FREE!r}")
+        return replace(self, heights=without_trend(self.heights, degree))
+
+    def power_spectrum(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return wave numbers q, rad/m, and the radial power spectrum C(q), m^4, of the roughness."""
+        from icha.surfaces.moments import radial_power_spectrum
+
+        q, power, _ = radial_power_spectrum(self)
+        return q, power
+
+    def plot(self, axes=None):
+        """Draw a map of the heights; return the axes of matplotlib. `axes` None stands for new axes."""
+        import matplotlib.pyplot as plt
+
+        axes = plt.subplots()[1] if axes is None else axes
+        (length, unit), (height, height_unit) = (choose_unit(each, "m") for each in (self.period, self._range))
+        side = self.period * length
+        heights = (self.profile if self.shape else self.heights) * height
+        image = axes.imshow(heights, origin="lower", extent=(0, side, 0, side), cmap="cividis")
+        axes.figure.colorbar(image, ax=axes, label=f"height ({height_unit})")
+        axes.set(xlabel=f"x ({unit})", ylabel=f"y ({unit})")
+        return axes
+
+    @property
+    def _range(self) -> float:
+        """Range of the heights, with the shape, m."""
+        return float(np.ptp(self.profile[np.isfinite(self.profile)]) if self.shape else np.ptp(self.heights))
+
+    def _repr_html_(self) -> str:
+        """Return a table for notebooks."""
+        rows = {
+            "nodes": f"{self.grid} × {self.grid}",
+            "side": format_quantity(self.period, "m"),
+            "boundary": self.boundary,
+            "rms height": format_quantity(self.rms_height, "m"),
+            "rms slope": f"{self.rms_slope:.4g}",
+        }
+        return html_table("Surface", rows | ({"shape": str(self.shape)} if self.shape else {}))
 
     @property
     def grid(self) -> int:
