@@ -185,6 +185,7 @@ SECTIONS = {
         comparison_variables,
         surface_variables,
         model_error_variables,
+    answer_variables,
         theory_variables,
     )
 }
