@@ -92,25 +92,25 @@ def study_curves(campaign: xr.DataTree, study: str, boundary_elements: str | Non
     for group in groups:
         look = looks.look(group.contact, applicable=group.applicable) | {"ls": "-" if looks.many else "none"} | changed
         if name != ASPERITIES_NAME:
-            look |= {"marker": MODEL_MARKERS[name], "ms": look["ms"] + 2}
+            look |= {"marker": cross_look(looks, group.contact)["marker"], "ms": look["ms"] + 2}
         lines.append(_curve(group, look))
     other = boundary_elements or (study if name == ASPERITIES_NAME else None)
     truths = select.select_runs(campaign, other, ragged=False, model=REFERENCE_MODEL) if other else []
     grouped = select.group_by_contact(campaign, truths)
     crosses = [_curve(truth, cross_look(looks, truth.contact)) for truth in grouped]
-    # If markers distinguish surfaces and slopes, the crosses have different numbers of arms.
-    names = {looks.place_name(tuple(truth.contact[1:])): truth.contact for truth in grouped}
-    if looks.by_place or len(names) == 1:
-        truth_handles = {SHORT_RANGE: model_handle(SHORT_RANGE)} if crosses else {}
-    else:
-        truth_handles = {
-            f"{SHORT_RANGE}, {name}": model_handle(SHORT_RANGE, marker=cross_look(looks, contact)["marker"])
-            for name, contact in names.items()
-        }
     changed |= {"ls": "-" if looks.many or any(len(group.by_seed) > 1 for group in groups) else "none"}
-    changed |= {} if looks.by_place else {"marker": MODEL_MARKERS[name]}
-    handles = looks.handles(**changed) | {name: model_handle(name, mfc="white")}
-    return Curves(lines, crosses, looks, handles | truth_handles)
+    if looks.by_place or len(looks.places) == 1:
+        changed |= {} if looks.by_place else {"marker": MODEL_MARKERS[name]}
+        handles = looks.handles(**changed) | {name: model_handle(name, mfc="white")}
+        handles |= {SHORT_RANGE: model_handle(SHORT_RANGE)} if crosses else {}
+    else:
+        # Shapes show the model, surface and slope. In the legend, materials are therefore colours without a shape.
+        handles = {looks.material_name(each): looks.material_handle(each) for each in looks.materials}
+        for model, curves in ((name, lines), (SHORT_RANGE, crosses)):
+            for curve in curves:
+                words = f"{model}, {looks.place_name(curve.runs.contact[1:])}"
+                handles.setdefault(words, model_handle(model, mfc="white", marker=curve.look["marker"]))
+    return Curves(lines, crosses, looks, handles)
 
 
 def _curve(runs, look):

@@ -161,7 +161,7 @@ def _enlarge(ax, loops):
         return
     shown = separations[(np.abs(pressures) <= _REACH * tension) & (areas > 0)]
     room = 0.06 * np.ptp(shown)
-    inset = ax.inset_axes((0.5, 0.44, 0.46, 0.48))
+    inset = ax.inset_axes((0.5, 0.42, 0.45, 0.44))
     for loop in loops:
         _draw(inset, loop, _LOADS, turn=False)
     inset.set(xlim=(shown.min() - room, shown.max() + room), ylim=(-_REACH * tension, _REACH * tension))

@@ -141,6 +141,8 @@ def _draw_parts(ax, runs, looks):
         look = looks.look(contact, applicable=applicable)
         ax.plot(position, -0.055, transform=ax.get_xaxis_transform(), clip_on=False, **look | {"ls": "none"})
     ax.axhline(0, color="black", lw=0.6)
-    ax.set(xlim=(-0.7, len(bars) - 0.3), xticks=[], ylabel="share of the loss (%)")
-    ax.set_xlabel("lines of (a), at their largest load", labelpad=14)
+    ax.set(xlim=(-0.7, len(bars) - 0.3), ylabel="share of the loss (%)")
+    ax.set_xticks(range(len(bars)), [looks.place_name(tuple(place)) for (_, *place), _ in bars], rotation=90)
+    ax.tick_params("x", length=0, pad=14, labelsize=7)
+    ax.set_xlabel("lines of (a), at their largest load", labelpad=2)
     return shown

@@ -62,6 +62,7 @@ def figure(campaign: xr.DataTree, *, study: str, kind: str | None = None, target
                 area, values = points(true_areas, cell)
                 ax.plot(area, values.mean(axis=0), color=look["color"], marker=marker, **TRUTH_LINE)
     if most_bins < _FEWEST_BINS:
+        left.set_axis_off()
         left.text(0.5, 0.5, "too few patches for a density", transform=left.transAxes, ha="center", color=GREY)
     for ax in (left, right):
         logarithmic_axes(ax)

@@ -11,7 +11,7 @@ from icha.figures.declaration import Declaration, SnapshotFigure
 from icha.figures.ensembles import Points, points_handles
 from icha.figures.looks import Looks, legend_below, named_handles
 from icha.figures.select import ContactRuns, NothingToDraw, group_by_contact, select_runs, snapshot_label
-from icha.figures.style import GREY, in_style, new_panels
+from icha.figures.style import GREY, in_style, logarithmic_axes, new_panels
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -26,6 +26,8 @@ DECLARATION = Declaration(
     options=SnapshotFigure,
 )
 
+# The axis of the Tabor parameter is logarithmic if the ratio of its largest to its smallest value exceeds this number.
+_SPAN = 10.0
 _STATE = ("contact_area_fraction", "reduced_separation")
 
 
@@ -72,6 +74,8 @@ def figure(campaign: xr.DataTree, *, study: str, kind: str | None = None, target
             mean = np.mean([float(state[name]) for group in line for state in group.by_seed.values()])
             ax.axhline(mean, ls=(0, (5, 2)), lw=1, zorder=1, **look)
     for ax, label in zip(panels, (AREA_LABEL, gap_label(dataset)), strict=True):
+        if max(drawn) > _SPAN * min(drawn):
+            logarithmic_axes(ax, "x")
         _finish(ax, min(drawn))
         ax.set_ylabel(label)
     panels[0].set_title(shown, loc="right")

@@ -150,6 +150,10 @@ class Looks:
             found.pop("", None)  # the name is empty if the figure has a single surface and slope
         return {name: legend_handle(**look) for name, look in found.items()}
 
+    def material_handle(self, material: str) -> Line2D:
+        """Return the legend entry of a material if shapes have other meanings: a bar in the colour of the material."""
+        return legend_handle(color=self.material_colour(material), lw=4)
+
     def material_name(self, material: str) -> str:
         """Return a text with the modulus and the surface energy of a material."""
         return material_label(self.interfaces, material)

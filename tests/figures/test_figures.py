@@ -364,7 +364,9 @@ def test_fig5_marks_boundary_elements_of_the_study_or_of_another():
             assert found.any(axis=1).all()
             drawn = {line.get_color() for line in axes.get_lines() if line.get_marker() not in ("+", "None")}
             assert crosses.get_color() in drawn
-        assert legend(figure).count("boundary elements") == 1
+        words = dict(zip(legend(figure), figure.legends[0].legend_handles, strict=True))
+        (name,) = (each for each in words if each.startswith("boundary elements"))
+        assert name.endswith(f"= {labels.rms_slope:g}") and words[name].get_marker() == "+"
 
 
 def test_fig10_shows_means_and_seeds_of_the_errors_in_per_cent():
@@ -581,6 +583,20 @@ def two_surfaces(slopes=(1.0,)):
     return names, campaign_tree(runs)
 
 
+@pytest.mark.parametrize("alone", [False, True])
+def test_fig5_legend_has_the_markers_of_boundary_elements_that_are_drawn(alone):
+    runs = [(labels, run) for labels, run in small.runs() if labels.study == "slopes"]
+    crosses = [(labels._replace(model="boundary_elements"), compared.own_patches(run)) for labels, run in runs]
+    flat = min(labels.rms_slope for labels, _ in runs)
+    shown = crosses if alone else [*runs, *(pair for pair in crosses if pair[0].rms_slope == flat)]
+    figure = fig5_multi_slope.figure(campaign_tree(shown), study="slopes")
+    names = dict(zip(legend(figure), figure.legends[0].legend_handles, strict=True))
+    named = {name: names[name].get_marker() for name in names if name.startswith("boundary elements, ")}
+    assert len(set(named.values())) == len(named) == (2 if alone else 1)
+    for marker in named.values():
+        assert lines_of(figure.axes[0], marker)
+
+
 def test_fig5_distinguishes_surfaces():
     slopes = (1.0, 0.2)
     names, tree = two_surfaces(slopes)
@@ -593,7 +609,8 @@ def test_fig5_distinguishes_surfaces():
         wanted = [small.run(1 + names.index(name), slope, material) for material in ("soft", "hertz")]
         for line, run in zip(drawn, wanted, strict=True):
             np.testing.assert_allclose(line.get_ydata(), path_steps(run)["contact_area_fraction"])
-    assert len(words) == 4 + 3  # two materials, and the model
+    assert len(words) == 4 + 2  # two materials
+    assert [words[name].get_marker() for name in list(words)[:2]] == ["None", "None"]
 
 
 @pytest.mark.parametrize("limits", [(1.5e-4, 9e-4), (2e-4, 3e-3), (0.9e-3, 2.9e-3)])
