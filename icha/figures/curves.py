@@ -99,16 +99,16 @@ def study_curves(campaign: xr.DataTree, study: str, boundary_elements: str | Non
     grouped = select.group_by_contact(campaign, truths)
     crosses = [_curve(truth, cross_look(looks, truth.contact)) for truth in grouped]
     changed |= {"ls": "-" if looks.many or any(len(group.by_seed) > 1 for group in groups) else "none"}
-    if looks.by_place or len(looks.places) == 1:
+    if len(looks.materials if looks.by_place else looks.places) == 1:
         changed |= {} if looks.by_place else {"marker": MODEL_MARKERS[name]}
         handles = looks.handles(**changed) | {name: model_handle(name, mfc="white")}
         handles |= {SHORT_RANGE: model_handle(SHORT_RANGE)} if crosses else {}
     else:
-        # Shapes show the model, surface and slope. In the legend, materials are therefore colours without a shape.
-        handles = {looks.material_name(each): looks.material_handle(each) for each in looks.materials}
+        # A shape shows the model and, for example, the slope. Colours therefore have legend entries without a shape.
+        handles = looks.colour_handles()
         for model, curves in ((name, lines), (SHORT_RANGE, crosses)):
             for curve in curves:
-                words = f"{model}, {looks.place_name(curve.runs.contact[1:])}"
+                words = f"{model}, {looks.shape_name(curve.runs.contact)}"
                 handles.setdefault(words, model_handle(model, mfc="white", marker=curve.look["marker"]))
     return Curves(lines, crosses, looks, handles)
 
@@ -123,7 +123,7 @@ def cross_look(looks: Looks, contact: Contact, model: str = SHORT_RANGE) -> dict
     # Crosses without adhesion are larger than crosses with adhesion, so that both are visible if they coincide.
     size = (8 if adhesive else 11) * (1 if len(looks.contacts) <= FEW_LINES else 0.7)
     look = {"color": colour, "mec": colour, "ms": size, "zorder": 6 + adhesive}
-    rank = 0 if looks.by_place or model != SHORT_RANGE else looks.rank(contact)
+    rank = looks.rank(contact) if model == SHORT_RANGE else 0
     marker = CROSSES[rank % len(CROSSES)] if rank else MODEL_MARKERS[model]
     return look | {"ls": "none", "marker": marker, "mew": 1.0}
 

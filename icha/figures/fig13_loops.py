@@ -14,7 +14,14 @@ from icha.datasets.variables.model_error import FINITE_RANGE, SHORT_RANGE
 from icha.figures import select
 from icha.figures.curves import AREA_LABEL, PRESSURE_LABEL, SEPARATION_LABEL
 from icha.figures.declaration import Campaign, Declaration, Inputs, TopographyFigure, TruthFigure, UnloadedFigure
-from icha.figures.looks import BRANCH_DASHES, MODEL_MARKERS, UNLOADING_MARKERS, legend_below, looks_of_studies
+from icha.figures.looks import (
+    BRANCH_DASHES,
+    MODEL_MARKERS,
+    UNLOADING_MARKERS,
+    legend_below,
+    looks_of_studies,
+    surface_label,
+)
 from icha.figures.style import GREY, in_style, legend_handle, new_panels, slope_label
 
 if TYPE_CHECKING:
@@ -127,7 +134,7 @@ def figure(
     panels[-1, 0].set_xlabel(SEPARATION_LABEL)
     panels[-1, 1].set_xlabel(PRESSURE_LABEL)
     labels, _ = runs[0]
-    panels[0, 0].set_title(f"surface {labels.surface}, seed {labels.seed}", loc="right", parse_math=False)
+    panels[0, 0].set_title(f"surface {surface_label(campaign, labels.surface)}, seed {labels.seed}", loc="right")
     legend_below(fig, _handles(looks, drawn, marked=len(rows[0]) > 1))
     return fig
 

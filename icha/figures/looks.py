@@ -150,9 +150,15 @@ class Looks:
             found.pop("", None)  # the name is empty if the figure has a single surface and slope
         return {name: legend_handle(**look) for name, look in found.items()}
 
-    def material_handle(self, material: str) -> Line2D:
-        """Return the legend entry of a material if shapes have other meanings: a bar in the colour of the material."""
-        return legend_handle(color=self.material_colour(material), lw=4)
+    def colour_handles(self) -> dict[str, Line2D]:
+        """Return legend entries that show only colours: bars of some materials, or of some surfaces and slopes."""
+        named, coloured = (self.place_name, self.places) if self.by_place else (self.material_name, self.materials)
+        return {named(each): legend_handle(color=self._colours[each], lw=4) for each in some_of(coloured)}
+
+    def shape_name(self, contact: Contact) -> str:
+        """Return what the marker of a contact shows, as text: surface and slope, or the material."""
+        material, *place = contact
+        return self.material_name(material) if self.by_place else self.place_name(tuple(place))
 
     def material_name(self, material: str) -> str:
         """Return a text with the modulus and the surface energy of a material."""
@@ -166,9 +172,9 @@ class Looks:
         return ", ".join([*words, slope_label(slope)] if slope is not None and len(slopes) > 1 else words)
 
     def rank(self, contact: Contact) -> int:
-        """Return the number of a surface and slope in the order of the markers, from 0; 0 for unknown ones."""
-        places = list(self._markers)
-        return places.index(contact[1:]) if contact[1:] in places else 0
+        """Return the number of a contact in the order of the markers, from 0; 0 for unknown ones."""
+        shapes, shape = list(self._markers), contact[0] if self.by_place else contact[1:]
+        return shapes.index(shape) if shape in shapes else 0
 
     def name(self, contact: Contact) -> str:
         """Return a name that distinguishes a line from the other lines of the figure."""
