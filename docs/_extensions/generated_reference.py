@@ -185,7 +185,7 @@ SECTIONS = {
         comparison_variables,
         surface_variables,
         model_error_variables,
-    answer_variables,
+        answer_variables,
         theory_variables,
     )
 }

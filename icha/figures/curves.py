@@ -26,6 +26,7 @@ from icha.figures.looks import (
     named_handles,
 )
 from icha.figures.style import GREY, legend_handle, logarithmic_axes, slope_label
+from icha.support.formatting import choose_unit
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -170,6 +171,31 @@ def area_points(run: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
 def gap_points(run: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
     """Return reduced pressures and reduced separations of the steps of a run."""
     return run["reduced_pressure"].values, run["reduced_separation"].values
+
+
+class Axis(NamedTuple):
+    """Unit of an axis: the label, and the factor by which a figure multiplies the values of a run in SI units."""
+
+    label: str
+    factor: float
+
+
+def physical_units(dataset: xr.Dataset) -> tuple[Axis, Axis]:
+    """Return the axes of nominal pressure and mean gap in units with prefixes, for the runs of a study."""
+    (pressure, pressure_unit), (gap, gap_unit) = (
+        choose_unit(float(np.abs(dataset[name]).max()), unit)
+        for name, unit in (("nominal_pressure", "Pa"), ("mean_gap", "m"))
+    )
+    return Axis(f"pressure  $p$ ({pressure_unit})", pressure), Axis(f"mean gap ({gap_unit})", gap)
+
+
+def physical_points(name: str, pressure: Axis, factor: float = 1.0) -> Points:
+    """Return the function that returns nominal pressures, in the unit of an axis, and a variable times a factor."""
+
+    def points(run):
+        return run["nominal_pressure"].values * pressure.factor, run[name].values * factor
+
+    return points
 
 
 def draw_curves(

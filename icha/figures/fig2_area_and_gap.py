@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
+from pydantic import Field
 
 from icha.contact.models import REFERENCE_MODEL
 from icha.datasets import results
@@ -37,9 +38,25 @@ def inputs(campaign: Campaign, options: StudyFigure, files: results.ResultFiles)
     return found
 
 
+class AreaAndGapFigure(StudyFigure):
+    """A figure of all runs of a study, in reduced or in physical units."""
+
+    units: Literal["reduced", "physical"] = Field(
+        default="reduced",
+        description="`reduced`: loads in units of E* h'rms, separations in units of the rms height. `physical`: "
+        "nominal pressures in Pa and mean gaps in m, with prefixes. Theories are then shown only if all runs have the "
+        "same modulus and slope.",
+    )
+
+    def arguments(self, campaign: Campaign) -> dict[str, Any]:
+        """Return the arguments of `figure`; the default units are left out."""
+        arguments = super().arguments(campaign)
+        return {name: value for name, value in arguments.items() if (name, value) != ("units", "reduced")}
+
+
 DECLARATION = Declaration(
     description="Contact area and mean separation against load, with theories, and differences between the models.",
-    options=StudyFigure,
+    options=AreaAndGapFigure,
     inputs=inputs,
 )
 
@@ -55,7 +72,12 @@ _QUANTITIES = ((curves.area_points, "A"), (curves.gap_points, r"\bar{u}"))
 
 @in_style
 def figure(
-    campaign: xr.DataTree, references: xr.Dataset | None = None, model_error: xr.DataTree | None = None, *, study: str
+    campaign: xr.DataTree,
+    references: xr.Dataset | None = None,
+    model_error: xr.DataTree | None = None,
+    *,
+    study: str,
+    units: str = "reduced",
 ) -> Figure:
     """Draw all runs of a study.
 
@@ -64,7 +86,10 @@ def figure(
     campaign : the campaign dataset.
     references : theories and published results for the study's first surface (`icha.references.theories`), if any.
     model_error : values of boundary elements at a finite range (`icha.analysis.model_error.model_error`), if any.
+    units : "reduced" or "physical".
     """
+    if units == "physical":
+        return _in_physical_units(campaign, study, references)
     shown, dataset = curves.study_curves(campaign, study), campaign[study].to_dataset()
     if solved := _finite_range_curves(model_error, study, shown.looks):
         shown.crosses.extend(solved)
@@ -100,6 +125,39 @@ def figure(
         ax.set_ylabel(rf"${symbol}/{symbol}_{{\mathrm{{BEM}}}}-1$  (%)")
     for ax in axes[-1]:
         ax.set(xlim=x, xlabel=curves.PRESSURE_LABEL)
+    curves.add_legend(fig, [left, right], shown)
+    return fig
+
+
+def _in_physical_units(campaign, study, references):
+    """Draw area and mean gap against the nominal pressure; theories only if one pressure unit holds for all runs."""
+    shown, dataset = curves.study_curves(campaign, study), campaign[study].to_dataset()
+    pressure, gap = curves.physical_units(dataset)
+    fig, [(left, right)] = new_panels(3.3)
+    panels = {
+        left: curves.physical_points("contact_area_fraction", pressure),
+        right: curves.physical_points("mean_gap", pressure, gap.factor),
+    }
+    curves.draw_curves(shown, panels, unloading=True)
+    units = {
+        (float(run["contact_modulus"] * run["unit_slope"]), float(run["unit_height"]))
+        for line in shown.lines
+        for run in line.runs.by_seed.values()
+    }
+    if references is not None and len({float(f"{each:.6g}") for each, _ in units}) == 1:
+        limits = left.get_xlim()
+        (modulus, height) = next(iter(units))
+        p = references["reduced_pressure"].values * modulus * pressure.factor
+        inside = (p >= limits[0]) & (p <= limits[1])
+        look = {"color": BLACK, "lw": 1, "zorder": 2}
+        left.plot(p[inside], references["persson_area_fraction"].values[inside], label="Persson", **look)
+        if "persson_reduced_separation" in references:
+            separation = references["persson_reduced_separation"].values[inside] * height * gap.factor
+            right.plot(p[inside], separation, label="Yang & Persson", **look | {"ls": (0, (7, 2))})
+    for ax in (left, right):
+        ax.set_xlabel(pressure.label)
+    left.set_ylabel(curves.AREA_LABEL)
+    right.set_ylabel(gap.label)
     curves.add_legend(fig, [left, right], shown)
     return fig
 

@@ -670,3 +670,25 @@ def test_captions_state_only_what_the_figure_contains():
     errors = compared.errors()
     assert "three arms" in caption_of("fig2_area_and_gap", contents_of(compared.tree(), ["one"], errors))
     assert "three arms" not in both and len(caption_of("fig2_area_and_gap")) > len(both)
+
+
+def test_fig2_in_physical_units_has_pressures_and_gaps_with_units():
+    references = reference_dataset(small.SPECTRUM, spectral_moments(small.surface()), {})
+    left, right = fig2_area_and_gap.figure(small.tree(), references, study="single", units="physical").axes
+    assert left.get_xlabel() == "pressure  $p$ (kPa)" and right.get_ylabel() == "mean gap (µm)"
+    load, values = at_common([small.run(seed) for seed in (1, 2)])
+    (mean,) = (line for line in right.get_lines() if line.get_marker() == "o" and len(line.get_xdata()) == len(load))
+    np.testing.assert_allclose(mean.get_xdata(), load * 1e-3, rtol=1e-6)
+    np.testing.assert_allclose(mean.get_ydata(), values.mean(axis=0) * 1e6, rtol=1e-6)
+    (theory,) = (line for line in left.get_lines() if line.get_label() == "Persson")
+    p = theory.get_xdata() * 1e3 / small.MATERIALS["soft"].contact_modulus
+    expected = np.interp(p, references["reduced_pressure"], references["persson_area_fraction"])
+    np.testing.assert_allclose(theory.get_ydata(), expected, rtol=1e-6)
+    several = fig2_area_and_gap.figure(small.tree(), references, study="slopes", units="physical").axes[0]
+    assert "Persson" not in [line.get_label() for line in several.get_lines()]
+
+
+def at_common(runs):
+    """Nominal pressures and mean gaps of runs at the targets that they share."""
+    stops = [path_steps(run) for run in runs]
+    return stops[0]["nominal_pressure"].values, np.array([each["mean_gap"].values for each in stops])
