@@ -50,13 +50,18 @@ def describe(
 def _print_scans(campaign, plots: Path | None) -> None:
     """Print the descriptions of the measured surfaces that studies use; draw them to the folder `plots`, if given."""
     from icha.configuration.cases import run_cases
-    from icha.configuration.surfaces import MeasuredSurface
+    from icha.configuration.surfaces import MeasuredSurface, SpectrumSurface
     from icha.contact.models import MODELS
 
     models: dict[str, list] = {}
     for case in run_cases(campaign):
         if isinstance(campaign.surfaces[case.surface], MeasuredSurface):
             models.setdefault(case.surface, []).append(MODELS[case.model])
+    for name in dict.fromkeys(case.surface for case in run_cases(campaign)):
+        if isinstance(section := campaign.surfaces[name], SpectrumSurface):
+            text = Path(section.path).read_text(encoding="utf-8")
+            for line in (each for each in text.splitlines() if each.startswith(("# scan", "# profiles"))):
+                echo(f"{name}: {line.removeprefix('# ')}")
     if not models:
         return
     from icha.surfaces.measured.resolution import examine_scan

@@ -11,7 +11,7 @@ import math
 import re
 from collections.abc import Iterator, Mapping
 from decimal import Decimal
-from typing import Any
+from typing import Any, get_args
 
 from pydantic import ValidationError
 
@@ -361,6 +361,8 @@ def varied_values(campaign: Campaign) -> dict[str, dict[str, tuple[str, str, dic
 
 def unit_of(section, name: str) -> str:
     """Return the SI unit of a key of a section, in the notation of CF; "" for a key without a unit."""
-    metadata = type(section).model_fields[name].metadata if name in type(section).model_fields else ()
-    unit = next((each.unit for each in metadata if isinstance(each, FloatRange)), "")
-    return unit.replace("/m^2", " m^-2")
+    field = type(section).model_fields.get(name)
+    # The type of a key without a default, such as `Length`, or one of the types in `Length | None`.
+    types = [field, *get_args(field.annotation)] if field else []
+    rules = [rule for each in types for rule in getattr(each, "metadata", None) or getattr(each, "__metadata__", ())]
+    return next((rule.unit.replace("/m^2", " m^-2") for rule in rules if isinstance(rule, FloatRange)), "")

@@ -8,7 +8,7 @@ import pytest
 import small_campaign as small
 
 from icha.configuration.cases import run_cases
-from icha.configuration.design import varied_values
+from icha.configuration.design import unit_of, varied_values
 from icha.configuration.load import load_configuration
 from icha.datasets.campaign_file import write_campaign
 from icha.datasets.files import read_campaign
@@ -73,6 +73,8 @@ studies:
 """)
     campaign = load_configuration(tmp_path / "c.yaml").campaign
     assert len(run_cases(campaign)) == 4
+    assert unit_of(campaign.materials["soft-surface_energy1mJ"], "thickness") == "m"
+    assert unit_of(campaign.surfaces["rough-short_wavelength20um"], "hurst") == ""
     assert varied_values(campaign)["one"] == {
         "short_wavelength": (
             "surface",
