@@ -252,7 +252,7 @@ def test_fig8_of_few_patches(areas):
     assert len(at) == len(above) == len(areas)
 
 
-def test_fig9_joins_runs_that_differ_in_range_and_shows_the_adhesionless_one():
+def test_fig9_joins_runs_that_differ_in_range_and_shows_the_adhesionless_one(monkeypatch):
     ranges = {"long": 4e-9, "short": 1e-9, "bare": 2e-9}
     runs = {}
     for name, reach in ranges.items():
@@ -267,6 +267,8 @@ def test_fig9_joins_runs_that_differ_in_range_and_shows_the_adhesionless_one():
         np.testing.assert_array_equal(curve.get_xydata(), expected)
         assert set(bare.get_ydata()) == {float(runs["bare"][name].values[-1])}
     assert curve.get_xdata()[1] == pytest.approx(4 * curve.get_xdata()[0])
+    monkeypatch.setattr(fig9_tabor, "_SPAN", 3.9)
+    assert (left.get_xscale(), fig9_tabor.figure(tree, study="tabor").axes[0].get_xscale()) == ("linear", "log")
     # The range is along the axis, and not in the name.
     assert len(legend(left.figure)) == 2 and not any("range" in name for name in legend(left.figure))
     tree = campaign_tree([(RunLabels("tabor", "asperities", "rough", 1, 1.0, "bare"), runs["bare"])])

@@ -15,6 +15,7 @@ from icha.figures import fig13_loops, fig14_pull_off, fig15_loss, fig16_snap_map
 from icha.figures.ensembles import Points
 from icha.figures.fig15_loss import PARTS, fit_line, shares
 from icha.figures.select import ContactRuns, select_unloaded_runs
+from icha.figures.style import slope_label
 
 MODULES = (fig13_loops, fig14_pull_off, fig15_loss)
 NAMES = (("reduced_separation", "reduced_pressure"), ("reduced_pressure", "contact_area_fraction"))
@@ -280,6 +281,13 @@ def test_points_of_a_line_are_means_over_the_seeds_that_all_have():
     assert line.means.tolist() == [[1, 3], [4, 20]]
     apart = points({1: (2.0, 10.0)}, {2: (3.0, 8.0)})
     assert not apart.same_seeds and apart.means[1].tolist() == [10, 8]
+
+
+def test_fig15_names_the_slope_below_each_bar():
+    slopes = (0.5, 0.3)
+    tree = separate.tree(separate.study("one", slopes=slopes))
+    words = [label.get_text() for label in fig15_loss.figure(tree, studies=["one"]).axes[1].get_xticklabels()]
+    assert sorted(words) == sorted(slope_label(slope) for slope in slopes)
 
 
 def test_fig15_needs_adhesion():
