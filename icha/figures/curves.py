@@ -110,7 +110,9 @@ def study_curves(campaign: xr.DataTree, study: str, boundary_elements: str | Non
         for model, curves in ((name, lines), (SHORT_RANGE, crosses)):
             for curve in curves:
                 words = f"{model}, {looks.shape_name(curve.runs.contact)}"
-                handles.setdefault(words, model_handle(model, mfc="white", marker=curve.look["marker"]))
+                filled = looks.by_place and curve.look.get("mfc") == curve.look["color"]
+                look = {"mfc": GREY if filled else "white", "marker": curve.look["marker"]}
+                handles.setdefault(words, model_handle(model, **look))
     return Curves(lines, crosses, looks, handles)
 
 

@@ -101,7 +101,8 @@ def figure(
         covered = contact_of_spots(data, at, len(beside["contact_map"]))
         _draw_boundary_elements(panels, topography, (corner, width), heights, beside, covered)
     load = rf"$F/(E^{{\ast}}h′_{{\mathrm{{rms}}}}A_0)$ = {format_number(float(state['reduced_pressure']))}"
-    title = f"{surface_label(campaign, labels.surface)}, {material_label(campaign[labels.study].to_dataset(), labels.material)}, {load}"
+    material = material_label(campaign[labels.study].to_dataset(), labels.material)
+    title = f"{surface_label(campaign, labels.surface)}, {material}, {load}"
     fig.suptitle(title if is_applicable(data) else f"{title}\n{NOT_APPLICABLE_ALONE}", fontsize="medium")
     for ax in panels.ravel():
         topography.label(ax)
