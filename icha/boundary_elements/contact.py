@@ -62,6 +62,11 @@ class BoundaryElements(FullContactProblem):
         """Return 1: the model covers full contact."""
         return 1.0
 
+    @property
+    def area_step(self) -> float:
+        """Area of a cell without adhesion, because whole cells touch; 0 with adhesion, because fronts divide cells."""
+        return 0.0 if self.adhesive else 1 / self.count
+
     @cached_property
     def path_accuracy(self) -> PathAccuracy:
         """Accuracy of a path, with `least_work` of the material; without adhesion the work does not control steps."""

@@ -115,6 +115,7 @@ class ContactModel(Protocol):
     asperities : summits of the surface; there may be none if the model does not need them.
     area : nominal contact area A0, m^2.
     largest_area_fraction : the model is not valid if contact area divided by nominal area exceeds this value.
+    area_step : smallest change of the contact area divided by nominal area; 0 if the area is continuous.
     path_accuracy : accuracy with which a path resolves its events.
     """
 
@@ -125,6 +126,7 @@ class ContactModel(Protocol):
     asperities: Asperities
     area: float
     largest_area_fraction: float
+    area_step: float
     path_accuracy: PathAccuracy
 
     def untouched(self) -> State:

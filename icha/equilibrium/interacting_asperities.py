@@ -36,6 +36,7 @@ class InteractingAsperities(AsperityContact):
     mean_height: float = 0.0
     # Largest contact area fraction of a state. A target is at most 0.25, but the search for a target may exceed 0.25.
     largest_area_fraction = 1.5 * 0.25
+    area_step = 0.0
     path_accuracy = MODELS[DEFAULT_MODEL].accuracy
 
     def untouched(self) -> ContactState:

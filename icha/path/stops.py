@@ -95,6 +95,10 @@ def next_of_each_kind(pending: Iterable[TargetFunction]) -> list[TargetFunction]
     return list(first.values())
 
 
+# A jump of at most this number of cells is due to the grid.
+_FEW_CELLS = 4
+
+
 class InsideJump(NotConverged):
     """Error: the path jumps over the `target` after the state `before`, and no equilibrium at the target is found."""
 
@@ -102,11 +106,17 @@ class InsideJump(NotConverged):
         """Write the message about a target that lies between the states before and after a jump."""
         contact = target.contact
         area_before, area_after = (contact.area_fraction(state) for state in (before, after))
+        few_cells = area_after - area_before <= _FEW_CELLS * contact.area_step * (1 + 1e-9)
+        remedy = (
+            f"one grid cell is {contact.area_step:.3g} of the nominal area, so use a finer grid, or a larger area"
+            if few_cells
+            else "remove this target, or give the path by mean separations"
+        )
         super().__init__(
             f"{target.target.describe()} lies inside a jump: at a mean separation of "
             f"{after.separation / contact.rms_height:.4f} h_rms the contact area jumps from {area_before:.3g} to "
             f"{area_after:.3g} of the nominal area, and the branch after the jump does not reach back to the target; "
-            "remove this target, or give the path by mean separations"
+            f"{remedy}"
         )
         self.target, self.before = target, before
 

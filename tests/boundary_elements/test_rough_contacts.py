@@ -156,6 +156,7 @@ def test_an_area_of_few_cells_is_met_to_two_of_them():
     with pytest.raises(icha.ConvergenceError, match="lies inside a jump") as caught:
         icha.simulate(surface, HARD, icha.Path(area_fractions=[1e-4, 0.02]), model="boundary_elements")
     assert caught.value.dataset.step_target == [0.02]
+    assert "one grid cell is 0.000244 of the nominal area, so use a finer grid" in str(caught.value)
 
 
 @pytest.mark.parametrize("slope", [pytest.param(1.0, marks=pytest.mark.slow), 1e-9])
