@@ -215,6 +215,7 @@ def test_computed_again_it_has_the_same_bytes(published, tmp_path):
     done = CliRunner().invoke(app, ["reproduce", f"{published}.zip", "--folder", str(tmp_path / "again")])
     assert done.exit_code == 0, done.output
     computed = [path for path in files_of(published) if path.endswith((".nc", ".png", ".pdf"))]
+    computed += [path for path in files_of(published) if path.startswith("dataset/") and path.endswith(".csv")]
     assert f"identical: every value in {len(computed) + 3} files" in done.output  # report, checks, verdict
 
 
