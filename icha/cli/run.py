@@ -376,7 +376,9 @@ def _print_checks(campaign, results: Path) -> None:
     import xarray as xr
 
     from icha.analysis.checks import read_checks
+    from icha.analysis.measured_error import measured_errors
     from icha.analysis.validity import statements_on_dataset
+    from icha.contact.models import DEFAULT_MODEL
     from icha.planning.results import campaign_files
 
     files = campaign_files(campaign)
@@ -385,7 +387,16 @@ def _print_checks(campaign, results: Path) -> None:
     echo(f"checks:  {passed} of {len(checks)} checks of the solved equations passed")
     echo("Applicability of the models, which is a separate question:")
     with xr.open_datatree(results / files.dataset, engine="netcdf4") as tree:
-        _print_validity(statements_on_dataset(tree))
+        statements = statements_on_dataset(tree)
+        of_asperities = {name for name, node in tree.children.items() if DEFAULT_MODEL in node["model"].values}
+    if files.model_error:
+        with xr.open_datatree(results / files.model_error[0], engine="netcdf4") as errors:
+            measured = measured_errors(errors)
+        # Where all studies have a measured error, the statement on other surfaces is not needed.
+        if of_asperities <= measured.keys():
+            statements = [each for each in statements if each.about != "accuracy"]
+        statements = [*measured.values(), *statements]
+    _print_validity(statements)
 
 
 def _print_validity(statements) -> None:

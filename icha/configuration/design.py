@@ -66,6 +66,9 @@ def expand_design(campaign: Campaign, content: Mapping) -> tuple[Campaign, list[
     for label, study in campaign.studies.items():
         contacts = [variants.contact(point) for point in _points(label, study)]
         runs[label], studies[label] = list(itertools.product(study.models, contacts)), study
+        if study.error_check and study.levels is None:
+            first = {contact._replace(seed=0): contact for contact in reversed(contacts)}
+            runs[label] += [(REFERENCE_MODEL, contact) for contact in contacts if contact in first.values()]
         if study.levels is not None:
             runs |= _runs_of_levels(label, study.levels, contacts, variants)
             if study.levels.coarse:
@@ -198,6 +201,9 @@ def _study_problems(campaign: Campaign, label: str, study: Study) -> Iterator[Pr
             "is the name of the runs of another study on half the grid; expected a name that does not end in -coarse"
         )
         yield prefix, NOTHING, reason
+    if study.error_check and list(study.models) != [DEFAULT_MODEL]:
+        reason = "needs `models: [asperities]`, because other studies measure the error anyway. Remove the key"
+        yield (*prefix, "error_check"), True, reason
     if study.levels is not None:
         yield from _level_problems(campaign, label, study, [name for _, name in values("surface")])
     for location, slope in values("rms_slope"):

@@ -287,6 +287,10 @@ class Study(Section):
     """Contact models of every run. `asperities` is fast. `boundary_elements` assumes a very short range of attraction,
     and needs a grid with at least 4 (better 8) cells per shortest wavelength. On a surface with free edges, boundary
     elements take about four times as long as on a periodic surface."""
+    error_check: StrictBool = False
+    """If true, boundary elements also compute the first seed of each surface, slope and material, so that ICHA measures
+    the error of the asperity model on these surfaces. Only for `models: [asperities]`; with targets by
+    `reduced_pressures`, `icha run` and the report state the error."""
     levels: Levels | None = None
     """Seeds of three levels of accuracy, instead of `seeds` and `models`. ICHA estimates each result with an interval,
     and `icha answer` prints the estimates."""

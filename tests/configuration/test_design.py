@@ -182,3 +182,10 @@ def test_levels_of_variants_halve_the_grid_of_each_variant(load):
         "one": ["rough-hurst0.5-grid80", "rough-hurst0.5-grid96"],
         "one-coarse": ["rough-hurst0.5-grid40", "rough-hurst0.5-grid48"],
     }
+
+
+def test_an_error_check_adds_boundary_elements_for_the_first_seed_of_each_contact(load):
+    campaign = load({"studies.one.error_check": True, "studies.one.seeds": [3, 1, 2]}).campaign
+    found = [(case.model, case.seed, case.rms_slope) for case in run_cases(campaign)]
+    assert len(found) == 6 + 2 and found[6:] == [("boundary_elements", 3, 0.2), ("boundary_elements", 3, 1.0)]
+    assert campaign.compares_models("one")

@@ -1,0 +1,42 @@
+"""State the error of the asperity model that a campaign has measured, study by study."""
+
+import numpy as np
+import xarray as xr
+
+from icha.analysis.validity import Statement
+from icha.datasets.variables.model_error import SHORT_RANGE
+
+_QUANTITIES = {"area_error": "contact area", "separation_error": "mean separation"}
+
+
+def measured_errors(model_error: xr.DataTree) -> dict[str, Statement]:
+    """Return a statement for each study whose error is measured in the limit of a short range, by name of the study.
+
+    Parameters
+    ----------
+    model_error : result of `icha.analysis.model_error.model_error`.
+    """
+    found = {}
+    for name, node in model_error.children.items():
+        errors = node.to_dataset()
+        if errors.attrs.get("truth") != SHORT_RANGE or not np.isfinite(errors["area_error"]).any():
+            continue
+        ranges = ", ".join(f"{words} {_range(errors[variable].values)}" for variable, words in _QUANTITIES.items())
+        known = np.isfinite(errors["area_error"])
+        seeds = int(known.any([dim for dim in known.dims if dim != "seed"]).sum())
+        loads = errors.sizes["reduced_pressure"]
+        among = f"{seeds} {'seed' if seeds == 1 else 'seeds'}, {loads} {'load' if loads == 1 else 'loads'}"
+        found[name] = Statement(
+            "error", f"of the asperity model in study {name}: {ranges} ({among}, boundary elements)"
+        )
+    return found
+
+
+def _range(values: np.ndarray) -> str:
+    """Return the range of relative errors in per cent, such as `11 to 18 % too small`."""
+    low, high = 100 * np.nanmin(values), 100 * np.nanmax(values)
+    if high <= 0:
+        return f"{-high:.0f} to {-low:.0f} % too small"
+    if low >= 0:
+        return f"{low:.0f} to {high:.0f} % too large"
+    return f"from {-low:.0f} % too small to {high:.0f} % too large"
