@@ -4,8 +4,8 @@ For each case, boundary elements on the grid for many seeds are the truth. Group
 three levels of accuracy. The interval of an estimate must contain the truth in 85 to 97 % of all estimates. The truth
 has an error of its own, because its seeds are not infinitely many; the interval is widened by this error.
 
-`python -m validation.answers` computes 60 cases in about an hour, saves their values in results/answers.csv, and writes
-the tables of docs/howto/accuracy.md. Values that the file already contains are not computed again.
+`python -m validation.answers` computes all cases in about an hour, saves their values in results/answers.csv, and
+writes the tables of docs/estimates.md. Values that the file already contains are not computed again.
 """
 
 import csv
@@ -25,7 +25,8 @@ from icha.analysis.control_variates import PROBABILITY, estimate_mean
 from validation.tables import Table, write_tables
 
 FILE = Path("results/answers.csv")
-GRID, CELLS, SLOPE, MODULUS = 96, 8, 0.1, 2e6
+CELLS, SLOPE, MODULUS = 8, 0.1, 2e6
+GRID, LARGE_GRID = 96, 512
 # Hurst exponent and number of roll-off wavelengths along a side of each surface.
 SURFACES = ((0.3, 2), (0.3, 4), (0.5, 2), (0.5, 4), (0.8, 2), (0.8, 4), (0.8, 6))
 # Elastic energy of full contact divided by the work of adhesion: without adhesion, weak, medium and sticky.
@@ -43,20 +44,23 @@ LEVELS = {
 # Numbers of seeds of one estimate: with asperities, without asperities, and of a loop.
 PLAN, STICKY_PLAN = {"asperities": 24, "coarse": 8, "fine": 3}, {"coarse": 24, "fine": 3}
 SEEDS, LOOP_SEEDS = 96, 48
+# On the large grid, one surface with few seeds shows what the levels save: seeds of each level.
+LARGE_SURFACE, LARGE_RATIOS = (0.8, 4), ("bare", "medium")
+LARGE_PLAN = {"asperities": 24, "coarse": 8, "fine": 4}
 
 
-def spectrum(surface):
+def spectrum(surface, grid):
     """Return the spectrum of a surface."""
     hurst, waves = surface
-    return icha.SelfAffineSpectrum(1e-4, 1e-4 / waves, 1e-4 * CELLS / GRID, hurst, SLOPE)
+    return icha.SelfAffineSpectrum(1e-4, 1e-4 / waves, 1e-4 * CELLS / grid, hurst, SLOPE)
 
 
 def values_of(job):
     """Compute one run; return its seconds and its values, by quantity and pressure (0 for a quantity of a loop)."""
-    surface, ratio, level, loop, seed = job
+    surface, grid, ratio, level, loop, seed = job
     model, coarsening = LEVELS[level]
     warnings.simplefilter("ignore")
-    rough = spectrum(surface).realise(GRID // coarsening, seed)
+    rough = spectrum(surface, grid).realise(grid // coarsening, seed)
     material = icha.Material(MODULUS, rough.full_contact_energy * MODULUS / RATIOS[ratio])
     path = icha.Path(reduced_pressures=[1e-2] if loop else PRESSURES, unload=loop)
     begin = time.perf_counter()
@@ -76,32 +80,37 @@ def values_of(job):
 
 
 def jobs():
-    """Return all runs as tuples (surface, ratio, level, loop, seed)."""
+    """Return all runs as tuples (surface, grid, ratio, level, loop, seed)."""
     loading = [
-        (surface, ratio, level, False, seed)
+        (surface, GRID, ratio, level, False, seed)
         for surface, ratio, level in itertools.product(SURFACES, RATIOS, LEVELS)
         if not (ratio == "sticky" and level == "asperities")
         for seed in range(1, SEEDS + 1)
     ]
-    loops = itertools.product(LOOP_SURFACES, LOOP_RATIOS, LEVELS, [True], range(1, LOOP_SEEDS + 1))
-    return [*loading, *loops]
+    loops = itertools.product(LOOP_SURFACES, [GRID], LOOP_RATIOS, LEVELS, [True], range(1, LOOP_SEEDS + 1))
+    large = [
+        (LARGE_SURFACE, LARGE_GRID, ratio, level, False, seed)
+        for ratio, level in itertools.product(LARGE_RATIOS, LARGE_PLAN)
+        for seed in range(1, LARGE_PLAN[level] + 1)
+    ]
+    return [*loading, *loops, *large]
 
 
 def compute():
     """Compute the runs that the file lacks, on two cores, and append their values to the file."""
     FILE.parent.mkdir(exist_ok=True)
-    done = {tuple(row[:6]) for row in read_rows()}
+    done = {tuple(row[:7]) for row in read_rows()}
     left = [job for job in jobs() if _key(job) not in done]
     with ProcessPoolExecutor(2) as pool, FILE.open("a", newline="") as file:
         writer = csv.writer(file)
-        for job, (seconds, values) in zip(left, pool.map(values_of, left, chunksize=4), strict=True):
+        for job, (seconds, values) in zip(left, pool.map(values_of, left), strict=True):
             writer.writerows([*_key(job), *place, value, f"{seconds:.3f}"] for place, value in values.items())
             file.flush()
 
 
 def _key(job):
-    (hurst, waves), ratio, level, loop, seed = job
-    return tuple(map(str, (hurst, waves, ratio, level, int(loop), seed)))
+    (hurst, waves), grid, ratio, level, loop, seed = job
+    return tuple(map(str, (hurst, waves, grid, ratio, level, int(loop), seed)))
 
 
 def read_rows():
@@ -112,9 +121,9 @@ def read_rows():
 def read_values():
     """Return logarithms of values by case, level and seed, and seconds per run by case and level."""
     values, seconds = defaultdict(lambda: defaultdict(dict)), defaultdict(lambda: defaultdict(list))
-    for hurst, waves, ratio, level, _, seed, quantity, pressure, value, duration in read_rows():
+    for hurst, waves, grid, ratio, level, _, seed, quantity, pressure, value, duration in read_rows():
         if float(value):
-            case = (hurst, waves, ratio, quantity, float(pressure))
+            case = (hurst, waves, int(grid), ratio, quantity, float(pressure))
             values[case][level][int(seed)] = math.log(abs(float(value)))  # pull-off pressures are negative
             seconds[case][level].append(float(duration))
     return values, seconds
@@ -149,7 +158,9 @@ def tables():
     values, seconds = read_values()
     found = defaultdict(list)
     for case, levels in values.items():
-        ratio, quantity = case[2], case[3]
+        grid, ratio, quantity = case[2], case[3], case[4]
+        if grid != GRID:
+            continue
         plan = STICKY_PLAN if ratio == "sticky" else PLAN
         spent = sum(count * np.mean(seconds[case][level]) for level, count in plan.items())
         price = np.mean(seconds[case]["fine"])
@@ -166,7 +177,26 @@ def tables():
     total = [str(len({each[3] for each in every})), str(len(every)), f"{100 * np.mean([e[0] for e in every]):.0f} %"]
     rows.append(["all", *total, "", f"{np.median([e[2] for e in every]):.1f}"])
     head = ["", "cases", "intervals", "contain the truth", "half-width", "saved time"]
-    return {"answers_coverage": Table(head, rows, numbers=True)}
+    return {"answers_coverage": Table(head, rows, numbers=True), "answers_cost": _costs(values, seconds)}
+
+
+def _costs(values, seconds):
+    """Return the table of what levels save on the large grid; plain seeds have the scatter of the coarse level."""
+    rows = []
+    for case, levels in values.items():
+        *_, grid, ratio, quantity, pressure = case
+        if grid != LARGE_GRID or quantity == "stiffness":
+            continue
+        found = estimate_mean(levels["asperities"], levels["coarse"], levels["fine"])
+        half = math.hypot(found.scatter, found.model, found.refinement)
+        scatter = np.std(list(levels["coarse"].values()), ddof=1)
+        plain = next(n for n in range(2, 10**6) if students_t.ppf(0.95, n - 1) * scatter / math.sqrt(n) <= half)
+        spent = sum(count * np.mean(seconds[case][level]) for level, count in LARGE_PLAN.items())
+        times = [f"{np.mean(seconds[case][level]):.1f} s" for level in LARGE_PLAN]
+        cells = [f"{quantity}, {ratio}, p* = {pressure:g}", *times, f"{100 * half:.1f} %", str(plain)]
+        rows.append([*cells, f"{plain * np.mean(seconds[case]['fine']) / spent:.1f}"])
+    head = ["", *(f"one seed: {level}" for level in LARGE_PLAN), "half-width", "plain fine seeds", "saved time"]
+    return Table(head, rows, numbers=True)
 
 
 if __name__ == "__main__":
