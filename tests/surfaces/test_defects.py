@@ -2,8 +2,10 @@
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 from icha import SelfAffineSpectrum
+from icha.cli import app
 from icha.cli.scans import describe_scan
 from icha.surfaces.measured.defects import find_outliers, level_lines, line_offsets
 from icha.surfaces.measured.resolution import examine_scan
@@ -139,3 +141,43 @@ def test_scattered_points_are_interpolated_on_request(tmp_path):
     inside, spacing = found.surface.heights[4:-4, 4:-4] / 1e-9, found.surface.spacing / 1e-6
     np.testing.assert_allclose(np.diff(inside, axis=1), 0.2 * spacing, rtol=1e-4)
     np.testing.assert_allclose(np.diff(inside, axis=0), -0.1 * spacing, rtol=1e-4)
+
+
+def test_a_filled_outlier_is_no_reason_for_a_cut_off(examined):
+    scan = examined(with_spikes(), outliers="remove")
+    assert "cutoff" not in scan.advice and "recommended: `cutoff" not in lines(scan)
+    noisy = examined(PLAIN + 0.2 * RMS * np.random.default_rng(4).normal(size=PLAIN.shape))
+    assert "cutoff" in noisy.advice
+
+
+CAMPAIGN = """
+name: grooves
+title: T
+summary: S
+license: CC0-1.0
+surfaces:
+  ground: {kind: measured, path: ground.npy, height_unit: um, size: 32 um, boundary: free}
+materials:
+  bare: {contact_modulus: 2 GPa, surface_energy: 0 J/m^2}
+studies:
+  load:
+    surfaces: [ground]
+    rms_slopes: measured
+    materials: [bare]
+    targets: {area_fractions: [0.01]}
+"""
+
+
+def test_describe_quotes_no_accuracy_for_grooves_and_draws_the_preparation(tmp_path, monkeypatch):
+    grooved = SelfAffineSpectrum(SIDE, 16e-6, 4e-6, 0.8, rms_slope=0.04).realise(GRID, 2).heights
+    wavy = np.fft.ifft2(np.fft.fft2(grooved) * (np.abs(np.fft.fftfreq(GRID))[None] < 0.02)).real
+    np.save(tmp_path / "ground.npy", (wavy + 0.05 * grooved) * 1e6)
+    (tmp_path / "grooves.yaml").write_text(CAMPAIGN, encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    result = CliRunner().invoke(app, ["describe", "grooves.yaml", "--plot"])
+    assert result.exit_code == 0, result.output
+    assert "anisotropic: the largest rms slope" in result.output
+    (accuracy,) = (line for line in result.output.splitlines() if line.startswith("accuracy"))
+    assert accuracy.startswith("accuracy: the accuracy of this campaign is unknown (ground: anisotropy of slopes")
+    assert "before and after the preparation: results/grooves/scan_ground.png" in result.output
+    assert (tmp_path / "results/grooves/scan_ground.png").stat().st_size > 10_000

@@ -29,6 +29,8 @@ _FLOOR_FALLS, _FLOOR_SPANS = -1.0, 1.3
 _ROUNDING = 1e-20
 # A coarser grid is recommended if its number of nodes along a side is at most this fraction of the present number.
 _WORTH = 0.75
+# A cut-off is recommended only if noise contributes at least this fraction of the mean square slope.
+_NOTICEABLE = 0.01
 
 
 @dataclass(frozen=True)
@@ -123,7 +125,8 @@ class ScanResolution(PreparedTopography):
         """Recommended `cutoff` (m) and `grid` for a grid that resolves the surface; empty if no change is needed."""
         found = {}
         cutoff, pixel = self.cutoff or 0.0, self.measured.spacing
-        if self.noise is not None and cutoff < self.noise.wavelength * (1 - 1e-9):
+        noisy = self.noise is not None and self.noise.slope_share >= _NOTICEABLE
+        if noisy and cutoff < self.noise.wavelength * (1 - 1e-9):
             found["cutoff"] = _rounded_up(max(self.noise.wavelength, LEAST_PIXELS * pixel))
         elif self.cells_per_summit < LEAST_CELLS_OF_SUMMIT and cutoff < RESOLVED_CELLS * pixel * (1 - 1e-9):
             found["cutoff"] = _rounded_up(RESOLVED_CELLS * pixel)
