@@ -92,7 +92,7 @@ def empty_folder(tmp_path, monkeypatch):
     return tmp_path
 
 
-@pytest.mark.parametrize("command", [[], *([each.callback.__name__] for each in app.registered_commands)])
+@pytest.mark.parametrize("command", [[], *([each.name or each.callback.__name__] for each in app.registered_commands)])
 def test_help_of_every_command_fits_a_narrow_terminal(command):
     lines = output(*command, "--help", env={"COLUMNS": "80"}).splitlines()
     assert len(lines) > 6 and "Usage:" in "".join(lines) and [line for line in lines if len(line) > 80] == []
@@ -348,6 +348,21 @@ def test_the_states_of_runs_are_distinguished(tiny):
     described = printed("describe", "tiny.yaml", "--runs")
     assert "4 runs, 2 to do" in described and "1 run made with other settings" in described
     assert f"failed: runs/{failed.path}.nc: {reason}" in described
+
+
+def test_all_campaigns_are_listed_with_their_states(tiny):
+    campaign, results = tiny
+    done, *_ = run_cases(campaign)
+    (results / f"runs/{done.path}.nc").parent.mkdir(parents=True, exist_ok=True)
+    write_dataset(small.run().assign_attrs(config_sha256=run_sha256(campaign, done)), results / f"runs/{done.path}.nc")
+    Path("config/campaigns").mkdir(parents=True, exist_ok=True)
+    Path("config/campaigns/tiny.yaml").write_text(TINY, encoding="utf-8")
+    Path("config/campaigns/wrong.yaml").write_text("name: wrong\n", encoding="utf-8")
+    listed = output("list")
+    (row,) = (line for line in listed.splitlines() if line.startswith("tiny "))
+    assert row.split()[:3] == ["tiny", "4", "1"] and row.rstrip().endswith("tiny.yaml")
+    assert any(line.startswith("paper ") for line in listed.splitlines())
+    assert "cannot be read: " in listed and "wrong.yaml: title: the key is missing" in listed
 
 
 def test_a_dataset_with_runs_that_are_no_longer_in_the_campaign_is_computed_again(tiny):

@@ -125,9 +125,9 @@ class ScanResolution(PreparedTopography):
         """Recommended `cutoff` (m) and `grid` for a grid that resolves the surface; empty if no change is needed."""
         found = {}
         cutoff, pixel = self.cutoff or 0.0, self.measured.spacing
-        noisy = self.noise is not None and self.noise.slope_share >= _NOTICEABLE
-        if noisy and cutoff < self.noise.wavelength * (1 - 1e-9):
-            found["cutoff"] = _rounded_up(max(self.noise.wavelength, LEAST_PIXELS * pixel))
+        noise = self.noise if self.noise is not None and self.noise.slope_share >= _NOTICEABLE else None
+        if noise is not None and cutoff < noise.wavelength * (1 - 1e-9):
+            found["cutoff"] = _rounded_up(max(noise.wavelength, LEAST_PIXELS * pixel))
         elif self.cells_per_summit < LEAST_CELLS_OF_SUMMIT and cutoff < RESOLVED_CELLS * pixel * (1 - 1e-9):
             found["cutoff"] = _rounded_up(RESOLVED_CELLS * pixel)
         cutoff = found.get("cutoff", cutoff)
