@@ -28,7 +28,7 @@ def campaign_configuration(workflow, root: str) -> Configuration:
             names = ", ".join(map(str, files))
             raise ConfigurationError(f"--configfile: {names}; expected one file, because one file describes a campaign")
         file = files[0] if files else _shortened(Path(root, DEFAULT))
-        configuration = load_configuration(file, dict(settings.config))
+        configuration = load_configuration(file, dict(settings.config), results="results")
     except ConfigurationError as error:
         raise SystemExit(f"The configuration cannot be run:\n{printable_lines(error)}") from None
     for warning in configuration.warnings:

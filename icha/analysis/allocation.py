@@ -11,23 +11,31 @@ from collections.abc import Mapping
 import numpy as np
 import xarray as xr
 
+from icha.analysis.control_variates import quantile
+
 # Variables with the number of seeds, by level. Seeds of a level are among those of the level before.
 LEVELS = {"asperities": "asperity_seeds", "coarse": "coarse_seeds", "fine": "fine_seeds"}
 # Fewest seeds of each level: the scatter of a level must be known, and the coefficient of the asperities fitted.
 _LEAST = {"asperities": 5, "coarse": 5, "fine": 2}
+# Largest number of iterations for numbers of seeds and quantiles that depend on each other.
+_ITERATIONS = 20
 
 
 def variances_per_seed(answers: xr.Dataset) -> tuple[dict[str, np.ndarray], np.ndarray]:
-    """Return, for each level, the variance of every answer times the number of seeds; and the variance of the grid.
+    """Return, for each level, the variance of every answer times the number of seeds; and the squared error of the grid.
 
-    Variances are squares of relative half-widths. A level without seeds is left out.
+    Variances are those of means of logarithms. A level without seeds is left out.
     """
     counts = {level: answers[name].values for level, name in LEVELS.items()}
     present = [level for level, count in counts.items() if count.any()]
     # The share of the scatter is that of the cheapest level. The next level corrects the model, unless both levels are
     # boundary elements; the fine level corrects the coarse grid.
     of_level = {"coarse": "model", "fine": "refinement" if "coarse" in present else "model"} | {present[0]: "seeds"}
-    per_seed = {level: answers[f"share_{of_level[level]}"].values ** 2 * counts[level] for level in present}
+    deviations = {
+        level: answers[f"share_{of_level[level]}"].values / quantile(answers["degrees_of_freedom"].values)
+        for level in present
+    }
+    per_seed = {level: deviation**2 * counts[level] for level, deviation in deviations.items()}
     return per_seed, np.nan_to_num(answers["share_grid"].values) ** 2
 
 
@@ -53,13 +61,24 @@ def allocate(
             f"the error of the grid is ± {100 * math.sqrt(float(grid.max())):.2g} %; expected a finer grid, or a wider "
             "interval"
         )
-    found = {}
     spent = sum(np.sqrt(variance * costs[level]) for level, variance in per_seed.items())
-    for level, variance in per_seed.items():
-        wanted = np.sqrt(variance / costs[level]) * spent / left
-        found[level] = max(_LEAST[level], math.ceil(float(wanted.max()) * (1 - 1e-9)))
-    # Each level contains the seeds of the next one.
-    fewest = 0
-    for level in reversed(found):
-        found[level] = fewest = max(found[level], fewest)
-    return found
+    width, counts = quantile(math.inf), {}
+    for _ in range(_ITERATIONS):
+        before = counts
+        wanted = {level: np.sqrt(a / costs[level]) * spent * width**2 / left for level, a in per_seed.items()}
+        counts = {level: max(_LEAST[level], math.ceil(float(n.max()) * (1 - 1e-9))) for level, n in wanted.items()}
+        # Each level contains the seeds of the next one.
+        fewest = 0
+        for level in reversed(counts):
+            counts[level] = fewest = max(counts[level], fewest)
+        if counts == before:
+            break
+        width = np.maximum(width, _width(per_seed, counts))
+    return counts
+
+
+def _width(per_seed, counts):
+    """Return the quantile of the interval of each answer, with Welch and Satterthwaite's degrees of freedom."""
+    variances = {level: a / counts[level] for level, a in per_seed.items()}
+    shares = sum(variance**2 / (counts[level] - 1) for level, variance in variances.items())
+    return quantile(sum(variances.values()) ** 2 / np.maximum(shares, np.finfo(float).tiny))

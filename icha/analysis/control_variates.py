@@ -42,6 +42,7 @@ class Estimate(NamedTuple):
     refinement : half-width because few seeds correct the error of the coarse grid; 0 without coarse seeds.
     grid : error of the fine grid, from the difference of the two grids; NaN without coarse seeds.
     coefficient : coefficient b of the asperity model; 0 without asperities.
+    freedom : degrees of freedom of the interval.
     """
 
     mean: float
@@ -50,6 +51,7 @@ class Estimate(NamedTuple):
     refinement: float
     grid: float
     coefficient: float
+    freedom: float
 
     @property
     def half_width(self) -> float:
@@ -101,8 +103,8 @@ def estimate_mean(
     variance = sum(term.variance for term in terms.values())
     # Welch and Satterthwaite's degrees of freedom of a sum of estimated variances.
     shares = sum(term.variance**2 / term.freedom for term in terms.values())
-    quantile = float(students_t.ppf(0.5 * (1 + PROBABILITY), variance**2 / shares)) if shares else 0.0
-    half = {name: quantile * math.sqrt(term.variance) for name, term in terms.items()}
+    freedom = variance**2 / shares if shares else sum(term.freedom for term in terms.values())
+    half = {name: float(quantile(freedom)) * math.sqrt(term.variance) for name, term in terms.items()}
     difference = [fine[seed] - coarse[seed] for seed in sorted(set(coarse) & set(fine))]
     return Estimate(
         sum(term.mean for term in terms.values()),
@@ -111,7 +113,13 @@ def estimate_mean(
         half.get("refinement", 0.0),
         abs(float(np.mean(difference))) / (2**ORDER - 1) if difference else math.nan,
         coefficient,
+        freedom,
     )
+
+
+def quantile(freedom):
+    """Return the half-width of the interval of a mean, divided by the standard deviation of the mean."""
+    return students_t.ppf(0.5 * (1 + PROBABILITY), freedom)
 
 
 def _mean_of(values):

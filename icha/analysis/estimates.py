@@ -20,26 +20,20 @@ from icha.datasets.campaign import loading_stops
 from icha.datasets.labels import LABELS, coarse_study, is_coarse_study, slopes_at
 from icha.datasets.variables.answers import ANSWERS
 from icha.datasets.variables.campaign import COMPLETE, LOADED_RUNS
-from icha.path.targets import AREAS, INDENTATION, LOADS, MEAN_SEPARATION
+from icha.path.targets import ESTIMATED_AT_TARGETS, ESTIMATED_OF_LOOPS
 
-# Quantities of each state of the first loading, and kinds of targets that prescribe the quantity.
-_AT_STOPS = {
-    "contact_area_fraction": AREAS,
-    "mean_gap": (MEAN_SEPARATION, INDENTATION),
-    "contact_stiffness": (),
-    "spot_count": (),
-    "nominal_pressure": LOADS,
-}
-_OF_LOOPS = ("pull_off_pressure", "hysteresis_loss")
 LOOP = "loop"
 
 
-def estimate_campaign(tree: xr.DataTree, *, attrs: Mapping[str, str] = {}) -> xr.DataTree:
+def estimate_campaign(
+    tree: xr.DataTree, *, asperities: bool = True, attrs: Mapping[str, str] = {}
+) -> xr.DataTree:
     """Return a tree with the answers of each study that has boundary elements for several seeds.
 
     Parameters
     ----------
     tree : the campaign dataset.
+    asperities : whether to use the runs of the asperity model.
     attrs : further global attributes.
 
     Returns
@@ -52,7 +46,7 @@ def estimate_campaign(tree: xr.DataTree, *, attrs: Mapping[str, str] = {}) -> xr
         if is_coarse_study(name, tree.children):
             continue
         coarse = tree.children.get(coarse_study(name))
-        rows = list(_answers(node.to_dataset(), coarse.to_dataset() if coarse else None))
+        rows = list(_answers(node.to_dataset(), coarse.to_dataset() if coarse else None, asperities))
         if rows:
             described = combine_attributes(f"Answers of study {name}", _SUMMARY, DERIVED, [node.attrs])
             values = stack_rows(ANSWERS, rows, "answer")
@@ -64,14 +58,14 @@ def estimate_campaign(tree: xr.DataTree, *, attrs: Mapping[str, str] = {}) -> xr
 _SUMMARY = "Means over random surfaces with intervals of 90 %, from up to three levels of accuracy."
 
 
-def _answers(study: xr.Dataset, coarse: xr.Dataset | None) -> Iterator[dict]:
+def _answers(study: xr.Dataset, coarse: xr.Dataset | None, asperities: bool) -> Iterator[dict]:
     """Yield the answers of a study; `coarse` has the same contacts on half the grid."""
     if REFERENCE_MODEL not in study["model"].values or study.sizes["seed"] < 2:
         return
-    levels = {"asperities": (study, DEFAULT_MODEL), "coarse": (coarse, REFERENCE_MODEL)}
+    levels = {"asperities": (study if asperities else None, DEFAULT_MODEL), "coarse": (coarse, REFERENCE_MODEL)}
     levels |= {"fine": (study, REFERENCE_MODEL)}
-    for (kind, target), quantity in itertools.product([*_stops(study), (LOOP, 0.0)], (*_AT_STOPS, *_OF_LOOPS)):
-        if (kind == LOOP) != (quantity in _OF_LOOPS) or kind in _AT_STOPS.get(quantity, ()) or quantity not in study:
+    for (kind, target), quantity in itertools.product([*_stops(study), (LOOP, 0.0)], (*ESTIMATED_AT_TARGETS, *ESTIMATED_OF_LOOPS)):
+        if (kind == LOOP) != (quantity in ESTIMATED_OF_LOOPS) or kind in ESTIMATED_AT_TARGETS.get(quantity, ()) or quantity not in study:
             continue
         values = {level: _values(data, model, quantity, kind, target) for level, (data, model) in levels.items()}
         for surface, slope, material in itertools.product(*(range(study.sizes[dim]) for dim in _CONTACT)):
@@ -95,6 +89,7 @@ def _answers(study: xr.Dataset, coarse: xr.Dataset | None) -> Iterator[dict]:
                 "share_refinement": found.refinement,
                 "share_grid": found.grid,
                 "asperity_coefficient": found.coefficient,
+                "degrees_of_freedom": found.freedom,
                 "asperity_seeds": len(by_seed["asperities"]),
                 "coarse_seeds": len(by_seed["coarse"]),
                 "fine_seeds": len(by_seed["fine"]),

@@ -26,7 +26,7 @@ def list_(folder: Folder = None) -> None:
     wrong = []
     for name, path in sorted(list_campaigns().items()):
         try:
-            campaign = load_configuration(path).campaign
+            campaign = load_configuration(path, results=home / "results").campaign
         except ConfigurationError as error:
             wrong.append(str(error).splitlines()[0])
             continue

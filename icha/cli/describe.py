@@ -41,10 +41,10 @@ def describe(
     `icha run -n` also detects changes of the program. For each measured surface, the command prints the number of
     summits, whether the spectrum ends in noise, and recommended keys.
     """
-    path = find_configuration(config)
-    campaign = read_configuration(path).campaign
-    print_plan(path, campaign, find_workflow(), (folder or project()).resolve(), cores or DEFAULT_CORES, runs=runs)
-    _print_scans(campaign, (folder or project()).resolve() / "results" / campaign.name if plot else None)
+    path, home = find_configuration(config), (folder or project()).resolve()
+    campaign = read_configuration(path, home).campaign
+    print_plan(path, campaign, find_workflow(), home, cores or DEFAULT_CORES, runs=runs)
+    _print_scans(campaign, home / "results" / campaign.name if plot else None)
 
 
 def _print_scans(campaign, plots: Path | None) -> None:
@@ -123,6 +123,9 @@ def print_plan(path: Path, campaign, workflow: Path, home: Path, cores: int, *, 
         _print_files(console, items)
     _print_sums(console, items)
     _print_cost(console, items, cores, damaged(results))
+    for name, study in campaign.studies.items():
+        if study.accuracy is not None:
+            print_line("bold", "answer", _accuracy(name, study))
     for file in damaged(results):
         print_line("red", "damaged", f"{file}: will be computed again")
     for item in items:
@@ -141,6 +144,18 @@ def print_plan(path: Path, campaign, workflow: Path, home: Path, cores: int, *, 
             print_line("red", name, reason)
     for shortage in find_shortages(items, cores, results, read_profile(profile or workflow / "profiles/default")):
         print_line("red", "too small", shortage)
+
+
+def _accuracy(name: str, study) -> str:
+    """Return a sentence on the seeds of a study with `accuracy`: the pilot, or the seeds that ICHA has chosen."""
+    from icha.configuration.studies import PILOT
+    from icha.planning.levels import quantity_of, words_of_levels
+
+    levels = study.seeds_of_levels
+    wanted = f"± {100 * study.accuracy.half_width:.3g} % of {quantity_of(study.accuracy, study)}"
+    counts = {key: len(seeds) for key in type(levels).model_fields if (seeds := getattr(levels, key))}
+    pilot = "a pilot of " if levels == PILOT else ""
+    return f"study {name}, {wanted}: {pilot}{words_of_levels(counts)}"
 
 
 def _print_files(console, items) -> None:

@@ -132,8 +132,13 @@ def find_configuration(config: str | None) -> Path:
     raise UserError(f"{config}: {problem_with_path(config)}, and not the name of a campaign; {listed}")
 
 
-def read_configuration(path: Path):
+def read_configuration(path: Path, home: Path | None = None):
     """Load a configuration with `icha.configuration.load.load_configuration`, and print its warnings.
+
+    Parameters
+    ----------
+    path : configuration file.
+    home : folder that contains results/. Default: the folder of the project.
 
     Raises
     ------
@@ -144,7 +149,7 @@ def read_configuration(path: Path):
     from icha.configuration.load import load_configuration
 
     try:
-        configuration = load_configuration(path)
+        configuration = load_configuration(path, results=(home or project()) / "results")
     except ConfigurationError as error:
         raise UserError(f"the configuration cannot be run:\n{error}") from None
     for warning in configuration.warnings:

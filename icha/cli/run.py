@@ -82,8 +82,8 @@ def run(
     if config is not None and (config.startswith("-") or (config in TARGETS and not Path(config).is_file())):
         config, targets = None, [config, *targets]
     path = find_configuration(config)
-    campaign = read_configuration(path).campaign
     folder = (folder or project()).resolve()
+    campaign = read_configuration(path, folder).campaign
     results = folder / "results" / campaign.name
     profile_folder = _profile_folder(profile, workflow)
     names = itertools.takewhile(lambda target: not target.startswith("-"), targets)
@@ -92,9 +92,9 @@ def run(
         raise UserError(f"{', '.join(unknown)}: not a target; expected {expected}")
     if reason := find_conflict(shorten_path(results), campaign.name, path, workflow):
         raise UserError(f"{reason} Nothing was started")
-    command = [
-        # With -P, a file in the working directory cannot replace a module of the same name.
-        *(sys.executable, "-P", "-m", "snakemake", *targets),
+    # With -P, a file in the working directory cannot replace a module of the same name.
+    program = [sys.executable, "-P", "-m", "snakemake"]
+    options = [
         *("--snakefile", str(workflow / "Snakefile"), "--directory", str(folder)),
         *(["--configfile", str(path.resolve())] if path.resolve() != (workflow / DEFAULT).resolve() else []),
         *(["--cores", str(cores)] if cores else []),
@@ -102,35 +102,91 @@ def run(
         *(["--workflow-profile", str(profile_folder)] if profile else []),
     ]
     if dry_run:
-        jobs = _dry_run([*command, "--dry-run"], workflow)
+        jobs = _dry_run([*program, *targets, *options, "--dry-run"], workflow)
         print_plan(path, campaign, workflow, folder, cores or DEFAULT_CORES, profile=profile_folder)
         echo(jobs)
         return
+    from icha.planning.validity import expected_validity
+
+    every = not set(targets) - {"all", "report", "publish"}
+    if not set(targets) - set(TARGETS):
+        _print_validity(expected_validity(campaign))
+
+    def compute(campaign, targets):
+        """Compute targets with Snakemake, and print the outcome."""
+        from icha.planning.plan import plan
+
+        items = plan(campaign, results)
+        if not anyway:
+            _refuse_if_too_large(items, targets, cores or DEFAULT_CORES, results, read_profile(profile_folder))
+        _compute([*program, *targets, *options, "--logger", "icha"], workflow, folder, campaign, items)
+
+    choices = {}
+    if every:
+        campaign, choices = _reach_accuracy(campaign, path, folder, cores or DEFAULT_CORES, compute)
+    compute(campaign, targets)
+    if every:
+        _print_checks(campaign, results)
+        _print_accuracy(choices)
+    if "publish" in targets:
+        version = campaign.deposit_metadata().version
+        echo(f"deposit: {shorten_path(results / 'publish' / f'{campaign.name}-{version}.zip')}")
+
+
+def _compute(command: list[str], workflow: Path, folder: Path, campaign, items) -> None:
+    """Run a command of Snakemake, show its progress and print its outcome; after a failure, exit."""
     from rich.console import Console
 
     from icha.cli.live import Progress, View
     from icha.planning.costs import WORKFLOW
-    from icha.planning.plan import plan
-    from icha.planning.validity import expected_validity
 
-    items = plan(campaign, results)
-    if not anyway:
-        _refuse_if_too_large(items, targets, cores or DEFAULT_CORES, results, read_profile(profile_folder))
-    if not set(targets) - set(TARGETS):
-        _print_validity(expected_validity(campaign))
     expected = {f"results/{campaign.name}/{item.path}": (item.rule, item.work + WORKFLOW.job) for item in items}
     progress = Progress(expected)
     view = View(progress, campaign.name, folder, Console(highlight=False))
     log = _log_file(folder, campaign.name)
-    status, stopped = _run_snakemake([*command, "--logger", "icha"], workflow, log, progress, view)
+    status, stopped = _run_snakemake(command, workflow, log, progress, view)
     _print_outcome(status, stopped, progress, campaign, folder, log)
     if status:
         raise typer.Exit(FAILED)
-    if not set(targets) - {"all", "report", "publish"}:
-        _print_checks(campaign, results)
-    if "publish" in targets:
-        version = campaign.deposit_metadata().version
-        echo(f"deposit: {shorten_path(results / 'publish' / f'{campaign.name}-{version}.zip')}")
+
+
+# Largest number of times that the seeds of a study are increased to reach its accuracy.
+_MOST_EXTENSIONS = 2
+
+
+def _reach_accuracy(campaign, path: Path, folder: Path, cores: int, compute):
+    """Increase the seeds of studies with `accuracy` until all intervals are narrow enough.
+
+    Returns
+    -------
+    The campaign with the last seeds, and the last choice of each study (`icha.planning.levels`).
+    """
+    from icha.configuration.load import load_configuration
+    from icha.planning.levels import choose_levels, words_of_levels, write_levels
+
+    results, choices = folder / "results" / campaign.name, {}
+    if all(study.accuracy is None for study in campaign.studies.values()):
+        return campaign, choices
+    for extension in range(_MOST_EXTENSIONS + 1):
+        compute(campaign, ["dataset"])
+        choices = choose_levels(campaign, results, cores)
+        extended = {name: choice for name, choice in choices.items() if choice.counts}
+        if not extended or extension == _MOST_EXTENSIONS:
+            break
+        for name, choice in extended.items():
+            time = formatting.duration(choice.seconds / cores)
+            echo(f"{name}: {choice.sentence}; next: {words_of_levels(choice.counts)}, {time} in all", bold=True)
+        write_levels(results, extended)
+        campaign = load_configuration(path, results=folder / "results").campaign
+    return campaign, choices
+
+
+def _print_accuracy(choices) -> None:
+    """Print the accuracy that each study has reached, and the reason if it is not the required one."""
+    for name, choice in choices.items():
+        reached = choice.half_width <= choice.required
+        reason = "" if reached else f". Not reached: {choice.reason or 'repeat the command to add seeds'}"
+        echo(f"answer:   study {name}: {choice.sentence}{reason}", fg=None if reached else "yellow")
 
 
 def _profile_folder(profile: str | None, workflow: Path) -> Path:

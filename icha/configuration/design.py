@@ -21,6 +21,7 @@ from icha.configuration.studies import MEASURED, SCALARS, RmsHeight, Study, slop
 from icha.configuration.surfaces import SURFACE_KINDS, MaterialSection
 from icha.contact.models import DEFAULT_MODEL, REFERENCE_MODEL
 from icha.datasets.labels import coarse_study, is_coarse_study, number_label
+from icha.path.targets import ESTIMATED_AT_TARGETS, ESTIMATED_OF_LOOPS
 from icha.support.rules import FloatRange
 from icha.support.values import LONGEST_LABEL, NOTHING, Problem, list_names
 
@@ -66,13 +67,14 @@ def expand_design(campaign: Campaign, content: Mapping) -> tuple[Campaign, list[
     for label, study in campaign.studies.items():
         contacts = [variants.contact(point) for point in _points(label, study)]
         runs[label], studies[label] = list(itertools.product(study.models, contacts)), study
-        if study.error_check and study.levels is None:
+        levels = study.seeds_of_levels
+        if study.error_check and levels is None:
             first = {contact._replace(seed=0): contact for contact in reversed(contacts)}
             runs[label] += [(REFERENCE_MODEL, contact) for contact in contacts if contact in first.values()]
-        if study.levels is not None:
-            runs |= _runs_of_levels(label, study.levels, contacts, variants)
-            if study.levels.coarse:
-                studies[coarse_study(label)] = study.model_copy(update={"levels": None})
+        if levels is not None:
+            runs |= _runs_of_levels(label, levels, contacts, variants)
+            if levels.coarse:
+                studies[coarse_study(label)] = study.model_copy(update={"levels": None, "accuracy": None})
     if variants.problems:
         return campaign, list(variants.problems.values())
     sections = {name: getattr(campaign, name) | derived for name, derived in variants.derived.items()}
@@ -99,8 +101,8 @@ def _lists(label: str, study: Study) -> dict[str, list[_Located]]:
 
     varied = study.vary.model_dump(exclude_none=True) if study.vary else {}
     lists = {one: located(getattr(study, many), many) for many, one in _LISTS.items()}
-    if study.levels is not None:
-        lists["seed"] = located(study.levels.seeds, "levels")
+    if (levels := study.seeds_of_levels) is not None:
+        lists["seed"] = located(levels.seeds, _key_of_levels(study))
     if study.rms_heights is not None:
         heights = [RmsHeight(value) for value in study.rms_heights]
         lists["rms_slope"] = located(heights, "rms_heights")
@@ -204,7 +206,7 @@ def _study_problems(campaign: Campaign, label: str, study: Study) -> Iterator[Pr
     if study.error_check and list(study.models) != [DEFAULT_MODEL]:
         reason = "needs `models: [asperities]`, because other studies measure the error anyway. Remove the key"
         yield (*prefix, "error_check"), True, reason
-    if study.levels is not None:
+    if study.seeds_of_levels is not None:
         yield from _level_problems(campaign, label, study, [name for _, name in values("surface")])
     for location, slope in values("rms_slope"):
         if slope != MEASURED:
@@ -217,17 +219,27 @@ def _study_problems(campaign: Campaign, label: str, study: Study) -> Iterator[Pr
 
 def _level_problems(campaign, label, study, surfaces):
     """Yield the problems of the key `levels` of a study."""
-    location = ("studies", label, "levels")
+    given = _key_of_levels(study)
+    location = ("studies", label, given)
     for key in ("seeds", "models"):
         if key in study.model_fields_set:
-            yield (
-                (*location[:2], key),
-                getattr(study, key),
-                "is given beside `levels`, which contain it. Remove the key",
-            )
+            reason = f"is given beside `{given}`, which determines it. Remove the key"
+            yield (*location[:2], key), getattr(study, key), reason
     for name in dict.fromkeys(surfaces):
         if name in campaign.surfaces and not campaign.surfaces[name].random:
-            yield location, NOTHING, f"need random surfaces, but {name!r} has no seeds; expected only random surfaces"
+            reason = f"the key needs random surfaces, but {name!r} has no seeds; expected only random surfaces"
+            yield location, NOTHING, reason
+    quantity = study.accuracy and study.accuracy.quantity
+    if quantity in ESTIMATED_OF_LOOPS and not study.unload:
+        yield (*location, "quantity"), quantity, "is a quantity of a loop; expected `unload: true` in this study"
+    elif study.targets.last[0] in ESTIMATED_AT_TARGETS.get(quantity, ()):
+        reason = "is prescribed by the targets of the study; expected another quantity"
+        yield (*location, "quantity"), quantity, reason
+
+
+def _key_of_levels(study):
+    """Return the name of the key of a study that determines its levels."""
+    return "accuracy" if study.levels is None else "levels"
 
 
 def _zip_problems(prefix, study, lists) -> Iterator[Problem]:
@@ -294,7 +306,7 @@ class _Variants:
         """Return a contact on the same surface with half the number of nodes along each side."""
         every = self._campaign.surfaces | self.derived["surfaces"]
         base, grid = contact.surface, every[contact.surface].grid
-        half = (("studies", study, "levels", "coarse"), grid // 2)
+        half = (("studies", study, _key_of_levels(self._campaign.studies[study])), grid // 2)
         origin = self.origin.get(("surfaces", base), base)
         changes = {name: value for name, value in self._changes.get(base, {}).items() if name != "grid"}
         return contact._replace(surface=self._variant("surfaces", origin, changes | {"grid": half}))

@@ -2,6 +2,7 @@
 
 import itertools
 import os
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
@@ -30,7 +31,8 @@ from icha.configuration.yaml_files import (
     merge,
     read_yaml,
 )
-from icha.support.values import Problem
+from icha.datasets.results import CHOSEN_LEVELS
+from icha.support.values import NAME_PATTERN, Problem
 
 
 @dataclass(frozen=True)
@@ -52,7 +54,11 @@ class Configuration:
 
 
 def load_configuration(
-    path: str | os.PathLike, overrides: Mapping[str, Any] | None = None, *, within: str | os.PathLike | None = None
+    path: str | os.PathLike,
+    overrides: Mapping[str, Any] | None = None,
+    *,
+    within: str | os.PathLike | None = None,
+    results: str | os.PathLike | None = None,
 ) -> Configuration:
     """Read and check a configuration file, and all surfaces and measurements in other files.
 
@@ -63,6 +69,8 @@ def load_configuration(
     path : path of the configuration file (YAML).
     overrides : nested mapping of values that replace values in the file, as from `snakemake --config`.
     within : folder that must contain all files of surfaces and measurements; None to allow any folder.
+    results : folder with the results of all campaigns; it contains the seeds that ICHA has chosen for the studies with
+        `accuracy`. Without this folder, these studies have the seeds of a pilot.
 
     Raises
     ------
@@ -71,6 +79,8 @@ def load_configuration(
     """
     path = Path(path)
     written = merge(read_yaml(path), overrides or {})
+    if results is not None:
+        written = _with_chosen_levels(written, Path(results))
     origin = f"{path} with --config" if overrides else str(path)
     campaign, unusual = _check_text(path, origin, written), unusual_values(written)
     text, confirmed = dump_yaml(written, origin), written.get(CONFIRMED)
@@ -92,6 +102,19 @@ def load_configuration(
         format_problem(origin, each.location, each.value, reason.format(each.source, each.usual)) for each in unusual
     ]
     return Configuration(campaign, text, str(path), (*campaign.warnings(), *accepted))
+
+
+def _with_chosen_levels(written: dict, results: Path) -> dict:
+    """Return a configuration in which studies with `accuracy` have the seeds that ICHA has chosen, as `levels`."""
+    studies, name = apply_defaults(written).get("studies"), written.get("name")
+    if not isinstance(studies, Mapping) or not isinstance(name, str) or not re.fullmatch(NAME_PATTERN, name):
+        return written
+    asked = [label for label, study in studies.items() if isinstance(study, Mapping) and study.get("accuracy")]
+    file = results / name / CHOSEN_LEVELS
+    if not asked or not file.is_file():
+        return written
+    chosen = read_yaml(file)
+    return merge(written, {"studies": {label: {"levels": chosen[label]} for label in asked if label in chosen}})
 
 
 def _check_text(path: Path, origin: str, written: Mapping) -> Campaign:

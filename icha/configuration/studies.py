@@ -25,6 +25,8 @@ from icha.path.targets import (
     ASPERITY_RANGES,
     CONTACT_RADIUS,
     DEFAULT_STEP,
+    ESTIMATED_AT_TARGETS,
+    ESTIMATED_OF_LOOPS,
     FORCE,
     LARGEST_REDUCED_PRESSURE,
     MAX_AREA_FRACTION,
@@ -41,7 +43,7 @@ from icha.support.values import (
     Label,
     Length,
     Name,
-    OrWord,
+    OrSchema,
     Positive,
     Pressure,
     Problem,
@@ -259,6 +261,30 @@ class Levels(Section):
         return self.asperities or self.coarse or self.fine
 
 
+# Levels of a study with `accuracy` before its own levels are computed: a pilot.
+PILOT = Levels(asperities="1..8", coarse="1..6", fine="1..4")
+_HalfWidth = quantity(FloatRange(least=1e-3, most=0.5), "3 %")
+_Budget = quantity(FloatRange("s", above=0, most=1e8), "10 min")
+
+
+class Accuracy(Section):
+    """Accuracy that a study must reach. ICHA chooses the seeds of the levels, from the results of a pilot."""
+
+    half_width: _HalfWidth
+    """Half-width of the interval of 90 %, relative to the estimate. It holds at all targets and for all contacts of the
+    study."""
+    quantity: Literal[(*ESTIMATED_AT_TARGETS, *ESTIMATED_OF_LOOPS)] | None = None
+    """Quantity with this accuracy. Default: the contact area; if areas are targets, the pressure."""
+    budget: _Budget | None = None
+    """Largest expected time of all runs of the study, pilot included. If the accuracy takes longer, ICHA computes as
+    many seeds as the budget allows, and prints the accuracy that was reached."""
+
+
+def _short_form(value: Any) -> Any:
+    """Return the section of an accuracy that is given by its half-width alone, such as `3 %`."""
+    return value if isinstance(value, dict | Accuracy | None) else {"half_width": value}
+
+
 class Study(Section):
     """Runs for all combinations of surfaces, seeds, slopes and materials. All runs follow the same loading path."""
 
@@ -294,10 +320,15 @@ class Study(Section):
     levels: Levels | None = None
     """Seeds of three levels of accuracy, instead of `seeds` and `models`. ICHA estimates each result with an interval,
     and `icha answer` prints the estimates."""
+    accuracy: (
+        Annotated[Accuracy | None, BeforeValidator(_short_form), OrSchema({"type": "string", "examples": ["3 %"]})]
+    ) = None
+    """Accuracy that the results must have, such as `3 %`, instead of `seeds` and `models`. `icha run` computes a pilot
+    with few seeds, then the levels that reach the accuracy in the shortest time, and states the result."""
     targets: Targets
     """Targets of the loading path."""
     snapshots: (
-        Annotated[list[Snapshot], AfterValidator(distinct), WrapValidator(_list_or_word), OrWord(EVERY_STOP)] | None
+        Annotated[list[Snapshot], AfterValidator(distinct), WrapValidator(_list_or_word), OrSchema({"const": EVERY_STOP})] | None
     ) = None
     """States at which each run saves its contact spots and distributions. The path reaches each of these states
     exactly. `every_stop` means all targets. Default: the last target."""
@@ -311,6 +342,11 @@ class Study(Section):
     The separation then jumps where the load has a maximum or minimum along the path."""
     max_step: number(STEP) = DEFAULT_STEP
     """Largest change of the mean separation between two equilibria, in units of the rms height."""
+
+    @property
+    def seeds_of_levels(self) -> Levels | None:
+        """Seeds of each level: those of `levels`, or those of the pilot of `accuracy`."""
+        return PILOT if self.levels is None and self.accuracy is not None else self.levels
 
     @property
     def own_snapshots(self) -> list[tuple[str, float]]:

@@ -24,7 +24,7 @@ from icha.support.values import (
     File,
     Length,
     Modulus,
-    OrWord,
+    OrSchema,
     Section,
     SurfaceEnergy,
     Text,
@@ -55,7 +55,7 @@ def _body(value: Any) -> Any:
 
 
 _Bodies = Annotated[
-    list[Annotated[Body | None, BeforeValidator(_body), OrWord(RIGID)]], Field(min_length=2, max_length=2)
+    list[Annotated[Body | None, BeforeValidator(_body), OrSchema({"const": RIGID})]], Field(min_length=2, max_length=2)
 ]
 
 

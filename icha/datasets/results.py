@@ -24,6 +24,8 @@ REPORT = "report.html"
 EXPLORER = "explore.html"
 RUN_TIMES = "run_times.tsv"
 CONFIGURATION = "config.used.yaml"
+# Seeds that ICHA has chosen for the studies with `accuracy`.
+CHOSEN_LEVELS = "levels.yaml"
 DEPOSIT = "publish/{campaign}-{version}"
 # Arrays with fewer values are not compressed, because the chunks of a compressed array would need as much space as
 # compression saves (docs/reference/dataset.md, "Compression").

@@ -102,6 +102,16 @@ QUANTITIES = {
 }
 LOADS = (REDUCED_PRESSURE, RELATIVE_LOAD, NOMINAL_PRESSURE, FORCE)
 AREAS = (AREA_FRACTION, CONTACT_RADIUS)
+# Quantities of a state whose means are estimated, with the kinds of targets that prescribe the quantity.
+ESTIMATED_AT_TARGETS: dict[str, tuple[str, ...]] = {
+    "contact_area_fraction": AREAS,
+    "mean_gap": (MEAN_SEPARATION, INDENTATION),
+    "contact_stiffness": (),
+    "spot_count": (),
+    "nominal_pressure": LOADS,
+}
+# Quantities of a loop whose means are estimated.
+ESTIMATED_OF_LOOPS = ("pull_off_pressure", "hysteresis_loss")
 # Kind of the target of an equilibrium between the targets of a path. The value of this target is the mean separation.
 BETWEEN = "path"
 # Units of the values of targets with a unit, by kind; the values of all other kinds have no unit.

@@ -40,6 +40,7 @@ PHYSICAL_NAMES = {
     "J/m^2": "energy per area",
     "N": "force",
     "rad": "angle",
+    "s": "time",
     "1": "ratio",
 }
 
@@ -71,7 +72,7 @@ _LONG_NAMES |= {
 }
 _LONG_NAMES |= {f"{name}s": factor for name, factor in _LONG_NAMES.items()} | {"inches": "0.0254"}
 
-PATTERN = rf"^\s*{_NUMBER}\s*[A-Za-zµμÅ].*$"
+PATTERN = rf"^\s*{_NUMBER}\s*[A-Za-zµμÅ%].*$"
 # Names become names of folders and files. Commands would read a name that begins with a hyphen as an option.
 NAME_PATTERN = r"^[a-z0-9_][a-z0-9_-]*$"
 # Largest number of characters of a name, and of a name with varied values. A file name may have 255 characters.
@@ -176,7 +177,8 @@ def finite(value) -> float:
 
 def quantity(rule: FloatRange, example: str):
     """Return the type of a value with a unit; the value becomes a float in the unit of `rule`."""
-    bounds = f"in {rule.interval} {rule.unit}" if rule.most is not None else "0 or greater"
+    unit = "" if rule.unit == "1" else f" {rule.unit}"
+    bounds = f"in {rule.interval}{unit}" if rule.most is not None else "0 or greater"
     expected = f"{PHYSICAL_NAMES[rule.unit]} with its unit, {bounds}, such as {example!r}"
     schema = {"type": "string", "pattern": PATTERN, "examples": [example]}
     return _float(lambda value: to_si(value, rule.unit), rule, expected, schema, rule)
@@ -293,22 +295,22 @@ Positive = number(POSITIVE)
 Seed = integer(SEED)
 
 
-class OrWord:
-    """Annotation that adds a word to the JSON schema of a value.
+class OrSchema:
+    """Annotation that adds an alternative to the JSON schema of a value.
 
     Attributes
     ----------
-    word : text that is valid instead of the value.
+    alternative : JSON schema of the values that are valid instead, such as `{"const": "rigid"}`.
     """
 
-    def __init__(self, word: str):
-        self.word = word
+    def __init__(self, alternative: dict):
+        self.alternative = alternative
 
     def __get_pydantic_json_schema__(self, core_schema: Any, handler: Callable[[Any], dict]) -> dict:
-        """Return the JSON schema: the value without null, or the word."""
+        """Return the JSON schema: the value without null, or the alternative."""
         schema = handler(core_schema)
         given = [each for each in schema.get("anyOf", [schema]) if each != {"type": "null"}]
-        return {"anyOf": [*given, {"const": self.word}]}
+        return {"anyOf": [*given, self.alternative]}
 
 
 def stops(kind, in_order):

@@ -1,0 +1,172 @@
+"""Choose the seeds of each study with `accuracy`, from the results of its present levels.
+
+The first levels are a pilot. From the pilot follow the scatter of each level and the time of its runs, and from these
+the levels of least cost. The chosen seeds are in the file `levels.yaml` in the folder of results, which
+`icha.configuration.load` reads. The configuration as used, and thus a deposit, contains them.
+"""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+import yaml
+
+from icha.analysis.allocation import LEVELS, allocate, variances_per_seed
+from icha.analysis.estimates import estimate_campaign
+from icha.configuration.campaign import Campaign
+from icha.configuration.studies import Accuracy, Study
+from icha.contact.models import DEFAULT_MODEL
+from icha.datasets.files import read_campaign
+from icha.datasets.labels import coarse_study
+from icha.datasets.results import CHOSEN_LEVELS
+from icha.path.targets import AREAS
+from icha.planning.costs import WORKFLOW
+from icha.planning.plan import plan
+from icha.planning.results import campaign_files
+from icha.support.atomic_files import whole_file
+from icha.support.formatting import format_count
+
+# If the accuracy exceeds the budget, it is increased by this factor until the budget suffices.
+_WIDER = 1.05
+
+
+class Choice(NamedTuple):
+    """Accuracy of a study, and the seeds that reach the required accuracy.
+
+    Attributes
+    ----------
+    quantity : quantity with the accuracy.
+    half_width : largest half-width of the intervals of this quantity, relative to the estimate.
+    required : largest half-width that the configuration allows.
+    counts : number of seeds of each level that the study needs; empty if the present seeds suffice, or if more seeds
+        do not help.
+    seconds : expected time of all runs of the study with these seeds on one core.
+    reason : reason why the accuracy cannot be reached; empty if it can.
+    """
+
+    quantity: str
+    half_width: float
+    required: float
+    counts: dict[str, int]
+    seconds: float
+    reason: str = ""
+
+    @property
+    def sentence(self) -> str:
+        """The accuracy that was reached, beside the required one."""
+        reached = f"± {100 * self.half_width:.2g} %" if np.isfinite(self.half_width) else "no interval"
+        return f"{self.quantity} has {reached} ({100 * self.required:.3g} % required)"
+
+
+def choose_levels(campaign: Campaign, results: Path, cores: int) -> dict[str, Choice]:
+    """Return the choice of each study with `accuracy`, by name; the campaign dataset must exist.
+
+    Parameters
+    ----------
+    campaign : campaign with the present seeds.
+    results : folder of the results of the campaign.
+    cores : number of cores that share the runs; a budget is a time on these cores.
+    """
+    studies = {name: study for name, study in campaign.studies.items() if study.accuracy is not None}
+    if not studies:
+        return {}
+    tree = read_campaign(results / campaign_files(campaign).dataset)
+    costs = _costs(campaign, results)
+    # Without the asperity model, the other levels may take less time.
+    estimates = [estimate_campaign(tree, asperities=used) for used in (True, False)]
+    return {name: _choose(name, study, estimates, costs[name], cores) for name, study in studies.items()}
+
+
+def _costs(campaign, results) -> dict[str, dict[str, float]]:
+    """Return the expected time of one seed of each level with all its contacts, s, for each study."""
+    seconds = {item.path: item.work + WORKFLOW.job for item in plan(campaign, results) if item.is_run}
+    times: dict[tuple[str, str], list[float]] = {}
+    seeds: dict[tuple[str, str], set[int]] = {}
+    for path, case in campaign_files(campaign).runs.items():
+        key = case.study, case.model
+        times.setdefault(key, []).append(seconds[path])
+        seeds.setdefault(key, set()).add(case.seed)
+    each = {key: sum(times[key]) / len(seeds[key]) for key in times}
+    found: dict[str, dict[str, float]] = {}
+    for name, study in campaign.studies.items():
+        for model in study.models:
+            found.setdefault(name, {})["asperities" if model == DEFAULT_MODEL else "fine"] = each[name, model]
+            if (coarse_study(name), model) in each:
+                found[name]["coarse"] = each[coarse_study(name), model]
+    return found
+
+
+def quantity_of(accuracy: Accuracy, study: Study) -> str:
+    """Return the quantity whose accuracy a study requires: the contact area, unless another one is named or needed."""
+    by_area = study.targets.last[0] in AREAS
+    return accuracy.quantity or ("nominal_pressure" if by_area else "contact_area_fraction")
+
+
+def _choose(name: str, study: Study, estimates, costs: Mapping[str, float], cores: int) -> Choice:
+    """Return the choice of one study; `estimates` are the answers with and without the asperity model."""
+    accuracy = study.accuracy
+    quantity, required = quantity_of(accuracy, study), accuracy.half_width
+    answers = [_answers(estimate, name, quantity) for estimate in estimates]
+    if answers[0] is None:
+        reason = f"no run has a result for {quantity}; look at the runs that ended early"
+        return Choice(quantity, np.inf, required, {}, 0.0, reason)
+    half_width = float(np.log(answers[0]["estimate_high"] / answers[0]["estimate"]).max())
+    present = {level: int(answers[0][counts].max()) for level, counts in LEVELS.items()}
+    if half_width <= required:
+        return Choice(quantity, half_width, required, {}, _seconds(costs, present))
+    budget = accuracy.budget and accuracy.budget * cores
+    choices = [_least_cost(each, costs, required, budget) for each in answers if each is not None]
+    counts, reason = min(choices, key=lambda choice: (bool(choice[1]), _seconds(costs, choice[0])))
+    counts = {level: max(count, present[level]) for level, count in counts.items()}
+    if all(count == present[level] for level, count in counts.items()):
+        counts = {}
+    return Choice(quantity, half_width, required, counts, _seconds(costs, counts or present), reason)
+
+
+def _answers(estimate: xr.DataTree, name: str, quantity: str) -> xr.Dataset | None:
+    if name not in estimate.children:
+        return None
+    study = estimate[name].to_dataset()
+    study = study.isel(answer=(study["quantity"] == quantity).values)
+    return study if study.sizes["answer"] else None
+
+
+def _seconds(costs, counts) -> float:
+    return sum(costs.get(level, 0.0) * count for level, count in counts.items())
+
+
+def _least_cost(answers: xr.Dataset, costs, required: float, budget: float | None) -> tuple[dict[str, int], str]:
+    """Return the numbers of seeds of least cost, and the reason if they cannot reach the required half-width."""
+    per_seed, grid = variances_per_seed(answers)
+    try:
+        counts = allocate(per_seed, grid, costs, required)
+    except ValueError as error:
+        return {}, str(error)
+    half_width, reason = required, ""
+    while budget is not None and _seconds(costs, counts) > budget:
+        reason, half_width = "the budget does not suffice", _WIDER * half_width
+        if half_width > 1:
+            return {}, reason
+        counts = allocate(per_seed, grid, costs, half_width)
+    return counts, reason
+
+
+def words_of_levels(counts: Mapping[str, int]) -> str:
+    """Return numbers of seeds in words, such as `8 seeds of asperities, 4 seeds of fine boundary elements`."""
+    words = {"asperities": "asperities", "coarse": "coarse boundary elements", "fine": "fine boundary elements"}
+    return ", ".join(f"{format_count(count, 'seed')} of {words[level]}" for level, count in counts.items())
+
+
+def write_levels(results: Path, choices: Mapping[str, Choice]) -> None:
+    """Write the chosen seeds of all studies to the folder of results; the seeds of other studies stay."""
+    file = results / CHOSEN_LEVELS
+    known = yaml.safe_load(file.read_text(encoding="utf-8")) if file.is_file() else {}
+    known |= {
+        name: {level: f"1..{count}" for level, count in choice.counts.items()}
+        for name, choice in choices.items()
+        if choice.counts
+    }
+    with whole_file(file) as temporary:
+        temporary.write_text(yaml.safe_dump(known, sort_keys=False), encoding="utf-8")
